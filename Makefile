@@ -1,0 +1,71 @@
+# One environment (.venv) and one build folder (build); each target does all the set-up that it needs.
+SHELL := /bin/bash
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+OUT ?= out/demo
+CORE := $(shell find cpp/include cpp/src src/dynakin/bindings -type f) CMakeLists.txt pyproject.toml
+CPP_TESTS := $(shell find cpp/tests -type f)
+export PATH := $(CURDIR)/$(BIN):$(PATH)
+export PIP_DISABLE_PIP_VERSION_CHECK := 1
+
+.PHONY: all demo test test-python test-cpp lint bench peers clean prerequisites
+all: $(VENV)/.built
+
+prerequisites:
+	@missing=""; \
+	command -v $(PYTHON) >/dev/null || missing="$$missing python3"; \
+	$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || missing="$$missing python3-venv"; \
+	$(PYTHON) -c 'import os, sysconfig, sys; sys.exit(not os.path.exists(os.path.join(sysconfig.get_path("include"), "Python.h")))' 2>/dev/null || missing="$$missing python3-dev"; \
+	command -v g++ >/dev/null || missing="$$missing g++"; \
+	if [ -n "$$missing" ]; then echo "missing:$$missing. Install with: apt-get install$$missing" >&2; exit 1; fi; \
+	$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { echo "$(PYTHON) is $$($(PYTHON) --version 2>&1), expected Python 3.11 or newer (set PYTHON=...)" >&2; exit 1; }
+
+# What the build needs, then the package itself with what it runs on.
+$(VENV)/.env: | prerequisites
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --upgrade pip
+	$(BIN)/python -m pip install --quiet "scikit-build-core>=0.11" "nanobind>=3" "cmeel-eigen>=3.4" cmake ninja
+	@touch $@
+
+$(VENV)/.built: $(VENV)/.env $(CORE)
+	$(BIN)/python -m pip install --quiet --no-build-isolation --editable .
+	@touch $@
+
+$(VENV)/.dev: $(VENV)/.built
+	$(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[dev]"
+	@touch $@
+
+demo: $(VENV)/.built
+	$(BIN)/dynakin demo -o $(OUT)
+
+test: lint test-cpp test-python
+
+test-python: $(VENV)/.dev
+	$(BIN)/python -m pytest
+
+# The core's own tests: once as shipped (nothing may be allocated in a step), once under the sanitizers.
+test-cpp: $(VENV)/.dev
+	@for kind in release sanitize; do \
+	  $(BIN)/cmake -S . -B build/cpp-$$kind -G Ninja -DDYNAKIN_PYTHON=OFF -DDYNAKIN_TESTS=ON \
+	    -DDYNAKIN_SANITIZE=$$([ $$kind = sanitize ] && echo ON || echo OFF) \
+	    -DCMAKE_PREFIX_PATH="$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" >/dev/null && \
+	  $(BIN)/cmake --build build/cpp-$$kind >build/cpp-$$kind/build.log || { cat build/cpp-$$kind/build.log; exit 1; }; \
+	  $(BIN)/ctest --test-dir build/cpp-$$kind --output-on-failure || exit 1; \
+	done
+
+lint: $(VENV)/.dev
+	$(BIN)/ruff check src tests benchmarks examples
+	$(BIN)/ruff format --check src tests benchmarks examples
+	$(BIN)/mypy
+	$(BIN)/clang-format --dry-run --Werror $$(find cpp src/dynakin/bindings -name '*.cpp' -o -name '*.hpp')
+
+bench: $(VENV)/.dev
+	$(BIN)/python benchmarks/step.py
+
+peers: $(VENV)/.dev
+	$(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[dev,peers]"
+	$(BIN)/python -m pytest -m peers
+
+clean:
+	rm -rf build out $(VENV)

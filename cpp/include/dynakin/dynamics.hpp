@@ -1,0 +1,38 @@
+// Total external wrench and joint moments (1) by Newton-Euler sweeps in the ground frame, and the wrench's derivatives.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "dynakin/kinematics.hpp"
+
+namespace dynakin {
+
+// Of each segment with all that hangs on it.
+struct SubtreeState {
+  Force force;  // sum of f_i = I_i a_i + v_i x* I_i v_i
+  SpatialInertia inertia;
+  VelocityResponse response;
+};
+
+struct DynamicState {
+  explicit DynamicState(const Model& model) : subtrees(model.segments().size()) {}
+
+  std::vector<SubtreeState> subtrees;
+  Force wrench;       // external, on the whole body, about the ground origin
+  double mass = 0.0;  // of the whole body
+};
+
+// Needs forward_kinematics of the same x. The wrench is what the ground must give: weight and inertia together.
+void subtree_dynamics(const Model& model, const StateRef& x, const KinematicState& state, DynamicState& out);
+
+// Moment (N m) or force (N) along each coordinate, locked ones too: S' (subtree force - external wrenches that act
+// there). external: a wrench a segment, already about the ground origin, or nullptr.
+void joint_moments(const Model& model, const KinematicState& state, const DynamicState& dynamics,
+                   const std::vector<Force>* external, Eigen::Ref<Eigen::VectorXd> out);
+
+// d wrench / dx in the columns model.wrench_columns(); the others of out (6, n) are left as they are.
+void wrench_jacobian(const Model& model, const KinematicState& state, const DynamicState& dynamics,
+                     Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>> out);
+
+}  // namespace dynakin

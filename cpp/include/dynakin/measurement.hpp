@@ -1,0 +1,61 @@
+// The measurements (5) as row blocks: few rows, a fixed list of columns, a small dense matrix; no dense H.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "dynakin/dynamics.hpp"
+#include "dynakin/settings.hpp"
+
+namespace dynakin {
+
+using MarkerMatrix = Eigen::Matrix<double, 3, Eigen::Dynamic>;  // a column a marker, m, ground frame; NaN missing
+
+// One sensor's rows. `channel` numbers a row among all channels of the model: 3 a marker, 6 wrench components, total
+// mass.
+struct RowBlock {
+  const std::vector<int>* columns = nullptr;
+  Eigen::MatrixXd H;              // (capacity rows, columns)
+  Eigen::Matrix<double, 6, 1> v;  // innovation
+  Matrix6 R;
+  std::array<int, 6> channel{};
+  int rows = 0;  // of these, how many are measured in this frame
+};
+
+class Measurement {
+ public:
+  Measurement(const Model& model, const FilterSettings& settings);
+
+  static int channel_count(const Model& model) { return 3 * static_cast<int>(model.markers().size()) + 7; }
+  int max_rows() const { return max_rows_; }
+  const std::vector<RowBlock>& blocks() const { return blocks_; }
+  // z predicted at the state of the last evaluate(), all channels (also those that are not measured).
+  const Eigen::VectorXd& predicted() const { return predicted_; }
+  const KinematicState& kinematics() const { return kinematics_; }
+  const DynamicState& dynamics() const { return dynamics_; }
+
+  // Kinematics, dynamics and h(x), no derivatives.
+  void evaluate(const Eigen::VectorXd& x);
+  // Fills the blocks for what this frame measures. wrench: ground on person, about the ground origin; NaN missing.
+  void linearise(const Eigen::VectorXd& x, const Eigen::Ref<const MarkerMatrix>& markers, const Vector6& wrench);
+
+ private:
+  void marker_rows(int marker, const Vector3& measured);
+  void wrench_rows(const Vector6& measured);
+  void mass_rows();
+
+  const Model& model_;
+  const FilterSettings& settings_;
+  Matrix6 wrench_covariance_;  // about the ground origin
+  std::array<bool, 6> wrench_used_{};
+  std::vector<std::vector<int>> slot_;  // a marker: state column -> place in its list
+  MarkerMatrix marker_scratch_;
+  Eigen::Matrix<double, 6, Eigen::Dynamic> wrench_scratch_;
+  KinematicState kinematics_;
+  DynamicState dynamics_;
+  Eigen::VectorXd predicted_;
+  std::vector<RowBlock> blocks_;
+  int max_rows_ = 0;
+};
+
+}  // namespace dynakin

@@ -1,0 +1,28 @@
+// A whole trial through a filter, with a record of what is reported of each frame.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "dynakin/filter.hpp"
+
+namespace dynakin {
+
+// Row-major arrays, a row a frame. "predicted": before the frame is used; "estimated": after.
+struct RunRecord {
+  RunRecord(const Model& model, std::size_t frames);
+
+  std::vector<double> state, state_sd;
+  std::vector<double> markers_predicted, markers_estimated;  // (frames, markers, 3)
+  std::vector<double> wrench_predicted, wrench_estimated;    // (frames, 6)
+  std::vector<double> moments;                               // (frames, coordinates)
+  std::vector<double> nis, log_likelihood, step_us;
+  std::vector<int> rows, constrained;
+};
+
+// Frames first to end - 1; frame 0 is an update only, the others step by the difference of their times.
+// Throws DivergenceError naming the frame and its time.
+void run_frames(Filter& filter, const double* time, const double* markers, const double* wrench, std::size_t first,
+                std::size_t end, RunRecord& record);
+
+}  // namespace dynakin

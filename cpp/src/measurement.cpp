@@ -1,0 +1,126 @@
+#include "dynakin/measurement.hpp"
+
+#include <cmath>
+
+namespace dynakin {
+namespace {
+
+// Covariance of a wrench declared at r, carried to the ground origin: m_O = m_r + r x f, so force noise becomes moment
+// noise. An infinite variance there makes every component that depends on it infinite too; infinity times zero is zero.
+Matrix6 carried(const Matrix6& R, const Vector3& r, std::array<bool, 6>& used) {
+  Matrix6 X = Matrix6::Identity();
+  X.bottomLeftCorner<3, 3>() = skew(r);
+  Matrix6 finite = R;
+  for (int k = 0; k < 6; ++k) {
+    if (std::isfinite(R(k, k))) continue;
+    finite.row(k).setZero();
+    finite.col(k).setZero();
+    for (int i = 0; i < 6; ++i)
+      if (X(i, k) != 0.0) used[i] = false;
+  }
+  return X * finite * X.transpose();
+}
+
+}  // namespace
+
+Measurement::Measurement(const Model& model, const FilterSettings& settings)
+    : model_(model),
+      settings_(settings),
+      wrench_used_(model.spec().wrench_measured),
+      wrench_scratch_(6, model.state_size()),
+      kinematics_(model),
+      dynamics_(model),
+      predicted_(channel_count(model)) {
+  wrench_covariance_ = carried(settings.wrench_covariance, settings.reference_point, wrench_used_);
+  wrench_scratch_.setZero();
+  std::size_t widest = 0;
+  for (std::size_t m = 0; m < model.markers().size(); ++m) {
+    const auto& columns = model.marker_columns(static_cast<int>(m));
+    widest = std::max(widest, columns.size());
+    slot_.emplace_back(model.state_size(), k_none);
+    for (std::size_t k = 0; k < columns.size(); ++k) slot_.back()[columns[k]] = static_cast<int>(k);
+    blocks_.emplace_back();
+    blocks_.back().columns = &columns;
+    blocks_.back().H.setZero(3, columns.size());
+    max_rows_ += model.markers()[m].n_measured;
+  }
+  marker_scratch_.setZero(3, widest);
+  blocks_.emplace_back();
+  blocks_.back().columns = &model.wrench_columns();
+  blocks_.back().H.setZero(6, model.wrench_columns().size());
+  for (bool used : wrench_used_) max_rows_ += used;
+  if (settings.total_mass && !model.mass_columns().empty()) {
+    blocks_.emplace_back();
+    blocks_.back().columns = &model.mass_columns();
+    blocks_.back().H.setOnes(1, model.mass_columns().size());
+    max_rows_ += 1;
+  }
+}
+
+void Measurement::evaluate(const Eigen::VectorXd& x) {
+  forward_kinematics(model_, x, kinematics_);
+  subtree_dynamics(model_, x, kinematics_, dynamics_);
+  const int n_markers = static_cast<int>(model_.markers().size());
+  for (int m = 0; m < n_markers; ++m) predicted_.segment<3>(3 * m) = kinematics_.markers[m];
+  predicted_.segment<6>(3 * n_markers) = dynamics_.wrench.vector();
+  predicted_(3 * n_markers + 6) = dynamics_.mass;
+}
+
+void Measurement::linearise(const Eigen::VectorXd& x, const Eigen::Ref<const MarkerMatrix>& markers,
+                            const Vector6& wrench) {
+  evaluate(x);
+  for (std::size_t m = 0; m < model_.markers().size(); ++m) marker_rows(static_cast<int>(m), markers.col(m));
+  wrench_rows(wrench);
+  if (blocks_.size() > model_.markers().size() + 1) mass_rows();
+}
+
+void Measurement::marker_rows(int marker, const Vector3& measured) {
+  RowBlock& block = blocks_[marker];
+  block.rows = 0;
+  const double variance = settings_.marker_variance(marker);
+  const Marker& site = model_.markers()[marker];
+  if (std::isinf(variance)) return;
+  for (int k = 0; k < 3; ++k)
+    if (site.measured[k] && std::isnan(measured(k))) return;
+  auto J = marker_scratch_.leftCols(block.H.cols());
+  marker_jacobian(model_, kinematics_, marker, slot_[marker], J);
+  for (int k = 0; k < 3; ++k) {
+    if (!site.measured[k]) continue;
+    block.H.row(block.rows) = J.row(k);
+    block.v(block.rows) = measured(k) - kinematics_.markers[marker](k);
+    block.channel[block.rows] = 3 * marker + k;
+    ++block.rows;
+  }
+  block.R.setZero();
+  block.R.diagonal().setConstant(variance);
+}
+
+void Measurement::wrench_rows(const Vector6& measured) {
+  const int n_markers = static_cast<int>(model_.markers().size());
+  RowBlock& block = blocks_[n_markers];
+  block.rows = 0;
+  std::array<int, 6> component{};
+  for (int k = 0; k < 6; ++k)
+    if (wrench_used_[k] && !std::isnan(measured(k))) component[block.rows++] = k;
+  if (block.rows == 0) return;
+  wrench_jacobian(model_, kinematics_, dynamics_, wrench_scratch_);
+  const std::vector<int>& columns = *block.columns;
+  for (std::size_t c = 0; c < columns.size(); ++c)
+    for (int r = 0; r < block.rows; ++r) block.H(r, c) = wrench_scratch_(component[r], columns[c]);
+  const Vector6 predicted = dynamics_.wrench.vector();
+  for (int r = 0; r < block.rows; ++r) {
+    block.v(r) = measured(component[r]) - predicted(component[r]);
+    block.channel[r] = 3 * n_markers + component[r];
+    for (int s = 0; s < block.rows; ++s) block.R(r, s) = wrench_covariance_(component[r], component[s]);
+  }
+}
+
+void Measurement::mass_rows() {
+  RowBlock& block = blocks_.back();
+  block.rows = std::isinf(settings_.total_mass_variance) ? 0 : 1;
+  block.v(0) = *settings_.total_mass - dynamics_.mass;
+  block.channel[0] = channel_count(model_) - 1;
+  block.R(0, 0) = settings_.total_mass_variance;
+}
+
+}  // namespace dynakin

@@ -1,0 +1,56 @@
+#include "dynakin/run.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <string>
+
+namespace dynakin {
+
+RunRecord::RunRecord(const Model& model, std::size_t frames)
+    : state(frames * model.state_size()),
+      state_sd(state.size()),
+      markers_predicted(frames * 3 * model.markers().size()),
+      markers_estimated(markers_predicted.size()),
+      wrench_predicted(frames * 6),
+      wrench_estimated(frames * 6),
+      moments(frames * model.coordinates().size()),
+      nis(frames),
+      log_likelihood(frames),
+      step_us(frames),
+      rows(frames),
+      constrained(frames) {}
+
+void run_frames(Filter& filter, const double* time, const double* markers, const double* wrench, std::size_t first,
+                std::size_t end, RunRecord& record) {
+  using clock = std::chrono::steady_clock;
+  const Model& model = filter.model();
+  const auto n = static_cast<std::size_t>(model.state_size());
+  const std::size_t m = 3 * model.markers().size();
+  const std::size_t nc = model.coordinates().size();
+  for (std::size_t k = first; k < end; ++k) {
+    const Eigen::Map<const MarkerMatrix> z(markers + k * m, 3, m / 3);
+    const Vector6 w = Eigen::Map<const Vector6>(wrench + 6 * k);
+    const auto start = clock::now();
+    if (k > 0) filter.predict(time[k] - time[k - 1]);
+    const StepReport report = filter.update(z, w);
+    record.step_us[k] = std::chrono::duration<double, std::micro>(clock::now() - start).count();
+    if (report.diverged())
+      throw DivergenceError("the filter diverged at frame " + std::to_string(k) + " (" + std::to_string(time[k]) +
+                            " s): " + describe(report.status));
+    record.nis[k] = report.nis;
+    record.log_likelihood[k] = report.log_likelihood;
+    record.rows[k] = report.rows;
+    record.constrained[k] = report.constrained;
+    std::copy_n(filter.predicted().data(), m, record.markers_predicted.data() + k * m);
+    std::copy_n(filter.predicted().data() + m, 6, record.wrench_predicted.data() + 6 * k);
+    Eigen::Map<Eigen::VectorXd>(record.state.data() + k * n, n) = filter.state();
+    Eigen::Map<Eigen::VectorXd>(record.state_sd.data() + k * n, n) = filter.covariance().diagonal().cwiseSqrt();
+    const Measurement& now = filter.evaluate();
+    std::copy_n(now.predicted().data(), m, record.markers_estimated.data() + k * m);
+    std::copy_n(now.predicted().data() + m, 6, record.wrench_estimated.data() + 6 * k);
+    joint_moments(model, now.kinematics(), now.dynamics(), nullptr,
+                  Eigen::Map<Eigen::VectorXd>(record.moments.data() + k * nc, nc));
+  }
+}
+
+}  // namespace dynakin

@@ -1,0 +1,54 @@
+#include "dynakin/settings.hpp"
+
+#include <cmath>
+#include <stdexcept>
+
+namespace dynakin {
+namespace {
+
+[[noreturn]] void fail(const std::string& name, const std::string& message) {
+  throw std::invalid_argument("filter settings: " + name + ": " + message);
+}
+
+void check_size(const std::string& name, const Eigen::VectorXd& value, Eigen::Index expected) {
+  if (value.size() != expected)
+    fail(name, "expected " + std::to_string(expected) + " numbers, found " + std::to_string(value.size()));
+}
+
+}  // namespace
+
+void FilterSettings::check(const Model& model) const {
+  const int n = model.state_size();
+  const auto& names = model.layout().names();
+  check_size("process_variance", process_variance, n);
+  check_size("marker_variance", marker_variance, static_cast<Eigen::Index>(model.markers().size()));
+  check_size("lower", lower, n);
+  check_size("upper", upper, n);
+  for (int i = 0; i < n; ++i) {
+    if (!(process_variance(i) >= 0.0) || std::isinf(process_variance(i)))
+      fail("process_variance",
+           "of '" + names[i] + "' is " + std::to_string(process_variance(i)) + ", expected 0 or more");
+    if (!(lower(i) <= upper(i)))
+      fail("bounds", "of '" + names[i] + "' are " + std::to_string(lower(i)) + " and " + std::to_string(upper(i)) +
+                         ", expected lower <= upper");
+  }
+  for (std::size_t m = 0; m < model.markers().size(); ++m)
+    if (!(marker_variance(m) > 0.0))
+      fail("marker_variance",
+           "of '" + model.markers()[m].name + "' is " + std::to_string(marker_variance(m)) + ", expected more than 0");
+  for (int i = 0; i < 6; ++i)
+    if (!(wrench_covariance(i, i) > 0.0))
+      fail("wrench_covariance", "variance of component " + std::to_string(i) + " is " +
+                                    std::to_string(wrench_covariance(i, i)) + ", expected more than 0");
+  if (wrench_covariance.hasNaN()) fail("wrench_covariance", "holds a NaN");
+  if (wrench_covariance.allFinite() && !wrench_covariance.isApprox(wrench_covariance.transpose(), 1e-12))
+    fail("wrench_covariance", "is not symmetric");
+  if (!reference_point.allFinite()) fail("reference_point", "is not finite");
+  if (total_mass && !(*total_mass > 0.0 && std::isfinite(*total_mass)))
+    fail("total_mass", "is " + std::to_string(*total_mass) + " kg, expected more than 0");
+  if (total_mass && !(total_mass_variance > 0.0))
+    fail("total_mass_variance", "is " + std::to_string(total_mass_variance) + ", expected more than 0");
+  if (chunk_rows < 1) fail("chunk_rows", "is " + std::to_string(chunk_rows) + ", expected 1 or more");
+}
+
+}  // namespace dynakin

@@ -1,0 +1,97 @@
+#include "dynakin/update.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace dynakin {
+namespace {
+
+void mirror_lower(Eigen::MatrixXd& P) {
+  const Eigen::Index n = P.rows();
+  constexpr Eigen::Index tile = 8;  // a tile and its mirror image stay in the cache
+  for (Eigen::Index j = 0; j < n; j += tile) {
+    const Eigen::Index w = std::min(tile, n - j);
+    for (Eigen::Index c = 1; c < w; ++c) P.col(j + c).segment(j, c) = P.row(j + c).segment(j, c).transpose();
+    for (Eigen::Index i = j + w; i < n; i += tile) {
+      const Eigen::Index h = std::min(tile, n - i);
+      P.block(j, i, w, h) = P.block(i, j, h, w).transpose();
+    }
+  }
+}
+
+}  // namespace
+
+ChunkedUpdate::ChunkedUpdate(int state_size, int chunk_rows, int max_rows) : chunk_rows_(chunk_rows) {
+  const int capacity = std::min(std::max(chunk_rows, 6), std::max(max_rows, 1));  // a block is never split
+  PHt_.setZero(state_size, capacity);
+  Z_.setZero(capacity, state_size);
+  S_.setZero(capacity, capacity);
+  v_.setZero(capacity);
+}
+
+UpdateSums ChunkedUpdate::apply(const std::vector<RowBlock>& blocks, Eigen::MatrixXd& P, Eigen::VectorXd& dx) {
+  dx.setZero();
+  UpdateSums sums;
+  const int n_blocks = static_cast<int>(blocks.size());
+  int first = 0;
+  while (first < n_blocks && sums.factored) {
+    int end = first, rows = 0;
+    while (end < n_blocks && (rows == 0 || rows + blocks[end].rows <= chunk_rows_)) rows += blocks[end++].rows;
+    if (rows > 0) apply_chunk(first, end, rows, blocks, P, dx, sums);
+    first = end;
+  }
+  return sums;
+}
+
+void ChunkedUpdate::apply_chunk(int first_block, int end_block, int rows, const std::vector<RowBlock>& blocks,
+                                Eigen::MatrixXd& P, Eigen::VectorXd& dx, UpdateSums& sums) {
+  auto PHt = PHt_.leftCols(rows);
+  PHt.setZero();
+  int at = 0;
+  for (int b = first_block; b < end_block; ++b) {
+    const RowBlock& block = blocks[b];
+    const std::vector<int>& columns = *block.columns;
+    for (int r = 0; r < block.rows; ++r) {
+      double v = block.v(r);
+      for (std::size_t c = 0; c < columns.size(); ++c) {
+        const double h = block.H(r, c);
+        PHt.col(at + r) += h * P.col(columns[c]);
+        v -= h * dx(columns[c]);
+      }
+      v_(at + r) = v;
+    }
+    at += block.rows;
+  }
+
+  auto Z = Z_.topRows(rows);
+  Z = PHt.transpose();
+  auto S = S_.topLeftCorner(rows, rows);
+  S.setZero();
+  at = 0;
+  for (int b = first_block; b < end_block; ++b) {
+    const RowBlock& block = blocks[b];
+    const std::vector<int>& columns = *block.columns;
+    for (int r = 0; r < block.rows; ++r)
+      for (std::size_t c = 0; c < columns.size(); ++c) S.col(at + r) += block.H(r, c) * Z.col(columns[c]);
+    S.block(at, at, block.rows, block.rows) += block.R.topLeftCorner(block.rows, block.rows);
+    at += block.rows;
+  }
+
+  Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(S);  // in place; reads the lower triangle
+  if (llt.info() != Eigen::Success || !S.allFinite()) {
+    sums.factored = false;
+    return;
+  }
+  const auto L = S.triangularView<Eigen::Lower>();
+  L.solveInPlace(Z);
+  auto v = v_.head(rows);
+  L.solveInPlace(v);
+  P.selfadjointView<Eigen::Lower>().rankUpdate(Z.transpose(), -1.0);
+  mirror_lower(P);
+  dx.noalias() += Z.transpose() * v;
+  sums.rows += rows;
+  sums.nis += v.squaredNorm();
+  sums.log_determinant += 2.0 * S.diagonal().array().log().sum();
+}
+
+}  // namespace dynakin

@@ -1,0 +1,9 @@
+#include "module.hpp"
+
+NB_MODULE(_core, m) {
+  m.doc() = "dynakin's compiled core: model, kinematics, dynamics, filter. Arrays in and out are float64 copies.";
+  bind_spec(m);
+  bind_model(m);
+  bind_mechanics(m);
+  bind_filter(m);
+}

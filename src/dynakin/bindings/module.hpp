@@ -1,0 +1,11 @@
+// One bind_ function a concept; module.cpp calls them in the order in which their types depend on each other.
+#pragma once
+
+#include <nanobind/nanobind.h>
+
+namespace nb = nanobind;
+
+void bind_spec(nb::module_& m);
+void bind_model(nb::module_& m);
+void bind_mechanics(nb::module_& m);
+void bind_filter(nb::module_& m);
