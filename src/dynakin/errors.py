@@ -1,0 +1,37 @@
+"""The errors dynakin raises on purpose.
+
+Each carries one clear line: the file, the line or frame, the marker or key, what was found and what was
+expected. The command line prints that line and exits with code 2; anything else that escapes is a bug of
+dynakin.
+"""
+
+from __future__ import annotations
+
+
+class DynakinError(Exception):
+    """Root of every error that dynakin raises on purpose; ``str(error)`` is the one line for the user."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(message)
+        self.message = message
+
+
+class RecordingError(DynakinError):
+    """A recording (markers, forces) cannot be read or does not hold what is needed."""
+
+
+class ModelError(DynakinError):
+    """A model, marker set, subject or parameter table is wrong, or does not fit the recording."""
+
+
+class ConfigError(DynakinError):
+    """A configuration file or option is wrong: unknown key, wrong type, value out of its range."""
+
+
+class OutputError(DynakinError):
+    """Results cannot be written (folder missing, not writable, not a folder)."""
+
+
+class DivergenceError(DynakinError):
+    """The filter lost its estimate: non-finite state or indefinite covariance; the message names the
+    frame."""

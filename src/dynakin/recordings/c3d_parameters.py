@@ -1,0 +1,56 @@
+"""Parameters of a C3D file, found whatever the case of their names and whether they are there or not."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+
+class Parameters:
+    """View of the parameter section that ezc3d read."""
+
+    def __init__(self, groups: Any) -> None:
+        self._groups = {
+            str(group).upper(): {
+                str(name).upper(): content["value"]
+                for name, content in groups[group].items()
+                if not str(name).startswith("__") and isinstance(content, dict) and "value" in content
+            }
+            for group in groups
+        }
+
+    def names(self, group: str) -> list[str]:
+        """Parameter names of a group, upper case."""
+        return list(self._groups.get(group, {}))
+
+    def array(self, group: str, name: str) -> npt.NDArray[np.float64]:
+        """Values as numbers in the parameter's own shape; empty where it is absent or text."""
+        value = self._groups.get(group, {}).get(name)
+        if value is None:
+            return np.empty(0)
+        try:
+            return np.asarray(value, dtype=float)
+        except (TypeError, ValueError):
+            return np.empty(0)
+
+    def number(self, group: str, name: str) -> float | None:
+        """First value as a number, None where there is none."""
+        values = self.array(group, name).ravel()
+        return float(values[0]) if len(values) else None
+
+    def texts(self, group: str, name: str) -> list[str]:
+        """Values as stripped texts, continued in NAME2, NAME3, ... as C3D does beyond 255 of them."""
+        texts: list[str] = []
+        for suffix in ("", *map(str, range(2, 100))):
+            value = self._groups.get(group, {}).get(name + suffix)
+            if value is None:
+                break
+            texts += [str(text).strip() for text in np.ravel(np.asarray(value, dtype=object))]
+        return texts
+
+    def text(self, group: str, name: str) -> str:
+        """First text, "" where there is none."""
+        texts = self.texts(group, name)
+        return texts[0] if texts else ""

@@ -1,0 +1,64 @@
+"""Pairs of markers that show which way is up and which way the person faces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from dynakin.recordings.recording import Array, Recording
+
+
+@dataclass(frozen=True)
+class FacingPairs:
+    """Marker names, case, dots, underscores and subject prefixes aside.
+
+    Attributes:
+        heel_toe: (back, front) of each foot.
+        pelvis: (back, front), posterior and anterior iliac spine of each side.
+    """
+
+    heel_toe: tuple[tuple[str, str], ...]
+    pelvis: tuple[tuple[str, str], ...]
+
+
+DEFAULT_PAIRS = FacingPairs(
+    heel_toe=(("LHEE", "LTOE"), ("RHEE", "RTOE"), ("L_calc", "L_toe"), ("r_calc", "r_toe")),
+    pelvis=(("LPSI", "LASI"), ("RPSI", "RASI"), ("L.PSIS", "L.ASIS"), ("r.PSIS", "r.ASIS")),
+)
+"""Plug-in-Gait, and the marker set of OpenCap's laboratory recordings."""
+
+
+@lru_cache(maxsize=4096)
+def plain_name(name: str) -> str:
+    """A marker's name without subject prefix ("S1:"), case, dots, underscores, hyphens and blanks."""
+    kept = name.rsplit(":", 1)[-1].casefold()
+    return "".join(c for c in kept if c not in "._- ")
+
+
+def find_marker(recording: Recording, name: str) -> str | None:
+    """The recording's name for a marker: the exact one, else the first that is the same but for its
+    spelling."""
+    if name in recording.marker_names:
+        return name
+    plain = plain_name(name)
+    return next((own for own in recording.marker_names if plain_name(own) == plain), None)
+
+
+def present_pairs(recording: Recording, pairs: tuple[tuple[str, str], ...]) -> list[tuple[str, str]]:
+    """Those pairs whose markers the recording both has, seen at the same time at least once, in its own
+    spelling."""
+    found = []
+    for back, front in pairs:
+        a, b = find_marker(recording, back), find_marker(recording, front)
+        if a and b and np.isfinite(recording.marker(a) + recording.marker(b)).all(axis=1).any():
+            found.append((a, b))
+    return found
+
+
+def mean_position(recording: Recording, names: list[str], frames: slice) -> Array | None:
+    """Mean position (3,) m of some markers over some frames, None where none is seen."""
+    points = np.concatenate([recording.marker(name)[frames] for name in names]) if names else np.empty((0, 3))
+    points = points[np.isfinite(points).all(axis=1)]
+    return points.mean(axis=0) if len(points) else None

@@ -1,0 +1,67 @@
+"""A plate's wrench, its centre of pressure and free moment: the two ways of writing one and the same
+thing."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynakin.recordings.recording import Array, Plate
+
+DEFAULT_THRESHOLD_N = 10.0
+"""Push below which a plate counts as unloaded: a few times the noise of the usual plates (1 to 3 N), and
+small beside the errors that its centre of pressure has there (1 N m of noise moves it by 0.1 m)."""
+
+
+@dataclass(frozen=True)
+class Surface:
+    """Plane of a plate: a point on it (3,) m and its unit normal (3,) towards the person, laboratory
+    frame."""
+
+    point: Array
+    normal: Array
+
+
+def centre_of_pressure(
+    force: Array, moment: Array, surface: Surface, threshold_n: float
+) -> tuple[Array, Array]:
+    """Centre of pressure (T, 3) m and free moment (T, 3) N m of a wrench about the laboratory origin.
+
+    With M_c the moment about the surface's point c and n its normal, M_c = r x F + tau n and n . r = 0 give
+    r = (n x M_c) / (n . F). NaN (and no free moment) where the push |n . F| stays below ``threshold_n``.
+    """
+    n, c = surface.normal, surface.point
+    moment_c = moment - np.cross(c, force)
+    push = force @ n  # (T,)
+    loaded = np.abs(push) >= max(threshold_n, 1e-9)
+    r = np.full_like(force, np.nan)
+    r[loaded] = np.cross(n, moment_c[loaded]) / push[loaded, None]
+    free = np.zeros_like(force)
+    free[loaded] = np.outer((moment_c[loaded] - np.cross(r[loaded], force[loaded])) @ n, n)
+    return c + r, free
+
+
+def plate_from_wrench(
+    name: str,
+    force: Array,
+    moment: Array,
+    surface: Surface,
+    *,
+    corners: Array | None,
+    threshold_n: float,
+    zero_unloaded: bool,
+) -> Plate:
+    """A plate from its wrench about the laboratory origin.
+
+    ``zero_unloaded``: the whole wrench becomes 0 where the push along the normal stays below the threshold; a
+    plate cannot pull a person, so this also takes away a negative offset. The sign must have been settled
+    before.
+    """
+    if zero_unloaded:
+        unloaded = force @ surface.normal < threshold_n
+        force, moment = force.copy(), moment.copy()
+        force[unloaded] = 0.0
+        moment[unloaded] = 0.0
+    cop, free = centre_of_pressure(force, moment, surface, threshold_n)
+    return Plate(name, force, moment, cop, free, corners)

@@ -1,0 +1,83 @@
+"""``read``: any recording, by the extension of its file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+from dynakin.errors import RecordingError
+from dynakin.recordings.c3d import read_c3d
+from dynakin.recordings.csv import read_csv, read_csv_table
+from dynakin.recordings.forces import attach_forces
+from dynakin.recordings.grf_columns import parse_column
+from dynakin.recordings.mot import Table, read_table
+from dynakin.recordings.options import ReadOptions
+from dynakin.recordings.recording import Recording
+from dynakin.recordings.textfile import require_file
+from dynakin.recordings.trc import read_trc
+
+Reader = Callable[[Path, ReadOptions], Recording]
+ForceReader = Callable[[Path], Table]
+
+READERS: dict[str, Reader] = {".trc": read_trc, ".c3d": read_c3d, ".csv": read_csv}
+"""Readers of markers by extension (lower case, with its dot); a plug-in adds its own with
+``register_reader``."""
+
+FORCE_READERS: dict[str, ForceReader] = {".mot": read_table, ".sto": read_table, ".csv": read_csv_table}
+"""Readers of ground-force tables by extension."""
+
+
+def register_reader(extension: str, reader: Reader) -> None:
+    """Have ``read`` use ``reader`` for files that end in ``extension`` (".xyz")."""
+    READERS[extension.casefold()] = reader
+
+
+def read(
+    path: str | Path,
+    forces: str | Path | None = None,
+    *,
+    plate_filter_hz: float | None = None,
+    force_threshold_n: float | None = None,
+    causal: bool = False,
+) -> Recording:
+    """Read a trial: markers, and plates from the same file or from a ground-force table.
+
+    Args:
+        path: .trc, .c3d or .csv.
+        forces: .mot, .sto or .csv with ground forces in the laboratory frame of the markers.
+        plate_filter_hz, force_threshold_n, causal: see ``ReadOptions``.
+
+    Raises:
+        RecordingError: a file that is not there, of an unknown kind, damaged, or forces that do not fit the
+            markers.
+    """
+    options = ReadOptions(plate_filter_hz, force_threshold_n, causal)
+    path = Path(path)
+    reader = READERS.get(path.suffix.casefold())
+    require_file(path)
+    if reader is None:
+        raise RecordingError(
+            f"{path}: found extension {path.suffix!r}, expected one of {', '.join(sorted(READERS))}"
+        )
+    recording = reader(path, options)
+    if forces is None:
+        return recording
+    forces = Path(forces)
+    require_file(forces)
+    force_reader = FORCE_READERS.get(forces.suffix.casefold())
+    if force_reader is None:
+        known = ", ".join(sorted(FORCE_READERS))
+        raise RecordingError(
+            f"{forces}: found extension {forces.suffix!r}, expected forces as one of {known}"
+        )
+    table = force_reader(forces)
+    if forces.suffix.casefold() == ".csv":
+        table = _only_forces(table)
+    return attach_forces(recording, table, options)
+
+
+def _only_forces(table: Table) -> Table:
+    """A csv may hold markers beside the forces: these are not columns "not used"."""
+    spots = [k for k, name in enumerate(table.names) if parse_column(name)]
+    return replace(table, names=tuple(table.names[k] for k in spots), values=table.values[:, spots])

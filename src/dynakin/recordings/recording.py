@@ -1,0 +1,149 @@
+"""What was measured: marker trajectories and force plates of one trial, in the laboratory frame of its
+file."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.errors import RecordingError
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Plate:
+    """One force plate at the marker rate, laboratory frame, ground-on-person.
+
+    Attributes:
+        name: "plate 1", "plate r", ...: the number or side that the file gives.
+        force: (T, 3) N.
+        moment: (T, 3) N m, all of the wrench, about the LABORATORY origin.
+        cop: (T, 3) m, centre of pressure; NaN where the plate is unloaded.
+        free_moment: (T, 3) N m, what is left of the moment about the centre of pressure.
+        corners: (4, 3) m, or None where the file does not tell.
+    """
+
+    name: str
+    force: Array
+    moment: Array
+    cop: Array
+    free_moment: Array
+    corners: Array | None = None
+
+    def frames(self, index: slice | npt.NDArray[Any]) -> Plate:
+        """The same plate with only the frames of ``index``."""
+        return replace(
+            self,
+            force=self.force[index],
+            moment=self.moment[index],
+            cop=self.cop[index],
+            free_moment=self.free_moment[index],
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Recording:
+    """A trial as read: SI, laboratory frame of the file, a missing marker is NaN.
+
+    Attributes:
+        name: stem of the file's name.
+        path: where it was read from, None if made in memory.
+        time: (T,) s, strictly increasing.
+        marker_names: M names as the file spells them (subject prefix kept).
+        markers: (T, M, 3) m.
+        plates: each force plate on its own.
+        length_unit: unit of the file, in which its markers are written back.
+        notes: what the reader found or changed, one sentence each.
+        subject: "mass_kg" and "height_m" where the file tells.
+        hints: what the file says of its axes (C3D: "X_SCREEN", "Y_SCREEN"); can be wrong, so it only votes.
+    """
+
+    name: str
+    path: Path | None
+    time: Array
+    marker_names: tuple[str, ...]
+    markers: Array
+    plates: tuple[Plate, ...] = ()
+    length_unit: Literal["mm", "m"] = "m"
+    notes: tuple[str, ...] = ()
+    subject: dict[str, float] = field(default_factory=dict)
+    hints: dict[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        expected = (len(self.time), len(self.marker_names), 3)
+        if self.markers.shape != expected:
+            raise RecordingError(f"{self.name}: markers have shape {self.markers.shape}, expected {expected}")
+        for plate in self.plates:
+            shapes = {plate.force.shape, plate.moment.shape, plate.cop.shape, plate.free_moment.shape}
+            if shapes != {(len(self.time), 3)}:
+                raise RecordingError(
+                    f"{self.name}: {plate.name} has arrays of shapes {sorted(shapes)}, "
+                    f"expected ({len(self.time)}, 3)"
+                )
+
+    @property
+    def n_frames(self) -> int:
+        """Number of frames T."""
+        return len(self.time)
+
+    @property
+    def rate(self) -> float:
+        """Frames per second, from the median time step (NaN for a single frame)."""
+        return float(1.0 / np.median(np.diff(self.time))) if self.n_frames > 1 else float("nan")
+
+    @cached_property
+    def _columns(self) -> dict[str, int]:
+        return {name: k for k, name in enumerate(self.marker_names)}
+
+    def marker(self, name: str) -> Array:
+        """Trajectory (T, 3) m of one marker, named as in the file.
+
+        Raises:
+            RecordingError: no marker has this name; the message lists those that are there.
+        """
+        try:
+            return self.markers[:, self._columns[name]]
+        except KeyError:
+            raise RecordingError(
+                f"{self.path or self.name}: no marker {name!r}; it has {', '.join(self.marker_names)}"
+            ) from None
+
+    def total_wrench(self, about: npt.ArrayLike = (0.0, 0.0, 0.0)) -> Array:
+        """Sum of all plates' wrenches (T, 6) [force N, moment N m], laboratory frame, moment about ``about``
+        (3,) m."""
+        if not self.plates:
+            raise RecordingError(f"{self.path or self.name}: no force plates in this recording")
+        force = np.sum([plate.force for plate in self.plates], axis=0)
+        moment = np.sum([plate.moment for plate in self.plates], axis=0)
+        return np.hstack([force, moment - np.cross(np.asarray(about, dtype=float), force)])
+
+    def with_plates(self, plates: tuple[Plate, ...], notes: tuple[str, ...] = ()) -> Recording:
+        """The same recording with these plates instead of its own, and with further notes."""
+        return replace(self, plates=tuple(plates), notes=self.notes + notes)
+
+    def window(self, start_s: float, end_s: float) -> Recording:
+        """The part with ``start_s <= time <= end_s``; the times stay as they are.
+
+        Raises:
+            RecordingError: no frame lies in that window.
+        """
+        tolerance = 1e-9 * max(1.0, abs(end_s))
+        index = np.flatnonzero((self.time >= start_s - tolerance) & (self.time <= end_s + tolerance))
+        if not len(index):
+            raise RecordingError(
+                f"{self.path or self.name}: no frame between {start_s:g} s and {end_s:g} s; "
+                f"it runs from {self.time[0]:g} s to {self.time[-1]:g} s"
+            )
+        keep = slice(int(index[0]), int(index[-1]) + 1)
+        return replace(
+            self,
+            time=self.time[keep],
+            markers=self.markers[keep],
+            plates=tuple(plate.frames(keep) for plate in self.plates),
+        )

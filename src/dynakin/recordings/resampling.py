@@ -1,0 +1,131 @@
+"""From the analog rate of force plates to the times of the markers, without aliasing."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import interpolate, signal
+
+from dynakin.errors import RecordingError
+from dynakin.recordings.recording import Array
+
+_PASS = 0.4  # end of the pass band, times the marker rate
+_STOP = 0.6  # begin of the stop band: what lies between folds back only above the pass band
+_STOP_DB = 60.0
+_CAUSAL_ORDER = 4
+
+
+class CausalLowPass:
+    """Butterworth low-pass that only looks back and keeps its state: blocks pushed in turn give what one push
+    of the whole gives, so that an offline run equals live use.
+
+    Args:
+        rate_hz: samples per second of the input.
+        cutoff_hz: -3 dB frequency.
+        order: of the filter.
+    """
+
+    def __init__(self, rate_hz: float, cutoff_hz: float, order: int = _CAUSAL_ORDER) -> None:
+        _check_cutoff(rate_hz, cutoff_hz)
+        self._sos = signal.butter(order, cutoff_hz, fs=rate_hz, output="sos")
+        b, a = signal.butter(order, cutoff_hz, fs=rate_hz)
+        self.delay_s: float = float(signal.group_delay((b, a), w=[0.0], fs=rate_hz)[1][0] / rate_hz)
+        self._state: Array | None = None
+
+    def push(self, block: Array) -> Array:
+        """Filter the next samples (n, k) and keep the state; the first sample is taken as having lasted for
+        ever."""
+        if not len(block):
+            return block.copy()
+        if self._state is None:
+            self._state = signal.sosfilt_zi(self._sos)[:, :, None] * block[0]
+        out, self._state = signal.sosfilt(self._sos, block, axis=0, zi=self._state)
+        return np.asarray(out)
+
+
+def low_pass(samples: Array, rate_hz: float, cutoff_hz: float, *, causal: bool = False) -> Array:
+    """Butterworth low-pass of (N, k) samples, -3 dB at ``cutoff_hz``: 4th-order zero-lag (2nd order both
+    ways, its cutoff corrected for the two passes as in Winter, Biomechanics and Motor Control, 2009), or 2nd
+    order one way.
+
+    Raises:
+        RecordingError: the cutoff is not below half the rate.
+    """
+    if causal:
+        return CausalLowPass(rate_hz, cutoff_hz, order=2).push(samples)
+    _check_cutoff(rate_hz, cutoff_hz)
+    # Two passes of |H|^2 = 1/(1 + w^4), w warped, are -3 dB where w = (sqrt 2 - 1)^(1/4).
+    warped = np.tan(np.pi * cutoff_hz / rate_hz) / (np.sqrt(2) - 1) ** 0.25
+    sos = signal.butter(2, np.arctan(warped) / np.pi * rate_hz, fs=rate_hz, output="sos")
+    return np.asarray(
+        signal.sosfiltfilt(sos, samples, axis=0, padlen=min(len(samples) - 1, int(rate_hz / cutoff_hz)))
+    )
+
+
+def resample(samples: Array, time_in: Array, time_out: Array, *, causal: bool = False) -> Array:
+    """Samples (N, k) at the evenly spaced ``time_in`` (N,) brought to ``time_out`` (T,), both in s.
+
+    The same times pass through untouched. From a higher rate, a linear-phase FIR filter (Kaiser window, 60
+    dB, pass band up to 0.4 and stop band from 0.6 of the output's rate, odd extension at the ends) goes
+    first, centred, so that nothing is delayed. ``causal``: instead a 4th-order Butterworth low-pass at 0.4 of
+    the output's rate that only looks back (it delays by ``CausalLowPass.delay_s``). Then the sample at each
+    time is picked, or, where times do not coincide, interpolated (cubic; causal: the latest sample before).
+
+    Raises:
+        RecordingError: ``time_in`` is uneven, or does not cover ``time_out``.
+    """
+    if same_times(time_in, time_out):
+        return samples
+    rate_in, rate_out = _rate(time_in), _rate(time_out)
+    step = 1 / rate_in
+    if np.abs(np.diff(time_in) * rate_in - 1).max() > 0.05:
+        raise RecordingError("the forces are sampled unevenly, expected a constant rate to resample from")
+    # The last marker frame may lie up to one marker step after the last analog sample of the frame before.
+    if time_out[0] < time_in[0] - 0.5 * step or time_out[-1] > time_in[-1] + max(step, 0.5 / rate_out):
+        raise RecordingError(
+            f"forces from {time_in[0]:g} s to {time_in[-1]:g} s "
+            f"do not cover {time_out[0]:g} s to {time_out[-1]:g} s"
+        )
+    if rate_in > 1.01 * rate_out:
+        if causal:
+            samples = CausalLowPass(rate_in, _PASS * rate_out).push(samples)
+        else:
+            samples = _antialias(samples, rate_in, rate_out)
+    nearest = np.clip(np.rint((time_out - time_in[0]) * rate_in).astype(int), 0, len(time_in) - 1)
+    if np.abs(time_in[nearest] - time_out).max() < 0.01 * step:
+        picked: Array = samples[nearest]
+        return picked
+    if causal:
+        latest = np.searchsorted(time_in, time_out + 1e-6 * step, side="right") - 1
+        held: Array = samples[np.clip(latest, 0, len(time_in) - 1)]
+        return held
+    inside = np.clip(time_out, time_in[0], time_in[-1])
+    return np.asarray(interpolate.CubicSpline(time_in, samples, axis=0)(inside))
+
+
+def same_times(a: Array, b: Array) -> bool:
+    """Whether two time columns are the same within 1 % of a step."""
+    return len(a) == len(b) and (len(a) < 2 or bool(np.abs(a - b).max() < 0.01 * np.median(np.diff(b))))
+
+
+def _antialias(samples: Array, rate_in: float, rate_out: float) -> Array:
+    width = (_STOP - _PASS) * rate_out
+    taps, beta = signal.kaiserord(_STOP_DB, width / (0.5 * rate_in))
+    half = taps // 2
+    cutoff = min(0.5 * (_PASS + _STOP) * rate_out, 0.49 * rate_in)
+    kernel = signal.firwin(2 * half + 1, cutoff, window=("kaiser", beta), fs=rate_in)
+    reach = min(half, len(samples) - 1)
+    padded = np.pad(samples, ((reach, reach), (0, 0)), mode="reflect", reflect_type="odd")
+    padded = np.pad(padded, ((half - reach, half - reach), (0, 0)), mode="edge")
+    return np.asarray(signal.oaconvolve(padded, kernel[:, None], mode="valid", axes=0))
+
+
+def _rate(time: Array) -> float:
+    return float(1 / np.median(np.diff(time))) if len(time) > 1 else float("inf")
+
+
+def _check_cutoff(rate_hz: float, cutoff_hz: float) -> None:
+    if not 0 < cutoff_hz < 0.5 * rate_hz:
+        raise RecordingError(
+            f"low-pass at {cutoff_hz:g} Hz is not possible at {rate_hz:g} Hz, "
+            f"expected less than {rate_hz / 2:g} Hz"
+        )

@@ -1,0 +1,47 @@
+"""Find a stretch in which the person stands still."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynakin.recordings.recording import Array, Recording
+
+STILL_SPEED_M_S = 0.06
+"""Still: the 90th percentile of the markers' speeds stays below this. Quiet standing sways with 0.01 to 0.03
+m/s, the slowest phases of a slow squat reach this only for instants at its turning points."""
+
+MIN_STILL_S = 0.5
+"""Shortest stretch that counts, so that a squat's turning point does not."""
+
+_SPAN_S = 0.1  # speeds are taken over this span, so that 1 mm of marker noise counts as 0.01 m/s only
+
+
+def marker_speeds(recording: Recording) -> Array:
+    """Speed of each marker (T, M) m/s, over 0.1 s around each frame; NaN where either end is missing."""
+    half = max(1, round(0.5 * _SPAN_S * recording.rate)) if recording.n_frames > 1 else 0
+    frames = np.arange(recording.n_frames)
+    before, after = np.maximum(frames - half, 0), np.minimum(frames + half, recording.n_frames - 1)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        travelled = np.linalg.norm(recording.markers[after] - recording.markers[before], axis=2)
+        speeds: Array = travelled / (recording.time[after] - recording.time[before])[:, None]
+    return speeds
+
+
+def standing_window(recording: Recording) -> slice | None:
+    """Frames of the first stretch of at least 0.5 s in which the person is still, None where there is none.
+
+    Still is a frame in which the 90th percentile of the speeds of the markers that are seen is below
+    ``STILL_SPEED_M_S``; a frame without markers is not still. It need not be upright: a squat held at its
+    bottom for half a second counts too, and the plates then carry m g just the same.
+    """
+    if recording.n_frames < 2 or not recording.marker_names:
+        return None
+    speeds = marker_speeds(recording)
+    still = np.zeros(recording.n_frames, dtype=bool)
+    seen = np.isfinite(speeds).any(axis=1)
+    still[seen] = np.nanpercentile(speeds[seen], 90, axis=1) < STILL_SPEED_M_S
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
+    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+        if recording.time[stop - 1] - recording.time[start] >= MIN_STILL_S - 1.5 / recording.rate:
+            return slice(int(start), int(stop))
+    return None

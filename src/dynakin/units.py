@@ -1,0 +1,45 @@
+"""Conversion factors to SI at the edges of dynakin: files and reports; inside, everything is SI and
+radians."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+GRAVITY_M_S2 = 9.80665
+"""Standard gravity, m/s^2 (CGPM 1901): the value in every model's gravity vector (0, -9.80665, 0)."""
+
+_LENGTH = {
+    1.0: ("m", "meter", "meters", "metre", "metres"),
+    1e-2: ("cm", "centimeter", "centimeters", "centimetre", "centimetres"),
+    1e-3: ("mm", "millimeter", "millimeters", "millimetre", "millimetres"),
+}
+_FORCE = {1.0: ("n", "newton", "newtons"), 1e3: ("kn", "kilonewton", "kilonewtons")}
+
+
+def _clean(unit: str) -> str:
+    return "".join(c for c in unit.casefold() if c not in " .*·-()[]")
+
+
+def _find(unit: str, table: Mapping[float, tuple[str, ...]]) -> float | None:
+    word = _clean(unit)
+    return next((factor for factor, names in table.items() if word in names), None)
+
+
+def length_factor(unit: str) -> float | None:
+    """Metres per ``unit`` ("mm", "Meters", "(cm)", ... in any case), or None where the unit is unknown."""
+    return _find(unit, _LENGTH)
+
+
+def force_factor(unit: str) -> float | None:
+    """Newtons per ``unit`` ("N", "kN", ...), or None where the unit is unknown (a plate's raw volts, say)."""
+    return _find(unit, _FORCE)
+
+
+def moment_factor(unit: str) -> float | None:
+    """Newton metres per ``unit`` ("Nm", "N.mm", "Newton millimetres", ...), or None where it is unknown."""
+    word = _clean(unit)
+    for force, force_names in _FORCE.items():
+        for length, length_names in _LENGTH.items():
+            if any(word == f + m for f in force_names for m in length_names):
+                return force * length
+    return None

@@ -1,0 +1,139 @@
+"""Plate checks and the containers themselves."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from made_recordings import standing
+
+from dynakin.errors import RecordingError
+from dynakin.recordings import Recording, check_plates, find_ground_frame
+from dynakin.recordings.feet import distance_to_hull
+
+
+def check(recording: Recording, mass_kg: float | None = None):  # type: ignore[no-untyped-def]
+    return check_plates(recording, find_ground_frame(recording, vertical="+Y"), mass_kg)
+
+
+def test_a_good_recording_is_ok_and_gives_the_mass() -> None:
+    found = check(standing(70.0), 70.0)
+    assert found.ok
+    assert found.refusal is None
+    assert found.mass_kg_from_plates == pytest.approx(70.0)
+    said = " ".join(found.messages)
+    assert "686.5 N" in said
+    assert "plate 1: centre of pressure under the left foot" in said
+    assert "plate 2: centre of pressure under the right foot" in said
+    assert "free moment 2.00 N m" in said
+
+
+def test_another_mass_is_a_warning_with_numbers() -> None:
+    found = check(standing(70.0), 78.6)
+    assert not found.ok
+    assert found.refusal is None
+    assert any(text.startswith("Warning: the plates read 70.00 kg, the declared mass is 78.6 kg (-10.9 %)")
+               for text in found.messages)  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("recording", "mass", "words"),
+    [
+        (standing(70.0, sign=-1.0), None, ["vertical force is -686.5 N", "expected a positive one"]),
+        (
+            standing(70.0, cop_shift_m=0.9),
+            None,
+            ["plate 1: centre of pressure 800 mm away", "expected it under"],
+        ),
+        (standing(1.0), None, ["1 kg standing", "expected a person's mass"]),
+        (standing(0.0), None, ["vertical force is 0.0 N"]),
+        (standing(700.0), None, ["700 kg"]),
+        (standing(700.0), 70.0, ["700.00 kg", "declared mass is 70 kg"]),
+        (replace(standing(), plates=()), None, ["no force plates"]),
+    ],
+)
+def test_refusals_give_the_number(recording: Recording, mass: float | None, words: list[str]) -> None:
+    found = check(recording, mass)
+    assert not found.ok
+    assert found.refusal is not None
+    for word in words:
+        assert word in found.refusal
+
+
+def test_pressure_somewhat_off_the_foot_is_a_warning() -> None:
+    found = check(standing(70.0, cop_shift_m=0.3))
+    assert found.refusal is None
+    assert any(text.startswith("Warning: plate 1: centre of pressure 200 mm away") for text in found.messages)
+
+
+def test_both_plates_under_one_foot_and_big_free_moments_are_told() -> None:
+    good = standing(70.0)
+    doubled = replace(good, plates=(good.plates[0], replace(good.plates[0], name="plate 2")))
+    assert any(
+        "both have their centre of pressure under the left foot" in text for text in check(doubled).messages
+    )
+    twisted = replace(good.plates[0], free_moment=good.plates[0].free_moment + np.array([8.0, 30.0, 0.0]))
+    said = " ".join(check(replace(good, plates=(twisted, good.plates[1]))).messages)
+    assert "free moment 32.0 N m is large" in said
+    assert "8.0 N m about horizontal axes" in said
+
+
+def test_an_idle_plate_and_missing_foot_markers_are_told() -> None:
+    good = standing(70.0)
+    idle = replace(good.plates[0], name="plate 3", force=np.zeros((101, 3)), moment=np.zeros((101, 3)))
+    found = check(replace(good, plates=(*good.plates, idle)))
+    assert found.ok
+    assert any("plate 3 carries nothing" in text for text in found.messages)
+    frame = find_ground_frame(good)
+    other = check_plates(good, frame, foot_markers={"left": ["NONE"]})
+    assert any("no foot markers" in text for text in other.messages)
+
+
+def test_without_standing_the_mass_is_only_told() -> None:
+    good = standing(70.0)
+    hop = good.markers + np.array([0, 0.1, 0]) * np.sin(2 * np.pi * 2 * good.time)[:, None, None]
+    found = check(replace(good, markers=hop), 70.0)
+    assert found.mass_kg_from_plates is None
+    assert any("does not stand still" in text for text in found.messages)
+    assert found.refusal is None
+
+
+SQUARE = np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]])
+
+
+@settings(max_examples=60, deadline=None)
+@given(x=st.floats(-2, 3), y=st.floats(-2, 3), order=st.permutations(range(4)))
+def test_distance_to_a_square(x: float, y: float, order: list[int]) -> None:
+    expected = np.hypot(max(-x, 0, x - 1), max(-y, 0, y - 1))
+    found = distance_to_hull(np.array([[x, y]]), SQUARE[order][None])
+    assert found[0] == pytest.approx(expected, abs=1e-9)
+
+
+def test_distance_with_missing_corners() -> None:
+    corners = SQUARE[None].repeat(3, axis=0).copy()
+    corners[1, 2] = np.nan
+    corners[2] = np.nan
+    found = distance_to_hull(np.array([[0.9, 0.9]] * 3), corners)
+    assert found[0] == 0
+    assert found[1] == pytest.approx(0.8 / np.sqrt(2))
+    assert np.isnan(found[2])
+
+
+def test_recording_window_marker_and_shapes() -> None:
+    recording = standing()
+    part = recording.window(0.2, 0.5)
+    assert part.n_frames == 31
+    assert part.time[0] == pytest.approx(0.2)
+    assert part.plates[0].force.shape == (31, 3)
+    assert recording.rate == pytest.approx(100.0)
+    with pytest.raises(RecordingError, match="no frame between 5 s and 6 s; it runs from 0 s to 1 s"):
+        recording.window(5, 6)
+    with pytest.raises(RecordingError, match="no marker 'XYZ'; it has LHEE, LTOE"):
+        recording.marker("XYZ")
+    with pytest.raises(RecordingError, match=r"markers have shape \(2, 1, 3\), expected \(3, 1, 3\)"):
+        Recording("a", None, np.arange(3.0), ("A",), np.zeros((2, 1, 3)))
+    with pytest.raises(RecordingError, match="plate 1 has arrays of shapes"):
+        recording.with_plates((part.plates[0],))

@@ -1,0 +1,268 @@
+"""C3D files written by hand: markers, the four types of plate, turned plates, damaged files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from made_recordings import write, write_c3d
+
+from dynakin.errors import RecordingError
+from dynakin.recordings import read
+
+T = 20
+PER_FRAME = 10
+LEVEL = 0.0
+
+# A plate of 0.4 x 0.6 m whose centre is (1, 2, 0.1) m, in a laboratory with Z up. Plate axes: x along the
+# laboratory's X, y along its -Y, z into the floor. Corners 1 to 4 at (+x, +y), (-x, +y), (-x, -y), (+x, -y).
+CENTRE = np.array([1.0, 2.0, 0.1])
+R_LP = np.array([[1.0, 0, 0], [0, -1.0, 0], [0, 0, -1.0]])
+LOCAL_CORNERS = np.array([[0.2, 0.3, 0], [-0.2, 0.3, 0], [-0.2, -0.3, 0], [0.2, -0.3, 0]])
+
+# What the person gets from the ground, in the plate's frame: 10 N along x, 800 N up (negative z), at (0.05,
+# -0.1, 0), and 4 N m about z.
+FORCE_P = np.array([10.0, -20.0, -800.0])
+POINT_P = np.array([0.05, -0.1, 0.0])
+FREE_P = np.array([0.0, 0.0, 4.0])
+MOMENT_CENTRE_P = np.cross(POINT_P, FORCE_P) + FREE_P  # (80, 40, 4) by hand
+DEPTH = 0.04  # the transducers lie this much below the surface
+MOMENT_TRANSDUCER_P = MOMENT_CENTRE_P + np.cross([0, 0, -DEPTH], FORCE_P)
+
+
+def body(turn: np.ndarray = R_LP, above: float = 1.0) -> dict[str, np.ndarray]:
+    """One marker above the plate, mm."""
+    return {"LASI": np.tile(1e3 * (CENTRE - above * turn[:, 2]), (T, 1))}
+
+
+def channels_of(kind: int, sign: float = 1.0) -> np.ndarray:
+    """Channels of a plate under FORCE_P and MOMENT (N, N mm, mm), constant in time."""
+    f, m = sign * FORCE_P, sign * MOMENT_TRANSDUCER_P * 1e3
+    if kind == 1:
+        values = [*f, *(POINT_P[:2] * 1e3), sign * 4e3]
+    elif kind == 3:
+        a, b = 0.12, 0.2
+        # Vertical forces at (+-a, +-b) with sum F_z and moments M_x = b(z1+z2-z3-z4), M_y = a(-z1+z2+z3-z4).
+        mx, my, mz = sign * MOMENT_TRANSDUCER_P
+        z = np.array([[1, 1, 1, 1], [b, b, -b, -b], [-a, a, a, -a], [1, -1, 1, -1]])
+        z14 = np.linalg.solve(z, [f[2], mx, my, 0.0])
+        # f_y14 = f_y23, and the rest of M_z = b(x34 - x12) + a(y14 - y23) comes from x12, x34.
+        x34 = 0.5 * (f[0] + mz / b)
+        values = [f[0] - x34, x34, f[1] / 2, f[1] / 2, *z14]
+    else:
+        values = [*f, *m]
+    return np.repeat(np.array(values, dtype=float)[:, None], T * PER_FRAME, axis=1)
+
+
+def origin_of(kind: int, depth_sign: float = -1.0) -> list[float]:
+    return [120.0, 200.0, depth_sign * 40.0] if kind == 3 else [0.0, 0.0, depth_sign * 40.0]
+
+
+def turned(turn: np.ndarray) -> np.ndarray:
+    return np.asarray(1e3 * (CENTRE + LOCAL_CORNERS @ turn.T))
+
+
+def expected_wrench(turn: np.ndarray) -> np.ndarray:
+    force = turn @ FORCE_P
+    return np.concatenate([force, turn @ MOMENT_CENTRE_P + np.cross(CENTRE, force)])
+
+
+def test_moment_by_hand() -> None:
+    np.testing.assert_allclose(MOMENT_CENTRE_P, [80, 40, 4])
+    # (1, 2, 0.1) x (10, 20, 800) = (1598, -799, 0), and (80, -40, -4) of the plate in laboratory axes
+    np.testing.assert_allclose(expected_wrench(R_LP), [10, 20, 800, 1678, -839, -4])
+
+
+@pytest.mark.parametrize("kind", [1, 2, 3, 4])
+@pytest.mark.parametrize("sign", [1.0, -1.0], ids=["reaction", "action"])
+@pytest.mark.parametrize("depth_sign", [1.0, -1.0])
+@pytest.mark.parametrize("turn_deg", [0.0, 26.0])
+def test_all_four_types(tmp_path: Path, kind: int, sign: float, depth_sign: float, turn_deg: float) -> None:
+    c, s = np.cos(np.radians(turn_deg)), np.sin(np.radians(turn_deg))
+    turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ R_LP
+    path = write_c3d(
+        tmp_path / "a.c3d",
+        body(turn),
+        kinds=[kind],
+        channels=channels_of(kind, sign),
+        corners=[turned(turn)],
+        origins=[origin_of(kind, depth_sign)],
+        calibration=np.eye(6),
+    )
+    recording = read(path)
+    (plate,) = recording.plates
+    wrench = np.hstack([plate.force, plate.moment])
+    np.testing.assert_allclose(wrench, np.tile(expected_wrench(turn), (T, 1)), rtol=1e-5, atol=2e-2)
+    np.testing.assert_allclose(plate.cop, np.tile(CENTRE + turn @ POINT_P, (T, 1)), atol=1e-5)
+    np.testing.assert_allclose(plate.free_moment, np.tile(turn @ FREE_P, (T, 1)), atol=1e-3)
+    assert plate.corners is not None
+    np.testing.assert_allclose(plate.corners, CENTRE + LOCAL_CORNERS @ turn.T, atol=1e-6)
+    assert any("person's action" in note for note in recording.notes) == (sign < 0)
+
+
+def test_type_4_calibration_mixes_channels(tmp_path: Path) -> None:
+    calibration = np.diag([500.0, 500, 1000, 2e5, 3e5, 1e5])
+    calibration[0, 2] = 12.0  # asymmetric: rows are outputs
+    path = write_c3d(
+        tmp_path / "a.c3d",
+        body(),
+        kinds=[4],
+        channels=np.linalg.solve(calibration, channels_of(4)),
+        corners=[turned(R_LP)],
+        origins=[origin_of(4)],
+        calibration=calibration,
+        analog_units=["V"] * 6,
+    )
+    np.testing.assert_allclose(read(path).total_wrench()[5], expected_wrench(R_LP), rtol=1e-5, atol=1e-2)
+
+
+def test_units_of_channels_and_metres(tmp_path: Path) -> None:
+    channels = channels_of(2)
+    channels[3:] *= 1e-3
+    points = {name: 1e-3 * values for name, values in body().items()}
+    path = write_c3d(
+        tmp_path / "a.c3d",
+        points,
+        unit="m",
+        kinds=[2],
+        channels=channels,
+        corners=[1e-3 * turned(R_LP)],
+        origins=[[0, 0, -DEPTH]],
+        analog_units=["N"] * 3 + ["Nm"] * 3,
+    )
+    recording = read(path)
+    assert recording.length_unit == "m"
+    np.testing.assert_allclose(recording.total_wrench()[0], expected_wrench(R_LP), rtol=1e-5, atol=1e-2)
+    mixed = write_c3d(
+        tmp_path / "b.c3d",
+        body(),
+        kinds=[2],
+        channels=channels,
+        corners=[turned(R_LP)],
+        origins=[origin_of(2)],
+        analog_units=["N"] * 3 + ["N.m"] * 3,
+    )
+    np.testing.assert_allclose(read(mixed).total_wrench()[0], expected_wrench(R_LP), rtol=1e-5, atol=1e-2)
+
+
+def test_each_plate_is_kept_and_an_idle_one_is_zero(tmp_path: Path) -> None:
+    idle = np.full_like(channels_of(2), 0.0)
+    idle[2] = -6.0  # an offset below the threshold
+    shifted = turned(R_LP) + np.array([0, 700.0, 0])
+    path = write_c3d(
+        tmp_path / "a.c3d",
+        body(),
+        kinds=[2, 2],
+        channels=np.vstack([channels_of(2), idle]),
+        corners=[turned(R_LP), shifted],
+        origins=[origin_of(2), origin_of(2)],
+    )
+    recording = read(path)
+    assert [plate.name for plate in recording.plates] == ["plate 1", "plate 2"]
+    np.testing.assert_array_equal(recording.plates[1].force, 0.0)
+    np.testing.assert_array_equal(recording.plates[1].moment, 0.0)
+    assert np.isnan(recording.plates[1].cop).all()
+    assert any("plate 2 reads 6 N where nobody stands" in note for note in recording.notes)
+    kept = read(path, force_threshold_n=0.0)
+    np.testing.assert_allclose(kept.plates[1].force[:, 2], 6.0, rtol=1e-5)
+
+
+@settings(max_examples=15, deadline=None)
+@given(angles=st.tuples(*[st.floats(-3.0, 3.0)] * 3))
+def test_turning_the_plate_turns_its_wrench(
+    tmp_path_factory: pytest.TempPathFactory, angles: tuple[float, ...]
+) -> None:
+    """The wrench about the plate's own centre, in its own axes, does not depend on how it lies in the
+    laboratory."""
+    from scipy.spatial.transform import Rotation
+
+    turn = Rotation.from_euler("xyz", angles).as_matrix()
+    path = write_c3d(
+        tmp_path_factory.mktemp("turned") / "a.c3d",
+        body(turn),
+        kinds=[2],
+        channels=channels_of(2),
+        corners=[turned(turn)],
+        origins=[origin_of(2)],
+    )
+    recording = read(path)
+    wrench = recording.total_wrench(about=CENTRE)[0]
+    np.testing.assert_allclose(turn.T @ wrench[:3], FORCE_P, atol=1e-2)
+    np.testing.assert_allclose(turn.T @ wrench[3:], MOMENT_CENTRE_P, atol=1e-2)
+
+
+def test_markers_missing_unlabelled_and_prefixed(tmp_path: Path) -> None:
+    base = np.tile([100.0, 200.0, 300.0], (T, 1))
+    seen = base.copy()
+    seen[3] = 0.0
+    residuals = np.zeros((3, T))
+    residuals[1, 5] = -1
+    points = {"S1:LASI": seen, "S1:RASI": base + 1, "*12": base + 2}
+    path = write_c3d(tmp_path / "a.c3d", points, residuals=residuals)
+    recording = read(path)
+    assert recording.marker_names == ("S1:LASI", "S1:RASI")
+    assert np.isnan(recording.marker("S1:LASI")[3]).all()
+    assert np.isnan(recording.marker("S1:RASI")[5]).all()
+    assert np.isnan(recording.markers).sum() == 6
+    np.testing.assert_allclose(recording.marker("S1:LASI")[0], [0.1, 0.2, 0.3])
+    assert any("1 unlabelled points left out" in note for note in recording.notes)
+    assert recording.plates == ()
+    assert any("no force plates" in note for note in recording.notes)
+    with pytest.raises(RecordingError, match="no force plates"):
+        recording.total_wrench()
+
+
+def test_files_that_are_no_c3d(tmp_path: Path) -> None:
+    with pytest.raises(RecordingError, match="no such file"):
+        read(tmp_path / "none.c3d")
+    for text in ("", "P", "not a C3D at all " * 100):
+        path = write(tmp_path, "a.c3d", text)
+        with pytest.raises(RecordingError) as caught:
+            read(path)
+        assert str(caught.value).startswith(f"{path}: is not a C3D file")
+
+
+@pytest.mark.parametrize("share", [0.02, 0.3, 0.6, 0.95])
+def test_truncated_file_is_one_clear_error(tmp_path: Path, share: float) -> None:
+    whole = write_c3d(tmp_path / "a.c3d", {f"M{k}": np.ones((200, 3)) + k for k in range(10)})
+    data = whole.read_bytes()
+    cut = tmp_path / "cut.c3d"
+    cut.write_bytes(data[: int(share * len(data))])
+    with pytest.raises(RecordingError, match=r"truncated C3D file, found \d+ bytes, ") as caught:
+        read(cut)
+    assert "\n" not in str(caught.value)
+
+
+def test_plates_that_cannot_be_understood(tmp_path: Path) -> None:
+    common = {"channels": channels_of(2), "corners": [turned(R_LP)], "origins": [origin_of(2)]}
+    with pytest.raises(RecordingError, match=r"plate 1 has type 7, expected a force plate of type 1 to 4"):
+        read(write_c3d(tmp_path / "a.c3d", body(), kinds=[7], **common))  # type: ignore[arg-type]
+    with pytest.raises(RecordingError, match="CAL_MATRIX has 0 numbers, plate 1 needs 36"):
+        read(write_c3d(tmp_path / "b.c3d", body(), kinds=[4], **common))  # type: ignore[arg-type]
+    with pytest.raises(
+        RecordingError, match=r"plate 1 lists channels \[1, 2, 3, 4, 5, 6, 7, 8\], expected 8 of 1 to 6"
+    ):
+        read(write_c3d(tmp_path / "c.c3d", body(), kinds=[3], **common))  # type: ignore[arg-type]
+    common["corners"] = [np.zeros((4, 3))]
+    recording = read(write_c3d(tmp_path / "d.c3d", body(), kinds=[2], **common))  # type: ignore[arg-type]
+    assert recording.plates == ()
+    assert any("plate 1 left out" in note for note in recording.notes)
+
+
+def test_causal_reading_says_its_delay(tmp_path: Path) -> None:
+    path = write_c3d(
+        tmp_path / "a.c3d",
+        body(),
+        kinds=[2],
+        channels=channels_of(2),
+        corners=[turned(R_LP)],
+        origins=[origin_of(2)],
+    )
+    recording = read(path, causal=True, plate_filter_hz=20.0)
+    np.testing.assert_allclose(recording.total_wrench()[7], expected_wrench(R_LP), rtol=1e-5, atol=2e-2)
+    assert any("ms late" in note for note in recording.notes)
+    with pytest.raises(RecordingError, match="expected less than 500 Hz"):
+        read(path, plate_filter_hz=600.0)

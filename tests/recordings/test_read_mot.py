@@ -1,0 +1,216 @@
+"""MOT and STO tables, ground forces in them, and bringing these to the markers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from made_recordings import TRC_TOP, grf_text, plain, write
+
+from dynakin.errors import RecordingError
+from dynakin.recordings import attach_forces, plates_from_table, read, read_table
+from dynakin.recordings.grf_columns import parse_column
+from dynakin.recordings.options import ReadOptions
+
+QUANTITIES = {"vx": 10.0, "vy": 700.0, "vz": -20.0, "px": 0.2, "py": 0.01, "pz": 0.3}
+WRENCH_MOMENT = np.cross([0.2, 0.01, 0.3], [10.0, 700.0, -20.0]) + np.array([0.0, 5.0, 0.0])
+
+
+def trc(folder: Path, n_frames: int, start_s: float = 0.0) -> Path:
+    rows = "".join(f"{k + 1}\t{start_s + k / 100:.4f}\t1\t2\t3\t4\t5\t6\n" for k in range(n_frames))
+    return write(folder, "trial.trc", TRC_TOP + rows)
+
+
+def single(time: np.ndarray) -> str:
+    columns = {f"ground_force_{key}": value for key, value in QUANTITIES.items()}
+    return grf_text(time, {**columns, "ground_torque_x": 0.0, "ground_torque_y": 5.0, "ground_torque_z": 0.0})
+
+
+OLD = "name trial\ndatacolumns 3\ndatarows 2\nrange 0 0.01\nendheader\ntime knee tx\n0 90 1\n0.01 180 2\n"
+NEW = (
+    "Coordinates\nversion=1\nnRows=2\nnColumns=3\ninDegrees=yes\n\nUnits are S.I.\nendheader\n"
+    "time\tknee\ttx\n0\t90\t1\n0.01\t180\t2\n"
+)
+MIXED = (
+    "squat.mot\nnRows = 2\nnColumns = 3\nINDEGREES = no\nEndHeader\n\n"
+    "Time\tknee\ttx\t\n0\t90\t1\t\n0.01\t180\t2\t\n"
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "degrees"), [(OLD, None), (NEW, True), (MIXED.replace("\n", "\r\n"), False)]
+)
+def test_all_headers(tmp_path: Path, text: str, degrees: bool | None) -> None:
+    table = read_table(write(tmp_path, "a.mot", text))
+    assert table.names == ("knee", "tx")
+    assert table.in_degrees is degrees
+    np.testing.assert_array_equal(table.time, [0, 0.01])
+    np.testing.assert_array_equal(table.column("knee"), [90, 180])
+    assert table.notes == ()
+
+
+def test_degrees_become_radians_but_translations_stay(tmp_path: Path) -> None:
+    table = read_table(write(tmp_path, "a.mot", NEW)).radians(["knee"])
+    np.testing.assert_allclose(table.column("knee"), [np.pi / 2, np.pi])
+    np.testing.assert_array_equal(table.column("tx"), [1, 2])
+    already = read_table(write(tmp_path, "b.mot", MIXED)).radians(["knee"])
+    np.testing.assert_array_equal(already.column("knee"), [90, 180])
+    with pytest.raises(RecordingError, match="inDegrees"):
+        read_table(write(tmp_path, "c.mot", OLD)).radians(["knee"])
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        (NEW.replace("nRows=2", "nRows=9"), ["found 2 rows", "expected the 9"]),
+        (NEW.replace("0.01\t180\t2", "0.01\t180"), ["line 11", "found 2 columns", "expected 3"]),
+        (NEW.replace("\ttx", "\tknee"), ["'knee'", "more than once"]),
+        (NEW.replace("0.01\t180", "0\t180"), ["line 11", "increasing"]),
+        (NEW.replace("time\tknee", "knee\ttime"), ["line 9", "found column 'knee' first"]),
+        (NEW.replace("inDegrees=yes", "inDegrees=maybe"), ["inDegrees=maybe", "yes or no"]),
+        ("nothing here\n", ["not a MOT or STO"]),
+    ],
+)
+def test_bad_tables(tmp_path: Path, text: str, words: list[str]) -> None:
+    with pytest.raises(RecordingError) as caught:
+        read_table(write(tmp_path, "a.mot", text))
+    for word in [*words, "a.mot"]:
+        assert word in str(caught.value)
+
+
+def test_more_rows_than_the_header_says_are_used_and_said(tmp_path: Path) -> None:
+    table = read_table(write(tmp_path, "a.mot", NEW.replace("nRows=2", "nRows=1")))
+    assert len(table.time) == 2
+    assert "holds 2" in table.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("ground_force_vx", ("", "force", "x")),
+        ("1_ground_force_vy", ("1", "force", "y")),
+        ("ground_force_1_vz", ("1", "force", "z")),
+        ("ground_force2_px", ("2", "point", "x")),
+        ("l_ground_force_py", ("l", "point", "y")),
+        ("R_ground_force_pz", ("r", "point", "z")),
+        ("ground_force_vx_r", ("r", "force", "x")),
+        ("ground_force_calcn_r_vx", ("calcn_r", "force", "x")),
+        ("FP1_vx", ("1", "force", "x")),
+        ("FP2.Fy", ("2", "force", "y")),
+        ("FP2_mz", ("2", "torque", "z")),
+        ("ground_torque_x", ("", "torque", "x")),
+        ("1_ground_torque_y", ("1", "torque", "y")),
+        ("ground_torque_1_z", ("1", "torque", "z")),
+        ("ground_torque2_x", ("2", "torque", "x")),
+        ("ground_force_1_mx", ("1", "torque", "x")),
+        ("ground_moment_l_my", ("l", "torque", "y")),
+        ("l_ground_moment_z", ("l", "torque", "z")),
+        ("pelvis_tx", None),
+        ("RKNE_x", None),
+        ("ground_force_x", None),
+        ("knee_angle_r", None),
+    ],
+)
+def test_spellings(name: str, expected: tuple[str, str, str] | None) -> None:
+    assert parse_column(name) == expected
+
+
+@pytest.mark.parametrize("style", [
+    ("{p}_ground_force_{q}", "{p}_ground_torque_{a}"),
+    ("ground_force_{p}_{q}", "ground_force_{p}_m{a}"),
+    ("ground_force{p}_{q}", "ground_torque{p}_{a}"),
+    ("FP{p}_{q}", "FP{p}_t{a}"),
+])  # fmt: skip
+def test_plates_of_every_spelling(tmp_path: Path, style: tuple[str, str]) -> None:
+    columns: dict[str, float] = {}
+    for p, gain in (("1", 1.0), ("2", 2.0)):
+        for q, value in QUANTITIES.items():
+            columns[style[0].format(p=p, q=q)] = value * (gain if q[0] == "v" else 1)
+        for a, value in zip("xyz", (0.0, 5.0, 0.0), strict=True):
+            columns[style[1].format(p=p, a=a)] = value * gain
+    path = write(tmp_path, "a.mot", grf_text(np.arange(3) / 100, columns))
+    plates, notes = plates_from_table(read_table(path))
+    assert [plate.name for plate in plates] == ["plate 1", "plate 2"]
+    assert notes == ()
+    for plate, gain in zip(plates, (1.0, 2.0), strict=True):
+        np.testing.assert_allclose(plate.force[0], gain * np.array([10, 700, -20]))
+        np.testing.assert_allclose(plate.moment[0], gain * WRENCH_MOMENT)
+        np.testing.assert_allclose(plate.cop[0], [0.2, 0.01, 0.3])
+        np.testing.assert_allclose(plate.free_moment[0], [0, gain * 5, 0])
+
+
+def test_same_rate_passes_through_untouched(tmp_path: Path) -> None:
+    text = single(np.arange(5) / 100).replace("700", "3.25")  # less than the threshold
+    recording = read(trc(tmp_path, 5), write(tmp_path, "a.mot", text))
+    (plate,) = recording.plates
+    np.testing.assert_array_equal(plate.force, np.tile([10.0, 3.25, -20.0], (5, 1)))
+    assert not [note for note in recording.notes if "brought to" in note]
+    assert recording.path is not None
+    zeroed = read(recording.path, tmp_path / "a.mot", force_threshold_n=25.0)
+    np.testing.assert_array_equal(zeroed.plates[0].force, 0.0)
+    assert np.isnan(zeroed.plates[0].cop).all()
+
+
+@pytest.mark.parametrize("rate", [1000.0, 1200.0, 333.0])
+def test_higher_rates_are_resampled(tmp_path: Path, rate: float) -> None:
+    time = np.arange(-0.2, 1.3, 1 / rate)
+    slow = 700 + 50 * np.sin(2 * np.pi * 3 * time)
+    columns = {f"FP1_{key}": value for key, value in QUANTITIES.items()} | {"FP1_vy": slow}
+    columns |= {"FP1_mx": 0.0, "FP1_my": 5.0, "FP1_mz": 0.0}
+    recording = read(trc(tmp_path, 101), write(tmp_path, "a.mot", grf_text(time, columns)))
+    (plate,) = recording.plates
+    expected = 700 + 50 * np.sin(2 * np.pi * 3 * recording.time)
+    np.testing.assert_allclose(plate.force[:, 1], expected, atol=0.15)
+    np.testing.assert_allclose(plate.force[:, 0], 10, atol=1e-2)
+    np.testing.assert_allclose(plate.cop, np.tile([0.2, 0.01, 0.3], (101, 1)), atol=1e-3)
+    np.testing.assert_allclose(plate.free_moment[:, 1], 5, atol=5e-2)
+    assert any("brought to" in note for note in recording.notes)
+
+
+def test_longer_table_at_the_same_rate_is_cut_exactly(tmp_path: Path) -> None:
+    text = single(np.arange(40) / 100)
+    recording = read(trc(tmp_path, 11, start_s=0.1), write(tmp_path, "a.mot", text))
+    np.testing.assert_allclose(recording.plates[0].force, np.tile([10.0, 700.0, -20.0], (11, 1)))
+    np.testing.assert_allclose(recording.plates[0].moment[4], WRENCH_MOMENT)
+
+
+@pytest.mark.parametrize(
+    ("time", "what"),
+    [
+        (np.arange(50) / 100, "do not cover"),
+        (np.arange(50) / 1000, "do not cover"),
+        (0.5 + np.arange(200) / 100, "do not cover"),
+        (np.arange(51) / 50, "sampled more slowly"),
+    ],
+)
+def test_forces_that_do_not_fit_name_both_lengths_and_ranges(
+    tmp_path: Path, time: np.ndarray, what: str
+) -> None:
+    with pytest.raises(RecordingError) as caught:
+        read(trc(tmp_path, 101), write(tmp_path, "a.mot", single(time)))
+    message = str(caught.value)
+    assert what in message
+    assert f"{len(time)} rows from {time[0]:g} s to {time[-1]:g} s" in message
+    assert "101 frames from 0 s to 1 s" in message
+
+
+def test_table_without_forces_and_plate_without_point(tmp_path: Path) -> None:
+    path = trc(tmp_path, 2)
+    with pytest.raises(
+        RecordingError, match="no ground force columns, expected names such as ground_force_vx"
+    ):
+        read(path, write(tmp_path, "a.mot", NEW))
+    text = single(np.arange(2) / 100).replace("ground_force_py", "height")
+    with pytest.raises(RecordingError, match="has no point y, expected columns px, py, pz"):
+        read(path, write(tmp_path, "b.mot", text))
+    with pytest.raises(RecordingError, match=r"found extension '\.txt'"):
+        read(path, write(tmp_path, "c.txt", text))
+
+
+def test_plates_without_free_moment_are_said(tmp_path: Path) -> None:
+    columns = {f"ground_force_{key}": value for key, value in QUANTITIES.items()}
+    table = read_table(write(tmp_path, "a.mot", grf_text(np.arange(3) / 100, columns)))
+    recording = attach_forces(plain(3), table, ReadOptions())
+    np.testing.assert_allclose(recording.plates[0].moment[0], WRENCH_MOMENT - [0, 5, 0])
+    assert any("no free moment" in note for note in recording.notes)
