@@ -1,0 +1,82 @@
+"""A model that is chosen but not yet measured: its file, the subject, the marker set and the table."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+
+from dynakin.errors import ModelError
+from dynakin.model.marker_schema import MarkerSetFile
+from dynakin.model.marker_set import load_marker_set
+from dynakin.model.schema import ModelFile
+from dynakin.model.subject import Subject
+from dynakin.model.table import BodyTable, load_table
+from dynakin.model.validation import nearest, read_toml, validate
+
+_FOLDER = resources.files("dynakin.model") / "builtin"
+
+
+def available_models() -> list[str]:
+    """Names of the built-in models."""
+    return sorted(
+        entry.name.removesuffix(".toml") for entry in _FOLDER.iterdir() if entry.name.endswith(".toml")
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class ModelDefinition:
+    """What ``load_model`` returns; ``initialise`` measures it on a recording.
+
+    Attributes:
+        model: the model file.
+        path: where it came from.
+        subject: mass, height, sex, as far as they are told.
+        marker_set: None: chosen by the recording's markers.
+        table: inertial parameters for the subject's sex.
+    """
+
+    model: ModelFile
+    path: Path
+    subject: Subject
+    marker_set: MarkerSetFile | None
+    table: BodyTable
+
+    @property
+    def name(self) -> str:
+        """The model's name."""
+        return self.model.name
+
+
+def load_model(
+    name_or_path: str | Path,
+    subject: Subject | None = None,
+    markers: str | Path = "auto",
+    table: str | Path = "dumas",
+) -> ModelDefinition:
+    """A built-in model ("sagittal7", "squat7") or a TOML file, with the subject, marker set and table to use.
+
+    Args:
+        subject: who is measured; nothing is known where not given.
+        markers: "auto" (by the recording's names), a built-in set ("opencap", "plug-in-gait"), or a TOML
+            file.
+        table: "dumas", "deleva" or a CSV file of the same shape.
+
+    Raises:
+        ModelError: an unknown name (the nearest is suggested), or a wrong file (file and key are named).
+    """
+    name, known = str(name_or_path), available_models()
+    path = Path(str(_FOLDER / f"{name}.toml")) if name in known else Path(name)
+    if name not in known and (path.suffix != ".toml" or not path.exists()):
+        raise ModelError(
+            f"model {name!r}: unknown{nearest(name, known)}; expected {', '.join(known)} or a .toml file "
+            "that exists"
+        )
+    model = validate(ModelFile, read_toml(path), str(path))
+    who = subject or Subject()
+    body = load_table(table, who.sex)
+    for segment in model.segments:
+        for part in segment.parts:
+            body.part(part)  # a misspelt part is said now, with the table's own names
+    marker_set = None if str(markers) == "auto" else load_marker_set(markers)
+    return ModelDefinition(model, path, who, marker_set, body)

@@ -1,0 +1,78 @@
+"""Measures a model on a recording, as the paper does: lengths and marker places from the first (or standing)
+frames, inertia from the table, coordinates from the landmarks."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynakin.model.definition import ModelDefinition
+from dynakin.model.initial import InitialModel
+from dynakin.model.measure import measure
+from dynakin.model.priors import Bounds, Priors
+from dynakin.recordings import GroundFrame, Recording
+
+
+def initialise(
+    definition: ModelDefinition,
+    recording: Recording,
+    ground: GroundFrame | None = None,
+    *,
+    static: Recording | None = None,
+    side: str = "auto",
+    vertical: str = "auto",
+    forward: str | tuple[float, float, float] = "auto",
+    priors: Priors | None = None,
+    bounds: Bounds | None = None,
+) -> InitialModel:
+    """Fill a model with what a recording tells of the person.
+
+    Args:
+        ground: directions of the ground frame; found in the recording (``vertical``, ``forward``) where not
+            given. Its origin is replaced by the model's ground landmark.
+        static: a recording of the same person and markers, standing; lengths and marker places come from it.
+        side: limb markers of a lumped model: "right", "left", "both" (separate sites), "auto" (fewest gaps,
+            right on a tie).
+        priors, bounds: other numbers than the defaults of ``dynakin.model.priors``.
+
+    Raises:
+        ModelError: the model, the markers and the recording do not fit; one line says what was found and
+            expected.
+    """
+    plan, rest = measure(
+        definition, recording, ground, static=static, side=side, vertical=vertical, forward=forward
+    )
+    from dynakin import _core  # the core is needed from here on only
+    from dynakin.model.spec import in_layout, to_core
+
+    spec = to_core(plan)
+    core = _core.Model(spec)
+    names = list(core.layout.names)
+    limits = plan.bounds(bounds or Bounds())
+    x0 = np.array(core.initial_state(), dtype=float)
+    lower = in_layout(names, {name: pair[0] for name, pair in limits.items()}, -np.inf)
+    upper = in_layout(names, {name: pair[1] for name, pair in limits.items()}, np.inf)
+    outside = (x0 < lower) | (x0 > upper)
+    messages = list(rest.messages)
+    for k in np.flatnonzero(outside):
+        messages.append(
+            f"Start of {names[k]} ({x0[k]:.3f}) lies beyond its bounds {lower[k]:.3f} to {upper[k]:.3f}: "
+            "put on the bound."
+        )
+    return InitialModel(
+        spec=spec,
+        names=tuple(names),
+        x0=np.clip(x0, lower, upper),
+        sd0=in_layout(names, plan.prior(priors or Priors()), np.nan),
+        lower=lower,
+        upper=upper,
+        table=in_layout(names, plan.table_values(), np.nan),
+        marker_variance=np.array([site.variance for site in plan.sites]),
+        ground=rest.ground,
+        recorded_markers=tuple(site.recorded for site in plan.sites),
+        side=rest.side,
+        mass_kg=rest.mass_kg,
+        height_m=rest.height_m,
+        parts=rest.parts,
+        messages=tuple(messages),
+        plan=plan,
+    )

@@ -1,0 +1,182 @@
+"""What a marker set file (TOML) may hold: markers with aliases, segments and variances; landmarks as
+recipes."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from dynakin.model.subject import Sex
+from dynakin.model.validation import Strict, nearest
+
+Vector3 = tuple[float, float, float]
+
+
+class Marker(Strict):
+    """One marker of the set: where it sits, under which names recordings know it, how far its place is
+    trusted."""
+
+    name: str
+    segment: str = ""  # a part of the body or a segment of the model; unused for landmark_only
+    right: tuple[str, ...] = ()
+    left: tuple[str, ...] = ()
+    centre: tuple[str, ...] = ()
+    variance: Annotated[float, Field(gt=0.0)] | None = None  # m^2, R of the measurement
+    reason: str = ""
+    landmark_only: bool = False  # virtual, or used for a joint centre only
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        if not (self.right or self.left or self.centre):
+            raise ValueError("expected aliases in right, left or centre")
+        if self.centre and (self.right or self.left):
+            raise ValueError("a marker is either in the centre or on the sides, not both")
+        if not self.landmark_only and (self.variance is None or not self.segment):
+            raise ValueError("segment and variance are needed (or landmark_only = true)")
+        return self
+
+    def aliases(self, side: str) -> tuple[str, ...]:
+        """Names under which a recording may have it on "right", "left" or in the "centre"."""
+        return {"right": self.right, "left": self.left, "centre": self.centre}[side]
+
+
+class PelvisCoefficients(Strict):
+    """Centre = mid ASIS + pelvis axes * (width * ASIS distance + depth * mid ASIS to mid PSIS + constant)."""
+
+    width: Vector3 = (0.0, 0.0, 0.0)
+    depth: Vector3 = (0.0, 0.0, 0.0)
+    constant_m: Vector3 = (0.0, 0.0, 0.0)
+
+
+class PelvisRegression(Strict):
+    """A joint centre in the ISB pelvis frame (X forward in the plane of ASIS and mid PSIS, Z to the
+    right)."""
+
+    asis: str
+    psis: str
+    male: PelvisCoefficients
+    female: PelvisCoefficients
+
+
+class PolarCoefficients(Strict):
+    """Distance in units of the scale, and the turn of its direction about Z (right), positive from X to Y."""
+
+    coefficient: float
+    angle_deg: float
+
+
+class PolarRegression(Strict):
+    """A joint centre at a distance and angle from a marker in the sagittal plane."""
+
+    origin: str
+    along: tuple[str, str]
+    scale: tuple[str, str]
+    male: PolarCoefficients
+    female: PolarCoefficients
+
+
+class Fraction(Strict):
+    """A point on the line between two landmarks, as a fraction from the first."""
+
+    between: tuple[str, str]
+    male: float
+    female: float
+
+
+class Recipe(Strict):
+    """One way to find a landmark: mean of markers or landmarks, a regression, or a proportion of a line."""
+
+    mean: tuple[str, ...] | None = None
+    sides: Literal["own", "both", "right", "left"] = "own"  # "right", "left": that side whatever side is used
+    pelvis: PelvisRegression | None = None
+    polar: PolarRegression | None = None
+    fraction: Fraction | None = None
+    source: str = ""
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        given = [key for key in ("mean", "pelvis", "polar", "fraction") if getattr(self, key) is not None]
+        if len(given) != 1:
+            raise ValueError(
+                f"exactly one of mean, pelvis, polar, fraction expected, found {given or 'none'}"
+            )
+        if given[0] != "mean" and self.sides == "both":
+            raise ValueError("sides = 'both' is possible with mean only")
+        if given[0] != "mean" and not self.source:
+            raise ValueError(f'{given[0]}: a regression needs its source = "..."')
+        return self
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Markers and landmarks it starts from."""
+        if self.mean is not None:
+            return self.mean
+        if self.pelvis is not None:
+            return (self.pelvis.asis, self.pelvis.psis)
+        if self.polar is not None:
+            return (self.polar.origin, *self.polar.along, *self.polar.scale)
+        assert self.fraction is not None
+        return self.fraction.between
+
+
+class MarkerSetFile(Strict):
+    """A whole marker set."""
+
+    schema_version: Literal[1]
+    name: str
+    description: str = ""
+    heel_toe: tuple[str, str] | None = None  # markers that tell where the person faces: foot,
+    pelvis_back_front: tuple[str, str] | None = None  # and pelvis
+    height_marker: str = ""  # marker whose height over the floor gives the body height if none is told
+    height_fraction: Annotated[float, Field(gt=0.0, lt=1.5)] | None = None
+    height_source: str = ""
+    markers: Annotated[tuple[Marker, ...], Field(min_length=1)]
+    landmarks: dict[str, tuple[Recipe, ...]]
+
+    @model_validator(mode="after")
+    def _references(self) -> Self:
+        names = [marker.name for marker in self.markers]
+        for name in names:
+            if names.count(name) > 1:
+                raise ValueError(f"markers: the name {name!r} is given twice")
+            if name in self.landmarks:
+                raise ValueError(f"landmarks: {name!r} is also the name of a marker")
+        known = {*names, *self.landmarks}
+        for landmark, recipes in self.landmarks.items():
+            if not recipes:
+                raise ValueError(f"landmarks.{landmark}: no recipe")
+            for recipe in recipes:
+                for source in recipe.inputs:
+                    if source not in known:
+                        raise ValueError(
+                            f"landmarks.{landmark}: {source!r} is neither marker nor "
+                            f"landmark{nearest(source, known)}"
+                        )
+        self._refuse_circles()
+        for key in ("heel_toe", "pelvis_back_front", "height_marker"):
+            value = getattr(self, key) or ()
+            for name in (value,) if isinstance(value, str) else value:
+                if name not in names:
+                    raise ValueError(f"{key}: no marker {name!r}{nearest(name, names)}")
+        return self
+
+    def _refuse_circles(self) -> None:
+        def visit(name: str, above: tuple[str, ...]) -> None:
+            if name in above:
+                raise ValueError(f"landmarks: {' -> '.join((*above, name))} is a circle")
+            for recipe in self.landmarks.get(name, ()):
+                for source in recipe.inputs:
+                    visit(source, (*above, name))
+
+        for name in self.landmarks:
+            visit(name, ())
+
+    def marker(self, name: str) -> Marker:
+        """The marker of that name (it exists: references are checked)."""
+        return next(marker for marker in self.markers if marker.name == name)
+
+
+def by_sex(male: float, female: float, sex: Sex | None) -> float:
+    """The number for one sex, or the mean of both where the sex is not given."""
+    return male if sex == "male" else female if sex == "female" else 0.5 * (male + female)

@@ -1,0 +1,209 @@
+"""Measures a model on a recording without the compiled core: lengths, marker places, inertia, first
+posture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.errors import ModelError
+from dynakin.model.body import find_height, find_mass
+from dynakin.model.checks import check_masses, fixed_lengths, reach, refuse_moving_origin, report
+from dynakin.model.definition import ModelDefinition
+from dynakin.model.frames import Trial, choose_side
+from dynakin.model.landmarks import LandmarkFinder
+from dynakin.model.lumping import PlacedPart, segment_bodies
+from dynakin.model.marker_set import MarkerKey, MarkerMatch, choose_marker_set, match_markers
+from dynakin.model.plan import ModelPlan
+from dynakin.model.posture import Geometry, Posture, find_geometry, find_posture, frame_landmarks
+from dynakin.model.schema import ModelFile
+from dynakin.model.sites import candidates, find_locks, place_sites
+from dynakin.recordings import GroundFrame, Recording, find_ground_frame
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What ``measure`` found beside the plan itself; attributes as in ``InitialModel``."""
+
+    ground: GroundFrame
+    side: str
+    mass_kg: float
+    height_m: float | None
+    parts: dict[str, list[PlacedPart]]
+    messages: tuple[str, ...]
+
+
+def measure(
+    definition: ModelDefinition,
+    recording: Recording,
+    ground: GroundFrame | None = None,
+    *,
+    static: Recording | None = None,
+    side: str = "auto",
+    vertical: str = "auto",
+    forward: str | tuple[float, float, float] = "auto",
+) -> tuple[ModelPlan, Measured]:
+    """All of ``initialise`` that needs no compiled core; arguments and errors as there."""
+    model, subject, messages = definition.model, definition.subject, []
+    marker_set = definition.marker_set or choose_marker_set(recording.marker_names)
+    if definition.marker_set is None:
+        messages.append(f"Marker set {marker_set.name}: chosen by the recording's marker names.")
+
+    def matched(entry: Recording, frame: GroundFrame | None) -> Trial:
+        seen = [bool(np.isfinite(entry.marker(name)).all(axis=1).any()) for name in entry.marker_names]
+        match = match_markers(marker_set, entry.marker_names, seen, str(entry.path or entry.name))
+        found = frame or find_ground_frame(
+            entry, vertical=vertical, forward=forward, pairs=match.facing_pairs
+        )
+        return Trial.of(entry, match, found)
+
+    trial = matched(recording, ground)
+    messages += trial.ground.how
+    side, how = choose_side(trial.match, recording, side)
+    messages.append(how)
+    chosen, left_out = candidates(model, trial.match, side)
+    locks, bare, locked = find_locks(model, trial.match, chosen)
+    messages += left_out + locked
+
+    source = trial if static is None else matched(static, None)
+    finder = LandmarkFinder(_common(trial.match, source.match), side, subject.sex, model.planar)
+    needed = needed_markers(model, finder, locks)
+    refuse_moving_origin(model, trial, finder)
+    wished = needed | table_markers(definition, finder)
+    frames, which = trial.calibration_frames(needed, wished)
+    trial = _at_origin(model, trial, finder, frames)
+    if static is not None:
+        frames, which = source.calibration_frames(needed, wished)
+    source = trial if static is None else _at_origin(model, source, finder, frames)
+    messages.append(f"Lengths and marker places: {which}.")
+    standing = source.median(frames)
+    landmarks = finder.find(standing)
+
+    mass_kg, how = find_mass(subject, [source, trial] if static is not None else [trial])
+    messages.append(how)
+    height_m, how = find_height(subject, [r for r in (static, recording) if r is not None], source)
+    messages.append(how)
+    if subject.sex is None:
+        messages.append(
+            "Sex not given: regressions and table are the mean of both sexes (masses, centres, signed "
+            "tensors)."
+        )
+
+    unmeasured = _unmeasured_lengths(definition, landmarks, height_m, messages)
+    geometry, posture = find_geometry(model, landmarks, locks, unmeasured)
+    sites, placed = place_sites(chosen, (source, posture, frames), trial, finder, geometry, model, needed)
+    messages += placed
+    bodies, parts = segment_bodies(
+        model, definition.table, landmarks, posture, mass_kg, height_m if height_m is not None else np.nan
+    )
+    check_masses(model, bodies, parts, mass_kg, height_m, messages)
+    start = _first_posture(model, geometry, finder, trial, needed, posture, messages)
+    plan = ModelPlan(
+        model, geometry, start.coordinates, fixed_lengths(model, bare), bodies,
+        {s.name: reach(model, s.name, geometry, parts[s.name]) for s in model.segments}, tuple(sites),
+    )  # fmt: skip
+    report(model, plan, mass_kg, messages)
+    return plan, Measured(trial.ground, side, mass_kg, height_m, parts, tuple(messages))
+
+
+def _common(match: MarkerMatch, other: MarkerMatch) -> MarkerMatch:
+    """Only markers that both recordings have, so that a joint centre is the same recipe in both."""
+    if other is match:
+        return match
+    names = {key: name for key, name in match.names.items() if key in other.names}
+    recorded = tuple(name for name in match.recorded if name in other.recorded)
+    return MarkerMatch(match.marker_set, names, recorded, f"{match.where} with {other.where}")
+
+
+def needed_markers(
+    model: ModelFile, finder: LandmarkFinder, locks: dict[str, float | None]
+) -> set[MarkerKey]:
+    """Markers of every landmark that the lengths and frames need; refuses a recording without one of them."""
+    wanted: dict[str, str] = {}
+    for segment in model.segments:
+        if segment.axes and all(locks.get(axis.coordinate) is not None for axis in segment.axes):
+            continue  # its pose follows from its parent's
+        for name in frame_landmarks(segment):
+            wanted.setdefault(name, f"segment {segment.name!r} of model {model.name}")
+    if model.ground.origin:
+        wanted.setdefault(model.ground.origin, f"the ground origin of model {model.name}")
+    keys: set[MarkerKey] = set()
+    for name, why in wanted.items():
+        finder.require(name, why)
+        keys |= finder.markers_of(name)
+    for length in model.lengths:
+        if length.between is not None and all(finder.known(name) for name in length.between):
+            keys |= finder.markers_of(length.between[0]) | finder.markers_of(length.between[1])
+    return keys
+
+
+def table_markers(definition: ModelDefinition, finder: LandmarkFinder) -> set[MarkerKey]:
+    """Markers of the landmarks at which the inertia table's parts lie, as far as the recording has them."""
+    names: set[str] = set()
+    for segment in definition.model.segments:
+        for part in (definition.table.part(name) for name in segment.parts):
+            for point in (part.axis_from, part.axis_to, part.origin, part.length_from, part.length_to):
+                names |= {point.start, point.end}
+    keys: set[MarkerKey] = set()
+    for name in sorted(names):
+        keys |= finder.markers_of(name)
+    return keys
+
+
+def _at_origin(model: ModelFile, trial: Trial, finder: LandmarkFinder, frames: npt.NDArray[np.intp]) -> Trial:
+    if model.ground.origin is None:
+        return trial
+    # the middle of the landmark's markers, out of plane as well, so that the ground origin is a point of the
+    # laboratory
+    keys = sorted(finder.markers_of(model.ground.origin))
+    spatial = LandmarkFinder(trial.match, finder.side, finder.sex, planar=False)
+    origin_G = spatial.find(trial.median(frames))[model.ground.origin]
+    assert keys and np.isfinite(origin_G).all()
+    return trial.about(trial.ground.points_to_laboratory(origin_G))
+
+
+def _unmeasured_lengths(
+    definition: ModelDefinition, landmarks: dict[str, Array], height_m: float | None, messages: list[str]
+) -> dict[str, float]:
+    found: dict[str, float] = {}
+    for length in definition.model.lengths:
+        if length.between is None or all(name in landmarks for name in length.between):
+            continue
+        part = definition.table.parts.get(length.name)
+        if part is None or part.length_per_height is None or height_m is None:
+            raise ModelError(
+                f"length {length.name!r}: its landmarks {' and '.join(length.between)} are not measured, "
+                "and neither the table "
+                f"{definition.table.name} nor the subject's height gives it"
+            )
+        found[length.name] = part.length_per_height * height_m
+        messages.append(
+            f"Length {length.name}: {1000 * found[length.name]:.0f} mm from the height "
+            f"({definition.table.name}), no markers."
+        )
+    return found
+
+
+def _first_posture(
+    model: ModelFile,
+    geometry: Geometry,
+    finder: LandmarkFinder,
+    trial: Trial,
+    needed: set[MarkerKey],
+    standing: Posture,
+    messages: list[str],
+) -> Posture:
+    usable = np.flatnonzero(trial.usable(needed))
+    if not len(usable):
+        raise ModelError(f"{trial.match.where}: no frame shows all markers of the joint centres")
+    first = int(usable[0])
+    if first > 0:
+        messages.append(
+            f"Start from frame {first} ({trial.recording.time[first]:.2f} s): markers are missing before."
+        )
+    positions = trial.median(np.array([first]))
+    return find_posture(model, geometry, finder.find(positions), standing)

@@ -1,0 +1,97 @@
+"""A measured model before it goes to the core: everything a specification needs, as plain data of Python."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.model.inertia import INERTIA_NAMES, PLANAR_INERTIA, RigidBody
+from dynakin.model.posture import Geometry
+from dynakin.model.priors import Bounds, Interval, Priors, inertia_bounds, inertia_prior
+from dynakin.model.schema import ModelFile
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Site:
+    """A marker on a segment."""
+
+    name: str  # in the model, the first alias of its side
+    recorded: str  # in the recording
+    segment: str
+    position: Array  # (3,) m, segment frame
+    variance: float  # m^2
+
+
+@dataclass(frozen=True, eq=False)
+class ModelPlan:
+    """A model file filled with what was measured on one person."""
+
+    model: ModelFile
+    geometry: Geometry
+    start: dict[str, float]  # coordinates at the first usable frame, locked ones too
+    fixed_lengths: frozenset[str]
+    bodies: dict[str, RigidBody]
+    reach: dict[str, float]  # length (m) that a segment's first moments are compared with
+    sites: tuple[Site, ...]
+
+    def estimated_axes(self) -> tuple[bool, bool, bool]:
+        """Axes along which markers are measured and their places estimated."""
+        return (True, True, not self.model.planar)
+
+    def estimated_inertia(self, segment: str) -> tuple[bool, ...]:
+        """Which of the ten numbers are estimated: four in the plane, ten in space, none of a massless
+        segment."""
+        entry = next(s for s in self.model.segments if s.name == segment)
+        wanted = entry.inertia_estimated and self.bodies[segment].mass > 0.0
+        return tuple(wanted and (not self.model.planar or name in PLANAR_INERTIA) for name in INERTIA_NAMES)
+
+    def _kinds(self) -> dict[str, str]:
+        return {axis.coordinate: axis.kind for segment in self.model.segments for axis in segment.axes}
+
+    def prior(self, priors: Priors) -> dict[str, float]:
+        """Standard deviation of every element that a state can have, by the core's name of it."""
+        sd: dict[str, float] = {}
+        for name, kind in self._kinds().items():
+            turn = kind == "rotation"
+            sd[name] = np.deg2rad(priors.rotation_deg) if turn else priors.translation_m
+            sd[f"{name}/speed"] = np.deg2rad(priors.rotation_speed_deg_s) if turn else priors.speed_m_s
+            sd[f"{name}/acceleration"] = (
+                np.deg2rad(priors.rotation_acceleration_deg_s2) if turn else priors.acceleration_m_s2
+            )
+        for name, value in self.geometry.lengths.items():
+            sd[f"length/{name}"] = priors.length_fraction * value
+        for site in self.sites:
+            sd |= {f"marker/{site.name}/{axis}": priors.marker_m for axis in "xyz"}
+        for segment, body in self.bodies.items():
+            entry = inertia_prior(body, self.reach[segment], priors)
+            sd |= {f"inertia/{segment}/{name}": value for name, value in entry.items()}
+        return sd
+
+    def bounds(self, bounds: Bounds) -> dict[str, Interval]:
+        """Bounds of (9) by the core's names; speeds and accelerations have none."""
+        found: dict[str, Interval] = {c.name: c.limits for c in self.model.coordinates}
+        for name, value in self.geometry.lengths.items():
+            found[f"length/{name}"] = (
+                (1 - bounds.length_fraction) * value,
+                (1 + bounds.length_fraction) * value,
+            )
+        for site in self.sites:
+            for axis, value in zip("xyz", site.position, strict=True):
+                half = bounds.marker_threshold_m
+                found[f"marker/{site.name}/{axis}"] = (float(value) - half, float(value) + half)
+        for segment, body in self.bodies.items():
+            entry = inertia_bounds(body, self.reach[segment], bounds)
+            found |= {f"inertia/{segment}/{name}": interval for name, interval in entry.items()}
+        return found
+
+    def table_values(self) -> dict[str, float]:
+        """What the table gives, by the core's names."""
+        return {
+            f"inertia/{segment}/{name}": float(value)
+            for segment, body in self.bodies.items()
+            for name, value in zip(INERTIA_NAMES, body.vector, strict=True)
+        }

@@ -1,0 +1,232 @@
+"""From landmarks to a posture: segment frames, joint placements, coordinates. Used once, when a model is
+initialised."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+from dynakin.errors import ModelError
+from dynakin.model.schema import Axis, Frame, ModelFile, Segment
+
+Array = npt.NDArray[np.float64]
+
+
+def axes_from(main: str, direction: Array, second: str = "", second_direction: Array | None = None) -> Array:
+    """Rotation matrix whose columns are x, y, z: ``main`` along ``direction``, ``second`` as near as
+    possible to its own.
+
+    Without a second direction it is the ground's Z (right), or the ground's Y where the main axis is z.
+    """
+    if second_direction is None:
+        second, second_direction = (
+            ("z", np.array([0.0, 0.0, 1.0])) if main != "z" else ("y", np.array([0.0, 1.0, 0.0]))
+        )
+    columns: dict[str, Array] = {main: direction / np.linalg.norm(direction)}
+    across = second_direction - columns[main] * float(columns[main] @ second_direction)
+    columns[second] = across / np.linalg.norm(across)
+    third = next(axis for axis in "xyz" if axis not in columns)
+    before, after = {"x": ("y", "z"), "y": ("z", "x"), "z": ("x", "y")}[third]
+    columns[third] = np.cross(columns[before], columns[after])
+    return np.column_stack([columns[axis] for axis in "xyz"])
+
+
+def frame_rotation(frame: Frame, landmarks: Mapping[str, Array]) -> Array:
+    """R_GS (3, 3) of a segment from landmarks in the ground frame."""
+    given = {axis: getattr(frame, axis) for axis in "xyz" if getattr(frame, axis) is not None}
+    directions: dict[str, Array] = {a: landmarks[pair[1]] - landmarks[pair[0]] for a, pair in given.items()}
+    main: str = frame.main or next(iter(directions))
+    other = next((axis for axis in directions if axis != main), "")
+    return axes_from(main, directions[main], other, directions.get(other))
+
+
+def frame_landmarks(segment: Segment) -> list[str]:
+    """Landmarks that a segment's origin and frame need."""
+    names = [segment.origin] if segment.origin else []
+    if isinstance(segment.frame, Frame):
+        names += [name for axis in "xyz" for name in (getattr(segment.frame, axis) or ())]
+    return list(dict.fromkeys(names))
+
+
+def joint_motion(
+    axes: tuple[Axis, ...], values: Mapping[str, float], lengths: Mapping[str, float]
+) -> tuple[Array, Array]:
+    """Rotation (3, 3) and translation (3,) m of a chain of axes, each moved along by those before it."""
+    rotation, translation = np.eye(3), np.zeros(3)
+    for axis in axes:
+        q = values[axis.coordinate]
+        s = sum(c * q**k for k, c in enumerate(axis.coefficients)) * (
+            lengths[axis.scale] if axis.scale else 1.0
+        )
+        direction = np.array(axis.direction)
+        if axis.kind == "rotation":
+            rotation = rotation @ Rotation.from_rotvec(s * direction).as_matrix()
+        else:
+            translation = translation + rotation @ (s * direction)
+    return rotation, translation
+
+
+def solve_joint(
+    segment: Segment, target: tuple[Array, Array], fixed: Mapping[str, float], lengths: Mapping[str, float]
+) -> dict[str, float]:
+    """Coordinates of a joint that come nearest to a rotation (3, 3) and translation (3,) of the child in the
+    joint frame."""
+    free = list(dict.fromkeys(axis.coordinate for axis in segment.axes if axis.coordinate not in fixed))
+    if not free:
+        return {}
+    kinds = {axis.coordinate: axis.kind for axis in segment.axes}
+
+    def residual(q: Array) -> Array:
+        rotation, translation = joint_motion(
+            segment.axes, {**fixed, **dict(zip(free, q, strict=True))}, lengths
+        )
+        return np.concatenate([(rotation - target[0]).ravel(), translation - target[1]])
+
+    starts = [np.zeros(len(free))]
+    for k, name in enumerate(free):  # from a third of a turn either way too: half a turn off is a saddle
+        if kinds[name] == "rotation":
+            starts += [np.eye(len(free))[k] * angle for angle in (2.1, -2.1)]
+    fits = [least_squares(residual, start, xtol=1e-14, ftol=1e-14, gtol=1e-14) for start in starts]
+    best = min(fits, key=lambda fit: (round(float(fit.cost), 12), float(np.abs(fit.x).sum())))
+    wrapped = [
+        (v + np.pi) % (2 * np.pi) - np.pi if kinds[n] == "rotation" else v
+        for n, v in zip(free, best.x, strict=True)
+    ]
+    return dict(zip(free, map(float, wrapped), strict=True))
+
+
+@dataclass
+class Posture:
+    """Poses of all segments in the ground frame and the coordinates that lead there."""
+
+    rotations: dict[str, Array] = field(default_factory=dict)  # R_GS (3, 3)
+    origins: dict[str, Array] = field(default_factory=dict)  # (3,) m
+    coordinates: dict[str, float] = field(default_factory=dict)
+
+    def to_local(self, segment: str, point: Array) -> Array:
+        """A point (3,) m of the ground frame in a segment's frame."""
+        return np.asarray(self.rotations[segment].T @ (point - self.origins[segment]))
+
+
+@dataclass
+class Geometry:
+    """Lengths (m), the directions of all joint placements, and the coordinates that are locked, with their
+    values."""
+
+    lengths: dict[str, float]
+    directions: dict[str, list[Array]]  # per segment, one for each term of its placement
+    locked: dict[str, float]
+
+    def placement(self, segment: Segment) -> Array:
+        """Joint origin (3,) m in the parent's frame."""
+        terms = [
+            self.lengths[t.length] * d
+            for t, d in zip(segment.placement, self.directions[segment.name], strict=True)
+        ]
+        return np.asarray(np.array(segment.translation) + sum(terms, np.zeros(3)))
+
+
+def find_posture(
+    model: ModelFile, geometry: Geometry, landmarks: Mapping[str, Array], standing: Posture | None = None
+) -> Posture:
+    """Coordinates and poses from landmarks, given the geometry.
+
+    Args:
+        standing: None while the person stands (a "ground" frame is then the ground's own); later the
+            standing posture, from which such a segment is turned so that its line to the next joint meets
+            the landmarks.
+    """
+    posture = Posture({"ground": np.eye(3)}, {"ground": np.zeros(3)}, dict(geometry.locked))
+    for segment in model.segments:
+        R_GP, p_GP = posture.rotations[segment.parent], posture.origins[segment.parent]
+        R_PJ, p_PJ = np.array(segment.rotation), geometry.placement(segment)
+        fixed = {
+            a.coordinate: posture.coordinates[a.coordinate]
+            for a in segment.axes
+            if a.coordinate in posture.coordinates
+        }
+        if any(axis.coordinate not in fixed for axis in segment.axes):
+            R_GS = _target_rotation(model, segment, landmarks, standing)
+            R_JS = (R_GP @ R_PJ).T @ R_GS
+            origin = landmarks[segment.origin] if segment.origin else p_GP + R_GP @ p_PJ
+            p_JS = (R_GP @ R_PJ).T @ (origin - p_GP - R_GP @ p_PJ)
+            if all(axis.kind == "rotation" for axis in segment.axes):
+                p_JS = np.zeros(3)
+            posture.coordinates.update(solve_joint(segment, (R_JS, p_JS), fixed, geometry.lengths))
+        R_JS, p_JS = joint_motion(segment.axes, posture.coordinates, geometry.lengths)
+        posture.rotations[segment.name] = R_GP @ R_PJ @ R_JS
+        posture.origins[segment.name] = p_GP + R_GP @ (p_PJ + R_PJ @ p_JS)
+    return posture
+
+
+def _target_rotation(
+    model: ModelFile, segment: Segment, landmarks: Mapping[str, Array], standing: Posture | None
+) -> Array:
+    if isinstance(segment.frame, Frame):
+        return frame_rotation(segment.frame, landmarks)
+    if standing is None:
+        return np.eye(3)
+    R_standing, p_standing = standing.rotations[segment.name], standing.origins[segment.name]
+    for child in model.segments:
+        ends = (child.origin, segment.origin)
+        if child.parent == segment.name and all(end in landmarks for end in ends):
+            before = standing.origins[child.name] - p_standing
+            now = landmarks[str(child.origin)] - landmarks[str(segment.origin)]
+            axis = np.cross(before, now)
+            sine, cosine = float(np.linalg.norm(axis)), float(before @ now)
+            turn = np.arctan2(sine, cosine) * (axis / sine if sine > 0.0 else np.array([0.0, 0.0, 1.0]))
+            return np.asarray(Rotation.from_rotvec(turn).as_matrix() @ R_standing)
+    return R_standing
+
+
+def find_geometry(
+    model: ModelFile,
+    landmarks: Mapping[str, Array],
+    locks: Mapping[str, float | None],
+    unmeasured: Mapping[str, float],
+) -> tuple[Geometry, Posture]:
+    """Lengths, measured directions, values of locked coordinates and the posture, from landmarks while
+    standing.
+
+    Args:
+        locks: coordinates to lock; None means at the angle found here.
+        unmeasured: lengths (m) that no landmarks give.
+
+    Raises:
+        ModelError: a length of zero (two landmarks at one place).
+    """
+    lengths: dict[str, float] = dict(unmeasured)
+    for length in model.lengths:
+        if length.value_m is not None:
+            lengths[length.name] = length.value_m
+        elif length.between is not None and all(name in landmarks for name in length.between):
+            start, end = length.between
+            lengths[length.name] = float(np.linalg.norm(landmarks[end] - landmarks[start]))
+            if lengths[length.name] < 1e-3:
+                raise ModelError(f"length {length.name}: landmarks {start} and {end} lie at one place")
+    directions = {s.name: [np.array(t.direction) for t in s.placement] for s in model.segments}
+    given = {name: value for name, value in locks.items() if value is not None}
+    geometry = Geometry(lengths, directions, given)
+    for segment in model.segments:  # parents first: a measured direction needs its parent's pose
+        measured = any(term.measured for term in segment.placement)
+        if not measured or segment.origin is None or segment.origin not in landmarks:
+            continue
+        above = _without(model, segment)
+        posture = find_posture(above, geometry, landmarks)
+        offset = posture.to_local(segment.parent, landmarks[segment.origin]) - np.array(segment.translation)
+        lengths[segment.placement[0].length] = float(np.linalg.norm(offset))
+        directions[segment.name] = [offset / np.linalg.norm(offset)]
+    posture = find_posture(model, geometry, landmarks)
+    locked = {name: posture.coordinates[name] if value is None else value for name, value in locks.items()}
+    return Geometry(lengths, directions, locked), posture
+
+
+def _without(model: ModelFile, segment: Segment) -> ModelFile:
+    """The model as far as the segments that stand before ``segment``."""
+    before = model.segments[: model.segments.index(segment)]
+    return model.model_copy(update={"segments": before})

@@ -1,0 +1,227 @@
+"""What a model file (TOML) may hold: a tree of segments joined by chains of axes, with lengths and joint
+limits.
+
+A file of a user's own works as the built-in ones in ``builtin/`` do; those are commented and serve as
+examples.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from dynakin.model.validation import Strict, nearest
+
+Vector3 = Annotated[tuple[float, float, float], Field(description="three numbers")]
+LandmarkPair = tuple[str, str]
+
+
+class Axis(Strict):
+    """One degree of freedom: ``scale * sum_k coefficients[k] q^k``, rad about or m along ``direction``."""
+
+    coordinate: str
+    kind: Literal["rotation", "translation"] = "rotation"
+    direction: Vector3 = (0.0, 0.0, 1.0)
+    coefficients: tuple[float, ...] = (0.0, 1.0)
+    scale: str = ""
+
+    @model_validator(mode="after")
+    def _unit_direction(self) -> Self:
+        norm = float(np.linalg.norm(self.direction))
+        if abs(norm - 1.0) > 1e-6:
+            raise ValueError(f"direction has length {norm:.6g}, expected a unit vector")
+        return self
+
+
+class Placement(Strict):
+    """The joint lies at ``direction * length`` in the parent; a measured direction replaces the nominal
+    one."""
+
+    length: str
+    direction: Vector3
+    measured: bool = False
+
+
+class Frame(Strict):
+    """Axes of a segment from landmarks: [from, to] of a main axis, then of a second one made orthogonal to
+    it."""
+
+    main: Literal["x", "y", "z"] | None = None
+    x: LandmarkPair | None = None
+    y: LandmarkPair | None = None
+    z: LandmarkPair | None = None
+
+    @model_validator(mode="after")
+    def _has_main(self) -> Self:
+        given = [axis for axis in ("x", "y", "z") if getattr(self, axis) is not None]
+        if not 1 <= len(given) <= 2:
+            raise ValueError(f"one or two of x, y, z expected, found {given or 'none'}")
+        if self.main is None and len(given) == 2:
+            raise ValueError("two axes are given: main = 'x', 'y' or 'z' must say which one is kept")
+        if self.main is not None and self.main not in given:
+            raise ValueError(f"main is {self.main!r}, but only {given} are given")
+        return self
+
+
+class WithoutMarkers(Strict):
+    """What happens to a segment that the recording has no marker of: the joint to ``lock_to`` is locked."""
+
+    lock_to: str
+    value_deg: float | None = None  # None: at the angle found while standing
+
+
+class Segment(Strict):
+    """A rigid segment, the joint by which it hangs on its parent, and the parts of the body in it."""
+
+    name: str
+    parent: str = "ground"
+    origin: str | None = None  # landmark of the joint by which it hangs
+    frame: Literal["ground"] | Frame = "ground"  # "ground": axes of the ground frame while standing
+    parts: tuple[str, ...] = ()  # names of the table and of the marker set
+    both_sides: bool = False  # lump right and left
+    straight: Vector3 | None = None  # lay the parts one after the other along this direction
+    translation: Vector3 = (0.0, 0.0, 0.0)
+    rotation: tuple[Vector3, Vector3, Vector3] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    placement: tuple[Placement, ...] = ()
+    axes: tuple[Axis, ...] = ()
+    without_markers: WithoutMarkers | None = None
+    inertia: Annotated[tuple[float, ...], Field(min_length=10, max_length=10)] | None = None
+    inertia_estimated: bool = True
+
+    @model_validator(mode="after")
+    def _consistent(self) -> Self:
+        rotation = np.array(self.rotation)
+        if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-6 or np.linalg.det(rotation) < 0.0:
+            raise ValueError(
+                "rotation is not a proper rotation matrix (three rows, orthonormal, determinant 1)"
+            )
+        if any(term.measured for term in self.placement) and len(self.placement) > 1:
+            raise ValueError("placement: a measured direction is possible with one length only")
+        if self.inertia is not None and self.parts:
+            raise ValueError("inertia: either ten numbers or parts of the table, not both")
+        return self
+
+
+class Coordinate(Strict):
+    """A generalised coordinate: limits of (9), start or locked value; degrees for rotations, metres
+    otherwise."""
+
+    name: str
+    description: str = ""
+    minimum_deg: float | None = None
+    maximum_deg: float | None = None
+    minimum_m: float | None = None
+    maximum_m: float | None = None
+    value_deg: float | None = None
+    value_m: float | None = None
+    locked: bool = False
+    source: str = ""
+
+    @model_validator(mode="after")
+    def _ordered(self) -> Self:
+        for low, high, unit in (
+            (self.minimum_deg, self.maximum_deg, "deg"),
+            (self.minimum_m, self.maximum_m, "m"),
+        ):
+            if low is not None and high is not None and low >= high:
+                raise ValueError(f"minimum_{unit} is {low:g}, expected less than maximum_{unit} ({high:g})")
+        return self
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """(lower, upper) in rad or m, infinite where none is given."""
+        low = np.deg2rad(self.minimum_deg) if self.minimum_deg is not None else self.minimum_m
+        high = np.deg2rad(self.maximum_deg) if self.maximum_deg is not None else self.maximum_m
+        return (-np.inf if low is None else float(low), np.inf if high is None else float(high))
+
+    @property
+    def value(self) -> float | None:
+        """Start or locked value in rad or m, None where the file gives none."""
+        return float(np.deg2rad(self.value_deg)) if self.value_deg is not None else self.value_m
+
+
+class Length(Strict):
+    """A geometry parameter: the distance between two landmarks, or a value."""
+
+    name: str
+    between: LandmarkPair | None = None
+    value_m: Annotated[float, Field(gt=0.0)] | None = None
+    estimated: bool = True
+
+    @model_validator(mode="after")
+    def _known(self) -> Self:
+        if (self.between is None) == (self.value_m is None):
+            raise ValueError("expected either between = [landmark, landmark] or value_m")
+        return self
+
+
+class Ground(Strict):
+    """Where the ground origin lies (a landmark), and how far that landmark may move during a trial."""
+
+    origin: str | None = None
+    fixed_within_m: Annotated[float, Field(gt=0.0)] | None = None
+
+
+class ModelFile(Strict):
+    """A whole model file."""
+
+    schema_version: Literal[1]
+    name: str
+    description: str = ""
+    planar: bool = False
+    gravity: Vector3 = (0.0, -9.80665, 0.0)
+    ground: Ground = Ground()
+    lengths: tuple[Length, ...] = ()
+    coordinates: tuple[Coordinate, ...]
+    segments: Annotated[tuple[Segment, ...], Field(min_length=1)]
+
+    @model_validator(mode="after")
+    def _references(self) -> Self:
+        for kind, items in (
+            ("lengths", self.lengths),
+            ("coordinates", self.coordinates),
+            ("segments", self.segments),
+        ):
+            names = [item.name for item in items]
+            double = next((name for name in names if names.count(name) > 1), None)
+            if double:
+                raise ValueError(f"{kind}: the name {double!r} is given twice")
+        lengths = {length.name for length in self.lengths}
+        coordinates = {coordinate.name for coordinate in self.coordinates}
+        used: set[str] = set()
+        seen: list[str] = ["ground"]
+        for segment in self.segments:
+            where = f'segments "{segment.name}"'
+            _need(segment.parent, seen, f"{where}: parent", "a segment that stands before it, or 'ground'")
+            for term in segment.placement:
+                _need(term.length, lengths, f"{where}: placement.length", "a name in lengths")
+            for axis in segment.axes:
+                _need(axis.coordinate, coordinates, f"{where}: axes.coordinate", "a name in coordinates")
+                if axis.scale:
+                    _need(axis.scale, lengths, f"{where}: axes.scale", "a name in lengths")
+                used.add(axis.coordinate)
+            seen.append(segment.name)
+        parents = {segment.name: segment.parent for segment in self.segments}
+        for segment in self.segments:
+            if segment.without_markers is not None:
+                other = segment.without_markers.lock_to
+                _need(other, parents, f'segments "{segment.name}": without_markers.lock_to', "a segment")
+                if parents[segment.name] != other and parents[other] != segment.name:
+                    raise ValueError(
+                        f'segments "{segment.name}": without_markers.lock_to: {other!r} is '
+                        "no neighbour of it in the tree"
+                    )
+        idle = coordinates - used
+        if idle:
+            raise ValueError(f"coordinates: no axis uses {sorted(idle)[0]!r}")
+        return self
+
+
+def _need(name: str, known: object, where: str, expected: str) -> None:
+    names = list(known)  # type: ignore[call-overload]
+    if name not in names:
+        raise ValueError(
+            f"{where} is {name!r}{nearest(name, names)}, expected {expected}: {', '.join(names)}"
+        )

@@ -1,0 +1,96 @@
+"""Reads TOML files into strict pydantic models; every error names the file and the key, what was found, what
+was expected."""
+
+from __future__ import annotations
+
+import difflib
+import tomllib
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+
+from dynakin.errors import ModelError
+
+
+def nearest(word: str, known: Iterable[str]) -> str:
+    """ " (did you mean 'x'?)" for the known word closest to a misspelt one, or an empty string."""
+    names = list(known)
+    close = difflib.get_close_matches(word, names, n=1, cutoff=0.6)
+    if not close:
+        by_case = {name.casefold(): name for name in names}
+        close = difflib.get_close_matches(word.casefold(), list(by_case), n=1, cutoff=0.6)
+        close = [by_case[name] for name in close]
+    return f" (did you mean {close[0]!r}?)" if close else ""
+
+
+class Strict(BaseModel):
+    """Base of everything read from a file: unknown keys are refused, instances cannot be changed."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True, str_strip_whitespace=True, allow_inf_nan=False)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _refuse_unknown_keys(cls, data: Any) -> Any:
+        if isinstance(data, dict):
+            for key in data:
+                if key not in cls.model_fields:
+                    raise ValueError(
+                        f"unknown key {key!r}{nearest(str(key), cls.model_fields)}; "
+                        f"expected keys: {', '.join(cls.model_fields)}"
+                    )
+        return data
+
+
+Schema = TypeVar("Schema", bound=BaseModel)
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The content of a TOML file.
+
+    Raises:
+        ModelError: no such file, not readable, or not TOML (with the line).
+    """
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise ModelError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
+    except tomllib.TOMLDecodeError as error:
+        raise ModelError(f"{path}: not a TOML file: {error}") from None
+
+
+def _place(location: tuple[int | str, ...], data: Any) -> str:
+    """'segments[2] "shank": axes[0]' from pydantic's location."""
+    text, node = "", data
+    for step in location:
+        if isinstance(step, int):
+            text += f"[{step}]"
+            node = node[step] if isinstance(node, list) and step < len(node) else None
+            if isinstance(node, dict) and isinstance(node.get("name"), str):
+                text += f' "{node["name"]}"'
+        elif "[" in step or step[:1].isupper():
+            continue  # pydantic's name of a branch of a union, no key of the file
+        else:
+            text += f".{step}" if text else str(step)
+            node = node.get(step) if isinstance(node, dict) else None
+    return text
+
+
+def validate(schema: type[Schema], data: Any, where: str) -> Schema:
+    """``data`` as an instance of ``schema``.
+
+    Raises:
+        ModelError: with the first thing that is wrong; ``where`` (a file, "subject") opens the message.
+    """
+    try:
+        return schema.model_validate(data)
+    except ValidationError as error:
+        found_errors = error.errors(include_url=False)
+        first = found_errors[0]
+        if first["type"] == "literal_error" and not isinstance(first["input"], str) and len(found_errors) > 1:
+            first = found_errors[1]  # "a word or a table", and it is a table: say what is wrong in that
+        place = _place(tuple(first["loc"]), data)
+        message = str(first["msg"]).removeprefix("Value error, ")
+        found = "" if first["type"] in {"value_error", "missing"} else f", found {first['input']!r}"
+        raise ModelError(f"{where}: {place + ': ' if place else ''}{message}{found}") from None

@@ -1,0 +1,120 @@
+"""Real people: the models take them, and find lengths, angles and masses that a person can have."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dynakin.errors import ModelError
+from dynakin.model import Subject, load_model, measure
+from dynakin.recordings import Recording, read, read_table
+
+OPENCAP = "opencap_subject4"
+PIG = "plugin_gait"
+
+
+def opencap(data_dir: Path, name: str) -> Recording:
+    return read(data_dir / OPENCAP / f"{name}.trc", data_dir / OPENCAP / f"{name}_grf.mot")
+
+
+def test_squats1(data_dir: Path) -> None:
+    recording = opencap(data_dir, "squats1")
+    plan, found = measure(load_model("sagittal7", Subject(mass_kg=60.05), "opencap"), recording)
+    assert found.side == "right"
+    assert len(plan.sites) == 17
+    expected = {
+        "foot": 0.155,
+        "shank": 0.413,
+        "thigh": 0.389,
+        "pelvis": 0.095,
+        "trunk": 0.450,
+        "upper_arm": 0.332,
+    }
+    assert plan.geometry.lengths == pytest.approx(expected, abs=2e-3)
+    assert not plan.geometry.locked
+    assert sum(body.mass for body in plan.bodies.values()) == pytest.approx(60.05, rel=1e-12)
+    assert all(body.possible_in_plane() for body in plan.bodies.values())
+    # the other system's 3D angles of the same frame (radians in the file): a plane and another pelvis frame
+    # apart
+    other = read_table(data_dir / OPENCAP / "squats1_ik.mot")
+    angles = dict(zip(other.names, other.values[0], strict=True))
+    assert plan.start["knee"] == pytest.approx(angles["knee_angle_r"], abs=np.deg2rad(5.0))
+    assert plan.start["ankle"] == pytest.approx(angles["ankle_angle_r"], abs=np.deg2rad(8.0))
+    assert plan.start["hip"] == pytest.approx(angles["hip_flexion_r"], abs=np.deg2rad(12.0))
+
+
+def test_static1_as_the_trial_and_as_the_static(data_dir: Path) -> None:
+    static = opencap(data_dir, "static1")
+    _, found = measure(load_model("sagittal7", markers="opencap"), static)
+    assert found.mass_kg == pytest.approx(60.05, abs=0.05)
+    assert any("from the plates of static1" in message for message in found.messages)
+    squats = opencap(data_dir, "squats1")
+    definition = load_model("sagittal7", markers="opencap")
+    own, _ = measure(load_model("sagittal7", Subject(mass_kg=60.05), "opencap"), squats)
+    plan, found = measure(definition, squats, static=static)
+    assert found.mass_kg == pytest.approx(60.05, abs=0.05)
+    assert any("of static1 (517 frames)" in message for message in found.messages)
+    for name, value in own.geometry.lengths.items():
+        assert plan.geometry.lengths[name] == pytest.approx(value, rel=0.02), name
+    assert abs(plan.start["knee"] - own.start["knee"]) < np.deg2rad(2.0)
+
+
+@pytest.mark.parametrize("side", ["auto", "right", "left", "both"])
+def test_s1_squat_without_t10_and_arms(data_dir: Path, side: str) -> None:
+    recording = read(data_dir / PIG / "S1_FlywheelSquat.c3d")
+    subject = Subject(mass_kg=78.6, height_m=1.74, sex="male")
+    plan, found = measure(load_model("squat7", subject), recording, side=side)
+    assert found.side == ("left" if side == "auto" else side)  # RSHO is missing for 68 frames
+    assert set(plan.geometry.locked) == {"thoracic", "shoulder"}
+    text = " ".join(found.messages)
+    assert "Segment abdomen has no markers: locked to thorax" in text
+    assert "Segment arm has no markers: locked to thorax" in text
+    assert "T10" in text
+    assert 0.40 < plan.geometry.lengths["shank"] < 0.48
+    assert 0.40 < plan.geometry.lengths["thigh"] < 0.48
+    assert all(np.isfinite(site.position).all() for site in plan.sites)
+    assert all(np.isfinite(value) for value in plan.start.values())
+    assert np.rad2deg(plan.start["knee"]) > 20.0  # the trial starts in a squat
+    assert abs(np.rad2deg(plan.start["toe"])) < 5.0
+
+
+def test_s1_squat_takes_the_mean_force_for_the_mass_and_warns(data_dir: Path) -> None:
+    recording = read(data_dir / PIG / "S1_FlywheelSquat.c3d")
+    _, alone = measure(load_model("squat7"), recording)
+    assert alone.mass_kg == pytest.approx(129.0, abs=0.1)  # the flywheel's cable pulls too
+    assert any(text.startswith("Warning: mass 129.0") for text in alone.messages)
+    _, found = measure(load_model("squat7"), recording, static=read(data_dir / PIG / "S1_StandingRef.c3d"))
+    assert found.mass_kg == pytest.approx(81.3, abs=0.1)
+
+
+@pytest.mark.parametrize("model", ["squat7", "sagittal7"])
+def test_walking_is_refused_because_the_toe_moves(data_dir: Path, model: str) -> None:
+    recording = read(data_dir / PIG / "GaitNormal_1.c3d")
+    with pytest.raises(
+        ModelError, match=r"GaitNormal_1\.c3d: marker [RL]TOE moves 1\d\d\d mm .*at most 40 mm"
+    ):
+        measure(load_model(model, Subject(mass_kg=66.0)), recording)
+
+
+def test_sagittal7_takes_plug_in_gait_without_arms(data_dir: Path) -> None:
+    recording = read(data_dir / PIG / "S1_FlywheelSquat.c3d")
+    plan, _ = measure(load_model("sagittal7", Subject(mass_kg=78.6)), recording)
+    assert set(plan.geometry.locked) == {"shoulder", "elbow"}
+    assert "upper_arm" in plan.fixed_lengths
+
+
+@pytest.mark.parametrize("table", ["dumas", "deleva"])
+@pytest.mark.parametrize("markers", ["opencap", "opencap-all"])
+def test_squat7_takes_opencap(data_dir: Path, table: str, markers: str) -> None:
+    subject = Subject(mass_kg=60.05)
+    plan, _ = measure(load_model("squat7", subject, markers, table), opencap(data_dir, "squats1"))
+    assert list(plan.geometry.locked) == ["thoracic"]
+    assert sum(body.mass for body in plan.bodies.values()) == pytest.approx(60.05, rel=1e-12)
+
+
+def test_a_wrong_marker_set_names_what_there_is(data_dir: Path) -> None:
+    with pytest.raises(ModelError, match=r"squats1\.trc.*it has C7, L\.ASIS") as error:
+        measure(load_model("squat7", Subject(mass_kg=60.0), "plug-in-gait"), opencap(data_dir, "squats1"))
+    assert "tried" in error.value.message or "has no marker" in error.value.message
