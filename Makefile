@@ -9,7 +9,7 @@ CPP_TESTS := $(shell find cpp/tests -type f)
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: all demo test test-python test-cpp lint bench peers clean prerequisites
+.PHONY: all demo test test-python test-cpp lint stubs bench peers clean prerequisites
 all: $(VENV)/.built
 
 prerequisites:
@@ -54,14 +54,25 @@ test-cpp: $(VENV)/.dev
 	  $(BIN)/ctest --test-dir build/cpp-$$kind --output-on-failure || exit 1; \
 	done
 
+# What editors and mypy know of the compiled module; committed, so lint checks that it is up to date.
+stubs: $(VENV)/.dev
+	$(BIN)/python -m nanobind.stubgen -q -m dynakin._core -o src/dynakin/_core.pyi
+	$(BIN)/python -m nanobind.stubgen -q -m dynakin._cpu -o src/dynakin/_cpu.pyi
+
 lint: $(VENV)/.dev
+	@mkdir -p build/stubs
+	@for m in _core _cpu; do $(BIN)/python -m nanobind.stubgen -q -m dynakin.$$m -o build/stubs/$$m.pyi && \
+	  diff -u src/dynakin/$$m.pyi build/stubs/$$m.pyi || { echo "src/dynakin/$$m.pyi is out of date: run make stubs" >&2; exit 1; }; done
 	$(BIN)/ruff check src tests benchmarks examples
 	$(BIN)/ruff format --check src tests benchmarks examples
 	$(BIN)/mypy
 	$(BIN)/clang-format --dry-run --Werror $$(find cpp src/dynakin/bindings -name '*.cpp' -o -name '*.hpp')
 
 bench: $(VENV)/.dev
-	$(BIN)/python benchmarks/step.py
+	$(BIN)/cmake -S . -B build/bench -G Ninja -DDYNAKIN_BENCH=ON -DPython_EXECUTABLE=$(CURDIR)/$(BIN)/python \
+	  -DCMAKE_PREFIX_PATH="$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" >/dev/null
+	$(BIN)/cmake --build build/bench --target dynakin_bench >/dev/null
+	PYTHONPATH=build/bench $(BIN)/python benchmarks/step.py
 
 peers: $(VENV)/.dev
 	$(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[dev,peers]"

@@ -1,5 +1,6 @@
 #include "dynakin/settings.hpp"
 
+#include <Eigen/Cholesky>
 #include <cmath>
 #include <stdexcept>
 
@@ -43,6 +44,14 @@ void FilterSettings::check(const Model& model) const {
   if (wrench_covariance.hasNaN()) fail("wrench_covariance", "holds a NaN");
   if (wrench_covariance.allFinite() && !wrench_covariance.isApprox(wrench_covariance.transpose(), 1e-12))
     fail("wrench_covariance", "is not symmetric");
+  Matrix6 finite = wrench_covariance;
+  for (int i = 0; i < 6; ++i) {
+    if (std::isfinite(finite(i, i))) continue;
+    finite.row(i).setZero();
+    finite.col(i).setZero();
+    finite(i, i) = 1.0;
+  }
+  if (Eigen::LLT<Matrix6>(finite).info() != Eigen::Success) fail("wrench_covariance", "is not positive definite");
   if (!reference_point.allFinite()) fail("reference_point", "is not finite");
   if (total_mass && !(*total_mass > 0.0 && std::isfinite(*total_mass)))
     fail("total_mass", "is " + std::to_string(*total_mass) + " kg, expected more than 0");

@@ -16,12 +16,16 @@ namespace {
 
 using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor>;
 
+void check_size(const Model& model, const StateRef& x) {
+  if (x.size() != model.state_size())
+    throw std::invalid_argument("x: expected " + std::to_string(model.state_size()) + " numbers, found " +
+                                std::to_string(x.size()));
+}
+
 // Everything at one state; convenient and allocating, for looking at a model. A Filter holds its own workspace.
 struct At {
   At(const Model& model, const StateRef& x) : kinematics(model), dynamics(model) {
-    if (x.size() != model.state_size())
-      throw std::invalid_argument("x: expected " + std::to_string(model.state_size()) + " numbers, found " +
-                                  std::to_string(x.size()));
+    check_size(model, x);
     forward_kinematics(model, x, kinematics);
     subtree_dynamics(model, x, kinematics, dynamics);
   }
@@ -86,6 +90,7 @@ nb::tuple segment_poses(const Model& model, const StateRef& x) {
 }
 
 nb::tuple coordinates(const Model& model, const StateRef& x) {
+  check_size(model, x);
   const Eigen::Index n = static_cast<Eigen::Index>(model.coordinates().size());
   Eigen::VectorXd q(n), qd(n), qdd(n);
   for (int i = 0; i < n; ++i) {

@@ -1,0 +1,15 @@
+// Models and settings that several tests use.
+#pragma once
+
+#include "dynakin/settings.hpp"
+
+// Seven hinges about Z from the ground up, six lengths, 17 markers measured in x and y: the size of sagittal7.
+dynakin::ModelSpec planar_chain();
+// A branched tree in space: rotations and translations, chains of several axes, a weld, a curved and a scaled axis, a
+// locked coordinate, a fixed length, all ten inertia numbers estimated.
+dynakin::ModelSpec spatial_tree();
+
+dynakin::FilterSettings settings_for(const dynakin::Model& model);
+Eigen::MatrixXd prior_for(const dynakin::Model& model);
+// Markers that the model itself would show at x.
+Eigen::Matrix<double, 3, Eigen::Dynamic> markers_at(const dynakin::Model& model, const Eigen::VectorXd& x);

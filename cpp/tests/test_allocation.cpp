@@ -1,0 +1,71 @@
+// given a filter that stands ready, when it steps, then nothing is allocated: not by new, not by malloc.
+#include <atomic>
+#include <cstdlib>
+#include <new>
+
+#include "check.hpp"
+#include "dynakin/filter.hpp"
+#include "models.hpp"
+
+#ifdef DYNAKIN_COUNT_ALLOCATIONS
+namespace {
+std::atomic<long> allocations{0};
+}
+
+extern "C" {
+void* __real_malloc(std::size_t);
+void* __real_calloc(std::size_t, std::size_t);
+void* __real_realloc(void*, std::size_t);
+void* __real_aligned_alloc(std::size_t, std::size_t);
+int __real_posix_memalign(void**, std::size_t, std::size_t);
+void* __wrap_malloc(std::size_t size) { return ++allocations, __real_malloc(size); }
+void* __wrap_calloc(std::size_t n, std::size_t size) { return ++allocations, __real_calloc(n, size); }
+void* __wrap_realloc(void* p, std::size_t size) { return ++allocations, __real_realloc(p, size); }
+void* __wrap_aligned_alloc(std::size_t a, std::size_t size) { return ++allocations, __real_aligned_alloc(a, size); }
+int __wrap_posix_memalign(void** p, std::size_t a, std::size_t n) {
+  return ++allocations, __real_posix_memalign(p, a, n);
+}
+}
+void* operator new(std::size_t size) { return std::malloc(size); }
+void* operator new(std::size_t size, std::align_val_t align) { return std::aligned_alloc(std::size_t(align), size); }
+void operator delete(void* p) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+void operator delete(void* p, std::align_val_t) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t, std::align_val_t) noexcept { std::free(p); }
+
+namespace {
+
+void check_no_allocation(const dynakin::ModelSpec& spec) {
+  using namespace dynakin;
+  const Model model(spec);
+  FilterSettings settings = settings_for(model);
+  settings.upper.setConstant(1.0);  // some elements are held, so the constraint works too
+  const Eigen::VectorXd x = model.initial_state();
+  auto markers = markers_at(model, x);
+  const Vector6 wrench = Vector6::Constant(10.0);
+  Filter filter(model, settings, x, prior_for(model));
+  for (int k = 0; k < 20; ++k) {
+    if (k == 10) markers.col(1).setConstant(std::nan(""));
+    const long before = allocations;
+    const StepReport report = filter.step(0.01, markers, wrench);
+    CHECK(allocations == before);
+    CHECK(!report.diverged());
+    CHECK(report.constrained > 0 || k > 0);
+  }
+}
+
+}  // namespace
+
+TEST(the_counter_sees_allocations) {
+  const long before = allocations;
+  const Eigen::VectorXd by_eigen = Eigen::VectorXd::Zero(100);
+  CHECK(allocations > before);
+  const long between = allocations;
+  void* volatile seen = ::operator new(8);  // volatile: else the compiler may leave the pair out
+  ::operator delete(seen);
+  CHECK(allocations > between && by_eigen.size() == 100);
+}
+
+TEST(a_planar_step_allocates_nothing) { check_no_allocation(planar_chain()); }
+TEST(a_spatial_step_allocates_nothing) { check_no_allocation(spatial_tree()); }
+#endif

@@ -1,0 +1,142 @@
+"""From the core's arrays to a labelled `Estimate`."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from dynakin import _core
+from dynakin.filter.events import events_of
+from dynakin.filter.parameters import parameters_of
+from dynakin.model import InitialModel
+from dynakin.recordings import Recording
+from dynakin.results import AXES, COMPONENTS, Estimate, Timing
+
+Array = npt.NDArray[np.float64]
+
+
+def assemble(
+    arrays: Mapping[str, Array],
+    model: _core.Model,
+    initial: InitialModel,
+    recording: Recording,
+    measured: tuple[Array, Array],
+    config: dict[str, Any],
+    notes: Sequence[str],
+) -> Estimate:
+    """Label what `Filter.run` returned and keep what is needed to judge it.
+
+    Args:
+        arrays: as `_core.Filter.run` returns them, T frames.
+        measured: markers (T, M, 3) and wrench (T, 6), as the filter took them.
+        config: what was asked for, as plain data.
+        notes: sentences of the plates' check.
+    """
+    data = _dataset(arrays, model, initial, recording, measured)
+    parameters = parameters_of(initial, arrays["state"][-1], arrays["state_sd"][-1])
+    config = config | {
+        "mass_kg": initial.mass_kg,
+        "height_m": initial.height_m,
+        "side": initial.side,
+        "ground": {
+            "vertical": initial.ground.vertical,
+            "forward": initial.ground.forward.tolist(),
+            "origin_m": initial.ground.origin_L.tolist(),
+        },
+    }
+    return Estimate(
+        data=data,
+        parameters=parameters,
+        events=events_of(data, parameters, initial),
+        timing=_timing(arrays["step_us"], recording),
+        recording=recording,
+        ground=initial.ground,
+        config=config,
+        model_name=initial.spec.name,
+        messages=[*recording.notes, *initial.messages, *notes],
+    )
+
+
+def _dataset(
+    arrays: Mapping[str, Array],
+    model: _core.Model,
+    initial: InitialModel,
+    recording: Recording,
+    measured: tuple[Array, Array],
+) -> xr.Dataset:
+    spec = initial.spec
+    axes = np.array(spec.markers[0].measured)
+    modelled = np.array(spec.wrench_measured)
+    data: dict[str, Any] = {}
+    for block, values in _coordinate_blocks(arrays, model).items():
+        data[block] = (("time", "coordinate"), values)
+    data["moments"] = (("time", "coordinate"), arrays["moments"])
+    missing = np.count_nonzero(np.isnan(measured[0]), axis=2, keepdims=True) > 0
+    for name, values in (
+        ("measured", np.where(missing, np.nan, measured[0])),
+        ("estimated", arrays["markers_estimated"]),
+        ("predicted", arrays["markers_predicted"]),
+    ):
+        data[f"markers_{name}"] = (("time", "marker", "axis"), np.where(axes, values, np.nan))
+    for name, values in (
+        ("measured", measured[1]),
+        ("estimated", arrays["wrench_estimated"]),
+        ("predicted", arrays["wrench_predicted"]),
+    ):
+        data[f"wrench_{name}"] = (("time", "component"), np.where(modelled, values, np.nan))
+    data["state"] = (("time", "element"), arrays["state"])
+    data["state_sd"] = (("time", "element"), arrays["state_sd"])
+    for name in ("nis", "n_rows", "log_likelihood", "constrained", "step_us"):
+        data[name] = ("time", arrays[name])
+    coords = {
+        "time": recording.time,
+        "coordinate": model.coordinate_names,
+        "coordinate_type": ("coordinate", _types(spec)),
+        "marker": list(initial.recorded_markers),
+        "axis": list(AXES),
+        "marker_axes_modelled": ("axis", axes),
+        "component": list(COMPONENTS),
+        "element": list(model.layout.names),
+    }
+    return xr.Dataset(data, coords=coords)
+
+
+def _coordinate_blocks(arrays: Mapping[str, Array], model: _core.Model) -> dict[str, Array]:
+    """Coordinates, speeds, accelerations and their deviations of all coordinates; locked ones stand still, for sure."""
+    spec = model.spec
+    free = [k for k, coordinate in enumerate(spec.coordinates) if not coordinate.locked]
+    frames = len(arrays["state"])
+    blocks: dict[str, Array] = {}
+    for name in ("coordinates", "speeds", "accelerations"):
+        offset, size = model.layout.blocks[name]
+        value, sd = (np.zeros((frames, len(spec.coordinates))) for _ in range(2))
+        if name == "coordinates":
+            value[:] = [coordinate.value for coordinate in spec.coordinates]
+        value[:, free] = arrays["state"][:, offset : offset + size]
+        sd[:, free] = arrays["state_sd"][:, offset : offset + size]
+        blocks[name], blocks[f"{name}_sd"] = value, sd
+    return blocks
+
+
+def _types(spec: _core.ModelSpec) -> list[str]:
+    """A coordinate is a rotation unless every axis that it moves is a translation."""
+    kinds: dict[str, set[str]] = {}
+    for segment in spec.segments:
+        for axis in segment.axes:
+            kinds.setdefault(axis.coordinate, set()).add(axis.kind)
+    return ["translation" if kinds[c.name] == {"translation"} else "rotation" for c in spec.coordinates]
+
+
+def _timing(step_us: Array, recording: Recording) -> Timing:
+    total = float(step_us.sum()) * 1e-6
+    duration = float(recording.time[-1] - recording.time[0])
+    return Timing(
+        frames=len(step_us),
+        median_us=float(np.median(step_us)),
+        p99_us=float(np.percentile(step_us, 99)),
+        realtime_factor=duration / total if total > 0.0 else float("nan"),
+    )

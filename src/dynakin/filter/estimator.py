@@ -1,0 +1,188 @@
+"""The estimator: a model and its noise; `run` for recordings, `start` and `step` for live use."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin import _core
+from dynakin.errors import ConfigError, DivergenceError, RecordingError
+from dynakin.filter import presets
+from dynakin.filter.assemble import assemble
+from dynakin.filter.noise import Noise
+from dynakin.filter.samples import Sample, recording_arrays, sample_arrays
+from dynakin.model import Bounds, InitialModel, ModelDefinition, Priors, initialise
+from dynakin.recordings import Recording, check_plates
+from dynakin.results import Estimate
+
+Array = npt.NDArray[np.float64]
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class StepEstimate:
+    """What one live step gives: all coordinates of the model in order, and how well the sample was expected."""
+
+    time_s: float
+    coordinates: Array  # (C,) rad or m
+    speeds: Array  # (C,)
+    accelerations: Array  # (C,)
+    moments: Array  # (C,) N m or N
+    wrench: Array  # (6,) N, N m, about the model's ground origin
+    markers: Array  # (M, 3) m, ground frame
+    report: _core.StepReport
+
+
+class Estimator:
+    """Estimates movement and what drives it with the paper's constrained extended Kalman filter.
+
+    Args:
+        model: what `load_model` returns.
+        noise: variances; the paper's Table I where not given.
+        priors, bounds: prior standard deviations and half widths of (9); see `dynakin.model.priors`.
+        side: limb markers of a lumped model ("auto", "right", "left", "both").
+        vertical, forward: laboratory directions, found in the recording where "auto".
+    """
+
+    def __init__(
+        self,
+        model: ModelDefinition,
+        noise: Noise | None = None,
+        *,
+        priors: Priors | None = None,
+        bounds: Bounds | None = None,
+        side: str = "auto",
+        vertical: str = "auto",
+        forward: str | tuple[float, float, float] = "auto",
+    ) -> None:
+        self.model = model
+        self.noise = noise or presets.paper()
+        self.priors = priors or Priors()
+        self.bounds = bounds or Bounds()
+        self.side = side
+        self.vertical = vertical
+        self.forward = forward
+        self.initial: InitialModel | None = None
+        self._filter: _core.Filter | None = None
+        self._core_model: _core.Model | None = None
+        self._time: float | None = None
+
+    def run(
+        self, recording: Recording, *, static: Recording | None = None, progress: Progress | None = None
+    ) -> Estimate:
+        """Estimate a whole recording.
+
+        Args:
+            recording: markers and plates, as `read` gives them.
+            static: the same person and markers, standing: lengths and marker places are taken from it.
+            progress: called with (frames done, frames in all) now and then.
+
+        Raises:
+            ModelError, RecordingError: model, markers, plates and recording do not fit.
+            DivergenceError: the filter lost its estimate; the message names the frame.
+        """
+        initial = self.start(recording, static=static)
+        assert self._filter is not None and self._core_model is not None
+        markers, wrench = recording_arrays(recording, initial)
+        check = check_plates(recording, initial.ground, initial.mass_kg)
+        if check.refusal:
+            raise RecordingError(f"{recording.path or recording.name}: {check.refusal}")
+        arrays = self._filter.run(np.ascontiguousarray(recording.time), markers, wrench, progress)
+        self._time = float(recording.time[-1])
+        return assemble(
+            arrays, self._core_model, initial, recording, (markers, wrench), self.settings(), check.messages
+        )
+
+    def start(self, recording: Recording, *, static: Recording | None = None) -> InitialModel:
+        """Measure the model on a recording (or the first seconds of a live one) and make the filter ready to step.
+
+        Raises:
+            ModelError, RecordingError: as in `run`.
+        """
+        initial = initialise(
+            self.model,
+            recording,
+            static=static,
+            side=self.side,
+            vertical=self.vertical,
+            forward=self.forward,
+            priors=self.priors,
+            bounds=self.bounds,
+        )
+        self._core_model = _core.Model(initial.spec)
+        self._filter = _core.Filter(
+            self._core_model, self.filter_settings(initial), initial.x0, np.diag(initial.sd0**2)
+        )
+        self.initial, self._time = initial, None
+        return initial
+
+    def step(self, sample: Sample) -> StepEstimate:
+        """Take one sample, after `start`; samples come in the order of their times.
+
+        Raises:
+            RecordingError: the sample is older than the one before.
+            DivergenceError: the filter lost its estimate.
+        """
+        if self._filter is None or self._core_model is None or self.initial is None:
+            raise ConfigError("step: the estimator has not been started; call start(recording) first")
+        dt = 0.0 if self._time is None else sample.time_s - self._time
+        if dt < 0.0:
+            raise RecordingError(f"sample at {sample.time_s} s: older than the one before, at {self._time} s")
+        markers, wrench = sample_arrays(sample, self.initial)
+        if self._time is not None:
+            self._filter.predict(dt)
+        report = self._filter.update(markers, wrench)
+        if report.diverged:
+            raise DivergenceError(f"the filter diverged at {sample.time_s} s: {report.status}")
+        self._time = sample.time_s
+        model, x = self._core_model, self._filter.state
+        q, qd, qdd = _core.coordinates(model, x)
+        return StepEstimate(
+            sample.time_s,
+            q,
+            qd,
+            qdd,
+            _core.joint_moments(model, x),
+            _core.wrench(model, x),
+            _core.marker_positions(model, x),
+            report,
+        )
+
+    def settings(self) -> dict[str, object]:
+        """What was asked for, as plain data: written into the outputs."""
+        return {
+            "model": str(self.model.path if self.model.path.parent.name != "builtin" else self.model.name),
+            "side": self.side,
+            "vertical": self.vertical,
+            "forward": self.forward if isinstance(self.forward, str) else list(self.forward),
+            "noise": self.noise.model_dump(mode="json"),
+            "priors": self.priors.model_dump(mode="json"),
+            "bounds": self.bounds.model_dump(mode="json"),
+        }
+
+    def filter_settings(self, initial: InitialModel) -> _core.FilterSettings:
+        """The core's settings for a measured model: this noise, the marker set's variances, the bounds of (9)."""
+        assert self._core_model is not None
+        unknown = set(self.noise.marker) - set(initial.recorded_markers)
+        if unknown:
+            raise ConfigError(
+                f"noise.marker: {', '.join(sorted(unknown))} not among the markers used; expected some of "
+                f"{', '.join(initial.recorded_markers)}"
+            )
+        variance = self.noise.marker_scale * initial.marker_variance
+        for k, name in enumerate(initial.recorded_markers):
+            variance[k] = self.noise.marker.get(name, variance[k])
+        return _core.FilterSettings(
+            process_variance=self.noise.process_variance(self._core_model.layout),
+            marker_variance=variance,
+            wrench_covariance=self.noise.wrench_covariance(),
+            reference_point=np.array(self.noise.reference_point_m, dtype=float),
+            total_mass=initial.mass_kg,
+            total_mass_variance=self.noise.total_mass,
+            lower=initial.lower,
+            upper=initial.upper,
+            constraint=self.noise.constraint,
+        )

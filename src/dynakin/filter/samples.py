@@ -1,0 +1,76 @@
+"""Recordings and live samples as the arrays that the core takes: the model's markers and the total wrench, ground frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.errors import RecordingError
+from dynakin.model import InitialModel
+from dynakin.recordings import Recording
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Sample:
+    """What the laboratory measured at one instant, in its own frame.
+
+    Attributes:
+        time_s: s.
+        markers: name in the recording -> (3,) m; a marker that is missing is left out or NaN.
+        plates: plate -> (6,) wrench [N, N m], ground on person, about the laboratory origin; empty: not measured.
+    """
+
+    time_s: float
+    markers: Mapping[str, npt.ArrayLike]
+    plates: Mapping[str, npt.ArrayLike] = field(default_factory=dict)
+
+
+def recording_arrays(recording: Recording, initial: InitialModel) -> tuple[Array, Array]:
+    """Markers (T, M, 3) m and total wrench (T, 6) about the model's ground origin, ground frame, NaN missing.
+
+    Raises:
+        RecordingError: no plates, a marker of the model that is not in the recording, a frame without any of its
+            markers, or a wrench that is not finite.
+    """
+    where = recording.path or recording.name
+    if not recording.plates:
+        raise RecordingError(
+            f"{where}: no force plates, expected at least one: the wrench is a measurement of this filter "
+            "(a force file can be given beside the markers)"
+        )
+    markers = initial.ground.points_to_ground(
+        np.stack([recording.marker(name) for name in initial.recorded_markers], axis=1)
+    )
+    seen = np.isfinite(markers).all(axis=2)
+    blind = np.flatnonzero(np.count_nonzero(seen, axis=1) == 0)
+    if len(blind):
+        k = int(blind[0])
+        raise RecordingError(
+            f"{where}: frame {k + 1} ({recording.time[k]:.3f} s) has none of the model's {seen.shape[1]} markers, "
+            f"expected at least one ({len(blind)} such frame{'s' if len(blind) > 1 else ''})"
+        )
+    wrench = initial.ground.wrench_to_ground(recording.total_wrench())
+    bad = np.flatnonzero(~np.isfinite(wrench).all(axis=1))
+    if len(bad):
+        k = int(bad[0])
+        raise RecordingError(
+            f"{where}: the plates' wrench at frame {k + 1} ({recording.time[k]:.3f} s) is {wrench[k]}, "
+            f"expected numbers ({len(bad)} such frame{'s' if len(bad) > 1 else ''})"
+        )
+    return np.ascontiguousarray(markers), np.ascontiguousarray(wrench)
+
+
+def sample_arrays(sample: Sample, initial: InitialModel) -> tuple[Array, Array]:
+    """Markers (M, 3) and total wrench (6,) of one live sample; what it lacks is NaN."""
+    missing = np.full(3, np.nan)
+    measured = [np.asarray(sample.markers.get(name, missing), float) for name in initial.recorded_markers]
+    markers = initial.ground.points_to_ground(np.stack(measured))
+    if not sample.plates:
+        return np.ascontiguousarray(markers), np.full(6, np.nan)
+    total = np.sum([np.asarray(plate, float) for plate in sample.plates.values()], axis=0)
+    return np.ascontiguousarray(markers), initial.ground.wrench_to_ground(total)

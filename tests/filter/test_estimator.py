@@ -1,0 +1,162 @@
+"""The estimator on a simulated squat, whose truth is known, and on bad input."""
+
+from __future__ import annotations
+
+import dataclasses
+import pickle
+
+import numpy as np
+import pytest
+
+import dynakin
+from dynakin.errors import ConfigError, DivergenceError, RecordingError
+from dynakin.simulation import SensorNoise, SimulatedTrial, simulate_squat
+
+SUBJECT = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
+
+
+@pytest.fixture(scope="module")
+def trial() -> SimulatedTrial:
+    return simulate_squat(seed=3, duration_s=6.0)
+
+
+def estimator(**options: object) -> dynakin.Estimator:
+    return dynakin.Estimator(dynakin.load_model("sagittal7", subject=SUBJECT, markers="opencap"), **options)
+
+
+def with_markers(recording: dynakin.Recording, change) -> dynakin.Recording:
+    markers = recording.markers.copy()
+    change(markers)
+    return dataclasses.replace(recording, markers=markers)
+
+
+def samples(recording: dynakin.Recording) -> list[dynakin.Sample]:
+    return [
+        dynakin.Sample(
+            time_s=float(t),
+            markers=dict(zip(recording.marker_names, recording.markers[k], strict=True)),
+            plates={p.name: np.concatenate([p.force[k], p.moment[k]]) for p in recording.plates},
+        )
+        for k, t in enumerate(recording.time)
+    ]
+
+
+def test_live_steps_equal_the_run(trial: SimulatedTrial) -> None:
+    offline = estimator().run(trial.recording)
+    live = estimator()
+    live.start(trial.recording)
+    for k, sample in enumerate(samples(trial.recording)[:200]):
+        step = live.step(sample)
+        np.testing.assert_allclose(step.coordinates, offline.data["coordinates"].values[k], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(step.moments, offline.data["moments"].values[k], rtol=0, atol=1e-8)
+    assert step.report.n_rows == 38
+
+
+def test_a_sample_without_plates_or_markers_is_ridden_through(trial: SimulatedTrial) -> None:
+    live = estimator()
+    live.start(trial.recording)
+    first, second, third, *_ = samples(trial.recording)
+    live.step(first)
+    assert live.step(dataclasses.replace(second, plates={})).report.n_rows == 35
+    assert live.step(dataclasses.replace(third, markers={})).report.n_rows == 4
+
+
+def test_without_sensor_noise_the_posture_comes_out(trial: SimulatedTrial) -> None:
+    # Landmarks are not joint centres, so angles keep an offset; their movement must be the truth's.
+    clean = simulate_squat(seed=3, duration_s=6.0, noise=SensorNoise.none())
+    result = estimator().run(clean.recording)
+    error = result.data["coordinates"].values - clean.truth.data["coordinates"].values
+    error -= error.mean(axis=0)
+    names = result.coordinate_names
+    rms_deg = np.degrees(np.sqrt(np.mean(error**2, axis=0)))
+    assert rms_deg[names.index("knee")] < 3.0, dict(zip(names, rms_deg, strict=True))
+    assert result.metrics()["markers"]["mean_rms_mm"] < 2.0
+
+
+def test_deviations_of_parameters_never_grow_and_coordinates_stay_finite(trial: SimulatedTrial) -> None:
+    result = estimator().run(trial.recording)
+    sd = result.data["state_sd"].values
+    constants = [k for k, name in enumerate(result.data["element"].values) if str(name).startswith("length/")]
+    held = result.data["constrained"].values > 0  # a restricted gain may widen what it holds
+    steps = np.diff(sd[:, constants], axis=0)[~held[1:]]
+    assert (steps <= 1e-12).all()
+
+
+def test_noise_settings_reach_the_filter(trial: SimulatedTrial) -> None:
+    plain = estimator().run(trial.recording)
+    trusting = estimator(noise=dynakin.Noise(marker={"r_knee": 1e-6})).run(trial.recording)
+    rms = [r.metrics()["markers"]["rms_mm"]["r_knee"] for r in (plain, trusting)]
+    assert rms[1] < 0.5 * rms[0]
+
+
+def test_bounds_are_kept_at_every_frame(trial: SimulatedTrial) -> None:
+    tight = estimator(bounds=dynakin.Bounds(marker_threshold_m=0.002))
+    result = tight.run(trial.recording)
+    initial = tight.initial
+    state = result.data["state"].values
+    assert (state >= initial.lower).all() and (state <= initial.upper).all()
+    assert result.data["constrained"].values.sum() > 0
+    assert any(p.at_bound and p.kind == "marker" for p in result.parameters)
+
+
+def test_a_model_survives_pickling(trial: SimulatedTrial) -> None:
+    spec = estimator().start(trial.recording).spec
+    model = dynakin._core.Model(spec)
+    again = pickle.loads(pickle.dumps(model))
+    assert again.layout.names == model.layout.names
+    np.testing.assert_array_equal(again.initial_state(), model.initial_state())
+
+
+def test_a_recording_without_plates_is_refused(trial: SimulatedTrial) -> None:
+    with pytest.raises(RecordingError, match="no force plates, expected at least one"):
+        estimator().run(trial.recording.with_plates(()))
+
+
+def test_a_frame_without_any_marker_is_named(trial: SimulatedTrial) -> None:
+    def blind(markers: np.ndarray) -> None:
+        markers[250] = np.nan
+
+    with pytest.raises(RecordingError, match=r"frame 251 \(2\.500 s\) has none of the model's 17 markers"):
+        estimator().run(with_markers(trial.recording, blind))
+
+
+def test_an_infinite_marker_is_divergence_at_its_frame(trial: SimulatedTrial) -> None:
+    def broken(markers: np.ndarray) -> None:
+        markers[250] = np.inf
+
+    with pytest.raises((DivergenceError, RecordingError), match=r"frame 25[01]"):
+        estimator().run(with_markers(trial.recording, broken))
+
+
+def test_plates_upside_down_are_refused_with_the_number(trial: SimulatedTrial) -> None:
+    turned = [dataclasses.replace(p, force=-p.force, moment=-p.moment) for p in trial.recording.plates]
+    with pytest.raises(RecordingError, match=r"vertical force is -\d+\.\d N"):
+        estimator().run(trial.recording.with_plates(tuple(turned)))
+
+
+def test_noise_for_a_marker_that_is_not_used_is_refused(trial: SimulatedTrial) -> None:
+    with pytest.raises(ConfigError, match=r"noise\.marker: r_nose not among the markers used"):
+        estimator(noise=dynakin.Noise(marker={"r_nose": 1e-3})).run(trial.recording)
+
+
+def test_an_unknown_preset_lists_the_known_ones() -> None:
+    with pytest.raises(ConfigError, match="preset 'papr' is unknown; expected paper"):
+        dynakin.presets.preset("papr")
+
+
+def test_steps_need_a_start_and_go_forward_in_time(trial: SimulatedTrial) -> None:
+    live = estimator()
+    first, second, *_ = samples(trial.recording)
+    with pytest.raises(ConfigError, match="has not been started"):
+        live.step(first)
+    live.start(trial.recording)
+    live.step(second)
+    with pytest.raises(RecordingError, match="older than the one before"):
+        live.step(first)
+
+
+def test_progress_reaches_the_end(trial: SimulatedTrial) -> None:
+    seen: list[tuple[int, int]] = []
+    estimator().run(trial.recording, progress=lambda done, total: seen.append((done, total)))
+    assert seen[-1] == (601, 601)
+    assert [done for done, _ in seen] == sorted(done for done, _ in seen)

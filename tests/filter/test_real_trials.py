@@ -1,0 +1,73 @@
+"""The estimator on the shared recordings, as a stranger would run it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dynakin
+from dynakin.errors import ModelError
+
+
+@pytest.fixture(scope="module")
+def squats1(data_dir: Path) -> dynakin.Estimate:
+    folder = data_dir / "opencap_subject4"
+    recording = dynakin.read(folder / "squats1.trc", forces=folder / "squats1_grf.mot")
+    model = dynakin.load_model("sagittal7", subject=dynakin.Subject(mass_kg=60.05), markers="opencap")
+    return dynakin.Estimator(model).run(recording)
+
+
+def test_squats1_follows_markers_and_plates_as_the_paper_does(squats1: dynakin.Estimate) -> None:
+    metrics = squats1.metrics()
+    assert metrics["window"]["start_s"] == 2.0
+    assert metrics["markers"]["mean_rms_mm"] <= 4.0
+    for component, limit in {"fx": 6.0, "fy": 10.0, "mz": 7.0}.items():
+        assert metrics["wrench"]["rms"][component] <= limit
+
+
+def test_squats1_knee_moves_as_another_system_says(squats1: dynakin.Estimate, data_dir: Path) -> None:
+    # The other system's angles are three-dimensional and of the right leg; only the movement is compared, not the zero.
+    table = dynakin.recordings.read_table(data_dir / "opencap_subject4" / "squats1_ik.mot")
+    other = table.column("knee_angle_r")
+    ours = squats1.data["coordinates"].sel(coordinate="knee").values
+    difference = np.degrees((ours - ours.mean()) - (other - other.mean()))
+    assert np.ptp(np.degrees(ours)) > 20.0
+    assert np.sqrt(np.mean(difference**2)) < 5.0
+
+
+def test_squats1_keeps_every_parameter_within_its_bounds(squats1: dynakin.Estimate) -> None:
+    assert len(squats1.parameters) == 6 + 34 + 28
+    for p in squats1.parameters:
+        assert p.lower is not None and p.upper is not None
+        assert p.lower <= p.value <= p.upper, p.name
+        assert 0.0 < p.sd < np.inf, p.name
+
+
+@pytest.mark.parametrize("mass_kg", [78.6, None])
+@pytest.mark.parametrize("side", ["auto", "right", "both"])
+def test_flywheel_squat_runs_to_the_end_without_preparation(data_dir: Path, mass_kg: float | None, side: str) -> None:
+    recording = dynakin.read(data_dir / "plugin_gait" / "S1_FlywheelSquat.c3d")
+    model = dynakin.load_model("squat7", subject=dynakin.Subject(mass_kg=mass_kg))
+    result = dynakin.Estimator(model, side=side).run(recording)
+    assert result.data.sizes["time"] == 317
+    for name in ("state", "state_sd", "moments", "markers_estimated", "wrench_estimated", "nis"):
+        values = result.data[name].values
+        if name == "markers_estimated":
+            values = values[..., :2]
+        if name == "wrench_estimated":
+            values = values[:, [0, 1, 5]]
+        assert np.isfinite(values).all(), name
+    if side != "auto":  # the right shoulder is lost for 68 frames
+        assert any(event.kind == "missing" and event.subject == "RSHO" for event in result.events)
+        assert np.isnan(result.data["markers_measured"].sel(marker="RSHO").values[:, 0]).sum() == 68
+    assert any("abdomen has no markers: locked" in text for text in result.messages)
+
+
+def test_walking_is_refused_because_the_toe_moves(data_dir: Path) -> None:
+    recording = dynakin.read(data_dir / "plugin_gait" / "GaitNormal_1.c3d")
+    assert len(recording.plates) == 3
+    model = dynakin.load_model("squat7", subject=dynakin.Subject(mass_kg=66.0))
+    with pytest.raises(ModelError, match=r"RTOE moves \d+ mm"):
+        dynakin.Estimator(model).run(recording)
