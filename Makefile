@@ -4,7 +4,8 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 OUT ?= out/demo
-CORE := $(shell find cpp/include cpp/src src/dynakin/bindings -type f) CMakeLists.txt pyproject.toml
+CORE := $(shell find cpp/include cpp/src src/dynakin/bindings -type f) CMakeLists.txt pyproject.toml \
+  $(shell find src/dynakin -name __init__.py)  # a new package must be made known to the editable install
 CPP_TESTS := $(shell find cpp/tests -type f)
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1

@@ -15,10 +15,10 @@ import dynakin
 from dynakin.simulation import simulate_squat
 
 HERE = Path(__file__).parent
-FRAMES = {"early": (0, 50, 100, 200, 300), "late": (600, -1)}
-# Of a standard deviation. The paper's gains hardly see the speeds: two orders of summation part by a factor of ten about
-# every 200 frames (measured on squats1), so late frames can't be held to the last digits on every machine.
-TOLERANCE = {"early": 1e-6, "late": 1e-2}
+# Frames and how far they may move, in standard deviations. The paper's gains hardly see the speeds, so rounding grows: the
+# last bit of the markers comes to 2e-7 at frame 200 of the simulated trial, 1e-2 at frame 600, 4e-5 at the end of squats1.
+SQUATS1 = {0: 1e-5, 50: 1e-5, 100: 1e-5, 200: 1e-5, 300: 1e-5, 600: 1e-4, -1: 1e-2}
+SIMULATED = {0: 1e-5, 50: 1e-5, 100: 1e-5, 200: 1e-4}
 
 
 def squats1(data_dir: Path) -> dynakin.Estimate:
@@ -31,10 +31,10 @@ def squats1(data_dir: Path) -> dynakin.Estimate:
 def simulated() -> dynakin.Estimate:
     subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
     model = dynakin.load_model("sagittal7", subject=subject, markers="opencap")
-    return dynakin.Estimator(model).run(simulate_squat(seed=1, duration_s=8.0).recording)
+    return dynakin.Estimator(model).run(simulate_squat(seed=1, duration_s=6.0).recording)
 
 
-def summary(estimate: dynakin.Estimate) -> dict:
+def summary(estimate: dynakin.Estimate, frames: dict[int, float]) -> dict:
     data = estimate.data
     return {
         "elements": [str(name) for name in data["element"].values],
@@ -43,46 +43,44 @@ def summary(estimate: dynakin.Estimate) -> dict:
                 "state": [float(f"{v:.12g}") for v in data["state"].values[k]],
                 "sd": [float(f"{v:.12g}") for v in data["state_sd"].values[k]],
             }
-            for frames in FRAMES.values()
             for k in frames
         },
     }
 
 
-def compare(estimate: dynakin.Estimate, path: Path, update: bool) -> None:
-    found = summary(estimate)
+def compare(estimate: dynakin.Estimate, frames: dict[int, float], path: Path, update: bool) -> None:
+    found = summary(estimate, frames)
     if update:
         path.write_text(json.dumps(found, indent=0) + "\n", encoding="utf-8")
         return
     expected = json.loads(path.read_text(encoding="utf-8"))
     assert found["elements"] == expected["elements"]
-    for stretch, frames in FRAMES.items():
-        for k in frames:
-            now, then = found["frames"][str(k)], expected["frames"][str(k)]
-            sd = np.array(then["sd"])
-            moved = np.abs(np.array(now["state"]) - then["state"]) / sd
-            wider = np.abs(np.array(now["sd"]) - sd) / sd
-            worst = int(np.argmax(np.maximum(moved, wider)))
-            assert max(moved[worst], wider[worst]) < TOLERANCE[stretch], (
-                f"frame {k}: {expected['elements'][worst]} moved by {moved[worst]:.2g} of its standard deviation, "
-                f"which changed by {wider[worst]:.2g}; --update accepts this"
-            )
+    for k, tolerance in frames.items():
+        now, then = found["frames"][str(k)], expected["frames"][str(k)]
+        sd = np.array(then["sd"])
+        moved = np.abs(np.array(now["state"]) - then["state"]) / sd
+        wider = np.abs(np.array(now["sd"]) - sd) / sd
+        worst = int(np.argmax(np.maximum(moved, wider)))
+        assert max(moved[worst], wider[worst]) < tolerance, (
+            f"frame {k}: {expected['elements'][worst]} moved by {moved[worst]:.2g} of its standard deviation, "
+            f"which changed by {wider[worst]:.2g}; --update accepts this"
+        )
 
 
 def test_squats1(data_dir: Path, update: bool) -> None:
-    compare(squats1(data_dir), HERE / "squats1.json", update)
+    compare(squats1(data_dir), SQUATS1, HERE / "squats1.json", update)
 
 
 def test_simulated_squat(update: bool) -> None:
-    compare(simulated(), HERE / "simulated_squat.json", update)
+    compare(simulated(), SIMULATED, HERE / "simulated_squat.json", update)
 
 
 def test_a_change_is_seen(tmp_path: Path) -> None:
     estimate = simulated()
-    compare(estimate, tmp_path / "replay.json", update=True)
-    compare(estimate, tmp_path / "replay.json", update=False)
+    compare(estimate, SIMULATED, tmp_path / "replay.json", update=True)
+    compare(estimate, SIMULATED, tmp_path / "replay.json", update=False)
     changed = json.loads((tmp_path / "replay.json").read_text())
     changed["frames"]["100"]["state"][0] *= 1.0 + 1e-3
     (tmp_path / "replay.json").write_text(json.dumps(changed))
     with pytest.raises(AssertionError, match="frame 100: toe moved"):
-        compare(estimate, tmp_path / "replay.json", update=False)
+        compare(estimate, SIMULATED, tmp_path / "replay.json", update=False)

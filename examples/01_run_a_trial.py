@@ -1,0 +1,31 @@
+"""Run a recording from files to an output folder.
+
+    python 01_run_a_trial.py TRIAL.trc FORCES.mot
+
+Without arguments a simulated squat is used, so that the example runs anywhere.
+"""
+
+import sys
+
+import dynakin
+from dynakin.simulation import simulate_squat
+
+if len(sys.argv) == 3:
+    recording = dynakin.read(sys.argv[1], forces=sys.argv[2])
+    subject = dynakin.Subject()  # mass from the plates, mean of both sexes' tables
+else:
+    recording = simulate_squat(seed=1).recording
+    subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
+
+model = dynakin.load_model("sagittal7", subject=subject, markers="opencap")
+result = dynakin.Estimator(model, noise=dynakin.presets.paper()).run(recording)
+
+for message in result.messages:  # what was found, left out, assumed
+    print("-", message)
+metrics = result.metrics()
+print(f"markers: {metrics['markers']['mean_rms_mm']:.2f} mm RMS on average (after the frame was used)")
+print("wrench:", {name: round(rms, 2) for name, rms in metrics["wrench"]["rms"].items()}, "N, N m RMS")
+print(metrics["consistency"]["verdict"])
+knee = result.data["moments"].sel(coordinate="knee")
+print(f"knee moment, both legs: {float(knee.min()):.0f} to {float(knee.max()):.0f} N m")
+print("written to", result.save("out/example_01"))

@@ -1,0 +1,180 @@
+"""A person who does not exist: lengths, masses, centres of mass and inertias drawn around the anthropometric
+table.
+
+Every body is a pseudo-inertia J (4, 4) = [[S, h], [h', m]]: mass m, first moment h and second moments S of
+its mass distribution about the frame's origin. Stretching, shifting and mirroring the distribution are J -> T
+J T' with T an affine map, and bodies joined are the sum of their J. So a positive definite J stays so, and
+what is drawn is always a possible body.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dynakin.errors import ConfigError
+from dynakin.model.table import PAIRED, BodyTable, load_table
+
+Array = NDArray[np.float64]
+
+# Distances between joint centres over body height: Drillis & Contini (1966) as in Winter, Biomechanics and
+# Motor Control of Human Movement (2009), fig. 4.1, where it gives them; the toe landmark is the marker on the
+# second toe's nail, 2.5 % up.
+FRACTIONS: Mapping[str, float] = {
+    "foot": 0.092,  # toe landmark to ankle
+    "shank": 0.246,
+    "thigh": 0.245,
+    "pelvis": 0.052,  # hip to L5/S1
+    "trunk": 0.236,  # L5/S1 to shoulder; shoulder at 0.818 of the height
+    "upper_arm": 0.186,
+    "forearm": 0.146,
+    "hand": 0.049,  # wrist to the metacarpal heads
+    "torso": 0.260,  # L5/S1 to the cervical joint
+    "head": 0.155,  # cervical joint to vertex
+    "instep": 0.075,  # ankle to the metatarsal heads, the table's foot length
+    "hip_width": 0.110,  # between the hip joint centres, and the feet below them
+    "shoulder_width": 0.220,
+}
+T12_ON_TORSO = 0.30  # T12/L1 from L5/S1 up, over the torso
+ANKLE_DIRECTION = np.array([-0.988, 0.152, 0.0])  # from the toe landmark, foot flat
+LUMBAR_DIRECTION = np.array([-0.30, 0.954, 0.0])  # from the hip, pelvis frame (X from mid-PSIS to mid-ASIS)
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Relative standard deviations around the table: how unlike an average person the subject may be.
+
+    length: of each length; mass: of each part's mass; size: of the stretch of a part's mass distribution
+    along each axis (second moments go with its square); centre: of the centre of mass, over the part's
+    length.
+    """
+
+    length: float = 0.03
+    mass: float = 0.08
+    size: float = 0.05
+    centre: float = 0.02
+
+    @classmethod
+    def none(cls) -> Spread:
+        """The table itself."""
+        return cls(0.0, 0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class SimulatedSubject:
+    """Lengths (m) and, for each segment, the pseudo-inertia (4, 4) of both sides together about the segment's
+    origin."""
+
+    mass_kg: float
+    height_m: float
+    sex: str | None
+    lengths: Mapping[str, float]
+    bodies: Mapping[str, Array]
+
+    def parameters(self) -> dict[str, float]:
+        """Estimated quantities by the names of the filter's state: length/shank (m), inertia/shank/mass, mx,
+        my, izz (SI)."""
+        named = {f"length/{k}": self.lengths[k] for k in ("foot", "shank", "thigh", "pelvis", "trunk", "upper_arm")}
+        for name, J in self.bodies.items():
+            values = {"mass": J[3, 3], "mx": J[0, 3], "my": J[1, 3], "izz": J[0, 0] + J[1, 1]}
+            named |= {f"inertia/{name}/{k}": float(v) for k, v in values.items()}
+        return named
+
+
+def pseudo_inertia(mass: float, com: Array, inertia: Array) -> Array:
+    """J (4, 4) from mass (kg), centre of mass (3,) m and inertia tensor (3, 3) kg m^2 about the centre of
+    mass."""
+    second = 0.5 * np.trace(inertia) * np.eye(3) - inertia + mass * np.outer(com, com)
+    return np.block([[second, mass * com[:, None]], [mass * com[None, :], np.array([[mass]])]])
+
+
+def mass_com_inertia(J: Array) -> tuple[float, Array, Array]:
+    """The inverse of `pseudo_inertia`."""
+    mass = float(J[3, 3])
+    com = J[:3, 3] / mass
+    second = J[:3, :3] - mass * np.outer(com, com)
+    return mass, com, np.trace(second) * np.eye(3) - second
+
+
+def affine(J: Array, stretch: Array | None = None, shift: Array | None = None) -> Array:
+    """J of the distribution moved by p -> stretch p + shift."""
+    T = np.eye(4)
+    if stretch is not None:
+        T[:3, :3] = stretch
+    if shift is not None:
+        T[:3, 3] = shift
+    return np.asarray(T @ J @ T.T)
+
+
+def draw_subject(
+    rng: np.random.Generator,
+    mass_kg: float,
+    height_m: float,
+    sex: str | None,
+    spread: Spread | None = None,
+    table: str = "dumas",
+) -> SimulatedSubject:
+    """A subject around the table; the parts' masses add up to ``mass_kg`` exactly.
+
+    Raises:
+        ConfigError: mass or height not positive, or an unknown sex.
+    """
+    if not mass_kg > 0.0 or not height_m > 0.0:
+        raise ConfigError(f"simulated subject: mass_kg is {mass_kg:g}, height_m is {height_m:g}; both must be positive")
+    if sex not in ("male", "female", None):
+        raise ConfigError(f"simulated subject: sex is {sex!r}, expected male, female or None")
+    spread = spread or Spread()
+    lengths = {k: f * height_m * float(np.exp(spread.length * rng.standard_normal())) for k, f in FRACTIONS.items()}
+    parts = _draw_parts(rng, load_table(table, sex), lengths, spread)  # type: ignore[arg-type]
+    total = sum(J[3, 3] * (2.0 if name in PAIRED else 1.0) for name, J in parts.items())
+    parts = {name: J * (mass_kg / total) for name, J in parts.items()}
+    return SimulatedSubject(mass_kg, height_m, sex, lengths, _join(parts, lengths))
+
+
+def _draw_parts(
+    rng: np.random.Generator, table: BodyTable, lengths: Mapping[str, float], spread: Spread
+) -> dict[str, Array]:
+    """One side of each part of the table about the part's own origin, drawn around its entry."""
+    own = {
+        "foot": lengths["instep"],
+        "thorax": (1.0 - T12_ON_TORSO) * lengths["torso"],
+        "abdomen": T12_ON_TORSO * lengths["torso"],
+    }
+    parts = {}
+    for name, entry in table.parts.items():
+        L = own[name] if name in own else lengths[name]
+        mass = entry.mass_fraction * float(np.exp(spread.mass * rng.standard_normal()))
+        J = pseudo_inertia(mass, np.zeros(3), mass * L**2 * entry.inertia)
+        J = affine(J, stretch=np.diag(np.exp(spread.size * rng.standard_normal(3))))
+        parts[name] = affine(J, shift=L * (entry.centre + spread.centre * rng.standard_normal(3)))
+    return parts
+
+
+def _join(parts: Mapping[str, Array], lengths: Mapping[str, float]) -> dict[str, Array]:
+    """Parts put into the model's segments, right and left lumped; symmetric about the sagittal plane."""
+    up, side = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
+    hip, shoulder = 0.5 * lengths["hip_width"] * side, 0.5 * lengths["shoulder_width"] * side
+
+    def both(J: Array) -> Array:
+        return J + affine(J, stretch=np.diag([1.0, 1.0, -1.0]))
+
+    def at(name: str, shift: Array) -> Array:
+        return affine(parts[name], shift=shift)
+
+    t12, neck = T12_ON_TORSO * lengths["torso"] * up, lengths["torso"] * up
+    middle = {  # the mass distribution of a part on the midline is made symmetric
+        "pelvis": at("pelvis", lengths["pelvis"] * LUMBAR_DIRECTION),
+        "trunk": at("abdomen", t12) + at("thorax", neck) + at("head", neck),
+    }
+    hand = at("hand", -lengths["forearm"] * up)
+    return {
+        "foot": both(at("foot", lengths["foot"] * ANKLE_DIRECTION + hip)),
+        "shank": both(at("shank", lengths["shank"] * up + hip)),
+        "thigh": both(at("thigh", lengths["thigh"] * up + hip)),
+        **{name: 0.5 * both(J) for name, J in middle.items()},
+        "upper_arm": both(at("upper_arm", shoulder)),
+        "forearm": both(affine(parts["forearm"] + hand, shift=shoulder)),
+    }
