@@ -22,9 +22,7 @@ def turn(degrees: float) -> Array:
     return np.array([[np.cos(a), -np.sin(a)], [np.sin(a), np.cos(a)]])
 
 
-def stand(
-    ankle: float = 5.0, knee: float = 8.0, hip: float = 10.0, heel_rise: float = 0.0
-) -> dict[str, Array]:
+def stand(ankle: float = 5.0, knee: float = 8.0, hip: float = 10.0, heel_rise: float = 0.0) -> dict[str, Array]:
     """Marker places (3,) m in the ground frame (toe at the origin) for angles in degrees with OpenSim's
     signs."""
     foot = turn(-heel_rise)

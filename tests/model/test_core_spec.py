@@ -91,6 +91,4 @@ def test_a_start_beyond_a_joint_limit_is_put_on_it_and_said() -> None:
 def test_the_specification_can_be_pickled(standing_person: Recording) -> None:
     initial = initialise(load_model("sagittal7", PERSON), standing_person)
     again = pickle.loads(pickle.dumps(initial.spec))
-    np.testing.assert_array_equal(
-        _core.Model(again).initial_state(), _core.Model(initial.spec).initial_state()
-    )
+    np.testing.assert_array_equal(_core.Model(again).initial_state(), _core.Model(initial.spec).initial_state())

@@ -111,9 +111,7 @@ def test_a_marker_seen_only_later_is_placed_there(standing_person: Recording) ->
     plan, found = measure(load_model("sagittal7", PERSON), recording)
     place = next(site.position for site in plan.sites if site.name == "r_thigh2")
     np.testing.assert_allclose(place[:2], [0.06, 0.17], atol=2e-3)
-    assert any(
-        "R_thigh2 is not seen in the calibration frames: placed from 0.40 s" in m for m in found.messages
-    )
+    assert any("R_thigh2 is not seen in the calibration frames: placed from 0.40 s" in m for m in found.messages)
 
 
 def test_a_moving_toe_is_refused_with_the_distance() -> None:
@@ -123,9 +121,7 @@ def test_a_moving_toe_is_refused_with_the_distance() -> None:
         for name in frame:
             frame[name] = frame[name] + [0.01 * k, 0.0, 0.0]
         frames.append(frame)
-    with pytest.raises(
-        ModelError, match=r"marker R_toe moves 9\d\d mm .* toe fixed in the ground \(at most 40 mm\)"
-    ):
+    with pytest.raises(ModelError, match=r"marker R_toe moves 9\d\d mm .* toe fixed in the ground \(at most 40 mm\)"):
         measure(load_model("sagittal7", PERSON), make(frames))
 
 
@@ -165,9 +161,7 @@ def test_an_abdomen_without_markers_is_locked_to_the_thorax(standing_person: Rec
 
 
 def test_a_segment_without_markers_and_without_a_rule_is_refused(standing_person: Recording) -> None:
-    trunk = [
-        name for name in standing_person.marker_names if any(w in name for w in ("Sternum", "C7", "Shoulder"))
-    ]
+    trunk = [name for name in standing_person.marker_names if any(w in name for w in ("Sternum", "C7", "Shoulder"))]
     with pytest.raises(ModelError, match=r"segment 'trunk' has no marker \(tried R_Sternum.*it has R_toe"):
         measure(load_model("sagittal7", PERSON, "opencap"), without(standing_person, *trunk))
 
@@ -186,9 +180,7 @@ def test_mass_is_needed_and_height_is_estimated(standing_person: Recording) -> N
 
 
 def test_one_frame_is_enough() -> None:
-    plan, _ = measure(
-        load_model("sagittal7", PERSON, "opencap"), make([stand()]), forward="+X", vertical="+Y"
-    )
+    plan, _ = measure(load_model("sagittal7", PERSON, "opencap"), make([stand()]), forward="+X", vertical="+Y")
     assert np.rad2deg(plan.start["ankle"]) == pytest.approx(5.0, abs=1e-6)
 
 
@@ -284,9 +276,7 @@ def test_a_users_own_spatial_tree(tmp_path: Path, standing_person: Recording) ->
         np.testing.assert_allclose([plan.start[name] for name in ("tx", "ty", "tz")], hip, atol=1e-6)
         assert plan.geometry.lengths["thigh"] == pytest.approx(np.linalg.norm(hip - knee), abs=1e-9)
         assert plan.geometry.lengths["shank"] == pytest.approx(np.linalg.norm(knee - ankle), abs=1e-9)
-        lean = np.arcsin(
-            (hip - knee)[2] / np.linalg.norm(hip - knee)
-        )  # the thigh leans outwards, knee off the hip
+        lean = np.arcsin((hip - knee)[2] / np.linalg.norm(hip - knee))  # the thigh leans outwards, knee off the hip
         assert plan.start["adduction"] == pytest.approx(lean, abs=0.01)
         assert np.sign(plan.start["adduction"]) == -sign
         assert plan.start["rotation"] == 0.0

@@ -37,9 +37,7 @@ def planar_sum(points: Array, masses: Array) -> Array:
     return np.array([masses.sum(), *(masses @ points)[:2], masses @ (points[:, 0] ** 2 + points[:, 1] ** 2)])
 
 
-@pytest.fixture(
-    params=[("sagittal7", "dumas"), ("squat7", "dumas"), ("sagittal7", "deleva"), ("squat7", "deleva")]
-)
+@pytest.fixture(params=[("sagittal7", "dumas"), ("squat7", "dumas"), ("sagittal7", "deleva"), ("squat7", "deleva")])
 def measured(request: pytest.FixtureRequest, standing_person: Recording) -> tuple[ModelPlan, Measured, str]:
     model, table = request.param
     return *measure(load_model(model, PERSON, "opencap", table), standing_person, side="right"), table
@@ -74,18 +72,14 @@ def test_each_segment_equals_the_points_of_its_parts_on_both_sides(
                 points.append(own @ part.rotation.T * [1.0, 1.0, mirror] + part.origin)
                 masses.append(weights)
         expected = planar_sum(np.vstack(points), np.concatenate(masses))
-        np.testing.assert_allclose(
-            plan.bodies[segment.name].vector[[0, 1, 2, 6]], expected, rtol=1e-10, atol=1e-12
-        )
+        np.testing.assert_allclose(plan.bodies[segment.name].vector[[0, 1, 2, 6]], expected, rtol=1e-10, atol=1e-12)
 
 
 def test_the_whole_body_is_where_the_parts_are(standing_person: Recording) -> None:
     """The centre of mass of the chain equals the one of the parts placed at the landmarks, in the ground
     frame."""
     plan, found = measure(load_model("sagittal7", PERSON, "opencap"), standing_person, side="right")
-    height = sum(
-        body.mass * (plan_pose(plan, name) @ [*body.centre[:2], 1.0])[1] for name, body in plan.bodies.items()
-    )
+    height = sum(body.mass * (plan_pose(plan, name) @ [*body.centre[:2], 1.0])[1] for name, body in plan.bodies.items())
     assert 0.50 * 1.75 < height / 70.0 + 0.03 < 0.60 * 1.75  # 53 to 57 % of the height in women and men
     assert found.mass_kg == 70.0
 
@@ -113,9 +107,7 @@ def test_foot_frame_is_turned_from_heel_to_metatarsals(standing_person: Recordin
     heel, middle = np.array([-0.21, -0.01]), 0.5 * np.array([-0.03, -0.02])
     direction = (middle - heel) / np.linalg.norm(middle - heel)
     np.testing.assert_allclose(foot.rotation[:2, 0], direction, atol=1e-9)
-    assert foot.length == pytest.approx(
-        np.linalg.norm(middle - 0.16 * np.array([-0.95, np.sqrt(1 - 0.95**2)]))
-    )
+    assert foot.length == pytest.approx(np.linalg.norm(middle - 0.16 * np.array([-0.95, np.sqrt(1 - 0.95**2)])))
 
 
 def test_proximal_table_origin_goes_to_the_distal_joint(standing_person: Recording) -> None:

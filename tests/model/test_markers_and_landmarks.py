@@ -38,11 +38,7 @@ def test_a_marker_that_is_blank_everywhere_is_absent() -> None:
 
 
 def test_the_set_is_chosen_by_the_names() -> None:
-    pig = [
-        f"{side}{name}"
-        for side in "RL"
-        for name in ("TOE", "HEE", "ANK", "TIB", "KNE", "THI", "ASI", "PSI", "SHO")
-    ]
+    pig = [f"{side}{name}" for side in "RL" for name in ("TOE", "HEE", "ANK", "TIB", "KNE", "THI", "ASI", "PSI", "SHO")]
     assert choose_marker_set(pig).name == "plug-in-gait"
     opencap = load_marker_set("opencap-all")
     names = [alias for marker in opencap.markers for alias in (*marker.right, *marker.left, *marker.centre)]
@@ -62,9 +58,7 @@ def test_variances_are_table_1_and_the_others_say_why() -> None:
         "STRN": 15e-3,
         "SHO": 10e-3,
     }
-    markers = {
-        marker.name: marker for marker in load_marker_set("plug-in-gait").markers if not marker.landmark_only
-    }
+    markers = {marker.name: marker for marker in load_marker_set("plug-in-gait").markers if not marker.landmark_only}
     for name, marker in markers.items():
         if name in table_1:
             assert marker.variance == table_1[name]
@@ -75,9 +69,7 @@ def test_variances_are_table_1_and_the_others_say_why() -> None:
 
 def test_opencap_has_seventeen_sites_a_side() -> None:
     marker_set = load_marker_set("opencap")
-    names = tuple(
-        alias for marker in marker_set.markers for alias in (*marker.right, *marker.left, *marker.centre)
-    )
+    names = tuple(alias for marker in marker_set.markers for alias in (*marker.right, *marker.left, *marker.centre))
     assert len(matched(names, "opencap").sites("right")) == 17
     assert len(matched(names, "opencap").sites("both")) == 33
 

@@ -49,9 +49,7 @@ def test_a_hinge_with_a_sign_is_exact(angle: float) -> None:
 
 
 def test_a_scaled_polynomial_axis() -> None:
-    axis = Axis(
-        coordinate="q", kind="translation", direction=(1, 0, 0), coefficients=(0.1, 1.0, 0.5), scale="L"
-    )
+    axis = Axis(coordinate="q", kind="translation", direction=(1, 0, 0), coefficients=(0.1, 1.0, 0.5), scale="L")
     _, translation = joint_motion((axis,), {"q": 0.2}, {"L": 2.0})
     np.testing.assert_allclose(translation, [2.0 * (0.1 + 0.2 + 0.5 * 0.04), 0.0, 0.0])
 

@@ -92,9 +92,7 @@ def test_s1_squat_takes_the_mean_force_for_the_mass_and_warns(data_dir: Path) ->
 @pytest.mark.parametrize("model", ["squat7", "sagittal7"])
 def test_walking_is_refused_because_the_toe_moves(data_dir: Path, model: str) -> None:
     recording = read(data_dir / PIG / "GaitNormal_1.c3d")
-    with pytest.raises(
-        ModelError, match=r"GaitNormal_1\.c3d: marker [RL]TOE moves 1\d\d\d mm .*at most 40 mm"
-    ):
+    with pytest.raises(ModelError, match=r"GaitNormal_1\.c3d: marker [RL]TOE moves 1\d\d\d mm .*at most 40 mm"):
         measure(load_model(model, Subject(mass_kg=66.0)), recording)
 
 

@@ -76,14 +76,10 @@ def test_point_on_a_line() -> None:
 
 def test_a_users_csv(tmp_path: Path) -> None:
     path = tmp_path / "mine.csv"
-    path.write_text(
-        (SOURCE / "dumas.csv").read_text(encoding="utf-8").replace(",male,", ",any,"), encoding="utf-8"
-    )
+    path.write_text((SOURCE / "dumas.csv").read_text(encoding="utf-8").replace(",male,", ",any,"), encoding="utf-8")
     table = load_table(path, "female")
     assert table.name == "mine"
-    assert table.part("head").centre[0] == pytest.approx(
-        0.02
-    )  # the row for any sex goes before the one for women
+    assert table.part("head").centre[0] == pytest.approx(0.02)  # the row for any sex goes before the one for women
 
 
 @pytest.mark.parametrize(
@@ -97,9 +93,7 @@ def test_a_users_csv(tmp_path: Path) -> None:
         ("head,male,y,cervical", "head,male,y", ["line 9", "18 cells, expected 19"]),
     ],
 )
-def test_a_wrong_cell_names_file_line_and_column(
-    tmp_path: Path, old: str, new: str, words: list[str]
-) -> None:
+def test_a_wrong_cell_names_file_line_and_column(tmp_path: Path, old: str, new: str, words: list[str]) -> None:
     path = tmp_path / "mine.csv"
     text = (SOURCE / "dumas.csv").read_text(encoding="utf-8")
     lines = [line for line in text.splitlines() if line.startswith("#")]

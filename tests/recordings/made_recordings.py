@@ -146,8 +146,6 @@ def write_c3d(
         c3d.add_parameter("FORCE_PLATFORM", "ORIGIN", np.array(origins, dtype=float).T)
         c3d.add_parameter("FORCE_PLATFORM", "ZERO", [1, 0])
         if calibration is not None:
-            c3d.add_parameter(
-                "FORCE_PLATFORM", "CAL_MATRIX", np.repeat(calibration[:, :, None], len(kinds), axis=2)
-            )
+            c3d.add_parameter("FORCE_PLATFORM", "CAL_MATRIX", np.repeat(calibration[:, :, None], len(kinds), axis=2))
     c3d.write(str(path))
     return path

@@ -52,9 +52,7 @@ def test_there_and_back() -> None:
     )
     np.testing.assert_allclose(frame.points_to_laboratory(frame.points_to_ground(points)), points, atol=1e-14)
     np.testing.assert_allclose(frame.wrench_to_laboratory(frame.wrench_to_ground(wrench)), wrench, atol=1e-14)
-    np.testing.assert_allclose(
-        frame.vectors_to_laboratory(frame.vectors_to_ground(points)), points, atol=1e-14
-    )
+    np.testing.assert_allclose(frame.vectors_to_laboratory(frame.vectors_to_ground(points)), points, atol=1e-14)
     moved = frame.with_origin((1, 0, 0))
     np.testing.assert_allclose(moved.points_to_ground(np.array([1.0, 0, 0])), 0.0)
 
@@ -62,9 +60,7 @@ def test_there_and_back() -> None:
 def test_wrench_moves_with_the_origin_by_hand() -> None:
     frame = find_ground_frame(standing(), vertical="+Y", forward="+X", origin_L=(1.0, 0.0, 0.0))
     # 100 N up at x = 3 m: 300 N m about Z at the laboratory's origin, 200 N m about one 1 m ahead
-    np.testing.assert_allclose(
-        frame.wrench_to_ground(np.array([0, 100.0, 0, 0, 0, 300.0])), [0, 100, 0, 0, 0, 200]
-    )
+    np.testing.assert_allclose(frame.wrench_to_ground(np.array([0, 100.0, 0, 0, 0, 300.0])), [0, 100, 0, 0, 0, 200])
 
 
 def test_a_screen_hint_that_is_wrong_is_told_and_not_followed() -> None:
@@ -127,9 +123,7 @@ def test_swapped_heel_and_toe_are_told() -> None:
 
 def test_markers_by_prefix_case_and_dots_and_pairs_of_a_marker_set() -> None:
     still = standing()
-    renamed = replace(
-        still, marker_names=tuple("S1:" + n[0] + "." + n[1:].lower() for n in still.marker_names)
-    )
+    renamed = replace(still, marker_names=tuple("S1:" + n[0] + "." + n[1:].lower() for n in still.marker_names))
     assert find_marker(renamed, "LHEE") == "S1:L.hee"
     assert find_marker(renamed, "XHEE") is None
     np.testing.assert_allclose(find_ground_frame(renamed).forward, [1, 0, 0], atol=1e-9)
@@ -142,9 +136,7 @@ def test_missing_first_second_does_not_hinder() -> None:
     still = standing(n_frames=300)
     markers = still.markers.copy()
     markers[:150] = np.nan
-    np.testing.assert_allclose(
-        find_ground_frame(replace(still, markers=markers)).forward, [1, 0, 0], atol=1e-9
-    )
+    np.testing.assert_allclose(find_ground_frame(replace(still, markers=markers)).forward, [1, 0, 0], atol=1e-9)
 
 
 def test_standing_window() -> None:

@@ -72,9 +72,7 @@ def test_pressure_somewhat_off_the_foot_is_a_warning() -> None:
 def test_both_plates_under_one_foot_and_big_free_moments_are_told() -> None:
     good = standing(70.0)
     doubled = replace(good, plates=(good.plates[0], replace(good.plates[0], name="plate 2")))
-    assert any(
-        "both have their centre of pressure under the left foot" in text for text in check(doubled).messages
-    )
+    assert any("both have their centre of pressure under the left foot" in text for text in check(doubled).messages)
     twisted = replace(good.plates[0], free_moment=good.plates[0].free_moment + np.array([8.0, 30.0, 0.0]))
     said = " ".join(check(replace(good, plates=(twisted, good.plates[1]))).messages)
     assert "free moment 32.0 N m is large" in said

@@ -27,9 +27,7 @@ def test_markers_and_plates(tmp_path: Path) -> None:
     assert np.isnan(recording.markers[1, 0]).all()
     # (0.1, 0, 0.2) x (0, 800, 0) = (-160, 0, 80), and 3 N m of free moment
     np.testing.assert_allclose(recording.total_wrench()[0], [0, 800, 0, -160, 3, 80])
-    np.testing.assert_allclose(
-        recording.total_wrench(about=(0.1, 0, 0.2))[0], [0, 800, 0, 0, 3, 0], atol=1e-12
-    )
+    np.testing.assert_allclose(recording.total_wrench(about=(0.1, 0, 0.2))[0], [0, 800, 0, 0, 3, 0], atol=1e-12)
 
 
 def test_forces_from_a_csv_beside_markers(tmp_path: Path) -> None:

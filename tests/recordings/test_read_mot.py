@@ -33,14 +33,11 @@ NEW = (
     "time\tknee\ttx\n0\t90\t1\n0.01\t180\t2\n"
 )
 MIXED = (
-    "squat.mot\nnRows = 2\nnColumns = 3\nINDEGREES = no\nEndHeader\n\n"
-    "Time\tknee\ttx\t\n0\t90\t1\t\n0.01\t180\t2\t\n"
+    "squat.mot\nnRows = 2\nnColumns = 3\nINDEGREES = no\nEndHeader\n\nTime\tknee\ttx\t\n0\t90\t1\t\n0.01\t180\t2\t\n"
 )
 
 
-@pytest.mark.parametrize(
-    ("text", "degrees"), [(OLD, None), (NEW, True), (MIXED.replace("\n", "\r\n"), False)]
-)
+@pytest.mark.parametrize(("text", "degrees"), [(OLD, None), (NEW, True), (MIXED.replace("\n", "\r\n"), False)])
 def test_all_headers(tmp_path: Path, text: str, degrees: bool | None) -> None:
     table = read_table(write(tmp_path, "a.mot", text))
     assert table.names == ("knee", "tx")
@@ -184,9 +181,7 @@ def test_longer_table_at_the_same_rate_is_cut_exactly(tmp_path: Path) -> None:
         (np.arange(51) / 50, "sampled more slowly"),
     ],
 )
-def test_forces_that_do_not_fit_name_both_lengths_and_ranges(
-    tmp_path: Path, time: np.ndarray, what: str
-) -> None:
+def test_forces_that_do_not_fit_name_both_lengths_and_ranges(tmp_path: Path, time: np.ndarray, what: str) -> None:
     with pytest.raises(RecordingError) as caught:
         read(trc(tmp_path, 101), write(tmp_path, "a.mot", single(time)))
     message = str(caught.value)
@@ -197,9 +192,7 @@ def test_forces_that_do_not_fit_name_both_lengths_and_ranges(
 
 def test_table_without_forces_and_plate_without_point(tmp_path: Path) -> None:
     path = trc(tmp_path, 2)
-    with pytest.raises(
-        RecordingError, match="no ground force columns, expected names such as ground_force_vx"
-    ):
+    with pytest.raises(RecordingError, match="no ground force columns, expected names such as ground_force_vx"):
         read(path, write(tmp_path, "a.mot", NEW))
     text = single(np.arange(2) / 100).replace("ground_force_py", "height")
     with pytest.raises(RecordingError, match="has no point y, expected columns px, py, pz"):

@@ -65,9 +65,7 @@ def test_s1_standing(data_dir: Path) -> None:
     assert found.ok
     assert found.mass_kg_from_plates == pytest.approx(81.3, abs=0.1)
     for plate, foot in zip(recording.plates, ("left", "right"), strict=True):
-        assert any(
-            f"{plate.name}: centre of pressure under the {foot} foot" in text for text in found.messages
-        )
+        assert any(f"{plate.name}: centre of pressure under the {foot} foot" in text for text in found.messages)
 
 
 def test_s1_flywheel_squat_is_a_warning_with_numbers(data_dir: Path) -> None:
@@ -92,9 +90,7 @@ def test_gait_with_three_plates(data_dir: Path) -> None:
     found = check_plates(recording, frame, 66.0)
     assert found.refusal is None
     for k, foot in enumerate(("right", "left", "right")):
-        assert any(
-            f"plate {k + 1}: centre of pressure under the {foot} foot" in text for text in found.messages
-        )
+        assert any(f"plate {k + 1}: centre of pressure under the {foot} foot" in text for text in found.messages)
     # Over one stride, from the middle of one right stance to the middle of the next, the mean force is m g.
     # The file's notes say 66 kg; its plates read 58 kg, two of them with offsets of -8 and -19 N.
     middles = [int(np.mean(np.flatnonzero(recording.plates[k].force[:, 1] > 50))) for k in (0, 2)]

@@ -23,18 +23,14 @@ def tone(time: np.ndarray, hz: float) -> np.ndarray:
 
 @pytest.mark.parametrize("hz", [0.0, 3.0, 20.0, 38.0])
 def test_slow_tones_pass_without_delay(hz: float) -> None:
-    np.testing.assert_allclose(
-        resample(tone(FINE, hz), FINE, COARSE)[INSIDE], tone(COARSE, hz)[INSIDE], atol=2e-3
-    )
+    np.testing.assert_allclose(resample(tone(FINE, hz), FINE, COARSE)[INSIDE], tone(COARSE, hz)[INSIDE], atol=2e-3)
 
 
 @pytest.mark.parametrize("hz", [63.0, 90.0, 101.0, 197.0, 512.0])
 @pytest.mark.parametrize("causal", [False, True])
 def test_fast_tones_do_not_fold_back(hz: float, causal: bool) -> None:
     found = resample(tone(FINE, hz), FINE, COARSE, causal=causal)[INSIDE]
-    limit = (
-        1.5 / np.sqrt(1 + (np.tan(np.pi * hz / 2000) / np.tan(np.pi * 40 / 2000)) ** 8) if causal else 2e-3
-    )
+    limit = 1.5 / np.sqrt(1 + (np.tan(np.pi * hz / 2000) / np.tan(np.pi * 40 / 2000)) ** 8) if causal else 2e-3
     assert np.abs(found).max() < limit
 
 
@@ -50,9 +46,7 @@ def test_same_times_are_the_same_array() -> None:
 
 def test_rates_without_a_common_grid() -> None:
     odd = np.arange(1000) / 480.0
-    np.testing.assert_allclose(
-        resample(tone(odd, 5.0), odd, COARSE)[INSIDE], tone(COARSE, 5.0)[INSIDE], atol=3e-3
-    )
+    np.testing.assert_allclose(resample(tone(odd, 5.0), odd, COARSE)[INSIDE], tone(COARSE, 5.0)[INSIDE], atol=3e-3)
 
 
 def test_uneven_or_short_input_is_refused() -> None:

@@ -48,9 +48,7 @@ def parameters_of(initial: InitialModel, state: Array, sd: Array) -> list[Parame
         if not length.estimated:
             value = float(length.value)
             name = f"length/{length.name}"
-            found.append(
-                Parameter(name, "length", length.name, "m", value, 0.0, value, None, None, None, False, False)
-            )
+            found.append(Parameter(name, "length", length.name, "m", value, 0.0, value, None, None, None, False, False))
     return found
 
 

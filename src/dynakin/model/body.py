@@ -65,9 +65,7 @@ def find_height(subject: Subject, recordings: list[Recording], trial: Trial) -> 
             return told, f"Height {told:.2f} m: from the file {recording.name}."
     marker_set = trial.match.marker_set
     heights = {key: path[np.isfinite(path).all(axis=1), 1] for key, path in trial.paths.items()}
-    tops = [
-        np.percentile(y, 99.0) for key, y in heights.items() if key[0] == marker_set.height_marker and len(y)
-    ]
+    tops = [np.percentile(y, 99.0) for key, y in heights.items() if key[0] == marker_set.height_marker and len(y)]
     if not tops or marker_set.height_fraction is None:
         return None, f"height_m is not given and {marker_set.height_marker or 'no marker'} does not tell it."
     floor = min(np.percentile(y, 1.0) for y in heights.values() if len(y))

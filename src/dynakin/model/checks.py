@@ -74,9 +74,7 @@ def check_masses(
             )
     total = sum(body.mass for body in bodies.values())
     if abs(total - mass_kg) > 1e-9 * mass_kg:
-        messages.append(
-            f"The segments of model {model.name} hold {total:.2f} kg of the body's {mass_kg:.2f} kg."
-        )
+        messages.append(f"The segments of model {model.name} hold {total:.2f} kg of the body's {mass_kg:.2f} kg.")
 
 
 def report(model: ModelFile, plan: ModelPlan, mass_kg: float, messages: list[str]) -> None:

@@ -19,9 +19,7 @@ _FOLDER = resources.files("dynakin.model") / "builtin"
 
 def available_models() -> list[str]:
     """Names of the built-in models."""
-    return sorted(
-        entry.name.removesuffix(".toml") for entry in _FOLDER.iterdir() if entry.name.endswith(".toml")
-    )
+    return sorted(entry.name.removesuffix(".toml") for entry in _FOLDER.iterdir() if entry.name.endswith(".toml"))
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,8 +67,7 @@ def load_model(
     path = Path(str(_FOLDER / f"{name}.toml")) if name in known else Path(name)
     if name not in known and (path.suffix != ".toml" or not path.exists()):
         raise ModelError(
-            f"model {name!r}: unknown{nearest(name, known)}; expected {', '.join(known)} or a .toml file "
-            "that exists"
+            f"model {name!r}: unknown{nearest(name, known)}; expected {', '.join(known)} or a .toml file that exists"
         )
     model = validate(ModelFile, read_toml(path), str(path))
     who = subject or Subject()

@@ -51,9 +51,7 @@ class Trial:
             warnings.simplefilter("ignore", RuntimeWarning)  # all-NaN: the answer is NaN, as wanted
             return {key: np.asarray(np.nanmedian(path[frames], axis=0)) for key, path in self.paths.items()}
 
-    def calibration_frames(
-        self, keys: set[MarkerKey], wished: set[MarkerKey]
-    ) -> tuple[npt.NDArray[np.intp], str]:
+    def calibration_frames(self, keys: set[MarkerKey], wished: set[MarkerKey]) -> tuple[npt.NDArray[np.intp], str]:
         """Frames on which lengths and marker places are measured, and a sentence that says which.
 
         The standing window where there is one, else the first frames; of these only frames with all markers
@@ -119,6 +117,5 @@ def choose_side(match: MarkerMatch, recording: Recording, side: str) -> tuple[st
                 gaps[own] += float((~np.isfinite(path).all(axis=1)).sum())
     best = "left" if gaps["left"] < gaps["right"] else "right"
     return best, (
-        f"Limb markers: {best} side (marker frames missing: right {gaps['right']:.0f}, left "
-        f"{gaps['left']:.0f})."
+        f"Limb markers: {best} side (marker frames missing: right {gaps['right']:.0f}, left {gaps['left']:.0f})."
     )

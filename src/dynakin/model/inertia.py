@@ -74,9 +74,7 @@ class RigidBody:
         p = np.asarray(p_SB, dtype=float)
         cross = np.dot(p, self.first_moment) * 2.0 * np.eye(3)
         cross -= np.outer(p, self.first_moment) + np.outer(self.first_moment, p)
-        return RigidBody(
-            self.mass, self.first_moment + self.mass * p, self.inertia + cross + self.mass * _shift(p)
-        )
+        return RigidBody(self.mass, self.first_moment + self.mass * p, self.inertia + cross + self.mass * _shift(p))
 
     def mirrored(self) -> RigidBody:
         """Map 3a: the body on the other side: z of the centre and the xz and yz entries change sign."""
@@ -85,9 +83,7 @@ class RigidBody:
 
     def __add__(self, other: RigidBody) -> RigidBody:
         """Map 3b: two bodies of one frame joined rigidly."""
-        return RigidBody(
-            self.mass + other.mass, self.first_moment + other.first_moment, self.inertia + other.inertia
-        )
+        return RigidBody(self.mass + other.mass, self.first_moment + other.first_moment, self.inertia + other.inertia)
 
     @property
     def pseudo_inertia(self) -> Array:

@@ -38,9 +38,7 @@ def initialise(
         ModelError: the model, the markers and the recording do not fit; one line says what was found and
             expected.
     """
-    plan, rest = measure(
-        definition, recording, ground, static=static, side=side, vertical=vertical, forward=forward
-    )
+    plan, rest = measure(definition, recording, ground, static=static, side=side, vertical=vertical, forward=forward)
     from dynakin import _core  # the core is needed from here on only
     from dynakin.model.spec import in_layout, to_core
 

@@ -82,9 +82,7 @@ class LandmarkFinder:
         if name not in marker_set.landmarks:
             raise ModelError(f"marker set {marker_set.name}: no landmark {name!r}, which {why} needs")
         side = SIDES[0] if self.side == "both" else self.side
-        raise ModelError(
-            f"{self.match.where}: {why} needs landmark {name!r}: {self._first_absent(name, side)}"
-        )
+        raise ModelError(f"{self.match.where}: {why} needs landmark {name!r}: {self._first_absent(name, side)}")
 
     def _first_absent(self, name: str, side: str) -> str:
         recipe = self.match.marker_set.landmarks[name][0]

@@ -37,9 +37,7 @@ class PlacedPart:
     body: RigidBody  # in its own frame, one side
 
 
-def part_length(
-    part: Part, landmarks: Mapping[str, Array], height_m: float, where: str
-) -> tuple[float, bool]:
+def part_length(part: Part, landmarks: Mapping[str, Array], height_m: float, where: str) -> tuple[float, bool]:
     """Length L (m) of a part: between its landmarks where both are known (True), else from the height
     (False)."""
     points = [point.at(dict(landmarks)) for point in (part.length_from, part.length_to)]
@@ -86,14 +84,10 @@ def place_parts(
             end = end + length * along
         else:
             if origin_G is None:
-                raise ModelError(
-                    f"{where}: part {name!r} starts at landmark {part.origin.end!r}, which is not known"
-                )
+                raise ModelError(f"{where}: part {name!r} starts at landmark {part.origin.end!r}, which is not known")
             origin = posture.to_local(segment.name, origin_G)
             rotation = _part_rotation(part, landmarks, posture.rotations[segment.name])
-        placed.append(
-            PlacedPart(name, length, measured, rotation, origin, scaled_body(part, mass_kg, length))
-        )
+        placed.append(PlacedPart(name, length, measured, rotation, origin, scaled_body(part, mass_kg, length)))
     return placed
 
 

@@ -98,9 +98,7 @@ class Recipe(Strict):
     def _one_way(self) -> Self:
         given = [key for key in ("mean", "pelvis", "polar", "fraction") if getattr(self, key) is not None]
         if len(given) != 1:
-            raise ValueError(
-                f"exactly one of mean, pelvis, polar, fraction expected, found {given or 'none'}"
-            )
+            raise ValueError(f"exactly one of mean, pelvis, polar, fraction expected, found {given or 'none'}")
         if given[0] != "mean" and self.sides == "both":
             raise ValueError("sides = 'both' is possible with mean only")
         if given[0] != "mean" and not self.source:
@@ -150,8 +148,7 @@ class MarkerSetFile(Strict):
                 for source in recipe.inputs:
                     if source not in known:
                         raise ValueError(
-                            f"landmarks.{landmark}: {source!r} is neither marker nor "
-                            f"landmark{nearest(source, known)}"
+                            f"landmarks.{landmark}: {source!r} is neither marker nor landmark{nearest(source, known)}"
                         )
         self._refuse_circles()
         for key in ("heel_toe", "pelvis_back_front", "height_marker"):

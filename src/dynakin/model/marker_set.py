@@ -20,9 +20,7 @@ _FOLDER = resources.files("dynakin.model") / "marker_sets"
 
 def available_marker_sets() -> list[str]:
     """Names of the built-in marker sets."""
-    return sorted(
-        entry.name.removesuffix(".toml") for entry in _FOLDER.iterdir() if entry.name.endswith(".toml")
-    )
+    return sorted(entry.name.removesuffix(".toml") for entry in _FOLDER.iterdir() if entry.name.endswith(".toml"))
 
 
 def load_marker_set(name_or_path: str | Path) -> MarkerSetFile:
@@ -69,13 +67,7 @@ class MarkerMatch:
         """Markers that become sites of the model on "right", "left" or "both" sides, in the order of the
         set."""
         sides = ("centre", "right", "left") if side == "both" else ("centre", side)
-        keys = [
-            (m, (m.name, s))
-            for m in self.marker_set.markers
-            if not m.landmark_only
-            for s in sides
-            if m.aliases(s)
-        ]
+        keys = [(m, (m.name, s)) for m in self.marker_set.markers if not m.landmark_only for s in sides if m.aliases(s)]
         return [(marker, key, self.names[key]) for marker, key in keys if key in self.names]
 
     def absent(self, name: str) -> str:

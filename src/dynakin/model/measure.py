@@ -56,9 +56,7 @@ def measure(
     def matched(entry: Recording, frame: GroundFrame | None) -> Trial:
         seen = [bool(np.isfinite(entry.marker(name)).all(axis=1).any()) for name in entry.marker_names]
         match = match_markers(marker_set, entry.marker_names, seen, str(entry.path or entry.name))
-        found = frame or find_ground_frame(
-            entry, vertical=vertical, forward=forward, pairs=match.facing_pairs
-        )
+        found = frame or find_ground_frame(entry, vertical=vertical, forward=forward, pairs=match.facing_pairs)
         return Trial.of(entry, match, found)
 
     trial = matched(recording, ground)
@@ -89,8 +87,7 @@ def measure(
     messages.append(how)
     if subject.sex is None:
         messages.append(
-            "Sex not given: regressions and table are the mean of both sexes (masses, centres, signed "
-            "tensors)."
+            "Sex not given: regressions and table are the mean of both sexes (masses, centres, signed tensors)."
         )
 
     unmeasured = _unmeasured_lengths(definition, landmarks, height_m, messages)
@@ -119,9 +116,7 @@ def _common(match: MarkerMatch, other: MarkerMatch) -> MarkerMatch:
     return MarkerMatch(match.marker_set, names, recorded, f"{match.where} with {other.where}")
 
 
-def needed_markers(
-    model: ModelFile, finder: LandmarkFinder, locks: dict[str, float | None]
-) -> set[MarkerKey]:
+def needed_markers(model: ModelFile, finder: LandmarkFinder, locks: dict[str, float | None]) -> set[MarkerKey]:
     """Markers of every landmark that the lengths and frames need; refuses a recording without one of them."""
     wanted: dict[str, str] = {}
     for segment in model.segments:
@@ -202,8 +197,6 @@ def _first_posture(
         raise ModelError(f"{trial.match.where}: no frame shows all markers of the joint centres")
     first = int(usable[0])
     if first > 0:
-        messages.append(
-            f"Start from frame {first} ({trial.recording.time[first]:.2f} s): markers are missing before."
-        )
+        messages.append(f"Start from frame {first} ({trial.recording.time[first]:.2f} s): markers are missing before.")
     positions = trial.median(np.array([first]))
     return find_posture(model, geometry, finder.find(positions), standing)

@@ -24,9 +24,7 @@ def axes_from(main: str, direction: Array, second: str = "", second_direction: A
     Without a second direction it is the ground's Z (right), or the ground's Y where the main axis is z.
     """
     if second_direction is None:
-        second, second_direction = (
-            ("z", np.array([0.0, 0.0, 1.0])) if main != "z" else ("y", np.array([0.0, 1.0, 0.0]))
-        )
+        second, second_direction = ("z", np.array([0.0, 0.0, 1.0])) if main != "z" else ("y", np.array([0.0, 1.0, 0.0]))
     columns: dict[str, Array] = {main: direction / np.linalg.norm(direction)}
     across = second_direction - columns[main] * float(columns[main] @ second_direction)
     columns[second] = across / np.linalg.norm(across)
@@ -60,9 +58,7 @@ def joint_motion(
     rotation, translation = np.eye(3), np.zeros(3)
     for axis in axes:
         q = values[axis.coordinate]
-        s = sum(c * q**k for k, c in enumerate(axis.coefficients)) * (
-            lengths[axis.scale] if axis.scale else 1.0
-        )
+        s = sum(c * q**k for k, c in enumerate(axis.coefficients)) * (lengths[axis.scale] if axis.scale else 1.0)
         direction = np.array(axis.direction)
         if axis.kind == "rotation":
             rotation = rotation @ Rotation.from_rotvec(s * direction).as_matrix()
@@ -82,9 +78,7 @@ def solve_joint(
     kinds = {axis.coordinate: axis.kind for axis in segment.axes}
 
     def residual(q: Array) -> Array:
-        rotation, translation = joint_motion(
-            segment.axes, {**fixed, **dict(zip(free, q, strict=True))}, lengths
-        )
+        rotation, translation = joint_motion(segment.axes, {**fixed, **dict(zip(free, q, strict=True))}, lengths)
         return np.concatenate([(rotation - target[0]).ravel(), translation - target[1]])
 
     starts = [np.zeros(len(free))]
@@ -94,8 +88,7 @@ def solve_joint(
     fits = [least_squares(residual, start, xtol=1e-14, ftol=1e-14, gtol=1e-14) for start in starts]
     best = min(fits, key=lambda fit: (round(float(fit.cost), 12), float(np.abs(fit.x).sum())))
     wrapped = [
-        (v + np.pi) % (2 * np.pi) - np.pi if kinds[n] == "rotation" else v
-        for n, v in zip(free, best.x, strict=True)
+        (v + np.pi) % (2 * np.pi) - np.pi if kinds[n] == "rotation" else v for n, v in zip(free, best.x, strict=True)
     ]
     return dict(zip(free, map(float, wrapped), strict=True))
 
@@ -125,8 +118,7 @@ class Geometry:
     def placement(self, segment: Segment) -> Array:
         """Joint origin (3,) m in the parent's frame."""
         terms = [
-            self.lengths[t.length] * d
-            for t, d in zip(segment.placement, self.directions[segment.name], strict=True)
+            self.lengths[t.length] * d for t, d in zip(segment.placement, self.directions[segment.name], strict=True)
         ]
         return np.asarray(np.array(segment.translation) + sum(terms, np.zeros(3)))
 
@@ -146,9 +138,7 @@ def find_posture(
         R_GP, p_GP = posture.rotations[segment.parent], posture.origins[segment.parent]
         R_PJ, p_PJ = np.array(segment.rotation), geometry.placement(segment)
         fixed = {
-            a.coordinate: posture.coordinates[a.coordinate]
-            for a in segment.axes
-            if a.coordinate in posture.coordinates
+            a.coordinate: posture.coordinates[a.coordinate] for a in segment.axes if a.coordinate in posture.coordinates
         }
         if any(axis.coordinate not in fixed for axis in segment.axes):
             R_GS = _target_rotation(model, segment, landmarks, standing)

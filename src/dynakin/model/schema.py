@@ -94,9 +94,7 @@ class Segment(Strict):
     def _consistent(self) -> Self:
         rotation = np.array(self.rotation)
         if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-6 or np.linalg.det(rotation) < 0.0:
-            raise ValueError(
-                "rotation is not a proper rotation matrix (three rows, orthonormal, determinant 1)"
-            )
+            raise ValueError("rotation is not a proper rotation matrix (three rows, orthonormal, determinant 1)")
         if any(term.measured for term in self.placement) and len(self.placement) > 1:
             raise ValueError("placement: a measured direction is possible with one length only")
         if self.inertia is not None and self.parts:
@@ -222,6 +220,4 @@ class ModelFile(Strict):
 def _need(name: str, known: object, where: str, expected: str) -> None:
     names = list(known)  # type: ignore[call-overload]
     if name not in names:
-        raise ValueError(
-            f"{where} is {name!r}{nearest(name, names)}, expected {expected}: {', '.join(names)}"
-        )
+        raise ValueError(f"{where} is {name!r}{nearest(name, names)}, expected {expected}: {', '.join(names)}")

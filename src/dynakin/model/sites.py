@@ -28,9 +28,7 @@ class Candidate:
 
 def candidates(model: ModelFile, match: MarkerMatch, side: str) -> tuple[list[Candidate], list[str]]:
     """Markers of the chosen side on the model's segments, and sentences on those that are left out."""
-    home = {part: s.name for s in model.segments for part in s.parts} | {
-        s.name: s.name for s in model.segments
-    }
+    home = {part: s.name for s in model.segments for part in s.parts} | {s.name: s.name for s in model.segments}
     sites = match.sites(side)
     chosen = [Candidate(m, key, name, home[m.segment]) for m, key, name in sites if m.segment in home]
     messages = [
@@ -89,9 +87,7 @@ def find_locks(
             locks.setdefault(axis.coordinate, value)
         names = ", ".join(axis.coordinate for axis in joint.axes)
         at = "the angle found while standing" if rule.value_deg is None else f"{rule.value_deg:g} deg"
-        messages.append(
-            f"Segment {name} has no markers: locked to {rule.lock_to} (coordinate {names} at {at})."
-        )
+        messages.append(f"Segment {name} has no markers: locked to {rule.lock_to} (coordinate {names} at {at}).")
     return locks, bare, messages
 
 
@@ -123,8 +119,7 @@ def place_sites(
             later = np.flatnonzero(trial.usable(needed | {c.key}))[:FIRST_FRAMES]
             if not len(later):
                 messages.append(
-                    f"Marker {c.recorded} left out: never seen together with the markers of the joint "
-                    "centres."
+                    f"Marker {c.recorded} left out: never seen together with the markers of the joint centres."
                 )
                 continue
             found = []

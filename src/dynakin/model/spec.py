@@ -55,9 +55,7 @@ def to_core(plan: ModelPlan) -> _core.ModelSpec:
     ]
     axes = list(plan.estimated_axes())
     markers = [
-        _core.MarkerSpec(
-            name=site.name, segment=site.segment, position=site.position, measured=axes, estimated=axes
-        )
+        _core.MarkerSpec(name=site.name, segment=site.segment, position=site.position, measured=axes, estimated=axes)
         for site in plan.sites
     ]
     planar = [True, True, False, False, False, True]

@@ -35,8 +35,6 @@ class Subject(_SubjectFields):
         for key in fields:
             if key not in _SubjectFields.model_fields:
                 known = _SubjectFields.model_fields
-                raise ModelError(
-                    f"subject: unknown key {key!r}{nearest(key, known)}; expected {', '.join(known)}"
-                )
+                raise ModelError(f"subject: unknown key {key!r}{nearest(key, known)}; expected {', '.join(known)}")
         checked = validate(_SubjectFields, fields, "subject")
         super().__init__(**checked.model_dump())

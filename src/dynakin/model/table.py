@@ -97,8 +97,7 @@ class BodyTable:
             return self.parts[name]
         except KeyError:
             raise ModelError(
-                f"table {self.name}: no part {name!r}{nearest(name, self.parts)}; it has "
-                f"{', '.join(self.parts)}"
+                f"table {self.name}: no part {name!r}{nearest(name, self.parts)}; it has {', '.join(self.parts)}"
             ) from None
 
 
@@ -112,9 +111,7 @@ def _read_rows(path: Path) -> list[tuple[int, dict[str, str]]]:
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()
     except (OSError, UnicodeDecodeError) as error:
-        raise ModelError(
-            f"{path}: table cannot be read ({getattr(error, 'strerror', None) or error})"
-        ) from None
+        raise ModelError(f"{path}: table cannot be read ({getattr(error, 'strerror', None) or error})") from None
     kept = [(k, line) for k, line in enumerate(lines, start=1) if line.strip() and not line.startswith("#")]
     if not kept:
         raise ModelError(f"{path}: the table is empty; expected a header with {', '.join(_COLUMNS)}")
@@ -168,9 +165,7 @@ def _part(row: dict[str, str], where: str) -> Part:
 
 def _mean_point(a: Point, b: Point, where: str) -> Point:
     if (a.start, a.end) != (b.start, b.end):
-        raise ModelError(
-            f"{where}: male and female rows name different landmarks, so their mean has no sense"
-        )
+        raise ModelError(f"{where}: male and female rows name different landmarks, so their mean has no sense")
     return Point(a.start, a.end, 0.5 * (a.fraction + b.fraction))
 
 
@@ -199,15 +194,9 @@ def load_table(name_or_path: str | Path, sex: Sex | None) -> BodyTable:
         expected.
     """
     name = str(name_or_path)
-    path = (
-        Path(str(resources.files("dynakin.model") / "tables" / f"{name}.csv"))
-        if name in BUILTIN
-        else Path(name)
-    )
+    path = Path(str(resources.files("dynakin.model") / "tables" / f"{name}.csv")) if name in BUILTIN else Path(name)
     if name not in BUILTIN and not path.exists():
-        raise ModelError(
-            f"table {name!r}: no such table{nearest(name, BUILTIN)}; expected dumas, deleva or a CSV file"
-        )
+        raise ModelError(f"table {name!r}: no such table{nearest(name, BUILTIN)}; expected dumas, deleva or a CSV file")
     found: dict[tuple[str, str], Part] = {}
     for line, row in _read_rows(path):
         where = f"{path}: line {line}"
@@ -223,11 +212,7 @@ def load_table(name_or_path: str | Path, sex: Sex | None) -> BodyTable:
         elif sex is None and (part, "male") in found and (part, "female") in found:
             parts[part] = _mean_part(found[part, "male"], found[part, "female"], f"{path}: part {part}")
         else:
-            raise ModelError(
-                f"{path}: part {part!r} has no row for sex {sex or 'male and female (sex not given)'}"
-            )
+            raise ModelError(f"{path}: part {part!r} has no row for sex {sex or 'male and female (sex not given)'}")
     total = sum((2 if part in PAIRED else 1) * entry.mass_fraction for part, entry in parts.items())
-    normalised = {
-        part: replace(entry, mass_fraction=entry.mass_fraction / total) for part, entry in parts.items()
-    }
+    normalised = {part: replace(entry, mass_fraction=entry.mass_fraction / total) for part, entry in parts.items()}
     return BodyTable(path.stem, sex, normalised, total)

@@ -41,9 +41,7 @@ def distance_to_hull(points: Array, outline: Array) -> Array:
     for i, j in combinations(range(n_corners), 2):
         distance = np.fmin(distance, _to_segment(points, outline[:, i], outline[:, j]))
     for i, j, k in combinations(range(n_corners), 3):
-        sides = np.stack(
-            [_side(points, outline[:, a], outline[:, b]) for a, b in ((i, j), (j, k), (k, i))], axis=1
-        )
+        sides = np.stack([_side(points, outline[:, a], outline[:, b]) for a, b in ((i, j), (j, k), (k, i))], axis=1)
         distance[(sides > 0).all(axis=1) | (sides < 0).all(axis=1)] = 0.0
     return np.where(np.isfinite(distance) & np.isfinite(points).all(axis=1), distance, np.nan)
 

@@ -102,9 +102,7 @@ def attach_forces(recording: Recording, table: Table, options: ReadOptions) -> R
         )
     if untouched and options.plate_filter_hz is None and options.force_threshold_n is None:
         return recording.with_plates(plates, notes)
-    return recording.with_plates(
-        tuple(_resampled(plate, table, recording, options) for plate in plates), notes
-    )
+    return recording.with_plates(tuple(_resampled(plate, table, recording, options) for plate in plates), notes)
 
 
 def _check_cover(recording: Recording, table: Table) -> None:
@@ -126,8 +124,7 @@ def _resampled(plate: Plate, table: Table, recording: Recording, options: ReadOp
     if np.isnan(wrench).any():
         row = int(np.flatnonzero(np.isnan(wrench).any(axis=1))[0])
         raise RecordingError(
-            f"{table.path}: {plate.name} has no force at {table.time[row]:g} s, "
-            "cannot be resampled or filtered"
+            f"{table.path}: {plate.name} has no force at {table.time[row]:g} s, cannot be resampled or filtered"
         )
     if options.plate_filter_hz is not None:
         rate = float(1 / np.median(np.diff(table.time)))

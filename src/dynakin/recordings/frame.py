@@ -101,13 +101,9 @@ def find_ground_frame(
         given = axis_vector(forward) if isinstance(forward, str) else np.asarray(forward, dtype=float)
         flat = horizontal(given, up) if given.shape == (3,) else None
         if flat is None:
-            raise ConfigError(
-                f"found forward {forward!r}, expected three numbers with a part across vertical {axis}"
-            )
+            raise ConfigError(f"found forward {forward!r}, expected three numbers with a part across vertical {axis}")
         ahead = flat
-        how.append(
-            f"Forward ({', '.join(f'{value:.3f}' for value in ahead + 0.0)}) in the laboratory: given."
-        )
+        how.append(f"Forward ({', '.join(f'{value:.3f}' for value in ahead + 0.0)}) in the laboratory: given.")
     rotation = np.vstack([ahead, up, np.cross(ahead, up)])
     origin = np.zeros(3) if origin_L is None else np.asarray(origin_L, dtype=float)
     return GroundFrame(rotation, origin, axis, ahead, tuple(how))

@@ -63,9 +63,7 @@ def parse_column(name: str) -> tuple[str, str, str] | None:
         quantity = "torque"
     else:
         return None
-    plate = "_".join(
-        re.sub(r"^fp(?=\d)", "", token) for token in rest if token not in _FILLER and token != "fp"
-    )
+    plate = "_".join(re.sub(r"^fp(?=\d)", "", token) for token in rest if token not in _FILLER and token != "fp")
     return plate, quantity, axis
 
 

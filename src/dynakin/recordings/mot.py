@@ -58,9 +58,7 @@ class Table:
             RecordingError: the header does not tell ``inDegrees``.
         """
         if self.in_degrees is None:
-            raise RecordingError(
-                f"{self.path}: header has no inDegrees line, expected inDegrees=yes or inDegrees=no"
-            )
+            raise RecordingError(f"{self.path}: header has no inDegrees line, expected inDegrees=yes or inDegrees=no")
         wanted = set(rotations)
         factor = np.array([np.pi / 180 if self.in_degrees and name in wanted else 1.0 for name in self.names])
         return Table(self.names, self.time, self.values * factor, False, self.path, self.notes)
@@ -106,12 +104,8 @@ def _names_line(lines: list[str], path: Path) -> int:
             if cells[0].casefold() == "time":
                 return k
             if end >= 0 and any(cells):
-                raise RecordingError(
-                    f"{path}, line {k + 1}: found column {cells[0]!r} first, expected 'time'"
-                )
-    raise RecordingError(
-        f"{path}: is not a MOT or STO table, found no line of column names that begins with 'time'"
-    )
+                raise RecordingError(f"{path}, line {k + 1}: found column {cells[0]!r} first, expected 'time'")
+    raise RecordingError(f"{path}: is not a MOT or STO table, found no line of column names that begins with 'time'")
 
 
 def _count_notes(header: dict[str, str], rows: int, columns: int, path: Path) -> list[str]:
@@ -120,9 +114,7 @@ def _count_notes(header: dict[str, str], rows: int, columns: int, path: Path) ->
     if said_columns.isdigit() and int(said_columns) != columns:
         notes.append(f"{path.name}: the header says {said_columns} columns, the file names {columns}.")
     if said_rows.isdigit() and int(said_rows) > rows:
-        raise RecordingError(
-            f"{path}: found {rows} rows, expected the {said_rows} of its header (truncated?)"
-        )
+        raise RecordingError(f"{path}: found {rows} rows, expected the {said_rows} of its header (truncated?)")
     if said_rows.isdigit() and int(said_rows) < rows:
         notes.append(f"{path.name}: the header says {said_rows} rows, the file holds {rows}: all are used.")
     return notes

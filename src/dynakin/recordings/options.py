@@ -25,8 +25,6 @@ class ReadOptions:
 
     def __post_init__(self) -> None:
         if self.plate_filter_hz is not None and not self.plate_filter_hz > 0:
-            raise ConfigError(
-                f"plate_filter_hz: found {self.plate_filter_hz!r}, expected a frequency above 0 Hz"
-            )
+            raise ConfigError(f"plate_filter_hz: found {self.plate_filter_hz!r}, expected a frequency above 0 Hz")
         if self.force_threshold_n is not None and not self.force_threshold_n >= 0:
             raise ConfigError(f"force_threshold_n: found {self.force_threshold_n!r}, expected 0 N or more")

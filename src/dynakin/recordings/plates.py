@@ -100,17 +100,13 @@ def check_plates(
         push = ground.vectors_to_ground(plate.force)[frames, 1]
         loaded = np.flatnonzero(np.abs(np.nan_to_num(push)) > LOADED_N) + (frames.start or 0)
         if not len(loaded):
-            findings.say(
-                f"{plate.name} carries nothing ({'standing' if standing else 'the whole recording'})."
-            )
+            findings.say(f"{plate.name} carries nothing ({'standing' if standing else 'the whole recording'}).")
             continue
         foot = _check_pressure(plate, loaded, feet, ground, findings)
         _check_free_moment(plate, loaded, ground, findings)
         _check_level(plate, ground, findings)
         if standing is not None and foot in under:
-            findings.warn(
-                f"{under[foot]} and {plate.name} both have their centre of pressure under the {foot} foot."
-            )
+            findings.warn(f"{under[foot]} and {plate.name} both have their centre of pressure under the {foot} foot.")
         if foot:
             under[foot] = plate.name
     refusal = "; ".join(findings.refusals) or None
@@ -150,15 +146,11 @@ def _check_vertical(
     findings.say(f"Vertical force {vertical:.1f} N, that is {mass:.2f} kg ({when}).")
     tilt = float(np.degrees(np.arctan2(np.hypot(mean[0], mean[2]), vertical)))
     if tilt > TILT_WARNING_DEG:
-        findings.warn(
-            f"the mean force is {tilt:.0f} deg off the vertical {ground.vertical}, expected a few degrees."
-        )
+        findings.warn(f"the mean force is {tilt:.0f} deg off the vertical {ground.vertical}, expected a few degrees.")
     if mass_kg is not None:
         _compare_mass(mass, mass_kg, standing is not None, findings)
     elif standing is not None and not MASS_REFUSED_KG[0] < mass < MASS_REFUSED_KG[1]:
-        findings.refuse(
-            f"the plates read {mass:.3g} kg standing, expected a person's mass (unit of the forces?)"
-        )
+        findings.refuse(f"the plates read {mass:.3g} kg standing, expected a person's mass (unit of the forces?)")
     return mass
 
 
@@ -181,9 +173,7 @@ def _feet(
     outlines = {foot: foot_outline(recording, ground, names) for foot, names in markers.items()}
     feet = {foot: outline for foot, outline in outlines.items() if np.isfinite(outline).any()}
     if not feet:
-        findings.warn(
-            "no foot markers, so it was not checked that the centres of pressure lie under the feet."
-        )
+        findings.warn("no foot markers, so it was not checked that the centres of pressure lie under the feet.")
     return feet
 
 
@@ -209,9 +199,7 @@ def _check_pressure(
         return foot
     both = distance_to_hull(cop, np.concatenate([outline[loaded] for outline in feet.values()], axis=1))
     if float(np.nanmedian(both)) <= COP_WARNING_M:
-        findings.say(
-            f"{plate.name}: centre of pressure between the feet, {1000 * away:.0f} mm from the {foot} one."
-        )
+        findings.say(f"{plate.name}: centre of pressure between the feet, {1000 * away:.0f} mm from the {foot} one.")
         return None
     text = f"{plate.name}: centre of pressure {1000 * away:.0f} mm away from the nearest foot ({foot})"
     if away > COP_REFUSED_M:
@@ -227,9 +215,7 @@ def _check_free_moment(plate: Plate, loaded: np.ndarray, ground: GroundFrame, fi
     about, across = float(free[1]), float(np.hypot(free[0], free[2]))
     findings.say(f"{plate.name}: free moment {about:.2f} N m about the vertical.")
     if abs(about) > FREE_MOMENT_WARNING_M * abs(push):
-        findings.warn(
-            f"{plate.name}: free moment {about:.1f} N m is large for a vertical force of {push:.0f} N."
-        )
+        findings.warn(f"{plate.name}: free moment {about:.1f} N m is large for a vertical force of {push:.0f} N.")
     if across > 1.0 + 0.1 * abs(about):
         findings.warn(f"{plate.name}: free moment has {across:.1f} N m about horizontal axes, expected none.")
 

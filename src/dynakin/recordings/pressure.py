@@ -23,9 +23,7 @@ class Surface:
     normal: Array
 
 
-def centre_of_pressure(
-    force: Array, moment: Array, surface: Surface, threshold_n: float
-) -> tuple[Array, Array]:
+def centre_of_pressure(force: Array, moment: Array, surface: Surface, threshold_n: float) -> tuple[Array, Array]:
     """Centre of pressure (T, 3) m and free moment (T, 3) N m of a wrench about the laboratory origin.
 
     With M_c the moment about the surface's point c and n its normal, M_c = r x F + tau n and n . r = 0 give

@@ -57,9 +57,7 @@ def read(
     reader = READERS.get(path.suffix.casefold())
     require_file(path)
     if reader is None:
-        raise RecordingError(
-            f"{path}: found extension {path.suffix!r}, expected one of {', '.join(sorted(READERS))}"
-        )
+        raise RecordingError(f"{path}: found extension {path.suffix!r}, expected one of {', '.join(sorted(READERS))}")
     recording = reader(path, options)
     if forces is None:
         return recording
@@ -68,9 +66,7 @@ def read(
     force_reader = FORCE_READERS.get(forces.suffix.casefold())
     if force_reader is None:
         known = ", ".join(sorted(FORCE_READERS))
-        raise RecordingError(
-            f"{forces}: found extension {forces.suffix!r}, expected forces as one of {known}"
-        )
+        raise RecordingError(f"{forces}: found extension {forces.suffix!r}, expected forces as one of {known}")
     table = force_reader(forces)
     if forces.suffix.casefold() == ".csv":
         table = _only_forces(table)

@@ -83,8 +83,7 @@ class Recording:
             shapes = {plate.force.shape, plate.moment.shape, plate.cop.shape, plate.free_moment.shape}
             if shapes != {(len(self.time), 3)}:
                 raise RecordingError(
-                    f"{self.name}: {plate.name} has arrays of shapes {sorted(shapes)}, "
-                    f"expected ({len(self.time)}, 3)"
+                    f"{self.name}: {plate.name} has arrays of shapes {sorted(shapes)}, expected ({len(self.time)}, 3)"
                 )
 
     @property

@@ -56,9 +56,7 @@ def low_pass(samples: Array, rate_hz: float, cutoff_hz: float, *, causal: bool =
     # Two passes of |H|^2 = 1/(1 + w^4), w warped, are -3 dB where w = (sqrt 2 - 1)^(1/4).
     warped = np.tan(np.pi * cutoff_hz / rate_hz) / (np.sqrt(2) - 1) ** 0.25
     sos = signal.butter(2, np.arctan(warped) / np.pi * rate_hz, fs=rate_hz, output="sos")
-    return np.asarray(
-        signal.sosfiltfilt(sos, samples, axis=0, padlen=min(len(samples) - 1, int(rate_hz / cutoff_hz)))
-    )
+    return np.asarray(signal.sosfiltfilt(sos, samples, axis=0, padlen=min(len(samples) - 1, int(rate_hz / cutoff_hz))))
 
 
 def resample(samples: Array, time_in: Array, time_out: Array, *, causal: bool = False) -> Array:
@@ -82,8 +80,7 @@ def resample(samples: Array, time_in: Array, time_out: Array, *, causal: bool = 
     # The last marker frame may lie up to one marker step after the last analog sample of the frame before.
     if time_out[0] < time_in[0] - 0.5 * step or time_out[-1] > time_in[-1] + max(step, 0.5 / rate_out):
         raise RecordingError(
-            f"forces from {time_in[0]:g} s to {time_in[-1]:g} s "
-            f"do not cover {time_out[0]:g} s to {time_out[-1]:g} s"
+            f"forces from {time_in[0]:g} s to {time_in[-1]:g} s do not cover {time_out[0]:g} s to {time_out[-1]:g} s"
         )
     if rate_in > 1.01 * rate_out:
         if causal:
@@ -126,6 +123,5 @@ def _rate(time: Array) -> float:
 def _check_cutoff(rate_hz: float, cutoff_hz: float) -> None:
     if not 0 < cutoff_hz < 0.5 * rate_hz:
         raise RecordingError(
-            f"low-pass at {cutoff_hz:g} Hz is not possible at {rate_hz:g} Hz, "
-            f"expected less than {rate_hz / 2:g} Hz"
+            f"low-pass at {cutoff_hz:g} Hz is not possible at {rate_hz:g} Hz, expected less than {rate_hz / 2:g} Hz"
         )

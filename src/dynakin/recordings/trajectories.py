@@ -25,9 +25,7 @@ def clean_markers(names: tuple[str, ...], markers: Array) -> tuple[Array, list[s
     missing = np.isnan(markers[:, :, 0]) if markers.size else np.zeros(markers.shape[:2], dtype=bool)
     if missing.any():
         share = ", ".join(
-            f"{name} {100 * part:.3g} %"
-            for name, part in zip(names, missing.mean(axis=0), strict=True)
-            if part
+            f"{name} {100 * part:.3g} %" for name, part in zip(names, missing.mean(axis=0), strict=True) if part
         )
         notes.append(f"Missing for part of the recording: {share}.")
     if len(names) and missing.all(axis=1).any():
@@ -44,12 +42,8 @@ def timing_notes(time: Array, rate_in_header: float | None = None) -> list[str]:
     step = np.diff(time)
     median = float(np.median(step))
     if rate_in_header and abs(rate_in_header * median - 1) > 0.01:
-        notes.append(
-            f"The header says {rate_in_header:g} Hz, the time column {1 / median:.4g} Hz: the latter is used."
-        )
+        notes.append(f"The header says {rate_in_header:g} Hz, the time column {1 / median:.4g} Hz: the latter is used.")
     if np.abs(step / median - 1).max() > 0.5:
         k = int(np.argmax(np.abs(step / median - 1)))
-        notes.append(
-            f"Time steps are uneven: {step[k]:.4g} s after {time[k]:.6g} s, {median:.4g} s elsewhere."
-        )
+        notes.append(f"Time steps are uneven: {step[k]:.4g} s after {time[k]:.6g} s, {median:.4g} s elsewhere.")
     return notes

@@ -82,9 +82,7 @@ def read_trc(path: Path, options: ReadOptions | None = None) -> Recording:
 
 def _is_names_row(line: str) -> bool:
     cells = split_cells(line)
-    return (
-        len(cells) > 1 and cells[0].casefold().startswith("frame") and cells[1].casefold().startswith("time")
-    )
+    return len(cells) > 1 and cells[0].casefold().startswith("frame") and cells[1].casefold().startswith("time")
 
 
 def _header(lines: list[str]) -> dict[str, str]:
