@@ -15,8 +15,9 @@ import dynakin
 from dynakin.simulation import simulate_squat
 
 HERE = Path(__file__).parent
-# Frames and how far they may move, in standard deviations. The paper's gains hardly see the speeds, so rounding grows: the
-# last bit of the markers comes to 2e-7 at frame 200 of the simulated trial, 1e-2 at frame 600, 4e-5 at the end of squats1.
+# Frames and how far they may move, in standard deviations. The paper's gains hardly see the speeds, so rounding grows:
+# the last bit of the markers comes to 2e-7 at frame 200 of the simulated trial and 1e-2 at frame 600, to 4e-5 at the
+# end of squats1.
 SQUATS1 = {0: 1e-5, 50: 1e-5, 100: 1e-5, 200: 1e-5, 300: 1e-5, 600: 1e-4, -1: 1e-2}
 SIMULATED = {0: 1e-5, 50: 1e-5, 100: 1e-5, 200: 1e-4}
 

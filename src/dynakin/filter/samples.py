@@ -1,4 +1,4 @@
-"""Recordings and live samples as the arrays that the core takes: the model's markers and the total wrench, ground frame."""
+"""Recordings and live samples as the arrays that the core takes: its markers and the total wrench, ground frame."""
 
 from __future__ import annotations
 
