@@ -71,6 +71,8 @@ StepReport Filter::update(const Eigen::Ref<const MarkerMatrix>& markers, const V
   if (markers.cols() != static_cast<Eigen::Index>(model_.markers().size()))
     throw std::invalid_argument("markers: expected " + std::to_string(model_.markers().size()) + " columns, found " +
                                 std::to_string(markers.cols()));
+  if (markers.array().isInf().any() || wrench.array().isInf().any())
+    throw std::invalid_argument("markers or wrench: infinite, expected a number, or NaN where nothing is measured");
   if (last_.diverged()) return last_;
   measurement_.linearise(x_, markers, wrench);
   predicted_ = measurement_.predicted();
@@ -83,6 +85,8 @@ StepReport Filter::update(const Eigen::Ref<const MarkerMatrix>& markers, const V
   report.log_likelihood = -0.5 * (sums.nis + sums.log_determinant + sums.rows * std::log(2.0 * std::numbers::pi));
   if (!sums.factored) {
     report.status = StepStatus::innovation_not_definite;
+  } else if (!x_.allFinite() || !std::isfinite(sums.nis)) {  // asked before a bound could hide what is lost
+    report.status = StepStatus::not_finite;
   } else {
     if (settings_.constraint == ConstraintKind::gain)
       report.constrained = constraint_.apply(settings_, sums.nis, x_, P_);

@@ -117,12 +117,15 @@ void Model::compile_segments() {
     const std::string where = "segment '" + s.name + "'";
     Segment segment;
     segment.name = s.name;
+    if (s.name == "ground") fail("segment 'ground': the name stands for the ground itself");
     segment.parent = s.parent == "ground" ? k_none : find(segments_, s.parent, where + ": parent", "earlier segment");
     check_finite(s.rotation, where + ": rotation");
     if (!(s.rotation * s.rotation.transpose()).isIdentity(1e-9) || s.rotation.determinant() < 0.0)
       fail(where + ": rotation is not a rotation matrix");
     check_finite(s.translation, where + ": translation");
     check_finite(s.inertia, where + ": inertia");
+    if (s.inertia(k_mass) < 0.0)
+      fail(where + ": mass is " + std::to_string(s.inertia(k_mass)) + " kg, expected 0 or more");
     segment.rotation = s.rotation;
     segment.translation = s.translation;
     for (const LengthTerm& t : s.lengths) {

@@ -6,6 +6,20 @@
 
 namespace dynakin {
 
+namespace {
+
+StepReport step(Filter& filter, double dt, const Eigen::Map<const MarkerMatrix>& markers, const Vector6& wrench,
+                std::size_t frame) {
+  try {
+    if (frame > 0) filter.predict(dt);
+    return filter.update(markers, wrench);
+  } catch (const std::invalid_argument& e) {
+    throw std::invalid_argument("frame " + std::to_string(frame) + ": " + e.what());
+  }
+}
+
+}  // namespace
+
 RunRecord::RunRecord(const Model& model, std::size_t frames)
     : state(frames * model.state_size()),
       state_sd(state.size()),
@@ -31,8 +45,7 @@ void run_frames(Filter& filter, const double* time, const double* markers, const
     const Eigen::Map<const MarkerMatrix> z(markers + k * m, 3, m / 3);
     const Vector6 w = Eigen::Map<const Vector6>(wrench + 6 * k);
     const auto start = clock::now();
-    if (k > 0) filter.predict(time[k] - time[k - 1]);
-    const StepReport report = filter.update(z, w);
+    const StepReport report = step(filter, k == 0 ? 0.0 : time[k] - time[k - 1], z, w, k);
     record.step_us[k] = std::chrono::duration<double, std::micro>(clock::now() - start).count();
     if (report.diverged())
       throw DivergenceError("the filter diverged at frame " + std::to_string(k) + " (" + std::to_string(time[k]) +

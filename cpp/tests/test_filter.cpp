@@ -54,12 +54,21 @@ TEST(a_frame_without_measurements_only_predicts) {
   CHECK(filter.covariance() == P);
 }
 
-TEST(a_measurement_that_is_not_finite_is_announced_as_divergence_and_stays_so) {
+TEST(an_infinite_measurement_is_refused_before_it_touches_the_state) {
+  const Model model(planar_chain());
+  Filter filter(model, settings_for(model), model.initial_state(), prior_for(model));
+  auto markers = markers_at(model, model.initial_state());
+  markers(0, 0) = std::numeric_limits<double>::infinity();
+  check_refused([&] { filter.update(markers, no_wrench); }, "infinite");
+  CHECK(filter.state() == model.initial_state());
+}
+
+TEST(a_measurement_beyond_all_numbers_is_announced_as_divergence_and_stays_so) {
   const Model model(planar_chain());
   Filter filter(model, settings_for(model), model.initial_state(), prior_for(model));
   auto markers = markers_at(model, model.initial_state());
   const auto good = markers;
-  markers(0, 0) = std::numeric_limits<double>::infinity();
+  markers(0, 0) = 1e300;
   CHECK(filter.step(0.01, markers, no_wrench).diverged());
   CHECK(filter.step(0.01, good, no_wrench).diverged());
   filter.reset(model.initial_state(), prior_for(model));

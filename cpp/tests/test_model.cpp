@@ -38,5 +38,8 @@ TEST(a_wrong_model_is_refused_by_the_name_of_what_is_wrong) {
   refused([](ModelSpec& s) { s.markers[0].segment = "foot"; }, "marker 'm00': no segment 'foot'");
   refused([](ModelSpec& s) { s.markers[1].name = "m00"; }, "marker 'm00' is declared twice");
   refused([](ModelSpec& s) { s.coordinates.push_back({"idle", 0.0, false}); }, "coordinate 'idle' moves no axis");
+  refused([](ModelSpec& s) { s.segments.back().name = s.markers.back().segment = "ground"; },
+          "the name stands for the ground itself");
+  refused([](ModelSpec& s) { s.segments[3].inertia(0) = -1.0; }, "segment 's3': mass is -1");
   refused([](ModelSpec& s) { s.segments[0].inertia(0) = std::nan(""); }, "segment 's0': inertia");
 }

@@ -90,7 +90,10 @@ class Estimator:
         check = check_plates(recording, initial.ground, initial.mass_kg)
         if check.refusal:
             raise RecordingError(f"{recording.path or recording.name}: {check.refusal}")
-        arrays = self._filter.run(np.ascontiguousarray(recording.time), markers, wrench, progress)
+        try:
+            arrays = self._filter.run(np.ascontiguousarray(recording.time), markers, wrench, progress)
+        except ValueError as error:  # a frame that the core refuses, named by it
+            raise RecordingError(f"{recording.path or recording.name}: {error}") from None
         self._time = float(recording.time[-1])
         return assemble(
             arrays, self._core_model, initial, recording, (markers, wrench), self.settings(), check.messages

@@ -1,0 +1,32 @@
+"""What a run gives back: labelled arrays, parameters, events and timing; figures of fit; one writer a file format."""
+
+from dynakin.results.consistency import Consistency, consistency
+from dynakin.results.estimate import AXES, COMPONENTS, Estimate
+from dynakin.results.fit import marker_rms_mm, wrench_fit
+from dynakin.results.marker_file import laboratory_markers, write_trc
+from dynakin.results.metrics import SCHEMA_VERSION, compute_metrics, evaluation_window
+from dynakin.results.output_folder import OUTPUT_FILES, check_output_writable
+from dynakin.results.records import EVENT_KINDS, Event, Parameter, Timing
+from dynakin.results.storage_file import write_storage
+
+__all__ = [
+    "AXES",
+    "COMPONENTS",
+    "EVENT_KINDS",
+    "OUTPUT_FILES",
+    "SCHEMA_VERSION",
+    "Consistency",
+    "Estimate",
+    "Event",
+    "Parameter",
+    "Timing",
+    "check_output_writable",
+    "compute_metrics",
+    "consistency",
+    "evaluation_window",
+    "laboratory_markers",
+    "marker_rms_mm",
+    "wrench_fit",
+    "write_storage",
+    "write_trc",
+]

@@ -1,0 +1,45 @@
+"""``parameters.json`` and ``metrics.json``: plain JSON with a schema version, `null` where a number is not defined."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+from dynakin.results.estimate import Estimate
+from dynakin.results.metrics import SCHEMA_VERSION
+
+
+def write_parameters(estimate: Estimate, path: Path) -> None:
+    """Every length, marker position and inertial parameter with its standard deviation, start, table and bounds."""
+    _write(
+        path,
+        {
+            "schema_version": SCHEMA_VERSION,
+            "model": estimate.model_name,
+            "parameters": [asdict(parameter) for parameter in estimate.parameters],
+        },
+    )
+
+
+def write_metrics(metrics: dict[str, Any], path: Path) -> None:
+    """The figures of `dynakin.results.metrics.compute_metrics`."""
+    _write(path, metrics)
+
+
+def _write(path: Path, content: dict[str, Any]) -> None:
+    text = json.dumps(_finite(content), indent=2, ensure_ascii=False, allow_nan=False)
+    path.write_text(text + "\n", encoding="utf-8", newline="\n")
+
+
+def _finite(value: Any) -> Any:
+    """The same with NaN and infinity as None: JSON has no word for them, and a bare NaN stops strict readers."""
+    if isinstance(value, dict):
+        return {key: _finite(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_finite(item) for item in value]
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return value

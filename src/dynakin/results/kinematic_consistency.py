@@ -1,0 +1,40 @@
+"""Is the estimated speed the derivative of the estimated coordinate? Where not, one of them is wrong."""
+
+from __future__ import annotations
+
+import numpy as np
+
+# A mismatch below half of the coordinate's own speed is left unsaid: differencing measured angles makes noise too.
+TOLERATED = 0.5
+
+
+def speed_mismatch(time: np.ndarray, coordinates: np.ndarray, speeds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """RMS of speed less differenced coordinate, and RMS of the differenced coordinate itself.
+
+    Args:
+        time: (T,) s.
+        coordinates, speeds: (T, C), rad and rad/s or m and m/s.
+
+    Returns:
+        Two arrays (C,), rad/s or m/s. Differences are central, so both lag by nothing.
+    """
+    if len(time) < 3:
+        return np.full(coordinates.shape[1], np.nan), np.full(coordinates.shape[1], np.nan)
+    derivative = np.gradient(coordinates, time, axis=0)
+    mismatch = np.sqrt(np.mean((speeds - derivative) ** 2, axis=0))
+    return mismatch, np.sqrt(np.mean(derivative**2, axis=0))
+
+
+def mismatch_in_words(names: list[str], mismatch: np.ndarray, moving: np.ndarray) -> str:
+    """One sentence about the worst coordinate, or an empty text where all speeds fit."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        ratio = np.where(mismatch > 0.0, mismatch / moving, 0.0)
+    wrong = np.flatnonzero(ratio > TOLERATED)
+    if not len(wrong):
+        return ""
+    worst = int(wrong[np.argmax(mismatch[wrong])])
+    return (
+        f"The estimated speeds are not the derivatives of the estimated coordinates ({len(wrong)} of {len(names)}; "
+        f"worst: {names[worst]}, {mismatch[worst]:.2g} rad/s off where it moves at {moving[worst]:.2g} rad/s), "
+        "so speeds, accelerations and moments of this run are not to be relied on."
+    )

@@ -1,0 +1,63 @@
+"""``markers.trc``: the model's markers in the recording's laboratory frame and unit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from dynakin.results.estimate import Estimate
+
+# 1e-9 m: far below what cameras see, so that figures recomputed from the file equal the ones in metrics.json.
+_DECIMALS = {"m": 9, "mm": 6}
+_PER_METRE = {"m": 1.0, "mm": 1000.0}
+
+
+def laboratory_markers(estimate: Estimate) -> np.ndarray:
+    """Estimated markers (T, M, 3), m, in the laboratory frame of the recording.
+
+    An axis that the model does not explain (a planar model's Z) is left as measured. Where the marker was not
+    measured such a point is not known in the laboratory and is NaN; its in-plane estimate is in ``estimate.nc``.
+    """
+    estimated = estimate.data["markers_estimated"].transpose("time", "marker", "axis").values
+    recording = estimate.recording
+    recorded = np.stack([recording.marker(name) for name in estimate.marker_names], axis=1)
+    measured = estimate.ground.points_to_ground(recorded)
+    points = np.where(estimate.modelled_axes(), estimated, measured)
+    points[~np.isfinite(points).all(axis=-1)] = np.nan
+    return np.asarray(estimate.ground.points_to_laboratory(points))
+
+
+def write_markers(estimate: Estimate, path: Path) -> None:
+    """Write the estimated markers as TRC; a missing marker is three blank cells."""
+    write_trc(
+        path,
+        estimate.time,
+        estimate.marker_names,
+        laboratory_markers(estimate),
+        unit=estimate.recording.length_unit,
+    )
+
+
+def write_trc(path: Path, time: np.ndarray, names: list[str], points: np.ndarray, *, unit: str) -> None:
+    """Write markers ``points`` (T, M, 3), m, as a TRC file in ``unit`` ("m" or "mm"); NaN becomes blank cells."""
+    frames, count = len(time), len(names)
+    rate = (frames - 1) / (time[-1] - time[0]) if frames > 1 else 0.0
+    rate_text = f"{rate:.10g}"
+    decimals = _DECIMALS[unit]
+    lines = [
+        f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
+        "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
+        f"{rate_text}\t{rate_text}\t{frames}\t{count}\t{unit}\t{rate_text}\t1\t{frames}",
+        "\t".join(["Frame#", "Time", *(f"{name}\t\t" for name in names)]).rstrip("\t"),
+        "\t\t" + "\t".join(f"X{i}\tY{i}\tZ{i}" for i in range(1, count + 1)),
+        "",
+    ]
+    scaled = np.asarray(points, dtype=float).reshape(frames, 3 * count) * _PER_METRE[unit]
+    missing = ~np.isfinite(scaled)
+    for index in range(frames):
+        cells = [
+            "" if blank else f"{value:.{decimals}f}" for value, blank in zip(scaled[index], missing[index], strict=True)
+        ]
+        lines.append("\t".join([str(index + 1), f"{time[index]:.12g}", *cells]))
+    path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")

@@ -1,0 +1,129 @@
+"""The figures of ``metrics.json``: fit, prediction, consistency, events and timing of one estimate."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+
+from dynakin.results.consistency import Consistency, consistency
+from dynakin.results.estimate import COMPONENTS, Estimate
+from dynakin.results.fit import WrenchFit, marker_rms_mm, wrench_fit
+from dynakin.results.kinematic_consistency import mismatch_in_words, speed_mismatch
+
+SCHEMA_VERSION = 1
+"""Version of ``metrics.json``, ``parameters.json`` and ``estimate.nc``; it grows when a key changes its meaning."""
+
+# The paper lets the filter adapt for 2 s before it counts (section III); a recording that is not at least twice as
+# long counts as a whole.
+ADAPTATION_S = 2.0
+
+
+def evaluation_window(time: np.ndarray) -> np.ndarray:
+    """Frames (T,) bool that the figures are taken over: after the first 2 s, or all of a trial of 4 s or less."""
+    if time[-1] - time[0] > 2.0 * ADAPTATION_S:
+        # half a microsecond: file times are rounded, the frame at 2 s belongs to the window
+        return np.asarray(time >= time[0] + ADAPTATION_S - 5e-7)
+    return np.ones(len(time), dtype=bool)
+
+
+def compute_metrics(estimate: Estimate) -> dict[str, Any]:
+    """Everything in ``metrics.json`` as a plain dictionary; a figure that is not defined is None."""
+    window = evaluation_window(estimate.time)
+    kept = estimate.time[window]
+    return {
+        "schema_version": SCHEMA_VERSION,
+        "window": {"start_s": float(kept[0]), "end_s": float(kept[-1])},
+        "markers": _markers(estimate, "estimated", window),
+        "wrench": _wrench(estimate, "estimated", window),
+        "prediction": {
+            "what": "one frame ahead: the model's expectation before the frame is used",
+            "markers": _markers(estimate, "predicted", window),
+            "wrench": {"rms": _wrench(estimate, "predicted", window)["rms"]},
+        },
+        "consistency": _consistency(estimate, window),
+        "events": _events(estimate),
+        "timing": asdict(estimate.timing),
+    }
+
+
+def _markers(estimate: Estimate, kind: str, window: np.ndarray) -> dict[str, Any]:
+    measured = _array(estimate, "markers_measured")[window]
+    compared = _array(estimate, f"markers_{kind}")[window]
+    axes = estimate.modelled_axes()
+    rms = {
+        name: marker_rms_mm(measured[:, index], compared[:, index], axes)
+        for index, name in enumerate(estimate.marker_names)
+    }
+    seen = [value for value in rms.values() if value is not None]
+    return {"rms_mm": rms, "mean_rms_mm": float(np.mean(seen)) if seen else None}
+
+
+def _wrench(estimate: Estimate, kind: str, window: np.ndarray) -> dict[str, dict[str, float | None]]:
+    measured = _array(estimate, "wrench_measured")[window]
+    compared = _array(estimate, f"wrench_{kind}")[window]
+    fits = {name: wrench_fit(measured[:, k], compared[:, k]) for k, name in enumerate(COMPONENTS)}
+    fits = {name: fit for name, fit in fits.items() if fit.rms is not None}
+    return {key: {name: getattr(fit, key) for name, fit in fits.items()} for key in WrenchFit._fields}
+
+
+def window_consistency(estimate: Estimate, window: np.ndarray) -> Consistency:
+    """Consistency over the frames ``window`` (T,) bool."""
+    markers = _array(estimate, "markers_measured") - _array(estimate, "markers_predicted")
+    wrench = _array(estimate, "wrench_measured") - _array(estimate, "wrench_predicted")
+    markers = markers[:, :, estimate.modelled_axes()]
+    return consistency(
+        estimate.data["nis"].values[window],
+        estimate.data["n_rows"].values[window],
+        markers.reshape(len(markers), -1)[window],
+        wrench[window],
+    )
+
+
+def _consistency(estimate: Estimate, window: np.ndarray) -> dict[str, Any]:
+    found = window_consistency(estimate, window)
+    names = estimate.coordinate_names
+    values = (estimate.data[name].transpose("time", "coordinate").values[window] for name in ("coordinates", "speeds"))
+    mismatch, moving = speed_mismatch(estimate.time[window], *values)
+    return {
+        "mean_nis_per_dof": found.mean_nis_per_dof,
+        "interval_95": list(found.interval_95) if found.interval_95 else None,
+        "measured_dof": found.measured_dof,
+        "whiteness": {
+            "what": "lag-1 autocorrelation of the innovations, 0 if white",
+            "markers": found.whiteness_markers,
+            "wrench": found.whiteness_wrench,
+        },
+        "speed_mismatch": {
+            "what": "RMS of estimated speed less differenced estimated coordinate, rad/s or m/s",
+            **{name: float(value) for name, value in zip(names, mismatch, strict=True) if np.isfinite(value)},
+        },
+        "verdict": " ".join(filter(None, [found.verdict, mismatch_in_words(names, mismatch, moving)])),
+    }
+
+
+def _events(estimate: Estimate) -> dict[str, Any]:
+    count = Counter(event.kind for event in estimate.events)
+    return {
+        "gated": count["gated"],
+        "missing": count["missing"],
+        "at_bound": count["at_bound"],
+        "resets": count["reset"],
+        "missing_frames": missing_frames(estimate),
+        "parameters_at_bound": [p.name for p in estimate.parameters if p.at_bound],
+        "log": [asdict(event) for event in estimate.events],
+    }
+
+
+def missing_frames(estimate: Estimate) -> dict[str, int]:
+    """Frames of the whole recording in which a marker in use was not measured; only markers that miss any."""
+    measured = _array(estimate, "markers_measured")[:, :, estimate.modelled_axes()]
+    gaps = (~np.isfinite(measured).all(axis=2)).sum(axis=0)
+    return {name: int(gap) for name, gap in zip(estimate.marker_names, gaps, strict=True) if gap}
+
+
+def _array(estimate: Estimate, name: str) -> np.ndarray:
+    dims = ("time", "marker", "axis") if name.startswith("markers") else ("time", "component")
+    return np.asarray(estimate.data[name].transpose(*dims).values, dtype=float)

@@ -1,0 +1,106 @@
+"""The motion tables of an output folder: coordinates, speeds, accelerations, moments and the wrench."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from dynakin.results.estimate import COMPONENTS, Estimate
+from dynakin.results.storage_file import write_storage
+
+
+def moment_columns(estimate: Estimate) -> list[str]:
+    """Column names of ``moments.sto``, as OpenSim's inverse dynamics writes them: `knee_moment`, `pelvis_tx_force`."""
+    return [
+        f"{name}_{'moment' if rotation else 'force'}"
+        for name, rotation in zip(estimate.coordinate_names, estimate.is_rotation(), strict=True)
+    ]
+
+
+def write_coordinates(estimate: Estimate, path: Path) -> None:
+    """``coordinates.mot``: degrees and metres."""
+    write_storage(
+        path,
+        "Coordinates",
+        estimate.time,
+        estimate.coordinate_names,
+        _in_degrees(estimate, "coordinates"),
+        in_degrees=True,
+        notes=["Rotations in degrees, translations in metres."],
+    )
+
+
+def write_speeds(estimate: Estimate, path: Path) -> None:
+    """``speeds.sto``: degrees/s and m/s, with inDegrees=yes as OpenSim's own Kinematics analysis writes them."""
+    write_storage(
+        path,
+        "Speeds",
+        estimate.time,
+        estimate.coordinate_names,
+        _in_degrees(estimate, "speeds"),
+        in_degrees=True,
+        notes=["Rotations in degrees per second, translations in metres per second."],
+    )
+
+
+def write_accelerations(estimate: Estimate, path: Path) -> None:
+    """``accelerations.sto``: degrees/s2 and m/s2, with inDegrees=yes as OpenSim's own Kinematics analysis does."""
+    write_storage(
+        path,
+        "Accelerations",
+        estimate.time,
+        estimate.coordinate_names,
+        _in_degrees(estimate, "accelerations"),
+        in_degrees=True,
+        notes=["Rotations in degrees per second squared, translations in metres per second squared."],
+    )
+
+
+def write_moments(estimate: Estimate, path: Path) -> None:
+    """``moments.sto``: N m about rotations, N along translations (radians: inDegrees=no)."""
+    write_storage(
+        path,
+        "Inverse Dynamics Generalized Forces",
+        estimate.time,
+        moment_columns(estimate),
+        estimate.data["moments"].transpose("time", "coordinate").values,
+        in_degrees=False,
+        notes=["Moments in N m, forces in N. In a model that lumps both sides, leg moments are the sum of both legs."],
+    )
+
+
+def write_wrench(estimate: Estimate, path: Path) -> None:
+    """``wrench.sto``: N and N m, ground frame, about the model's ground origin, what the ground does to the person.
+
+    Columns ``fx_measured`` ... ``mz_measured``, ``fx_estimated`` ... ``mz_estimated``; a component that is never
+    measured, or that the model does not explain, has no column.
+    """
+    names: list[str] = []
+    columns: list[np.ndarray] = []
+    for kind in ("measured", "estimated"):
+        values = estimate.data[f"wrench_{kind}"].transpose("time", "component").values
+        for index, component in enumerate(COMPONENTS):
+            if np.isfinite(values[:, index]).any():
+                names.append(f"{component}_{kind}")
+                columns.append(values[:, index])
+    table = np.column_stack(columns) if columns else np.empty((len(estimate.time), 0))
+    write_storage(
+        path,
+        "External wrench",
+        estimate.time,
+        names,
+        table,
+        in_degrees=False,
+        notes=[
+            "Forces in N, moments in N m about the origin of the ground frame (X forward, Y up, Z right), "
+            "acting from the ground on the person."
+        ],
+    )
+
+
+def _in_degrees(estimate: Estimate, variable: str) -> np.ndarray:
+    values = estimate.data[variable].transpose("time", "coordinate").values.astype(float, copy=True)
+    rotation = estimate.is_rotation()
+    values[:, rotation] = np.degrees(values[:, rotation])
+    return values

@@ -1,0 +1,110 @@
+"""Where results go: a folder that is replaced as a whole, and never one that is not ours."""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from dynakin.errors import OutputError
+
+# Every file that an output folder may hold; a folder with anything else in it is the user's, not ours.
+OUTPUT_FILES = (
+    "coordinates.mot",
+    "speeds.sto",
+    "accelerations.sto",
+    "moments.sto",
+    "markers.trc",
+    "wrench.sto",
+    "parameters.json",
+    "metrics.json",
+    "estimate.nc",
+    "config.toml",
+    "report.html",
+)
+# Left by file managers in any folder that somebody has looked at.
+_IGNORED = {".DS_Store", "Thumbs.db", "desktop.ini"}
+
+
+def check_output_writable(folder: str | Path, *, overwrite: bool = True) -> Path:
+    """Make sure, before anything long is computed, that results can be written to ``folder``.
+
+    Creates nothing that stays.
+
+    Raises:
+        OutputError: a file is in the way, the place cannot be written, or the folder holds something that dynakin
+            did not write (or, with ``overwrite`` false, anything at all).
+    """
+    folder = Path(folder)
+    try:
+        _check_replaceable(folder, overwrite)
+        ancestor = _nearest_existing(folder.absolute().parent)
+        if not ancestor.is_dir():
+            raise OutputError(f"{folder}: cannot write there, {ancestor} is a file and a folder was expected")
+        with tempfile.TemporaryDirectory(prefix=".dynakin-", dir=ancestor):
+            pass
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot write results there ({error.strerror or error})") from error
+    return folder
+
+
+@contextmanager
+def replacing(folder: Path, *, overwrite: bool = True) -> Iterator[Path]:
+    """Give a temporary sibling folder to fill; on success it takes the place of ``folder``, on failure it goes."""
+    check_output_writable(folder, overwrite=overwrite)
+    folder = folder.absolute()
+    made: Path | None = None
+    try:
+        folder.parent.mkdir(parents=True, exist_ok=True)
+        made = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+        made.chmod(0o755)  # mkdtemp makes it private, results are ordinary files
+        yield made
+        _swap(made, folder)
+        made = None
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot write results there ({error.strerror or error})") from error
+    finally:
+        if made is not None:
+            shutil.rmtree(made, ignore_errors=True)
+
+
+def _swap(made: Path, folder: Path) -> None:
+    if not folder.exists():
+        made.rename(folder)
+        return
+    old = Path(tempfile.mkdtemp(prefix=f".{folder.name}-old-", dir=folder.parent)) / folder.name
+    try:
+        folder.rename(old)
+        try:
+            made.rename(folder)
+        except OSError:
+            old.rename(folder)  # put back what was there
+            raise
+    finally:
+        shutil.rmtree(old.parent, ignore_errors=True)
+
+
+def _check_replaceable(folder: Path, overwrite: bool) -> None:
+    if not folder.exists():
+        return
+    if not folder.is_dir():
+        raise OutputError(f"{folder}: is a file, a folder for the results was expected")
+    names = sorted(entry.name for entry in folder.iterdir() if entry.name not in _IGNORED)
+    if not names:
+        return
+    foreign = [name for name in names if name not in OUTPUT_FILES]
+    if foreign or "metrics.json" not in names:
+        what = foreign[0] if foreign else names[0]
+        raise OutputError(
+            f"{folder}: is no output folder of dynakin (it holds {what}); name a new folder or an empty one"
+        )
+    if not overwrite:
+        raise OutputError(f"{folder}: already holds results and overwriting was not asked for")
+
+
+def _nearest_existing(path: Path) -> Path:
+    while not path.exists() and path != path.parent:
+        path = path.parent
+    return path

@@ -1,0 +1,61 @@
+"""The small records that stand beside the arrays of an estimate: parameters, events and timing."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+ParameterKind = Literal["length", "marker", "inertia"]
+EventKind = Literal["missing", "gated", "at_bound", "reset", "note"]
+EVENT_KINDS: tuple[EventKind, ...] = ("missing", "gated", "at_bound", "reset", "note")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One constant of the model: a segment length, a marker's place on its segment or an inertial number.
+
+    ``value`` and ``sd`` (one standard deviation) are those of the last frame; ``initial`` is where the filter
+    started; ``table`` is what the anthropometric table says, None where it says nothing; ``lower`` and ``upper``
+    are the bounds of equation (9), None where there is none. All in ``unit`` (m, kg, kg m, kg m2).
+    """
+
+    name: str
+    kind: ParameterKind
+    segment: str
+    unit: str
+    value: float
+    sd: float
+    initial: float
+    table: float | None
+    lower: float | None
+    upper: float | None
+    at_bound: bool
+    estimated: bool
+
+    def change_percent(self) -> float | None:
+        """Change from the initial value in percent of its size; None where the initial value is zero."""
+        if self.initial == 0.0 or not math.isfinite(self.initial):
+            return None
+        return 100.0 * (self.value - self.initial) / abs(self.initial)
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened at one frame: a marker missing or gated, a bound reached, a reset, a note."""
+
+    time_s: float
+    frame: int
+    kind: EventKind
+    subject: str
+    message: str
+
+
+@dataclass(frozen=True)
+class Timing:
+    """How long the filter's steps took. ``realtime_factor`` is recording time over computing time (above 1: faster)."""
+
+    frames: int
+    median_us: float
+    p99_us: float
+    realtime_factor: float

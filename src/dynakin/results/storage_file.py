@@ -1,0 +1,55 @@
+"""OpenSim's table format: `.mot` and `.sto` files that OpenSim reads (its storage format, version 1)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from dynakin.errors import OutputError
+
+# 15 significant digits: what a reader computes from the file equals what was computed from the arrays.
+_NUMBER = "%.15g"
+
+
+def write_storage(
+    path: Path,
+    title: str,
+    time: np.ndarray,
+    names: Sequence[str],
+    values: np.ndarray,
+    *,
+    in_degrees: bool,
+    notes: Sequence[str] = (),
+) -> None:
+    """Write one table.
+
+    Args:
+        title: first line of the file.
+        time: (T,) s.
+        names: one a column, without ``time``.
+        values: (T, N) in the units that the file is to carry; NaN stays ``nan``.
+        in_degrees: OpenSim's header line; says in what the rotational columns are given.
+        notes: lines of the header for people, ``;`` and ``=`` excluded since readers take ``key=value`` for settings.
+    """
+    values = np.asarray(values, dtype=float)
+    if values.shape != (len(time), len(names)):
+        raise OutputError(
+            f"{path.name}: values of shape {values.shape}, expected ({len(time)}, {len(names)}) for its names"
+        )
+    header = [
+        title,
+        "version=1",
+        f"nRows={len(time)}",
+        f"nColumns={len(names) + 1}",
+        f"inDegrees={'yes' if in_degrees else 'no'}",
+        "",
+        *(note.replace("=", " is ") for note in notes),
+        "",
+        "endheader",
+        "\t".join(["time", *names]),
+    ]
+    with path.open("w", encoding="utf-8", newline="\n") as file:
+        file.write("\n".join(header) + "\n")
+        np.savetxt(file, np.column_stack([time, values]), fmt=_NUMBER, delimiter="\t")

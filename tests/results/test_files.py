@@ -1,0 +1,130 @@
+"""Every file of an output folder: complete, of known units, and equal to the arrays when read back."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from synthetic_estimate import make_estimate
+
+from dynakin.recordings import read, read_table
+from dynakin.results import OUTPUT_FILES, Estimate, marker_rms_mm, wrench_fit, write_trc
+
+
+@pytest.fixture(scope="module")
+def folder(estimate: Estimate, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return estimate.save(tmp_path_factory.mktemp("results") / "out")
+
+
+def test_all_files_are_there_and_none_is_left_beside(folder: Path) -> None:
+    assert {entry.name for entry in folder.iterdir()} == set(OUTPUT_FILES)
+    assert [entry.name for entry in folder.parent.iterdir()] == ["out"]
+
+
+@pytest.mark.parametrize("name", ["coordinates.mot", "speeds.sto", "accelerations.sto"])
+def test_motion_tables_are_in_degrees_for_rotations_only(folder: Path, estimate: Estimate, name: str) -> None:
+    text = (folder / name).read_text().splitlines()
+    assert "inDegrees=yes" in text
+    top = text.index("endheader")
+    columns = text[top + 1].split("\t")
+    values = np.array([line.split("\t") for line in text[top + 2 :]], dtype=float)
+    assert columns == ["time", *estimate.coordinate_names]
+    assert f"nRows={len(values)}" in text and f"nColumns={len(columns)}" in text
+    expected = estimate.data[Path(name).stem].values
+    np.testing.assert_allclose(values[:, 3], np.degrees(expected[:, 2]), rtol=1e-13, atol=1e-13)
+    np.testing.assert_allclose(values[:, 8], expected[:, 7], rtol=1e-13, atol=1e-13)  # the translation
+
+
+def test_our_own_reader_gets_the_coordinates_back(folder: Path, estimate: Estimate) -> None:
+    table = read_table(folder / "coordinates.mot")
+    assert table.in_degrees
+    np.testing.assert_allclose(table.time, estimate.time)
+
+
+def test_moments_are_named_as_inverse_dynamics_names_them(folder: Path, estimate: Estimate) -> None:
+    table = read_table(folder / "moments.sto")
+    assert not table.in_degrees
+    assert table.names[2] == "knee_moment" and table.names[-1] == "slide_force"
+    np.testing.assert_allclose(table.values, estimate.data["moments"].values, rtol=1e-13)
+
+
+def test_wrench_has_columns_for_what_is_measured_and_modelled_only(folder: Path) -> None:
+    table = read_table(folder / "wrench.sto")
+    measured = [f"{c}_measured" for c in ("fx", "fy", "fz", "mx", "my", "mz")]
+    assert list(table.names) == [*measured, "fx_estimated", "fy_estimated", "mz_estimated"]
+
+
+def test_figures_recomputed_from_the_files_equal_metrics_json(folder: Path, estimate: Estimate) -> None:
+    metrics = json.loads((folder / "metrics.json").read_text())
+    markers, window = read(folder / "markers.trc"), estimate.time >= metrics["window"]["start_s"]
+    every_axis = np.ones(3, dtype=bool)  # out of the plane nothing differs, so the laboratory distance is the planar one
+    for name, told in metrics["markers"]["rms_mm"].items():
+        measured = estimate.recording.marker(name)[window]
+        assert marker_rms_mm(measured, markers.marker(name)[window], every_axis) == pytest.approx(told, abs=1e-5)
+    table = read_table(folder / "wrench.sto")
+    columns = dict(zip(table.names, table.values.T, strict=True))
+    for component, told in metrics["wrench"]["rms"].items():
+        fit = wrench_fit(columns[f"{component}_measured"][window], columns[f"{component}_estimated"][window])
+        assert fit.rms == pytest.approx(told, rel=1e-12)
+
+
+@pytest.mark.parametrize("unit", ["m", "mm"])
+def test_markers_are_written_in_the_unit_and_frame_of_the_recording(tmp_path: Path, unit: str) -> None:
+    made = make_estimate(3.0, unit=unit, gaps=False)
+    back = read(made.save(tmp_path / "out") / "markers.trc")
+    assert back.length_unit == unit
+    assert list(back.marker_names) == made.marker_names
+    measured = made.recording.markers[:, : len(made.marker_names)]
+    difference = made.ground.vectors_to_ground(back.markers - measured)
+    assert np.abs(difference[..., 2]).max() < 1e-9  # as measured
+    assert 0.001 < np.std(difference[..., :2]) < 0.005
+    expected = made.data["markers_estimated"].values[..., :2]
+    np.testing.assert_allclose(made.ground.points_to_ground(back.markers)[..., :2], expected, atol=2e-9)
+
+
+def test_missing_markers_are_blank_cells(folder: Path) -> None:
+    back = read(folder / "markers.trc")
+    assert np.isnan(back.marker("S1:RASI")[300:340]).all()
+    assert np.isfinite(back.marker("S1:RASI")[340:]).all()
+    row = (folder / "markers.trc").read_text().splitlines()[6 + 310]
+    assert row.count("\t") == 1 + 3 * 10  # blank cells keep their columns
+
+
+def test_trc_of_a_single_frame(tmp_path: Path) -> None:
+    write_trc(tmp_path / "one.trc", np.array([0.5]), ["A"], np.array([[[1.0, 2.0, np.nan]]]), unit="m")
+    back = read(tmp_path / "one.trc")
+    assert back.n_frames == 1 and back.time[0] == 0.5
+
+
+def test_parameters_json_is_strict_json_with_every_parameter(folder: Path, estimate: Estimate) -> None:
+    content = json.loads((folder / "parameters.json").read_text(), parse_constant=pytest.fail)
+    assert content["schema_version"] == 1
+    found = {entry["name"]: entry for entry in content["parameters"]}
+    assert set(found) == {p.name for p in estimate.parameters}
+    thigh = found["length/thigh"]
+    assert thigh["at_bound"] and thigh["table"] is None and thigh["unit"] == "m"
+    assert thigh["value"] == pytest.approx(1.2 * 0.43)
+
+
+def test_netcdf_gives_everything_back_with_labels(folder: Path, estimate: Estimate) -> None:
+    with xr.open_dataset(folder / "estimate.nc", engine="h5netcdf") as data:
+        assert data.attrs["schema_version"] == 1
+        for name, variable in estimate.data.data_vars.items():
+            np.testing.assert_array_equal(data[name].values, variable.values)
+        knee = data["coordinates"].sel(coordinate="knee")
+        np.testing.assert_array_equal(knee.values, estimate.data["coordinates"].sel(coordinate="knee").values)
+        assert float(data["parameter_value"].sel(parameter="length/thigh")) == pytest.approx(1.2 * 0.43)
+        assert list(data["event_kind"].values) == [event.kind for event in estimate.events]
+        np.testing.assert_allclose(data["ground_rotation"].values, estimate.ground.rotation)
+        assert data["markers_estimated"].attrs["units"] == "m"
+
+
+def test_config_toml_holds_what_was_used_and_versions(folder: Path, estimate: Estimate) -> None:
+    content = tomllib.loads((folder / "config.toml").read_text())
+    versions = content.pop("versions")
+    assert {"dynakin", "python", "numpy"} <= set(versions)
+    assert content == {key: value for key, value in estimate.config.items() if value is not None}

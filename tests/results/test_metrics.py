@@ -1,0 +1,117 @@
+"""Figures of fit and consistency, against numbers worked out by hand."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from synthetic_estimate import make_estimate
+
+from dynakin.results import Estimate, compute_metrics, consistency, evaluation_window, marker_rms_mm, wrench_fit
+from dynakin.results.consistency import lag_one
+
+PLANE = np.array([True, True, False])
+
+
+def test_marker_rms_is_the_distance_in_the_modelled_plane() -> None:
+    measured = np.zeros((4, 3))
+    estimated = np.array([[0.003, 0.004, 9.0]] * 4)
+    assert marker_rms_mm(measured, estimated, PLANE) == pytest.approx(5.0)
+
+
+def test_marker_rms_leaves_out_missing_frames_and_is_undefined_without_any() -> None:
+    measured = np.array([[0.0, 0.0, 0.0], [np.nan] * 3])
+    estimated = np.array([[0.001, 0.0, 0.0], [5.0, 5.0, 5.0]])
+    assert marker_rms_mm(measured, estimated, PLANE) == pytest.approx(1.0)
+    assert marker_rms_mm(measured[1:], estimated[1:], PLANE) is None
+
+
+def test_wrench_fit_is_relative_to_the_rms_of_the_measured_signal() -> None:
+    measured = np.array([3.0, -3.0, 3.0, -3.0])
+    fit = wrench_fit(measured, measured + 0.3)
+    assert fit.rms == pytest.approx(0.3)
+    assert fit.nrms_percent == pytest.approx(10.0)
+    assert fit.correlation == pytest.approx(1.0)
+
+
+def test_wrench_fit_of_a_constant_has_no_correlation() -> None:
+    assert wrench_fit(np.ones(5), np.arange(5.0)).correlation is None
+    assert wrench_fit(np.full(5, np.nan), np.arange(5.0)) == (None, None, None)
+
+
+def test_window_starts_after_two_seconds_of_a_long_trial_only() -> None:
+    long = np.arange(401) / 100.0 + 7.0
+    assert evaluation_window(long).all()
+    longer = np.arange(451) / 100.0 + 7.0
+    assert longer[evaluation_window(longer)][0] == pytest.approx(9.0)
+
+
+@pytest.mark.parametrize(
+    ("scale", "word"), [(1.0, "consistent"), (9.0, "overconfident"), (0.01, "too cautious")]
+)
+def test_verdict_follows_the_size_of_the_innovations(scale: float, word: str) -> None:
+    rng = np.random.default_rng(1)
+    found = consistency(
+        scale * rng.chisquare(10, 500), np.full(500, 10), rng.normal(size=(500, 6)), rng.normal(size=(500, 4))
+    )
+    assert found.mean_nis_per_dof == pytest.approx(scale, rel=0.05)
+    assert word in found.verdict
+    assert "not white" not in found.verdict
+
+
+def test_true_covariances_give_a_mean_within_the_95_percent_interval() -> None:
+    rng = np.random.default_rng(2)
+    inside = 0
+    for _ in range(200):
+        found = consistency(rng.chisquare(10, 50), np.full(50, 10), np.empty((50, 0)), np.empty((50, 0)))
+        assert found.interval_95 is not None and found.mean_nis_per_dof is not None
+        inside += found.interval_95[0] < found.mean_nis_per_dof < found.interval_95[1]
+    assert 180 <= inside <= 199
+
+
+def test_slow_innovations_are_called_not_white() -> None:
+    slow = np.sin(np.linspace(0, 20, 500))[:, None]
+    rng = np.random.default_rng(3)
+    found = consistency(rng.chisquare(4, 500), np.full(500, 4), slow, rng.normal(size=(500, 1)))
+    assert found.whiteness_markers == pytest.approx(1.0, abs=0.02)
+    assert "marker innovations are not white" in found.verdict
+
+
+def test_lag_one_counts_neighbouring_pairs_only_and_does_not_depend_on_units() -> None:
+    rng = np.random.default_rng(4)
+    e = rng.normal(size=(300, 3)) + 0.5
+    e[100:150, 1] = np.nan
+    assert lag_one(e) == pytest.approx(lag_one(e * [1.0, 1000.0, 1e-3]))
+    alternating = np.where(np.arange(40) % 2, 1.0, -1.0)[:, None]
+    assert lag_one(alternating) == pytest.approx(-1.0)
+    gaps = np.where(np.arange(40) % 2, 1.0, np.nan)[:, None]
+    assert lag_one(gaps) is None
+
+
+def test_metrics_hold_the_keys_of_the_design(estimate: Estimate) -> None:
+    metrics = compute_metrics(estimate)
+    assert set(metrics) == {
+        "schema_version",
+        "window",
+        "markers",
+        "wrench",
+        "prediction",
+        "consistency",
+        "events",
+        "timing",
+    }
+    assert metrics["window"] == {"start_s": 2.0, "end_s": 12.0}
+    assert set(metrics["markers"]) == {"rms_mm", "mean_rms_mm"}
+    assert set(metrics["wrench"]) == {"rms", "nrms_percent", "correlation"}
+    assert set(metrics["wrench"]["rms"]) == {"fx", "fy", "mz"}  # fz, mx, my are measured but not modelled
+    assert metrics["timing"]["frames"] == 1201
+
+
+def test_metrics_show_noise_of_known_size_and_gaps() -> None:
+    metrics = compute_metrics(make_estimate(40.0, seed=5))
+    # marker noise is 1.5 mm an axis, the planar distance therefore 1.5 sqrt(2); the thigh marker drifts besides
+    assert metrics["markers"]["rms_mm"]["S1:RKNE"] == pytest.approx(1.5 * np.sqrt(2), rel=0.05)
+    assert metrics["markers"]["rms_mm"]["S1:RTHI"] > 3.0
+    assert metrics["wrench"]["rms"] == pytest.approx({"fx": 2.0, "fy": 5.0, "mz": 3.0}, rel=0.06)
+    assert metrics["prediction"]["wrench"]["rms"]["fx"] == pytest.approx(np.sqrt(5.0), rel=0.06)
+    assert metrics["events"]["missing_frames"] == {"S1:RASI": 40, "S1:RELB": 25}
+    assert metrics["events"]["parameters_at_bound"] == ["length/thigh", "inertia/pelvis/mass"]
