@@ -30,9 +30,7 @@ MASSES = (1.6, 5.8, 14.6, 8.7, 23.9, 2.9, 2.5)
 ROTATION = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, 1.0], [-1.0, 0.0, 0.0]])
 
 
-def make_estimate(
-    duration_s: float = 12.0, *, seed: int = 0, unit: str = "mm", gaps: bool = True
-) -> Estimate:
+def make_estimate(duration_s: float = 12.0, *, seed: int = 0, unit: str = "mm", gaps: bool = True) -> Estimate:
     """A plausible squat: 8 coordinates (the last a locked translation), 10 markers, planar wrench."""
     rng = np.random.default_rng(seed)
     time = np.arange(round(duration_s * 100) + 1) / 100.0
@@ -149,21 +147,13 @@ def _parameters(rng: np.random.Generator) -> list[Parameter]:
     for marker in MARKERS:
         for axis in "xy":
             start = float(rng.normal(0, 0.05))
-            found.append(
-                _parameter(f"marker/{marker}/{axis}", "marker", "thigh", "m", start, start + 0.004, 0.1, None)
-            )
+            found.append(_parameter(f"marker/{marker}/{axis}", "marker", "thigh", "m", start, start + 0.004, 0.1, None))
     for segment, mass in zip(SEGMENTS, MASSES, strict=True):
         end = 0.8 * mass if segment == "pelvis" else mass * (1 + rng.normal(0, 0.04))
-        found.append(
-            _parameter(f"inertia/{segment}/mass", "inertia", segment, "kg", mass, end, 0.2 * mass, mass)
-        )
-        found.append(
-            _parameter(f"inertia/{segment}/mx", "inertia", segment, "kg m", 0.0, 0.02, 0.04 * mass, 0.0)
-        )
+        found.append(_parameter(f"inertia/{segment}/mass", "inertia", segment, "kg", mass, end, 0.2 * mass, mass))
+        found.append(_parameter(f"inertia/{segment}/mx", "inertia", segment, "kg m", 0.0, 0.02, 0.04 * mass, 0.0))
         izz = mass * 0.02
-        found.append(
-            _parameter(f"inertia/{segment}/izz", "inertia", segment, "kg m2", izz, izz * 1.05, 0.2 * izz, izz)
-        )
+        found.append(_parameter(f"inertia/{segment}/izz", "inertia", segment, "kg m2", izz, izz * 1.05, 0.2 * izz, izz))
     return found
 
 
@@ -182,9 +172,7 @@ def _path(parameter: Parameter, time: np.ndarray, rng: np.random.Generator) -> n
 
 def _events(parameters: list[Parameter], gaps: bool) -> list[Event]:
     events = [
-        Event(
-            3.2 + k, 320 + 100 * k, "at_bound", p.name, f"{p.name} reached its bound {p.value:.3f} {p.unit}"
-        )
+        Event(3.2 + k, 320 + 100 * k, "at_bound", p.name, f"{p.name} reached its bound {p.value:.3f} {p.unit}")
         for k, p in enumerate(p for p in parameters if p.at_bound)
     ]
     if gaps:
@@ -195,9 +183,7 @@ def _events(parameters: list[Parameter], gaps: bool) -> list[Event]:
     return sorted(events, key=lambda event: event.frame)
 
 
-def _recording(
-    time: np.ndarray, ground: GroundFrame, measured: np.ndarray, wrench: np.ndarray, unit: str
-) -> Recording:
+def _recording(time: np.ndarray, ground: GroundFrame, measured: np.ndarray, wrench: np.ndarray, unit: str) -> Recording:
     laboratory = ground.wrench_to_laboratory(wrench)
     cop = np.full((len(time), 3), np.nan)
     plate = Plate("plate 1", laboratory[:, :3], laboratory[:, 3:], cop, np.zeros((len(time), 3)))

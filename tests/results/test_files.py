@@ -61,7 +61,9 @@ def test_wrench_has_columns_for_what_is_measured_and_modelled_only(folder: Path)
 def test_figures_recomputed_from_the_files_equal_metrics_json(folder: Path, estimate: Estimate) -> None:
     metrics = json.loads((folder / "metrics.json").read_text())
     markers, window = read(folder / "markers.trc"), estimate.time >= metrics["window"]["start_s"]
-    every_axis = np.ones(3, dtype=bool)  # out of the plane nothing differs, so the laboratory distance is the planar one
+    every_axis = np.ones(
+        3, dtype=bool
+    )  # out of the plane nothing differs, so the laboratory distance is the planar one
     for name, told in metrics["markers"]["rms_mm"].items():
         measured = estimate.recording.marker(name)[window]
         assert marker_rms_mm(measured, markers.marker(name)[window], every_axis) == pytest.approx(told, abs=1e-5)

@@ -78,12 +78,12 @@ def _verdict(ratio: float | None, markers: float | None, wrench: float | None) -
         return "Nothing was measured in this window, so nothing can be said."
     if ratio > CONSISTENT[1]:
         text = (
-            f"The filter is overconfident: its innovations are {np.sqrt(ratio):.2g} times as large as its covariances "
+            f"The filter is overconfident: its innovations are {_times(ratio)} times as large as its covariances "
             "say. P, Q or R may be too small, or the model does not fit."
         )
     elif ratio < CONSISTENT[0]:
         text = (
-            f"The filter is too cautious: its innovations are {np.sqrt(1.0 / max(ratio, 1e-300)):.2g} times smaller "
+            f"The filter is too cautious: its innovations are {_times(1.0 / max(ratio, 1e-300))} times smaller "
             "than its covariances say. Q or R are larger than this recording needs, and the standard deviations it "
             "reports are too large."
         )
@@ -96,3 +96,9 @@ def _verdict(ratio: float | None, markers: float | None, wrench: float | None) -
             "is something in the recording that the model does not explain."
         )
     return text
+
+
+def _times(ratio: float) -> str:
+    """Ratio of standard deviations, from one of variances."""
+    root = float(np.sqrt(ratio))
+    return f"{root:.2g}" if root < 10.0 else f"{root:.0f}"

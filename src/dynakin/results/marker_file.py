@@ -59,5 +59,7 @@ def write_trc(path: Path, time: np.ndarray, names: list[str], points: np.ndarray
         cells = [
             "" if blank else f"{value:.{decimals}f}" for value, blank in zip(scaled[index], missing[index], strict=True)
         ]
+        if missing[index, -1]:
+            cells.append("")  # OpenSim takes a tab as the end of a cell and would miss an empty one at the end of a row
         lines.append("\t".join([str(index + 1), f"{time[index]:.12g}", *cells]))
     path.write_text("\n".join(lines) + "\n", encoding="utf-8", newline="\n")

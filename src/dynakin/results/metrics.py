@@ -82,11 +82,18 @@ def window_consistency(estimate: Estimate, window: np.ndarray) -> Consistency:
     )
 
 
-def _consistency(estimate: Estimate, window: np.ndarray) -> dict[str, Any]:
-    found = window_consistency(estimate, window)
+def speed_consistency(estimate: Estimate, window: np.ndarray) -> tuple[dict[str, float], str]:
+    """How far each speed is from the derivative of its coordinate, and a sentence, empty where all fit."""
     names = estimate.coordinate_names
     values = (estimate.data[name].transpose("time", "coordinate").values[window] for name in ("coordinates", "speeds"))
     mismatch, moving = speed_mismatch(estimate.time[window], *values)
+    finite = {name: float(value) for name, value in zip(names, mismatch, strict=True) if np.isfinite(value)}
+    return finite, mismatch_in_words(names, mismatch, moving)
+
+
+def _consistency(estimate: Estimate, window: np.ndarray) -> dict[str, Any]:
+    found = window_consistency(estimate, window)
+    mismatch, speeds_verdict = speed_consistency(estimate, window)
     return {
         "mean_nis_per_dof": found.mean_nis_per_dof,
         "interval_95": list(found.interval_95) if found.interval_95 else None,
@@ -98,9 +105,9 @@ def _consistency(estimate: Estimate, window: np.ndarray) -> dict[str, Any]:
         },
         "speed_mismatch": {
             "what": "RMS of estimated speed less differenced estimated coordinate, rad/s or m/s",
-            **{name: float(value) for name, value in zip(names, mismatch, strict=True) if np.isfinite(value)},
+            **mismatch,
         },
-        "verdict": " ".join(filter(None, [found.verdict, mismatch_in_words(names, mismatch, moving)])),
+        "verdict": " ".join(filter(None, [found.verdict, speeds_verdict])),
     }
 
 

@@ -1,0 +1,73 @@
+"""The command line: which commands there are, and how errors leave."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from typing import Annotated
+
+import typer
+
+import dynakin
+from dynakin.cli.check import check
+from dynakin.cli.console import print_error
+from dynakin.cli.demo import demo
+from dynakin.cli.model import model
+from dynakin.cli.print_config import print_config
+from dynakin.cli.run import run
+from dynakin.errors import DynakinError
+
+# Typer carries its own copy of click or uses click's, depending on its version; its own name leads to either.
+_USAGE_ERROR: type[Exception] = typer.BadParameter.__mro__[1]
+
+app = typer.Typer(
+    name="dynakin",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+for command in (run, demo, check, model):
+    app.command()(command)
+app.command("print-config")(print_config)
+
+
+def _version(asked: bool) -> None:
+    if asked:
+        typer.echo(f"dynakin {dynakin.__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _root(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version and exit.")
+    ] = False,
+) -> None:
+    """How a person moves and what drives the movement, from markers and force plates."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run a command and give its exit code: 0, or 2 with one line on stderr for anything wrong with the input.
+
+    DYNAKIN_DEBUG=1 in the environment lets the traceback through.
+    """
+    try:
+        code = app(args=list(sys.argv[1:] if arguments is None else arguments), standalone_mode=False)
+    except DynakinError as error:
+        if os.environ.get("DYNAKIN_DEBUG") == "1":
+            raise
+        print_error(error.message)
+        return 2
+    except _USAGE_ERROR as error:
+        if type(error).__name__ == "NoArgsIsHelpError":  # its message is the help text
+            typer.echo(str(getattr(error, "message", error)))
+            return 2
+        print_error(f"{getattr(error, 'format_message', error.__str__)()} See dynakin --help.")
+        return 2
+    except (KeyboardInterrupt, typer.Abort):
+        print_error("stopped")
+        return 130
+    return code if isinstance(code, int) else 0

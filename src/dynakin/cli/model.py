@@ -1,0 +1,124 @@
+"""`dynakin model`: what a model is made of."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import numpy as np
+import typer
+from rich.table import Table
+from rich.tree import Tree
+
+from dynakin.cli.console import out, table
+from dynakin.cli.options import Markers
+from dynakin.model import ModelDefinition, available_marker_sets, available_models, load_marker_set, load_model
+from dynakin.model.marker_schema import MarkerSetFile
+from dynakin.model.schema import ModelFile
+from dynakin.model.schema import Segment as ModelSegment
+
+
+def model(
+    name: Annotated[str | None, typer.Argument(help="squat7, sagittal7 or a .toml file; none: list them.")] = None,
+    markers: Markers = None,
+) -> None:
+    """Print a model: its tree, coordinates, states, markers and bounds."""
+    console = out()
+    if name is None:
+        console.print(_list())
+        return
+    definition = load_model(name, markers=markers or "auto")
+    console.print(f"{definition.name}: {definition.model.description}")
+    console.print()
+    console.print(_tree(definition.model))
+    console.print()
+    console.print(_coordinates(definition.model))
+    for marker_set in _marker_sets(definition):
+        console.print(_markers(definition.model, marker_set))
+    console.print(_states(definition.model))
+
+
+def _list() -> Table:
+    rows = table("name", "what it is", title="Models and marker sets")
+    for name in available_models():
+        rows.add_row(name, load_model(name).model.description)
+    for name in available_marker_sets():
+        rows.add_row(name, load_marker_set(name).description)
+    return rows
+
+
+def _tree(model: ModelFile) -> Tree:
+    root = Tree("ground" + (f" (origin: {model.ground.origin})" if model.ground.origin else ""))
+    nodes = {"ground": root}
+    for segment in model.segments:
+        nodes[segment.name] = nodes[segment.parent].add(_segment(segment))
+    return root
+
+
+def _segment(segment: ModelSegment) -> str:
+    lengths = " + ".join(term.length for term in segment.placement)
+    at = f", placed by length {lengths}" if lengths else ""
+    axes = ", ".join(axis.coordinate for axis in segment.axes) or "fixed"
+    parts = f" [{', '.join(segment.parts)}{', both sides' if segment.both_sides else ''}]" if segment.parts else ""
+    return f"{segment.name}{parts}: {axes}{at}"
+
+
+def _coordinates(model: ModelFile) -> Table:
+    rows = table("coordinate", "limits", "unit", "meaning", numbers=(1,), title="Coordinates")
+    kinds = {axis.coordinate: axis.kind for segment in model.segments for axis in segment.axes}
+    for coordinate in model.coordinates:
+        rotation = kinds[coordinate.name] == "rotation"
+        low, high = (np.degrees(v) if rotation else v for v in coordinate.limits)
+        limits = "locked" if coordinate.locked else f"{low:.4g} to {high:.4g}"
+        rows.add_row(coordinate.name, limits, "deg" if rotation else "m", coordinate.description)
+    return rows
+
+
+def _marker_sets(definition: ModelDefinition) -> list[MarkerSetFile]:
+    """The set asked for, or those built-in ones that have a marker for every segment that needs one."""
+    if definition.marker_set is not None:
+        return [definition.marker_set]
+    needed = [s.name for s in definition.model.segments if s.axes and s.without_markers is None]
+    sets = [load_marker_set(name) for name in available_marker_sets()]
+    return [s for s in sets if {*needed} <= {home for _, home in _sites(definition.model, s)}]
+
+
+def _sites(model: ModelFile, marker_set: MarkerSetFile) -> list[tuple[str, str]]:
+    """Markers of the set that the model carries, each with its segment."""
+    home = {part: s.name for s in model.segments for part in s.parts} | {s.name: s.name for s in model.segments}
+    return [(m.name, home[m.segment]) for m in marker_set.markers if not m.landmark_only and m.segment in home]
+
+
+def _markers(model: ModelFile, marker_set: MarkerSetFile) -> Table:
+    rows = table(
+        "segment", "marker", "names in recordings", "sd, mm", numbers=(3,), title=f"Markers of set {marker_set.name}"
+    )
+    for segment in model.segments:
+        for name, home in _sites(model, marker_set):
+            if home != segment.name:
+                continue
+            marker = marker_set.marker(name)
+            names = " | ".join(filter(None, (", ".join(a) for a in (marker.right, marker.left, marker.centre))))
+            sd = "" if marker.variance is None else f"{1000 * np.sqrt(marker.variance):.0f}"
+            rows.add_row(segment.name, name, names, sd)
+    return rows
+
+
+def _states(model: ModelFile) -> Table:
+    from dynakin.model import Bounds
+
+    bounds = Bounds()
+    free = sum(not c.locked for c in model.coordinates)
+    carrying = sum(s.inertia_estimated and bool(s.parts or s.inertia) for s in model.segments)
+    axes = 2 if model.planar else 3
+    rows = table("block", "elements", "bounds", title="State, where every segment has markers")
+    rows.add_row("coordinates, speeds, accelerations", f"3 x {free}", "coordinates: their limits")
+    lengths = sum(length.estimated for length in model.lengths)
+    rows.add_row("lengths", str(lengths), f"± {100 * bounds.length_fraction:g} % of the length at the start")
+    rows.add_row("marker places", f"{axes} a marker", f"± {1000 * bounds.marker_threshold_m:g} mm around the start")
+    rows.add_row(
+        "inertia",
+        f"{4 if model.planar else 10} x {carrying}",
+        f"mass, moments of inertia: ± {100 * bounds.mass_fraction:g}, {100 * bounds.inertia_fraction:g} %; "
+        f"first moments: ± {100 * bounds.first_moment_fraction:g} % of mass times length",
+    )
+    return rows

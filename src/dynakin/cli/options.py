@@ -1,0 +1,24 @@
+"""Options that several commands have in common; what they mean is written once, in `dynakin.config`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+Force = Annotated[Path | None, typer.Option("--forces", help="Ground forces: .mot, .sto or .csv.")]
+Markers = Annotated[str | None, typer.Option(help="Marker set: auto, a built-in one or a .toml file.")]
+Static = Annotated[Path | None, typer.Option(help="Recording of the same person standing.")]
+Mass = Annotated[float | None, typer.Option("--mass", help="Body mass, kg; else from the plates.")]
+Height = Annotated[float | None, typer.Option("--height", help="Body height, m; else from the markers.")]
+Sex = Annotated[str | None, typer.Option("--sex", help="male or female, for the table; else the mean of both.")]
+Preset = Annotated[str | None, typer.Option(help="Noise settings: paper.")]
+Side = Annotated[str | None, typer.Option(help="Markers of a one-legged model: auto, right, left, both.")]
+Vertical = Annotated[str | None, typer.Option(help="Laboratory axis that points up: auto, +Y, +Z, ...")]
+Forward = Annotated[str | None, typer.Option(help="Facing direction: auto, an axis or three numbers (0,1,0).")]
+TableName = Annotated[str | None, typer.Option("--table", help="Inertia table: dumas, deleva or a .csv file.")]
+PlateFilter = Annotated[float | None, typer.Option("--plate-filter-hz", help="Low-pass filter on the plates, Hz.")]
+ForceThreshold = Annotated[
+    float | None, typer.Option("--force-threshold-n", help="Load below which a plate counts as empty, N.")
+]

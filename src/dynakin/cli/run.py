@@ -1,0 +1,125 @@
+"""`dynakin run`: estimate a recording and write everything into a folder."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from dynakin.cli.console import busy, progress_bar
+from dynakin.cli.options import (
+    Force,
+    ForceThreshold,
+    Forward,
+    Height,
+    Markers,
+    Mass,
+    PlateFilter,
+    Preset,
+    Sex,
+    Side,
+    Static,
+    TableName,
+    Vertical,
+)
+from dynakin.cli.summary import print_summary
+from dynakin.config import RunConfig, make_config, read_config
+from dynakin.filter import Estimator
+from dynakin.model import load_model
+from dynakin.recordings import read
+from dynakin.results import Estimate, check_output_writable
+
+
+def run(
+    trial: Annotated[Path, typer.Argument(help="Recording (.c3d, .trc, .csv), or a configuration (.toml).")],
+    forces: Force = None,
+    model: Annotated[str | None, typer.Option(help="Model: squat7, sagittal7 or a .toml file.")] = None,
+    markers: Markers = None,
+    static: Static = None,
+    mass: Mass = None,
+    height: Height = None,
+    sex: Sex = None,
+    preset: Preset = None,
+    side: Side = None,
+    vertical: Vertical = None,
+    forward: Forward = None,
+    table: TableName = None,
+    plate_filter: PlateFilter = None,
+    force_threshold: ForceThreshold = None,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder for the results.")] = None,
+) -> None:
+    """Estimate coordinates, moments, lengths and masses from a recording, and write a report."""
+    given = {
+        "forces": forces,
+        "model": model,
+        "markers": markers,
+        "static": static,
+        "mass_kg": mass,
+        "height_m": height,
+        "sex": sex,
+        "preset": preset,
+        "side": side,
+        "vertical": vertical,
+        "forward": forward_direction(forward),
+        "table": table,
+        "plate_filter_hz": plate_filter,
+        "force_threshold_n": force_threshold,
+        "output": output,
+    }
+    config = configure(trial, given)
+    check_output_writable(config.output)
+    with progress_bar("estimating") as progress:
+        estimate = estimate_from(config, progress)
+    with busy("writing results and report"):
+        folder = estimate.save(config.output)
+    print_summary(estimate, folder)
+
+
+def configure(trial: Path, given: dict[str, Any]) -> RunConfig:
+    """Merge a configuration file, if that is what ``trial`` is, with what the command line gives, which wins."""
+    options = {key: value for key, value in given.items() if value is not None}
+    if trial.suffix.casefold() == ".toml":
+        return make_config(read_config(trial) | options, str(trial))
+    return make_config({"trial": trial} | options, "run")
+
+
+def estimate_from(config: RunConfig, progress: Callable[[int, int], None] | None = None) -> Estimate:
+    """Read, load, estimate: what a configuration asks for, with it kept in the result.
+
+    Raises:
+        DynakinError: anything that is wrong with the input, in one line.
+    """
+    model = load_model(config.model, config.subject(), markers=config.markers, table=config.table)
+    recording = read(
+        config.trial,
+        config.forces,
+        plate_filter_hz=config.plate_filter_hz,
+        force_threshold_n=config.force_threshold_n,
+    )
+    static = None if config.static is None else read(config.static)
+    estimator = Estimator(
+        model,
+        config.noise_settings(),
+        priors=config.priors,
+        bounds=config.bounds,
+        side=config.side,
+        vertical=config.vertical,
+        forward=config.forward,
+    )
+    estimate = estimator.run(recording, static=static, progress=progress)
+    return replace(estimate, config=config.as_used() | estimate.config)
+
+
+def forward_direction(text: str | None) -> str | tuple[float, ...] | None:
+    """`--forward 0,1,0` as numbers; a word stays a word and is checked with the configuration."""
+    if text is None or "," not in text:
+        return text
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise typer.BadParameter(
+            f"--forward is {text!r}, expected auto, an axis (+X) or three numbers (0,1,0)"
+        ) from None

@@ -1,0 +1,55 @@
+"""The table that `run` and `demo` end with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rich.table import Table
+
+from dynakin.cli.console import out, table
+from dynakin.results import Estimate
+
+
+def print_summary(estimate: Estimate, folder: Path) -> None:
+    """Fit, what to look at, speed, and where the files lie."""
+    console = out()
+    console.print(_figures(estimate))
+    console.print(f"Verdict: {estimate.metrics()['consistency']['verdict']}", style="dim")
+    console.print()
+    console.print(f"Results  {folder}", soft_wrap=True)
+    console.print(f"Report   {folder / 'report.html'}", soft_wrap=True)
+
+
+def _figures(estimate: Estimate) -> Table:
+    metrics = estimate.metrics()
+    window = metrics["window"]
+    rows = table(
+        "figure",
+        "value",
+        "",
+        numbers=(1,),
+        title=f"{estimate.recording.name}, {estimate.model_name}: {window['start_s']:g} to {window['end_s']:g} s",
+    )
+    rms = {name: value for name, value in metrics["markers"]["rms_mm"].items() if value is not None}
+    if rms:
+        worst = max(rms, key=lambda name: rms[name])
+        rows.add_row("markers, mean RMS", f"{metrics['markers']['mean_rms_mm']:.2f} mm", f"{len(rms)} markers")
+        rows.add_row("worst marker, RMS", f"{rms[worst]:.2f} mm", worst)
+    for name, value in metrics["wrench"]["rms"].items():
+        unit = "N" if name.startswith("f") else "N m"
+        share = metrics["wrench"]["nrms_percent"][name]
+        rows.add_row(
+            f"wrench {name}, RMS", f"{value:.2f} {unit}", "" if share is None else f"{share:.1f} % of measured"
+        )
+    stuck = metrics["events"]["parameters_at_bound"]
+    free = sum(p.estimated for p in estimate.parameters)
+    rows.add_row(
+        "parameters on a bound", f"{len(stuck)} of {free}", ", ".join(stuck[:3]) + (" ..." if stuck[3:] else "")
+    )
+    gaps = metrics["events"]["missing_frames"]
+    rows.add_row("markers with gaps", str(len(gaps)), ", ".join(gaps))
+    timing = estimate.timing
+    rows.add_row(
+        "time of a step, median", f"{timing.median_us:.0f} µs", f"{timing.realtime_factor:.0f} times real time"
+    )
+    return rows

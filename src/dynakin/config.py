@@ -1,0 +1,146 @@
+"""The configuration of a run: one definition of every key, its default and its meaning, for file and command line."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from dynakin.errors import ConfigError, ModelError
+from dynakin.filter import Noise, presets
+from dynakin.model import Bounds, Priors, Subject
+from dynakin.model.subject import Sex
+from dynakin.model.validation import Strict, nearest, validate
+
+# Keys that name files: relative to the configuration file that they stand in.
+_PATHS = ("trial", "forces", "static", "output")
+
+
+class RunConfig(Strict):
+    """What `dynakin run` needs to know; the keys of the file are the options of the command line."""
+
+    trial: Path = Field(examples=["squat.c3d"])
+    """Recording to estimate: .c3d, .trc or .csv. Paths are relative to this file."""
+    model: str = Field(examples=["squat7"])
+    """Built-in model (squat7, sagittal7) or a .toml file of your own."""
+    output: Path = Field(examples=["out/squat"])
+    """Folder for the results. It is replaced if it holds an earlier output, and refused if it holds anything else."""
+
+    forces: Path | None = Field(default=None, examples=["squat_grf.mot"])
+    """Ground forces, where the recording does not hold them: .mot, .sto or .csv."""
+    static: Path | None = Field(default=None, examples=["standing.c3d"])
+    """Recording of the same person and markers standing, from which lengths and marker places are taken."""
+    markers: str = "auto"
+    """Marker set: auto (by the names in the recording), a built-in one, or a .toml file of your own."""
+    table: str = "dumas"
+    """Table of inertial parameters: dumas, deleva, or a .csv file of your own."""
+
+    mass_kg: float | None = Field(default=None, examples=[70.0])
+    """Body mass. Not given: from the plates while the person stands still."""
+    height_m: float | None = Field(default=None, examples=[1.75])
+    """Body height. Not given: from the markers, where a length needs it."""
+    sex: Sex | None = Field(default=None, examples=["female"])
+    """male or female, for the table. Not given: the mean of both."""
+
+    preset: str = "paper"
+    """Noise settings to start from; [noise] changes single ones."""
+    side: Literal["auto", "right", "left", "both"] = "auto"
+    """Which side's markers a model uses that has one leg for both: auto (fewest gaps), right, left, both."""
+    vertical: str = "auto"
+    """Axis of the laboratory that points up: auto (found), or one of +X -X +Y -Y +Z -Z."""
+    forward: str | tuple[float, float, float] = "auto"
+    """Direction in which the person faces, in the laboratory: auto (found), an axis, or three numbers."""
+    plate_filter_hz: float | None = Field(default=None, examples=[20.0])
+    """Low-pass filter on the plates. Not given: only what resampling to the marker rate needs."""
+    force_threshold_n: float | None = Field(default=None, examples=[10.0])
+    """Load below which a plate counts as empty. Not given: 10 N for plates that are resampled."""
+
+    noise: dict[str, Any] = Field(default_factory=dict)
+    """Variances, SI units squared. Defaults: those of the preset."""
+    priors: Priors = Priors()
+    """Standard deviations at the first frame."""
+    bounds: Bounds = Bounds()
+    """Half widths of the bounds of equation (9)."""
+
+    ground: dict[str, Any] = Field(default_factory=dict)
+    """Written into an output's config.toml for the record: the ground frame that was found. Not read."""
+    versions: dict[str, Any] = Field(default_factory=dict)
+    """Written into an output's config.toml for the record. Not read."""
+
+    @model_validator(mode="after")
+    def _checked(self) -> Self:
+        try:
+            self.subject()
+            self.noise_settings()
+        except (ModelError, ConfigError) as error:
+            raise ValueError(error.message) from None
+        return self
+
+    def subject(self) -> Subject:
+        """Who is measured."""
+        return Subject(mass_kg=self.mass_kg, height_m=self.height_m, sex=self.sex)
+
+    def noise_settings(self) -> Noise:
+        """The preset with the changes of [noise].
+
+        Raises:
+            ConfigError: an unknown preset, an unknown key in [noise], or a value out of range.
+        """
+        for key in self.noise:
+            if key not in Noise.model_fields:
+                known = ", ".join(Noise.model_fields)
+                raise ConfigError(
+                    f"noise: unknown key {key!r}{nearest(key, Noise.model_fields)}; expected keys: {known}"
+                )
+        changed = presets.preset(self.preset).model_dump() | self.noise
+        try:
+            return validate(Noise, changed, "noise")
+        except ModelError as error:
+            raise ConfigError(error.message) from None
+
+    def as_used(self) -> dict[str, Any]:
+        """Plain data for an output's config.toml: every path absolute, so that the file works from where it lies."""
+        plain = self.model_dump(mode="json", exclude={"ground", "versions"})
+        for key in _PATHS:
+            path = getattr(self, key)
+            plain[key] = None if path is None else str(path.absolute())
+        return plain
+
+
+def read_config(path: Path) -> dict[str, Any]:
+    """The keys of a configuration file, its relative paths made relative to where the file lies.
+
+    Raises:
+        ConfigError: no such file, or not TOML (with the line).
+    """
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
+    except tomllib.TOMLDecodeError as error:
+        raise ConfigError(f"{path}: not a TOML file: {error}") from None
+    for key in _PATHS:
+        if isinstance(content.get(key), str):
+            content[key] = str(path.parent / content[key])
+    for key in ("model", "markers", "table"):  # a name, or a file beside the configuration
+        value = content.get(key)
+        if isinstance(value, str) and (path.parent / value).is_file():
+            content[key] = str(path.parent / value)
+    return content
+
+
+def make_config(content: dict[str, Any], where: str) -> RunConfig:
+    """A checked configuration; ``where`` (the file, or the command) opens the message of what is wrong.
+
+    Raises:
+        ConfigError: a key that is unknown (the nearest is suggested) or missing, or a value that is wrong.
+    """
+    for key, option in (("trial", "TRIAL"), ("model", "--model NAME"), ("output", "-o OUT")):
+        if content.get(key) is None:
+            raise ConfigError(f'{where}: {key} is missing, expected {option} or {key} = "..." in the configuration')
+    try:
+        return validate(RunConfig, content, where)
+    except ModelError as error:
+        raise ConfigError(error.message) from None

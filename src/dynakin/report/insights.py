@@ -1,0 +1,167 @@
+"""The report's summary in words: what was run, how well it fits, and what a reader should know before using it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from dynakin.report.labels import (
+    COMPONENT_LABELS,
+    listed,
+    number,
+    parameter_label,
+    plural,
+    sentence,
+    short_marker_names,
+    words,
+)
+from dynakin.results import Estimate
+from dynakin.results.consistency import CONSISTENT
+from dynakin.results.metrics import evaluation_window, speed_consistency, window_consistency
+
+Level = Literal["good", "note", "warning"]
+
+
+@dataclass(frozen=True)
+class Insight:
+    """One finding: how much it matters, a short title, and a sentence or two."""
+
+    level: Level
+    title: str
+    text: str
+
+
+def what_was_run(estimate: Estimate) -> str:
+    """One sentence: the recording, the model, the data used."""
+    recording, time = estimate.recording, estimate.time
+    plates = plural(len(recording.plates), "force plate") if recording.plates else "no force plate"
+    mass = estimate.config.get("mass_kg")
+    person = f" of a person of {mass:.4g} kg" if isinstance(mass, int | float) else ""
+    return (
+        f"{number(float(time[-1] - time[0]), 's')}{person}: {plural(len(time), 'frame')} at "
+        f"{recording.rate:.4g} Hz, {len(estimate.marker_names)} of {len(recording.marker_names)} "
+        f"markers, {plates}."
+    )
+
+
+def insights(estimate: Estimate, metrics: dict[str, Any]) -> list[Insight]:
+    """All findings, in the order of the report."""
+    found = [
+        _markers(estimate, metrics),
+        _wrench(metrics),
+        _consistency(estimate, metrics),
+        _speeds(estimate),
+        _bounds(estimate),
+        _joint_limits(estimate),
+        _missing(estimate, metrics),
+        _gated(estimate),
+        _locked(estimate),
+        _step_time(estimate),
+    ]
+    return [insight for insight in found if insight is not None]
+
+
+def _markers(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
+    mean = metrics["markers"]["mean_rms_mm"]
+    if mean is None:
+        return None
+    rms = {name: value for name, value in metrics["markers"]["rms_mm"].items() if value is not None}
+    worst = max(rms, key=lambda name: rms[name])
+    ahead = metrics["prediction"]["markers"]["mean_rms_mm"]
+    return Insight(
+        "good" if mean < 15.0 else "warning",  # the paper's own figure: below 15 mm
+        "Markers",
+        f"The model’s markers lie {number(mean, 'mm')} from the measured ones (RMS, mean of "
+        f"{plural(len(rms), 'marker')}); worst is {short_marker_names(estimate.marker_names)[worst]} with "
+        f"{number(rms[worst], 'mm')}. Expected one frame ahead, before it was seen: {number(ahead, 'mm')}. "
+        "This is the fit to what the filter was given, not the accuracy of angles or moments.",
+    )
+
+
+def _wrench(metrics: dict[str, Any]) -> Insight | None:
+    rms = metrics["wrench"]["rms"]
+    if not rms:
+        return Insight("note", "Force plates", "No wrench was compared: none was measured, or none is modelled.")
+    text = [
+        f"{COMPONENT_LABELS[name][0].lower()} {number(value, COMPONENT_LABELS[name][1])}"
+        + (f" ({number(share, digits=2)} %)" if (share := metrics["wrench"]["nrms_percent"][name]) is not None else "")
+        for name, value in rms.items()
+    ]
+    return Insight(
+        "note",
+        "Force plates",
+        f"RMS difference between the model’s wrench and the plates’: {listed(text)}; percent of the measured RMS.",
+    )
+
+
+def _consistency(estimate: Estimate, metrics: dict[str, Any]) -> Insight:
+    found = window_consistency(estimate, evaluation_window(estimate.time))
+    ratio = metrics["consistency"]["mean_nis_per_dof"]
+    good = ratio is not None and CONSISTENT[0] <= ratio <= CONSISTENT[1] and "not white" not in found.verdict
+    figure = "" if ratio is None else f" (Mean normalised innovation squared {number(ratio)}, 1 is right.)"
+    return Insight("good" if good else "warning", "Uncertainty", found.verdict + figure)
+
+
+def _speeds(estimate: Estimate) -> Insight | None:
+    _, verdict = speed_consistency(estimate, evaluation_window(estimate.time))
+    return Insight("warning", "Speeds", verdict) if verdict else None
+
+
+def _bounds(estimate: Estimate) -> Insight:
+    free = [p for p in estimate.parameters if p.estimated]
+    names = short_marker_names(estimate.marker_names)
+    stuck = [parameter_label(p, names) for p in free if p.at_bound]
+    if not stuck:
+        return Insight("good", "Bounds", f"None of the {len(free)} estimated parameters ends on its bound.")
+    return Insight(
+        "warning",
+        "Bounds",
+        f"{len(stuck)} of {len(free)} estimated parameters end on a bound: {listed(stuck)}. The data ask for a value "
+        "that the person cannot have, so the model or the noise settings do not fit there.",
+    )
+
+
+def _joint_limits(estimate: Estimate) -> Insight | None:
+    names = set(estimate.coordinate_names)
+    stuck = sorted({words(e.subject) for e in estimate.events if e.kind == "at_bound" and e.subject in names})
+    if not stuck:
+        return None
+    return Insight("warning", "Joint limits", f"Held at its limit for part of the time: {listed(stuck)}.")
+
+
+def _missing(estimate: Estimate, metrics: dict[str, Any]) -> Insight:
+    gaps: dict[str, int] = metrics["events"]["missing_frames"]
+    if not gaps:
+        return Insight("good", "Gaps", "Every marker in use was measured in every frame.")
+    names, frames = short_marker_names(estimate.marker_names), len(estimate.time)
+    text = [
+        f"{names[name]} ({100 * gap / frames:.2g} % of the frames)" if gap < frames else f"{names[name]} (always)"
+        for name, gap in sorted(gaps.items(), key=lambda item: -item[1])
+    ]
+    return Insight("note", "Gaps", f"Markers missing for part of the recording: {listed(text)}.")
+
+
+def _gated(estimate: Estimate) -> Insight | None:
+    gated = [event for event in estimate.events if event.kind in ("gated", "reset")]
+    if not gated:
+        return None
+    return Insight("warning", "Left out or reset", f"{listed([event.message for event in gated], 4)}.")
+
+
+def _locked(estimate: Estimate) -> Insight | None:
+    free = {str(name) for name in estimate.data["element"].values}
+    locked = [words(name) for name in estimate.coordinate_names if name not in free]
+    if not locked:
+        return None
+    verb = "is" if len(locked) == 1 else "are"
+    return Insight("note", "Locked", f"{sentence(listed(locked))} {verb} held still; the notes below say why.")
+
+
+def _step_time(estimate: Estimate) -> Insight:
+    timing = estimate.timing
+    return Insight(
+        "note",
+        "Time of a step",
+        f"A step took {number(timing.median_us, 'µs')} (median; 99 of 100 within {number(timing.p99_us, 'µs')}), "
+        f"{number(timing.realtime_factor, digits=2)} times faster than the recording went.",
+    )

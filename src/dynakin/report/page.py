@@ -1,0 +1,101 @@
+"""Puts the report together: words, figures and tables into one HTML file."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import jinja2
+import tomli_w
+
+from dynakin.report.insights import insights, what_was_run
+from dynakin.report.labels import listed, number, parameter_label, short_marker_names
+from dynakin.report.sections import sections
+from dynakin.results import Estimate, compute_metrics
+from dynakin.results.config_file import plain
+from dynakin.results.versions import versions
+
+KEY_LABELS = {
+    "measured": "measured",
+    "estimated": "estimated",
+    "band": "± 2 standard deviations",
+    "bound": "bound",
+}
+
+
+def render_report(estimate: Estimate, *, metrics: dict[str, Any] | None = None) -> str:
+    """The report of a run as one HTML text that needs nothing else."""
+    metrics = metrics or compute_metrics(estimate)
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("dynakin.report", "templates"),
+        autoescape=True,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        undefined=jinja2.StrictUndefined,
+    )
+    found = insights(estimate, metrics)
+    return environment.get_template("report.html.j2").render(
+        title=estimate.recording.name,
+        model=estimate.model_name,
+        preset=estimate.config.get("preset"),
+        what_was_run=what_was_run(estimate),
+        figures=_headline(estimate, metrics),
+        insights=found,
+        warnings=sum(insight.level == "warning" for insight in found),
+        sections=sections(estimate, metrics),
+        key_labels=KEY_LABELS,
+        messages=estimate.messages,
+        events=[event for event in estimate.events if event.kind != "missing"],
+        parameters=_parameter_rows(estimate),
+        configuration=tomli_w.dumps(plain(estimate.config)),
+        versions=versions(),
+    )
+
+
+def write_report(estimate: Estimate, path: Path, *, metrics: dict[str, Any] | None = None) -> None:
+    """Write `render_report` to ``path``."""
+    path.write_text(render_report(estimate, metrics=metrics), encoding="utf-8", newline="\n")
+
+
+def _headline(estimate: Estimate, metrics: dict[str, Any]) -> list[dict[str, str]]:
+    rms = metrics["wrench"]["rms"]
+    forces = [value for name, value in rms.items() if name.startswith("f")]
+    moments = [value for name, value in rms.items() if name.startswith("m")]
+    stuck = [p for p in estimate.parameters if p.at_bound]
+    free = [p for p in estimate.parameters if p.estimated]
+    tiles = [{"value": number(metrics["markers"]["mean_rms_mm"], digits=2), "unit": "mm", "label": "markers, mean RMS"}]
+    if forces:
+        names = listed([name for name in rms if name.startswith("f")])
+        value = " / ".join(number(force, digits=2) for force in forces)
+        tiles.append({"value": value, "unit": "N", "label": f"ground forces {names}, RMS"})
+    if moments:
+        names = listed([name for name in rms if name.startswith("m")])
+        value = " / ".join(number(moment, digits=2) for moment in moments)
+        tiles.append({"value": value, "unit": "N m", "label": f"ground moment {names}, RMS"})
+    tiles.append({"value": f"{len(stuck)} of {len(free)}", "unit": "", "label": "parameters on a bound"})
+    tiles.append({"value": number(estimate.timing.median_us, digits=2), "unit": "µs", "label": "a step, median"})
+    return tiles
+
+
+def _parameter_rows(estimate: Estimate) -> list[dict[str, Any]]:
+    names = short_marker_names(estimate.marker_names)
+    rows = []
+    for p in estimate.parameters:
+        cells = [p.value, p.sd, p.initial, p.table, p.lower, p.upper]
+        rows.append(
+            {
+                "kind": p.kind,
+                "label": parameter_label(p, names),
+                "unit": "mm" if p.unit == "m" else p.unit.replace("m2", "m²"),
+                "cells": [_cell(cell, p.unit) for cell in cells],
+                "at_bound": p.at_bound,
+                "estimated": p.estimated,
+            }
+        )
+    return rows
+
+
+def _cell(value: float | None, unit: str) -> str:
+    if value is None or unit != "m":
+        return number(value)
+    return f"{1000.0 * value:.1f}".replace("-0.0", "0.0").replace("-", "−")

@@ -1,0 +1,215 @@
+"""The report's sections: which figures, with which titles and explanations."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from dynakin.report import figures
+from dynakin.report.figures import Panel
+from dynakin.report.labels import (
+    COMPONENT_LABELS,
+    is_planar,
+    moment_note,
+    number,
+    sentence,
+    short_marker_names,
+    words,
+)
+from dynakin.results import AXES, COMPONENTS, Estimate, Parameter
+
+
+@dataclass(frozen=True)
+class Section:
+    """A heading, a paragraph, and panels; ``folded`` ones open on a click; ``key`` names the lines."""
+
+    anchor: str
+    title: str
+    text: str
+    panels: list[Panel] = field(default_factory=list)
+    wide: list[Panel] = field(default_factory=list)
+    folded: list[Panel] = field(default_factory=list)
+    folded_title: str = ""
+    key: tuple[str, ...] = ()
+
+
+def sections(estimate: Estimate, metrics: dict[str, Any]) -> list[Section]:
+    """All sections in order; one without anything to show is left out."""
+    every = [
+        marker_section(estimate, metrics),
+        wrench_section(estimate, metrics),
+        angle_section(estimate),
+        moment_section(estimate),
+        length_section(estimate),
+        mass_section(estimate),
+    ]
+    return [section for section in every if section.panels or section.wide]
+
+
+def marker_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
+    """RMS a marker, paths in the plane, and every marker over time."""
+    names = short_marker_names(estimate.marker_names)
+    measured = estimate.data["markers_measured"].values
+    estimated = estimate.data["markers_estimated"].values
+    rms = {names[name]: value for name, value in metrics["markers"]["rms_mm"].items()}
+    wide = [figures.rms_bars("rms", rms)]
+    wide.append(figures.plane_paths("paths", list(names.values()), measured[:, :, :2], estimated[:, :, :2]))
+    directions = {"x": "forward", "y": "up", "z": "right"}
+    folded = [
+        figures.compared(
+            f"marker-{index}-{axis}",
+            f"{names[name]}, {directions[axis]}",
+            "mm",
+            estimate.time,
+            1000.0 * measured[:, index, k],
+            1000.0 * estimated[:, index, k],
+        )
+        for index, name in enumerate(estimate.marker_names)
+        for k, axis in enumerate(AXES)
+        if estimate.modelled_axes()[k]
+    ]
+    window = metrics["window"]
+    plane = " In the plane of the model." if is_planar(estimate) else ""
+    return Section(
+        "markers",
+        "Markers",
+        f"Root mean square distance between {window['start_s']:.4g} and {window['end_s']:.4g} s.{plane}",
+        wide=wide,
+        folded=folded,
+        folded_title="Every marker over time",
+        key=("measured", "estimated"),
+    )
+
+
+def wrench_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
+    """Each modelled component, measured and estimated."""
+    measured = estimate.data["wrench_measured"].values
+    estimated = estimate.data["wrench_estimated"].values
+    rms = metrics["wrench"]["rms"]
+    panels = []
+    for k, component in enumerate(COMPONENTS):
+        if not np.isfinite(estimated[:, k]).any():
+            continue
+        title, unit = COMPONENT_LABELS[component]
+        seen = measured[:, k] if np.isfinite(measured[:, k]).any() else None
+        note = f"{component}, RMS difference {number(rms[component], unit)}" if component in rms else component
+        panels.append(
+            figures.compared(f"wrench-{component}", title, unit, estimate.time, seen, estimated[:, k], note=note)
+        )
+    place = "the toe, where the model stands on the ground" if is_planar(estimate) else "the ground’s origin"
+    return Section(
+        "wrench",
+        "Ground reaction",
+        f"What the ground does to the person, in forces and the moment about {place}.",
+        panels,
+        key=("measured", "estimated"),
+    )
+
+
+def angle_section(estimate: Estimate) -> Section:
+    """Coordinates with their band of uncertainty."""
+    panels = []
+    for index, name in enumerate(estimate.coordinate_names):
+        rotation = estimate.is_rotation()[index]
+        factor, unit = (180.0 / np.pi, "deg") if rotation else (1000.0, "mm")
+        values = factor * estimate.data["coordinates"].values[:, index]
+        sd = factor * estimate.data["coordinates_sd"].values[:, index]
+        moved = f"from {number(float(np.nanmin(values)))} to {number(float(np.nanmax(values)), unit)}"
+        locked = not np.any(sd > 0.0)
+        note = f"locked at {number(float(values[0]), unit)}" if locked else moved
+        panels.append(
+            figures.compared(
+                f"angle-{name}", sentence(words(name)), unit, estimate.time, None, values, note=note, sd=sd
+            )
+        )
+    return Section(
+        "angles",
+        "Joint angles" if estimate.is_rotation().all() else "Joint coordinates",
+        "The band is two standard deviations wide on either side, as the filter itself believes.",
+        panels,
+        key=("estimated", "band"),
+    )
+
+
+def moment_section(estimate: Estimate) -> Section:
+    """Moments, each with what it stands for."""
+    panels = []
+    for index, name in enumerate(estimate.coordinate_names):
+        unit = "N m" if estimate.is_rotation()[index] else "N"
+        values = estimate.data["moments"].values[:, index]
+        panels.append(
+            figures.compared(
+                f"moment-{name}",
+                sentence(words(name)),
+                unit,
+                estimate.time,
+                None,
+                values,
+                note=moment_note(estimate, name),
+            )
+        )
+    text = "What the muscles and ligaments do about each joint, in the direction in which its coordinate grows."
+    if is_planar(estimate):
+        text += (
+            " The model has one leg and one arm for both sides, so theirs are the sums of both. At the toe there is no "
+            "joint: its “moment” is the ground’s about the toe."
+        )
+    return Section("moments", "Joint moments", text, panels, key=("estimated",))
+
+
+def length_section(estimate: Estimate) -> Section:
+    """Segment lengths over time between their bounds."""
+    panels = [
+        _parameter_panel(estimate, p, sentence(words(p.name.split("/")[-1])), 1000.0, "mm")
+        for p in estimate.parameters
+        if p.kind == "length" and p.estimated
+    ]
+    return Section(
+        "lengths",
+        "Segment lengths",
+        "How the filter settles on each length. A line on its bound says that the model does not fit there.",
+        panels,
+        key=("estimated", "band", "bound"),
+    )
+
+
+def mass_section(estimate: Estimate) -> Section:
+    """Segment masses over time between their bounds."""
+    panels = [
+        _parameter_panel(estimate, p, sentence(words(p.segment)), 1.0, "kg")
+        for p in estimate.parameters
+        if p.kind == "inertia" and p.name.endswith("/mass") and p.estimated
+    ]
+    sides = " Limbs count both sides." if is_planar(estimate) else ""
+    return Section(
+        "masses",
+        "Segment masses",
+        f"From the anthropometric table to what the plates and the movement suggest.{sides} Masses are hard to "
+        "tell apart from a squat alone: read them with their bands.",
+        panels,
+        key=("estimated", "band", "bound"),
+    )
+
+
+def _parameter_panel(estimate: Estimate, p: Parameter, title: str, factor: float, unit: str) -> Panel:
+    element = estimate.data["state"].sel(element=p.name).values
+    sd = estimate.data["state_sd"].sel(element=p.name).values
+    change = p.change_percent()
+    note = f"{number(factor * p.initial)} to {number(factor * p.value, unit)}"
+    if change is not None:
+        note += f" ({change:+.1f} %)".replace("-", "−")
+    if p.at_bound:
+        note += ", on its bound"
+    return figures.parameter_path(
+        p.name,
+        title,
+        unit,
+        estimate.time,
+        factor * element,
+        lower=None if p.lower is None else factor * p.lower,
+        upper=None if p.upper is None else factor * p.upper,
+        sd=factor * sd,
+        note=note,
+    )

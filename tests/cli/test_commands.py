@@ -1,0 +1,100 @@
+"""Each command once, as a user calls it."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import dynakin
+from dynakin.cli import main
+from dynakin.model import available_marker_sets, available_models
+from dynakin.results import OUTPUT_FILES
+
+Said = pytest.CaptureFixture[str]
+
+
+def test_version(capsys: Said) -> None:
+    assert main(["--version"]) == 0
+    assert capsys.readouterr().out == f"dynakin {dynakin.__version__}\n"
+
+
+def test_without_arguments_the_commands_are_listed(capsys: Said) -> None:
+    main([])
+    said = capsys.readouterr()
+    for command in ("run", "demo", "check", "model", "print-config"):
+        assert command in said.out + said.err
+
+
+def test_installed_command_gives_its_exit_code(tmp_path: Path) -> None:
+    code = "import sys; from dynakin.cli import main; sys.exit(main())"
+    done = subprocess.run(
+        [sys.executable, "-c", code, "check", str(tmp_path / "no.c3d")], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 2
+    assert done.stderr.startswith("error: ") and "no.c3d" in done.stderr
+
+
+def test_model_lists_and_describes(capsys: Said) -> None:
+    assert main(["model"]) == 0
+    listed = capsys.readouterr().out
+    assert all(name in listed for name in (*available_models(), *available_marker_sets()))
+    assert main(["model", "squat7"]) == 0
+    told = capsys.readouterr().out
+    for word in ("thorax", "ankle", "-50 to 50", "RKNE", "4 x 7"):
+        assert word in told
+
+
+def test_demo_compares_with_the_truth_and_says_where_the_report_lies(tmp_path: Path, capsys: Said) -> None:
+    out = tmp_path / "demo"
+    assert main(["demo", "-o", str(out), "--duration", "6"]) == 0
+    told = capsys.readouterr().out
+    assert "RMS error against the truth" in told and str(out / "report.html") in told.replace("\n", "")
+    assert {entry.name for entry in out.iterdir()} == set(OUTPUT_FILES)
+
+
+def test_check_tells_what_is_there_and_what_run_would_do(data_dir: Path, capsys: Said) -> None:
+    assert main(["check", str(data_dir / "plugin_gait" / "S1_FlywheelSquat.c3d"), "--model", "squat7"]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    for words in ("317 frames at 100 Hz", "2 force plates", "Vertical +Z", "RSHO 78.5 %", "23 of 30", "abdomen"):
+        assert words in told
+
+
+def test_check_says_what_run_would_refuse(data_dir: Path, capsys: Said) -> None:
+    assert main(["check", str(data_dir / "plugin_gait" / "GaitNormal_1.c3d")]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert told.count("Refuse it:") == 2
+    assert "RTOE moves" in told
+
+
+def test_run_on_real_data_and_again_from_its_own_configuration(data_dir: Path, tmp_path: Path, capsys: Said) -> None:
+    folder = data_dir / "opencap_subject4"
+    options = ["--model", "sagittal7", "--markers", "opencap", "--mass", "60.05", "--preset", "paper"]
+    forces = ["--forces", str(folder / "squats1_grf.mot")]
+    out, again = tmp_path / "out", tmp_path / "again"
+    assert main(["run", str(folder / "squats1.trc"), *forces, *options, "-o", str(out)]) == 0
+    told = capsys.readouterr().out
+    assert "17 markers" in told and "Verdict:" in told
+    metrics = json.loads((out / "metrics.json").read_text())
+    assert metrics["markers"]["mean_rms_mm"] <= 4.0
+    rms = metrics["wrench"]["rms"]
+    assert rms["fx"] <= 6.0 and rms["fy"] <= 10.0 and rms["mz"] <= 7.0
+
+    used = tomllib.loads((out / "config.toml").read_text())
+    assert used["mass_kg"] == 60.05 and used["noise"]["coordinate"] == 1000.0
+    assert used["versions"]["dynakin"] == dynakin.__version__
+    assert main(["run", str(out / "config.toml"), "-o", str(again)]) == 0
+    repeated = json.loads((again / "metrics.json").read_text())
+    for key in ("window", "markers", "wrench", "prediction", "consistency", "events"):
+        assert repeated[key] == metrics[key]
+
+
+def test_run_replaces_its_own_output(data_dir: Path, tmp_path: Path) -> None:
+    trial = str(data_dir / "plugin_gait" / "S1_FlywheelSquat.c3d")
+    for _ in range(2):
+        assert main(["run", trial, "--model", "squat7", "--mass", "78.6", "-o", str(tmp_path / "out")]) == 0
+    assert {entry.name for entry in (tmp_path / "out").iterdir()} == set(OUTPUT_FILES)

@@ -1,0 +1,111 @@
+"""The configuration: one definition for file and command line."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from dynakin.cli import main
+from dynakin.cli.run import configure
+from dynakin.config import RunConfig, make_config, read_config
+from dynakin.config_template import attribute_docs, config_template
+from dynakin.errors import ConfigError
+from dynakin.filter import Noise
+from dynakin.model import Bounds, Priors
+
+REQUIRED = {"trial": "squat.c3d", "model": "squat7", "output": "out"}
+
+
+def _config(**keys: Any) -> RunConfig:
+    return make_config(REQUIRED | keys, "run.toml")
+
+
+def test_printed_configuration_is_valid_as_it_stands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["print-config"]) == 0
+    path = tmp_path / "run.toml"
+    path.write_text(capsys.readouterr().out)
+    config = make_config(read_config(path), str(path))
+    assert config.trial == tmp_path / "squat.c3d"
+    assert config.noise_settings() == Noise()
+
+
+def test_every_key_is_printed_with_its_default_and_a_comment() -> None:
+    text = config_template()
+    everything = re.sub(r"^#(?=\w)", "", text, flags=re.MULTILINE)
+    content = tomllib.loads(everything)
+    assert set(content) == set(RunConfig.model_fields) - {"ground", "versions"}
+    config = make_config(content, "template")
+    assert config.noise == Noise().model_dump(mode="json")
+    assert config.priors == Priors() and config.bounds == Bounds()
+    for key in ("markers", "table", "side", "vertical", "forward", "preset"):
+        assert content[key] == RunConfig.model_fields[key].default
+    for schema in (RunConfig, Noise, Priors, Bounds):
+        assert set(attribute_docs(schema)) == set(schema.model_fields)
+
+
+@pytest.mark.parametrize(
+    ("keys", "words"),
+    [
+        ({"masskg": 70.0}, ["'masskg'", "did you mean 'mass_kg'"]),
+        ({"noise": {"foce": 1.0}}, ["noise", "'foce'", "did you mean 'force'"]),
+        ({"priors": {"marker": 0.01}}, ["priors", "'marker'", "did you mean 'marker_m'"]),
+        ({"bounds": {"mass_fraction": -1.0}}, ["bounds", "mass_fraction"]),
+        ({"noise": {"force": -1.0}}, ["noise", "force"]),
+        ({"preset": "papers"}, ["papers", "paper"]),
+        ({"side": "middle"}, ["side", "middle"]),
+        ({"sex": "other"}, ["sex", "other"]),
+        ({"mass_kg": 0}, ["mass_kg"]),
+        ({"mass_kg": "heavy"}, ["mass_kg", "heavy"]),
+        ({"height_m": 175.0}, ["height_m", "175"]),
+    ],
+)
+def test_wrong_keys_and_values_are_named_with_the_file(keys: dict[str, Any], words: list[str]) -> None:
+    with pytest.raises(ConfigError) as error:
+        _config(**keys)
+    for word in ["run.toml", *words]:
+        assert word in error.value.message
+    assert "\n" not in error.value.message
+
+
+def test_noise_changes_single_values_of_the_preset() -> None:
+    noise = _config(noise={"force": 25.0, "marker": {"RKNE": 1e-4}}).noise_settings()
+    assert noise.force == 25.0 and noise.marker == {"RKNE": 1e-4}
+    assert noise.moment == Noise().moment
+
+
+def test_command_line_wins_over_the_file(tmp_path: Path) -> None:
+    path = tmp_path / "run.toml"
+    path.write_text('trial = "a.trc"\nforces = "/far/b.mot"\nmodel = "squat7"\noutput = "out"\nmass_kg = 70.0\n')
+    config = configure(path, {"mass_kg": 80.0, "model": None, "output": Path("elsewhere")})
+    assert config.mass_kg == 80.0
+    assert config.model == "squat7"
+    assert config.trial == tmp_path / "a.trc"
+    assert config.forces == Path("/far/b.mot")
+    assert config.output == Path("elsewhere")
+
+
+def test_a_model_file_beside_the_configuration_is_found(tmp_path: Path) -> None:
+    (tmp_path / "mine.toml").write_text("")
+    path = tmp_path / "run.toml"
+    path.write_text('model = "mine.toml"\nmarkers = "opencap"\n')
+    assert read_config(path) == {"model": str(tmp_path / "mine.toml"), "markers": "opencap"}
+
+
+def test_what_is_not_toml_is_refused_with_its_line(tmp_path: Path) -> None:
+    path = tmp_path / "run.toml"
+    path.write_text('trial = "a.trc"\nmodel = \n')
+    with pytest.raises(ConfigError, match=r"run\.toml.*line 2"):
+        read_config(path)
+    with pytest.raises(ConfigError, match="cannot be read"):
+        read_config(tmp_path / "none.toml")
+
+
+def test_configuration_as_used_can_be_read_again() -> None:
+    used = _config(mass_kg=70.0, forward=[0.0, 1.0, 0.0], noise={"force": 4.0}).as_used()
+    assert Path(used["trial"]).is_absolute()
+    again = make_config({key: value for key, value in used.items() if value is not None}, "config.toml")
+    assert again.as_used() == used

@@ -1,0 +1,163 @@
+"""The report: self-contained, complete, in words that match the numbers."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+from synthetic_estimate import make_estimate
+
+from dynakin.report import render_report
+from dynakin.report.insights import insights
+from dynakin.report.labels import listed, moment_note, number, short_marker_names
+from dynakin.report.plot import thin
+from dynakin.results import Estimate, compute_metrics
+
+
+@pytest.fixture(scope="module")
+def html(estimate: Estimate) -> str:
+    return render_report(estimate)
+
+
+class Structure(HTMLParser):
+    """Checks that tags close in order and keeps ids and addresses."""
+
+    VOID = frozenset({"meta", "link", "br", "img", "hr", "input"})
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.ids: list[str] = []
+        self.addresses: list[str] = []
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        if tag not in self.VOID:
+            self.open.append(tag)
+        self._keep(attrs)
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self._keep(attrs)
+
+    def _keep(self, attrs: list[tuple[str, str | None]]) -> None:
+        for key, value in attrs:
+            if key == "id":
+                self.ids.append(str(value))
+            if key in ("src", "href", "xlink:href"):
+                self.addresses.append(str(value))
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open and self.open[-1] == tag, f"</{tag}> closes {self.open[-3:]}"
+        self.open.pop()
+
+
+def test_page_is_well_formed_and_needs_no_other_file(html: str) -> None:
+    structure = Structure()
+    structure.feed(html)
+    assert structure.open == []
+    assert all(address.startswith("#") for address in structure.addresses)
+    assert "@import" not in html and "url(http" not in html and "<script" not in html
+
+
+def test_ids_are_unique_and_every_reference_is_there(html: str) -> None:
+    structure = Structure()
+    structure.feed(html)
+    twice = [name for name, count in Counter(structure.ids).items() if count > 1]
+    assert twice == []
+    used = {a[1:] for a in structure.addresses} | set(re.findall(r"url\(#([^)]+)\)", html))
+    assert used <= set(structure.ids)
+
+
+def test_a_figure_for_each_thing_with_a_unit_at_its_axis(html: str, estimate: Estimate) -> None:
+    assert html.count("<svg") == 2 + 2 * 10 + 3 + 8 + 8 + 6 + 7  # markers (2 and 20 folded), wrench, angles, moments...
+    for unit in ("time, s", "deg", "N m", "mm", "kg"):
+        assert f">{unit}</text>" in html
+    for name in estimate.coordinate_names:
+        assert f"<b>{name.capitalize()}</b>" in html
+
+
+def test_planar_moments_say_what_they_stand_for(html: str, estimate: Estimate) -> None:
+    assert "the ground’s moment about the toe" in html
+    assert html.count("sum of both legs") == 3
+    assert html.count("sum of both arms") == 2
+    spatial = estimate.data.assign_coords(marker_axes_modelled=("axis", [True, True, True]))
+    assert moment_note(replace(estimate, data=spatial), "knee") == ""
+
+
+def test_summary_names_bounds_gaps_and_locked_coordinates(estimate: Estimate) -> None:
+    found = {insight.title: insight for insight in insights(estimate, compute_metrics(estimate))}
+    assert found["Bounds"].level == "warning"
+    assert "2 of 47" in found["Bounds"].text
+    assert "thigh length and pelvis mass" in found["Bounds"].text
+    assert "RASI (3.3 % of the frames) and RELB (2.1 % of the frames)" in found["Gaps"].text
+    assert found["Locked"].text.startswith("Slide is held still")
+    assert found["Uncertainty"].level == "good"
+    assert "worst is RTHI" in found["Markers"].text
+
+
+def test_a_clean_run_is_said_to_be_clean() -> None:
+    made = make_estimate(4.0, gaps=False)
+    clean = replace(made, parameters=[replace(p, at_bound=False) for p in made.parameters], events=[])
+    found = {insight.title: insight for insight in insights(clean, compute_metrics(clean))}
+    assert found["Bounds"].level == found["Gaps"].level == "good"
+
+
+def test_names_from_files_cannot_break_the_page(estimate: Estimate) -> None:
+    recording = replace(estimate.recording, name="<script>alert(1)</script>")
+    html = render_report(replace(estimate, recording=recording, messages=["<b>bold</b> & more"]))
+    assert "<script>" not in html and "&lt;script&gt;" in html
+    assert "&lt;b&gt;bold&lt;/b&gt; &amp; more" in html
+
+
+def test_report_without_plates_leaves_the_section_out() -> None:
+    made = make_estimate(3.0)
+    empty = {name: (("time", "component"), np.full((301, 6), np.nan)) for name in made.data if "wrench" in str(name)}
+    html = render_report(replace(made, data=made.data.assign(empty)))
+    assert 'id="wrench"' not in html
+    assert "No wrench was compared" in html
+
+
+def test_same_estimate_same_page() -> None:
+    made = make_estimate(2.0)
+    assert render_report(made) == render_report(made)
+
+
+def test_thinned_line_keeps_peaks_and_gaps() -> None:
+    time = np.arange(20000) / 100.0
+    values = np.sin(time)
+    values[12345], values[5000:5200] = 50.0, np.nan
+    t, thinned = thin(time, values)
+    assert len(t) < 1500
+    assert np.nanmax(thinned) == 50.0 and time[12345] in t
+    assert np.isnan(thinned).any()
+    assert (np.diff(t) > 0).all()
+
+
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [
+        (2.3471, "2.35"),
+        (-0.01234, "−0.0123"),
+        (0.0, "0"),
+        (1234.5, "1234"),
+        (1e-7, "1.00e−07"),
+        (None, "–"),
+        (9.996, "10.0"),
+    ],
+)
+def test_numbers_carry_three_digits(value: float | None, text: str) -> None:
+    assert number(value) == text
+
+
+def test_lists_read_as_sentences() -> None:
+    assert listed(["a"]) == "a"
+    assert listed(["a", "b", "c"]) == "a, b and c"
+    assert listed(list("abcdefgh"), 3) == "a, b, c and 5 more"
+
+
+def test_a_common_prefix_of_marker_names_is_dropped() -> None:
+    assert short_marker_names(["S1:A", "S1:B"]) == {"S1:A": "A", "S1:B": "B"}
+    assert short_marker_names(["S1:A", "S2:A"]) == {"S1:A": "S1:A", "S2:A": "S2:A"}
