@@ -8,222 +8,268 @@ from typing import Annotated
 import numpy
 from numpy.typing import NDArray
 
+
 class AxisSpec:
     """
     One degree of freedom, s = scale * sum_k coefficients[k] q**k (rad or m).
     """
 
-    def __init__(
-        self,
-        coordinate: str,
-        kind: str = "rotation",
-        direction: Annotated[NDArray[numpy.float64], dict(shape=(3), order="C")] = ...,
-        coefficients: Sequence[float] = [0.0, 1.0],
-        scale: str = "",
-    ) -> None: ...
+    def __init__(self, coordinate: str, kind: str = 'rotation', direction: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C')] = ..., coefficients: Sequence[float] = [0.0, 1.0], scale: str = '') -> None: ...
+
     @property
     def coordinate(self) -> str: ...
+
     @coordinate.setter
     def coordinate(self, arg: str, /) -> None: ...
+
     @property
     def kind(self) -> str: ...
+
     @kind.setter
     def kind(self, arg: str, /) -> None: ...
+
     @property
-    def direction(self) -> Annotated[NDArray[numpy.float64], dict(shape=(3), order="C")]: ...
+    def direction(self) -> Annotated[NDArray[numpy.float64], dict(shape=(3), order='C')]: ...
+
     @direction.setter
-    def direction(self, arg: Annotated[NDArray[numpy.float64], dict(shape=(3), order="C")], /) -> None: ...
+    def direction(self, arg: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C')], /) -> None: ...
+
     @property
     def coefficients(self) -> list[float]: ...
+
     @coefficients.setter
     def coefficients(self, arg: Sequence[float], /) -> None: ...
+
     @property
     def scale(self) -> str: ...
+
     @scale.setter
     def scale(self, arg: str, /) -> None: ...
+
     def __getstate__(self) -> tuple: ...
+
     def __setstate__(self, arg: tuple, /) -> None: ...
 
 class LengthTerm:
     """Adds direction * parameter to a joint's placement in its parent."""
 
-    def __init__(
-        self, parameter: str, direction: Annotated[NDArray[numpy.float64], dict(shape=(3), order="C")]
-    ) -> None: ...
+    def __init__(self, parameter: str, direction: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C')]) -> None: ...
+
     @property
     def parameter(self) -> str: ...
+
     @parameter.setter
     def parameter(self, arg: str, /) -> None: ...
+
     @property
-    def direction(self) -> Annotated[NDArray[numpy.float64], dict(shape=(3), order="C")]: ...
+    def direction(self) -> Annotated[NDArray[numpy.float64], dict(shape=(3), order='C')]: ...
+
     @direction.setter
-    def direction(self, arg: Annotated[NDArray[numpy.float64], dict(shape=(3), order="C")], /) -> None: ...
+    def direction(self, arg: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C')], /) -> None: ...
+
     def __getstate__(self) -> tuple: ...
+
     def __setstate__(self, arg: tuple, /) -> None: ...
 
 class SegmentSpec:
     """A rigid segment and the joint by which it hangs from its parent."""
 
-    def __init__(
-        self,
-        name: str,
-        parent: str = "ground",
-        rotation: Annotated[NDArray[numpy.float64], dict(shape=(3, 3), order="F")] = ...,
-        translation: Annotated[NDArray[numpy.float64], dict(shape=(3), order="C")] = ...,
-        lengths: Sequence[LengthTerm] = [],
-        axes: Sequence[AxisSpec] = [],
-        inertia: Annotated[NDArray[numpy.float64], dict(shape=(10), order="C")] = ...,
-        inertia_estimated: Sequence[bool] = ...,
-    ) -> None: ...
+    def __init__(self, name: str, parent: str = 'ground', rotation: Annotated[NDArray[numpy.float64], dict(shape=(3, 3), order='F')] = ..., translation: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C')] = ..., lengths: Sequence[LengthTerm] = [], axes: Sequence[AxisSpec] = [], inertia: Annotated[NDArray[numpy.float64], dict(shape=(10), order='C')] = ..., inertia_estimated: Sequence[bool] = ...) -> None: ...
+
     @property
     def name(self) -> str: ...
+
     @name.setter
     def name(self, arg: str, /) -> None: ...
+
     @property
     def parent(self) -> str: ...
+
     @parent.setter
     def parent(self, arg: str, /) -> None: ...
+
     @property
-    def rotation(self) -> Annotated[NDArray[numpy.float64], dict(shape=(3, 3), order="F")]: ...
+    def rotation(self) -> Annotated[NDArray[numpy.float64], dict(shape=(3, 3), order='F')]: ...
+
     @rotation.setter
-    def rotation(self, arg: Annotated[NDArray[numpy.float64], dict(shape=(3, 3), order="F")], /) -> None: ...
+    def rotation(self, arg: Annotated[NDArray[numpy.float64], dict(shape=(3, 3), order='F')], /) -> None: ...
+
     @property
-    def translation(self) -> Annotated[NDArray[numpy.float64], dict(shape=(3), order="C")]: ...
+    def translation(self) -> Annotated[NDArray[numpy.float64], dict(shape=(3), order='C')]: ...
+
     @translation.setter
-    def translation(self, arg: Annotated[NDArray[numpy.float64], dict(shape=(3), order="C")], /) -> None: ...
+    def translation(self, arg: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C')], /) -> None: ...
+
     @property
     def lengths(self) -> list[LengthTerm]: ...
+
     @lengths.setter
     def lengths(self, arg: Sequence[LengthTerm], /) -> None: ...
+
     @property
     def axes(self) -> list[AxisSpec]: ...
+
     @axes.setter
     def axes(self, arg: Sequence[AxisSpec], /) -> None: ...
+
     @property
-    def inertia(self) -> Annotated[NDArray[numpy.float64], dict(shape=(10), order="C")]: ...
+    def inertia(self) -> Annotated[NDArray[numpy.float64], dict(shape=(10), order='C')]: ...
+
     @inertia.setter
-    def inertia(self, arg: Annotated[NDArray[numpy.float64], dict(shape=(10), order="C")], /) -> None: ...
+    def inertia(self, arg: Annotated[NDArray[numpy.float64], dict(shape=(10), order='C')], /) -> None: ...
+
     @property
     def inertia_estimated(self) -> list[bool]: ...
+
     @inertia_estimated.setter
     def inertia_estimated(self, arg: Sequence[bool], /) -> None: ...
+
     def __getstate__(self) -> tuple: ...
+
     def __setstate__(self, arg: tuple, /) -> None: ...
 
 class CoordinateSpec:
     """A generalised coordinate (rad or m)."""
 
     def __init__(self, name: str, value: float = 0.0, locked: bool = False) -> None: ...
+
     @property
     def name(self) -> str: ...
+
     @name.setter
     def name(self, arg: str, /) -> None: ...
+
     @property
     def value(self) -> float: ...
+
     @value.setter
     def value(self, arg: float, /) -> None: ...
+
     @property
     def locked(self) -> bool: ...
+
     @locked.setter
     def locked(self, arg: bool, /) -> None: ...
+
     def __getstate__(self) -> tuple: ...
+
     def __setstate__(self, arg: tuple, /) -> None: ...
 
 class ParameterSpec:
     """A geometry parameter, such as a segment's length (m)."""
 
     def __init__(self, name: str, value: float, estimated: bool = True) -> None: ...
+
     @property
     def name(self) -> str: ...
+
     @name.setter
     def name(self, arg: str, /) -> None: ...
+
     @property
     def value(self) -> float: ...
+
     @value.setter
     def value(self, arg: float, /) -> None: ...
+
     @property
     def estimated(self) -> bool: ...
+
     @estimated.setter
     def estimated(self, arg: bool, /) -> None: ...
+
     def __getstate__(self) -> tuple: ...
+
     def __setstate__(self, arg: tuple, /) -> None: ...
 
 class MarkerSpec:
     """A marker site on a segment (m, segment frame)."""
 
-    def __init__(
-        self,
-        name: str,
-        segment: str,
-        position: Annotated[NDArray[numpy.float64], dict(shape=(3), order="C")],
-        measured: Sequence[bool] = [True, True, True],
-        estimated: Sequence[bool] = [True, True, True],
-    ) -> None: ...
+    def __init__(self, name: str, segment: str, position: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C')], measured: Sequence[bool] = [True, True, True], estimated: Sequence[bool] = [True, True, True]) -> None: ...
+
     @property
     def name(self) -> str: ...
+
     @name.setter
     def name(self, arg: str, /) -> None: ...
+
     @property
     def segment(self) -> str: ...
+
     @segment.setter
     def segment(self, arg: str, /) -> None: ...
+
     @property
-    def position(self) -> Annotated[NDArray[numpy.float64], dict(shape=(3), order="C")]: ...
+    def position(self) -> Annotated[NDArray[numpy.float64], dict(shape=(3), order='C')]: ...
+
     @position.setter
-    def position(self, arg: Annotated[NDArray[numpy.float64], dict(shape=(3), order="C")], /) -> None: ...
+    def position(self, arg: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C')], /) -> None: ...
+
     @property
     def measured(self) -> list[bool]: ...
+
     @measured.setter
     def measured(self, arg: Sequence[bool], /) -> None: ...
+
     @property
     def estimated(self) -> list[bool]: ...
+
     @estimated.setter
     def estimated(self, arg: Sequence[bool], /) -> None: ...
+
     def __getstate__(self) -> tuple: ...
+
     def __setstate__(self, arg: tuple, /) -> None: ...
 
 class ModelSpec:
     """A model as plain data; Model checks and compiles it."""
 
-    def __init__(
-        self,
-        name: str,
-        coordinates: Sequence[CoordinateSpec],
-        parameters: Sequence[ParameterSpec],
-        segments: Sequence[SegmentSpec],
-        markers: Sequence[MarkerSpec],
-        gravity: Annotated[NDArray[numpy.float64], dict(shape=(3), order="C")] = ...,
-        wrench_measured: Sequence[bool] = [True, True, True, True, True, True],
-    ) -> None: ...
+    def __init__(self, name: str, coordinates: Sequence[CoordinateSpec], parameters: Sequence[ParameterSpec], segments: Sequence[SegmentSpec], markers: Sequence[MarkerSpec], gravity: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C')] = ..., wrench_measured: Sequence[bool] = [True, True, True, True, True, True]) -> None: ...
+
     @property
     def name(self) -> str: ...
+
     @name.setter
     def name(self, arg: str, /) -> None: ...
+
     @property
     def coordinates(self) -> list[CoordinateSpec]: ...
+
     @coordinates.setter
     def coordinates(self, arg: Sequence[CoordinateSpec], /) -> None: ...
+
     @property
     def parameters(self) -> list[ParameterSpec]: ...
+
     @parameters.setter
     def parameters(self, arg: Sequence[ParameterSpec], /) -> None: ...
+
     @property
     def segments(self) -> list[SegmentSpec]: ...
+
     @segments.setter
     def segments(self, arg: Sequence[SegmentSpec], /) -> None: ...
+
     @property
     def markers(self) -> list[MarkerSpec]: ...
+
     @markers.setter
     def markers(self, arg: Sequence[MarkerSpec], /) -> None: ...
+
     @property
-    def gravity(self) -> Annotated[NDArray[numpy.float64], dict(shape=(3), order="C")]: ...
+    def gravity(self) -> Annotated[NDArray[numpy.float64], dict(shape=(3), order='C')]: ...
+
     @gravity.setter
-    def gravity(self, arg: Annotated[NDArray[numpy.float64], dict(shape=(3), order="C")], /) -> None: ...
+    def gravity(self, arg: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C')], /) -> None: ...
+
     @property
     def wrench_measured(self) -> list[bool]: ...
+
     @wrench_measured.setter
     def wrench_measured(self, arg: Sequence[bool], /) -> None: ...
+
     def __getstate__(self) -> tuple: ...
+
     def __setstate__(self, arg: tuple, /) -> None: ...
 
 class StateLayout:
@@ -231,6 +277,7 @@ class StateLayout:
 
     @property
     def size(self) -> int: ...
+
     @property
     def names(self) -> list[str]:
         """One name an element."""
@@ -245,104 +292,87 @@ class Model:
     """
 
     def __init__(self, spec: ModelSpec) -> None: ...
+
     @property
     def spec(self) -> ModelSpec:
         """A copy of the specification."""
 
     @property
     def layout(self) -> StateLayout: ...
+
     @property
     def coordinate_names(self) -> list[str]: ...
+
     @property
     def segment_names(self) -> list[str]: ...
+
     @property
     def marker_names(self) -> list[str]: ...
-    def initial_state(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order="C")]:
+
+    def initial_state(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]:
         """The specification's values (n,); speeds and accelerations 0."""
 
     def __getstate__(self) -> tuple: ...
+
     def __setstate__(self, arg: tuple, /) -> None: ...
 
-def marker_positions(
-    model: Model, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]
-) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order="C")]:
+def marker_positions(model: Model, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]:
     """Marker positions p_GM (M, 3), m, ground frame."""
 
-def segment_poses(
-    model: Model, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]
-) -> tuple:
+def segment_poses(model: Model, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]) -> tuple:
     """Orientations R_GB (S, 3, 3) and origins p_GB (S, 3) of all segments."""
 
-def coordinates(
-    model: Model, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]
-) -> tuple:
+def coordinates(model: Model, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]) -> tuple:
     """q, qd, qdd of all coordinates, locked ones too: three arrays (C,)."""
 
-def wrench(
-    model: Model, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]
-) -> Annotated[NDArray[numpy.float64], dict(shape=(6), order="C")]:
+def wrench(model: Model, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(6), order='C')]:
     """
     Total external wrench (6,), N and N m, ground on person, about the ground origin.
     """
 
-def total_mass(
-    model: Model, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]
-) -> float:
+def total_mass(model: Model, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]) -> float:
     """kg"""
 
-def joint_moments(
-    model: Model,
-    x: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)],
-    external: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order="C")] | None = None,
-) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order="C")]:
+def joint_moments(model: Model, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)], external: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')] | None = None) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]:
     """
     Joint moments (1), (C,), N m or N, less the external wrenches (S, 6) that act on the segments, if given.
     """
 
-def marker_jacobian(
-    model: Model, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]
-) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order="C")]:
+def marker_jacobian(model: Model, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]:
     """d p_GM / dx (3 M, n), dense: for tests and study."""
 
-def wrench_jacobian(
-    model: Model, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]
-) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order="C")]:
+def wrench_jacobian(model: Model, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]:
     """d wrench / dx (6, n), dense: for tests and study."""
 
 class FilterSettings:
     """Noise, bounds and constraints of a Filter, SI units."""
 
-    def __init__(
-        self,
-        process_variance: Annotated[NDArray[numpy.float64], dict(shape=(None,), order="C")],
-        marker_variance: Annotated[NDArray[numpy.float64], dict(shape=(None,), order="C")],
-        wrench_covariance: Annotated[NDArray[numpy.float64], dict(shape=(6, 6), order="F")],
-        reference_point: Annotated[NDArray[numpy.float64], dict(shape=(3), order="C")],
-        total_mass: float | None,
-        total_mass_variance: float,
-        lower: Annotated[NDArray[numpy.float64], dict(shape=(None,), order="C")],
-        upper: Annotated[NDArray[numpy.float64], dict(shape=(None,), order="C")],
-        constraint: str = "gain",
-        chunk_rows: int = 28,
-    ) -> None: ...
+    def __init__(self, process_variance: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], marker_variance: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], wrench_covariance: Annotated[NDArray[numpy.float64], dict(shape=(6, 6), order='F')], reference_point: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C')], total_mass: float | None, total_mass_variance: float, lower: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], upper: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], constraint: str = 'gain', chunk_rows: int = 28) -> None: ...
+
     @property
-    def process_variance(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order="C")]: ...
+    def process_variance(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]: ...
+
     @property
-    def marker_variance(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order="C")]: ...
+    def marker_variance(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]: ...
+
     @property
-    def wrench_covariance(self) -> Annotated[NDArray[numpy.float64], dict(shape=(6, 6), order="F")]: ...
+    def wrench_covariance(self) -> Annotated[NDArray[numpy.float64], dict(shape=(6, 6), order='F')]: ...
+
     @property
-    def lower(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order="C")]: ...
+    def lower(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]: ...
+
     @property
-    def upper(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order="C")]: ...
+    def upper(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]: ...
 
 class StepReport:
     """What one step did."""
 
     @property
     def status(self) -> str: ...
+
     @property
     def diverged(self) -> bool: ...
+
     @property
     def n_rows(self) -> int:
         """measured rows that were used"""
@@ -361,61 +391,30 @@ class StepReport:
 class Filter:
     """The constrained extended Kalman filter; one thread at a time."""
 
-    def __init__(
-        self,
-        model: Model,
-        settings: FilterSettings,
-        x0: Annotated[NDArray[numpy.float64], dict(shape=(None,), order="C")],
-        P0: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order="F")],
-    ) -> None: ...
+    def __init__(self, model: Model, settings: FilterSettings, x0: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], P0: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='F')]) -> None: ...
+
     @property
-    def state(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order="C")]:
+    def state(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]:
         """x (n,)"""
 
     @property
-    def covariance(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order="F")]:
+    def covariance(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='F')]:
         """P (n, n)"""
 
-    def reset(
-        self,
-        x: Annotated[NDArray[numpy.float64], dict(shape=(None,), order="C")],
-        P: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order="F")],
-    ) -> None: ...
+    def reset(self, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], P: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='F')]) -> None: ...
+
     def predict(self, dt: float) -> None:
         """Moves the state by dt seconds."""
 
-    def update(
-        self,
-        markers: Annotated[
-            NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu", writable=False)
-        ],
-        wrench: Annotated[NDArray[numpy.float64], dict(shape=(6), order="C")],
-    ) -> StepReport:
+    def update(self, markers: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], wrench: Annotated[NDArray[numpy.float64], dict(shape=(6), order='C')]) -> StepReport:
         """
         Corrects with markers (M, 3), m, and wrench (6,), N and N m about the ground origin; NaN: missing.
         """
 
-    def step(
-        self,
-        dt: float,
-        markers: Annotated[
-            NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu", writable=False)
-        ],
-        wrench: Annotated[NDArray[numpy.float64], dict(shape=(6), order="C")],
-    ) -> StepReport:
+    def step(self, dt: float, markers: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], wrench: Annotated[NDArray[numpy.float64], dict(shape=(6), order='C')]) -> StepReport:
         """predict(dt), then update(markers, wrench)."""
 
-    def run(
-        self,
-        time: Annotated[NDArray[numpy.float64], dict(shape=(None,), order="C", device="cpu", writable=False)],
-        markers: Annotated[
-            NDArray[numpy.float64], dict(shape=(None, None, None), order="C", device="cpu", writable=False)
-        ],
-        wrench: Annotated[
-            NDArray[numpy.float64], dict(shape=(None, None), order="C", device="cpu", writable=False)
-        ],
-        progress: object | None = None,
-    ) -> dict:
+    def run(self, time: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], markers: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], wrench: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], progress: object | None = None) -> dict:
         """
         Runs over time (T,), markers (T, M, 3) and wrench (T, 6); the first frame is an update only. Returns arrays by name. Raises DivergenceError naming the frame. progress(done, total) is called now and then.
         """
