@@ -84,9 +84,7 @@ def _unit(parameters: Parameters, path: Path) -> tuple[float, Literal["mm", "m"]
     return factor, ("mm" if factor == 1e-3 else "m")
 
 
-def _markers(
-    parameters: Parameters, n_points: int, path: Path
-) -> tuple[list[int], tuple[str, ...], list[str]]:
+def _markers(parameters: Parameters, n_points: int, path: Path) -> tuple[list[int], tuple[str, ...], list[str]]:
     """Indices and names of the points that are markers, and notes on those that are not."""
     labels = parameters.texts("POINT", "LABELS")[:n_points]
     labels += [""] * (n_points - len(labels))

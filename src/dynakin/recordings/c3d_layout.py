@@ -30,9 +30,7 @@ def check_c3d_file(path: Path) -> None:
         file.seek((head[0] - 1) * _BLOCK)
         parameters = file.read(4)
     if len(head) < _BLOCK or len(parameters) < 4:
-        raise RecordingError(
-            f"{path}: truncated C3D file, found {size} bytes, the header alone needs {_BLOCK + 4}"
-        )
+        raise RecordingError(f"{path}: truncated C3D file, found {size} bytes, the header alone needs {_BLOCK + 4}")
     order = ">" if parameters[3] == _BIG_ENDIAN_PROCESSOR else "<"
     words = struct.unpack(f"{order}12H", head[:24])
     n_points, n_analog, first, last, data_block = words[1], words[2], words[3], words[4], words[8]

@@ -65,8 +65,7 @@ def read_plates(
     per_frame, odd = divmod(analog.shape[1], len(time))
     if per_frame == 0 or odd:
         raise RecordingError(
-            f"{path}: found {analog.shape[1]} analog samples for {len(time)} frames, "
-            "expected a whole number a frame"
+            f"{path}: found {analog.shape[1]} analog samples for {len(time)} frames, expected a whole number a frame"
         )
     raws, notes = [], []
     for k in range(count):
@@ -115,9 +114,7 @@ def _raw(
     channels = [int(number) - 1 for number in per_plate[:wanted, k]] if k < per_plate.shape[1] else []
     if len(channels) < wanted or min(channels) < 0 or max(channels) >= len(analog):
         numbers = [channel + 1 for channel in channels]
-        raise RecordingError(
-            f"{path}: {name} lists channels {numbers}, expected {wanted} of 1 to {len(analog)}"
-        )
+        raise RecordingError(f"{path}: {name} lists channels {numbers}, expected {wanted} of 1 to {len(analog)}")
     metre = 1e-3 if length_unit == "mm" else 1.0
     force, moment = plate_wrench(
         kind,
@@ -148,9 +145,7 @@ def _slice(values: Array, k: int, size: int, key: str, name: str, path: Path) ->
     """The ``size`` numbers of plate k in file order (first index fastest)."""
     flat = values.ravel(order="F")
     if len(flat) < size * (k + 1):
-        raise RecordingError(
-            f"{path}: FORCE_PLATFORM:{key} has {len(flat)} numbers, {name} needs {size * (k + 1)}"
-        )
+        raise RecordingError(f"{path}: FORCE_PLATFORM:{key} has {len(flat)} numbers, {name} needs {size * (k + 1)}")
     return flat[size * k : size * (k + 1)]
 
 

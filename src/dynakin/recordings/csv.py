@@ -40,9 +40,7 @@ def read_csv_table(path: Path) -> Table:
         if not names:
             names = [cell.strip('"') for cell in cells]
             if names[0].casefold() != "time":
-                raise RecordingError(
-                    f"{path}, line {number}: found column {names[0]!r} first, expected 'time'"
-                )
+                raise RecordingError(f"{path}, line {number}: found column {names[0]!r} first, expected 'time'")
             check_unique(names, "column", path)
         else:
             rows.append(parse_row(cells, names, path, number))
@@ -68,14 +66,8 @@ def read_csv(path: Path, options: ReadOptions | None = None) -> Recording:
     expected = {f"{name}_{axis}" for name in names for axis in "xyz"}
     for name in sorted(expected ^ set(rest)):
         found = "found" if name in rest else "missing"
-        raise RecordingError(
-            f"{path}: {found} column {name!r}, expected NAME_x, NAME_y and NAME_z for each marker"
-        )
-    raw = (
-        np.stack([table.column(f"{name}_{axis}") for name in names for axis in "xyz"], axis=1)
-        if names
-        else None
-    )
+        raise RecordingError(f"{path}: {found} column {name!r}, expected NAME_x, NAME_y and NAME_z for each marker")
+    raw = np.stack([table.column(f"{name}_{axis}") for name in names for axis in "xyz"], axis=1) if names else None
     shape = (len(table.time), len(names), 3)
     markers, notes = clean_markers(names, np.empty(shape) if raw is None else raw.reshape(shape))
     recording = Recording(
