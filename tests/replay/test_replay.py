@@ -15,11 +15,11 @@ import dynakin
 from dynakin.simulation import simulate_squat
 
 HERE = Path(__file__).parent
-# Frames and how far they may move, in standard deviations. The paper's gains hardly see the speeds, so rounding grows:
-# the last bit of the markers comes to 2e-7 at frame 200 of the simulated trial and 1e-2 at frame 600, to 4e-5 at the
-# end of squats1.
-SQUATS1 = {0: 1e-5, 50: 1e-5, 100: 1e-5, 200: 1e-5, 300: 1e-5, 600: 1e-4, -1: 1e-2}
-SIMULATED = {0: 1e-5, 50: 1e-5, 100: 1e-5, 200: 1e-4}
+# Frames and how far they may move, in standard deviations. The paper's gains hardly see the speeds, so rounding grows with
+# time: the last bit of the input came to 2e-4 at frame 200 of the simulated trial (a run in another process), and to a
+# standard deviation at its end. Late frames can't be compared; the early ones show any change of the equations.
+SQUATS1 = {0: 1e-6, 50: 1e-6, 100: 1e-5, 200: 1e-4, 300: 1e-3}
+SIMULATED = {0: 1e-6, 50: 1e-6, 100: 1e-4, 150: 1e-3}
 
 
 def squats1(data_dir: Path) -> dynakin.Estimate:
@@ -81,7 +81,7 @@ def test_a_change_is_seen(tmp_path: Path) -> None:
     compare(estimate, SIMULATED, tmp_path / "replay.json", update=True)
     compare(estimate, SIMULATED, tmp_path / "replay.json", update=False)
     changed = json.loads((tmp_path / "replay.json").read_text())
-    changed["frames"]["100"]["state"][0] *= 1.0 + 1e-3
+    changed["frames"]["50"]["state"][0] *= 1.0 + 1e-3
     (tmp_path / "replay.json").write_text(json.dumps(changed))
-    with pytest.raises(AssertionError, match="frame 100: toe moved"):
+    with pytest.raises(AssertionError, match="frame 50: toe moved"):
         compare(estimate, SIMULATED, tmp_path / "replay.json", update=False)

@@ -25,7 +25,7 @@ def speed_mismatch(time: np.ndarray, coordinates: np.ndarray, speeds: np.ndarray
     return mismatch, np.sqrt(np.mean(derivative**2, axis=0))
 
 
-def mismatch_in_words(names: list[str], mismatch: np.ndarray, moving: np.ndarray) -> str:
+def mismatch_in_words(names: list[str], rotation: np.ndarray, mismatch: np.ndarray, moving: np.ndarray) -> str:
     """One sentence about the worst coordinate, or an empty text where all speeds fit."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(mismatch > 0.0, mismatch / moving, 0.0)
@@ -33,8 +33,9 @@ def mismatch_in_words(names: list[str], mismatch: np.ndarray, moving: np.ndarray
     if not len(wrong):
         return ""
     worst = int(wrong[np.argmax(mismatch[wrong])])
+    unit = "rad/s" if rotation[worst] else "m/s"
     return (
         f"The estimated speeds are not the derivatives of the estimated coordinates ({len(wrong)} of {len(names)}; "
-        f"worst: {names[worst]}, {mismatch[worst]:.2g} rad/s off where it moves at {moving[worst]:.2g} rad/s), "
-        "so speeds, accelerations and moments of this run are not to be relied on."
+        f"worst: {names[worst]}, {mismatch[worst]:.2g} {unit} off where it moves at {moving[worst]:.2g} {unit}), "
+        "so the speeds and accelerations of this run are not to be relied on."
     )

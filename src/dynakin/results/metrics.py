@@ -88,7 +88,7 @@ def speed_consistency(estimate: Estimate, window: np.ndarray) -> tuple[dict[str,
     values = (estimate.data[name].transpose("time", "coordinate").values[window] for name in ("coordinates", "speeds"))
     mismatch, moving = speed_mismatch(estimate.time[window], *values)
     finite = {name: float(value) for name, value in zip(names, mismatch, strict=True) if np.isfinite(value)}
-    return finite, mismatch_in_words(names, mismatch, moving)
+    return finite, mismatch_in_words(names, estimate.is_rotation(), mismatch, moving)
 
 
 def _consistency(estimate: Estimate, window: np.ndarray) -> dict[str, Any]:
