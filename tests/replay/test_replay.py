@@ -16,7 +16,7 @@ from dynakin.simulation import simulate_squat
 
 HERE = Path(__file__).parent
 # Frames and how far they may move, in standard deviations. The paper's gains hardly see the speeds, so rounding grows
-# with time: the last bit of the input came to 2e-4 at frame 200 of the simulated trial (a run in another process), and to
+# with time: the last bit of the input came to 2e-4 at frame 200 of the simulated trial (in another process), and to
 # a standard deviation at its end. Late frames can't be compared; the early ones show any change of the equations.
 SQUATS1 = {0: 1e-6, 50: 1e-6, 100: 1e-5, 200: 1e-4, 300: 1e-3}
 SIMULATED = {0: 1e-6, 50: 1e-6, 100: 1e-4, 150: 1e-3}
