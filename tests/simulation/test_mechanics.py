@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from trees import inverse_dynamics
 
 from dynakin.simulation.mechanics import Axis, Motion, Segment, dynamics, kinematics
 
@@ -112,22 +113,18 @@ def test_moments_equal_pinocchios_inverse_dynamics(seed: int) -> None:
     rng = np.random.default_rng(seed)
     tree = random_tree(rng)
     motion = wave(rng, tree, 0.05 * np.arange(5))
-    model, joint_of = pin.Model(), {}
-    model.gravity.linear = np.array([0.0, -9.80665, 0.0])
-    for segment in tree:
-        joint = 0 if segment.parent is None else joint_of[segment.parent]
-        place = pin.SE3(np.eye(3), segment.placement)
-        for axis in segment.axes:
-            kind = pin.JointModelPrismaticUnaligned if axis.translation else pin.JointModelRevoluteUnaligned
-            joint = model.addJoint(joint, kind(np.array(axis.direction)), place, axis.coordinate)
-            place = pin.SE3.Identity()
-        inertia = pin.Inertia(segment.mass, segment.com, segment.inertia)
-        model.appendBodyToJoint(joint, inertia, pin.SE3.Identity())
-        joint_of[segment.name] = joint
-    order = [motion.names.index(name) for name in list(model.names)[1:]]
-    data = model.createData()
-    expected = np.stack(
-        [pin.rnea(model, data, motion.q[t, order], motion.qd[t, order], motion.qdd[t, order]) for t in range(5)]
-    )
-    moments = dynamics(tree, motion).moments[:, order]
+    expected = inverse_dynamics(pin, tuple(tree), motion)
+    moments = dynamics(tree, motion).moments
     assert np.abs(moments - expected).max() < 1e-11 * np.abs(expected).max()
+
+
+def test_wrenches_from_outside_are_not_the_joints_to_supply() -> None:
+    pin = pytest.importorskip("pinocchio", reason="Pinocchio is not installed (it is in the dev extra)")
+    rng = np.random.default_rng(7)
+    tree = random_tree(rng)
+    motion = wave(rng, tree, 0.05 * np.arange(5))
+    outside = {name: 20.0 * rng.standard_normal((5, 6)) for name in ("s2", "s4")}
+    expected = inverse_dynamics(pin, tuple(tree), motion, outside)
+    loaded = dynamics(tree, motion, external=outside)
+    assert np.abs(loaded.moments - expected).max() < 1e-11 * np.abs(expected).max()
+    np.testing.assert_allclose(loaded.wrench, dynamics(tree, motion).wrench, atol=1e-9)

@@ -97,7 +97,7 @@ def test_soft_tissue_has_its_declared_size() -> None:
     """Over subjects: the root mean square at the deepest frames, scaled to a full squat, is the list's."""
     at_depth: list[float] = []
     for seed in range(1, 13):
-        data = simulate_squat(seed, noise=SensorNoise(soft_tissue_random=0.0)).truth.data
+        data = simulate_squat(seed, 6.0, noise=SensorNoise(soft_tissue_random=0.0)).truth.data
         ratio = (data["coordinates"] - data["coordinates"][0]).sel(coordinate="knee").values / np.deg2rad(95.0)
         deepest = int(np.argmax(ratio))
         moved = np.linalg.norm(data["soft_tissue"].sel(marker="r_thigh2").values[deepest])

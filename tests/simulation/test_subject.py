@@ -2,46 +2,80 @@
 
 from __future__ import annotations
 
+from types import ModuleType
+
 import numpy as np
 import pytest
 
 from dynakin.errors import ConfigError
-from dynakin.simulation import Spread, draw_subject
-from dynakin.simulation.sagittal import build_tree
+from dynakin.simulation import Spread, draw_subject, sagittal, squat_chain
 from dynakin.simulation.subject import affine, mass_com_inertia, pseudo_inertia
 
 
+@pytest.mark.parametrize("chain", [sagittal, squat_chain])
 @pytest.mark.parametrize("sex", ["male", "female", None])
-@pytest.mark.parametrize("seed", range(10))
-def test_masses_add_up_and_every_body_is_possible(seed: int, sex: str | None) -> None:
+@pytest.mark.parametrize("seed", range(5))
+def test_masses_add_up_and_every_body_is_possible(seed: int, sex: str | None, chain: ModuleType) -> None:
     subject = draw_subject(np.random.default_rng(seed), 63.2, 1.68, sex)
-    assert sum(J[3, 3] for J in subject.bodies.values()) == pytest.approx(63.2, rel=1e-12)
-    for name, J in subject.bodies.items():
+    bodies = chain.segment_bodies(subject)
+    assert sum(J[3, 3] for J in bodies.values()) == pytest.approx(63.2, rel=1e-12)
+    for name, J in bodies.items():
         assert np.linalg.eigvalsh(J)[0] > 0.0, name
-    for segment in build_tree(subject):
+    for segment in chain.build_tree(subject):
         moments = np.linalg.eigvalsh(segment.inertia)
         assert moments[0] + moments[1] > moments[2] > 0.0, segment.name
 
 
-def test_the_planar_numbers_are_those_of_the_tree() -> None:
+def test_the_same_subject_weighs_the_same_in_both_chains() -> None:
+    """Straight, both chains are one and the same mass distribution: their sums about the toe are equal."""
+    subject = draw_subject(np.random.default_rng(4), 70.0, 1.75, "male")
+    total = []
+    for chain in (sagittal, squat_chain):
+        whole, at = np.zeros((4, 4)), {None: np.zeros(3)}
+        for segment in chain.build_tree(subject):
+            at[segment.name] = at[segment.parent] + segment.placement
+            whole += affine(pseudo_inertia(segment.mass, segment.com, segment.inertia), shift=at[segment.name])
+        total.append(whole)
+    np.testing.assert_allclose(total[0], total[1], rtol=1e-12, atol=1e-12)
+
+
+def test_the_ten_numbers_are_those_of_the_tree() -> None:
+    """Against second moments of mass: the tensor about the origin is trace(S) 1 - S."""
     subject = draw_subject(np.random.default_rng(3), 70.0, 1.75, "male")
-    named = subject.parameters()
-    for segment in build_tree(subject):
-        x, y, _ = segment.com
-        about_origin = segment.inertia[2, 2] + segment.mass * (x**2 + y**2)
-        expected = {"mass": segment.mass, "mx": segment.mass * x, "my": segment.mass * y, "izz": about_origin}
+    bodies = sagittal.segment_bodies(subject)
+    named = sagittal.build_body(subject, np.random.default_rng(0)).parameters()
+    for name, J in bodies.items():
+        S, h, m = J[:3, :3], J[:3, 3], J[3, 3]
+        tensor = np.trace(S) * np.eye(3) - S
+        expected = {"mass": m, "mx": h[0], "my": h[1], "mz": h[2]}
+        expected |= {"ixx": tensor[0, 0], "iyy": tensor[1, 1], "izz": tensor[2, 2]}
+        expected |= {"ixy": tensor[0, 1], "ixz": tensor[0, 2], "iyz": tensor[1, 2]}
         for key, value in expected.items():
-            assert named[f"inertia/{segment.name}/{key}"] == pytest.approx(value, rel=1e-12), segment.name
+            assert named[f"inertia/{name}/{key}"] == pytest.approx(value, rel=1e-12, abs=1e-12), name
 
 
 def test_without_spread_it_is_the_table() -> None:
     one, other = (
-        draw_subject(np.random.default_rng(s), 70.0, 1.75, "male", Spread.none()).parameters() for s in (1, 2)
+        sagittal.build_body(
+            draw_subject(np.random.default_rng(s), 70.0, 1.75, "male", Spread.none()), np.random.default_rng(s)
+        ).parameters()
+        for s in (1, 2)
     )
     assert one == other
     # Dumas: both thighs 2 x 12.3 % of a whole that adds up to 100.2 %
     assert one["inertia/thigh/mass"] == pytest.approx(70.0 * 0.246 / 1.002, rel=1e-12)
     assert one["length/shank"] == pytest.approx(0.246 * 1.75, rel=1e-12)
+
+
+def test_spread_has_its_size() -> None:
+    """Over 250 subjects, the standard deviation of the logarithm of a length."""
+    for factor in (0.5, 2.0):
+        spread = Spread().times(factor)
+        lengths = [
+            draw_subject(np.random.default_rng(seed), 70.0, 1.75, "male", spread).lengths["shank"]
+            for seed in range(250)
+        ]
+        assert np.log(lengths).std() == pytest.approx(0.03 * factor, rel=0.15)
 
 
 def test_shift_of_a_pseudo_inertia_is_the_parallel_axis_theorem() -> None:
@@ -60,3 +94,9 @@ def test_shift_of_a_pseudo_inertia_is_the_parallel_axis_theorem() -> None:
 def test_a_wrong_subject_is_named(mass_kg: float, height_m: float, sex: str | None, word: str) -> None:
     with pytest.raises(ConfigError, match=word):
         draw_subject(np.random.default_rng(0), mass_kg, height_m, sex)
+
+
+@pytest.mark.parametrize("values", [{"length": -0.1}, {"mass": 0.9}, {"size": float("nan")}])
+def test_a_wrong_spread_is_named(values: dict[str, float]) -> None:
+    with pytest.raises(ConfigError, match=next(iter(values))):
+        Spread(**values)

@@ -16,6 +16,7 @@ from dynakin.cli.demo import demo
 from dynakin.cli.model import model
 from dynakin.cli.print_config import print_config
 from dynakin.cli.run import run
+from dynakin.cli.simulate import simulate
 from dynakin.errors import DynakinError
 
 # Typer carries its own copy of click or uses click's, depending on its version; its own name leads to either.
@@ -29,7 +30,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (run, demo, check, model):
+for command in (run, demo, simulate, check, model):
     app.command()(command)
 app.command("print-config")(print_config)
 

@@ -2,7 +2,7 @@
 
 from dynakin.results.consistency import Consistency, consistency
 from dynakin.results.estimate import AXES, COMPONENTS, Estimate
-from dynakin.results.fit import marker_rms_mm, wrench_fit
+from dynakin.results.fit import SignalFit, TruthError, marker_rms_mm, signal_fit, truth_error, wrench_fit
 from dynakin.results.marker_file import laboratory_markers, write_trc
 from dynakin.results.metrics import SCHEMA_VERSION, compute_metrics, evaluation_window
 from dynakin.results.output_folder import OUTPUT_FILES, check_output_writable
@@ -19,13 +19,17 @@ __all__ = [
     "Estimate",
     "Event",
     "Parameter",
+    "SignalFit",
     "Timing",
+    "TruthError",
     "check_output_writable",
     "compute_metrics",
     "consistency",
     "evaluation_window",
     "laboratory_markers",
     "marker_rms_mm",
+    "signal_fit",
+    "truth_error",
     "wrench_fit",
     "write_storage",
     "write_trc",

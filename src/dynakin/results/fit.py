@@ -1,4 +1,5 @@
-"""How well two trajectories agree: RMS differences of markers and of wrench components."""
+"""How well two trajectories agree: RMS differences of markers, of wrench components and of any signal; errors against
+truth."""
 
 from __future__ import annotations
 
@@ -29,21 +30,69 @@ def marker_rms_mm(measured: np.ndarray, estimated: np.ndarray, axes: np.ndarray)
     return float(1000.0 * np.sqrt(np.mean(np.sum(difference[seen] ** 2, axis=1))))
 
 
+class SignalFit(NamedTuple):
+    """Agreement of two signals; None where a figure is not defined (a constant signal, no frame).
+
+    The paper does not say by what it normalises: per cent of the measured signal's RMS fits its FY, not its FX and MZ.
+    """
+
+    rms: float | None
+    nrms_rms_percent: float | None
+    """Of the measured signal's RMS."""
+    nrms_range_percent: float | None
+    """Of the measured signal's range."""
+    correlation: float | None
+
+
+class TruthError(NamedTuple):
+    """Error of an estimate where the truth is known, in the signal's unit; None without a frame."""
+
+    rms: float | None
+    """As it is."""
+    mean: float | None
+    """Estimate less truth: an angle's zero, mostly."""
+    rms_about_mean: float | None
+    """What is left once the mean offset is taken off: the error of the movement."""
+
+
+def signal_fit(measured: np.ndarray, estimated: np.ndarray) -> SignalFit:
+    """RMS difference, the same in per cent of the measured signal's RMS and of its range, correlation.
+
+    Args:
+        measured, estimated: (T,) in the same unit; frames in which either is NaN do not count.
+    """
+    seen = np.isfinite(measured) & np.isfinite(estimated)
+    if not seen.any():
+        return SignalFit(None, None, None, None)
+    a, b = measured[seen], estimated[seen]
+    rms, size, span = float(np.sqrt(np.mean((a - b) ** 2))), float(np.sqrt(np.mean(a**2))), float(np.ptp(a))
+    constant = span == 0.0 or np.ptp(b) == 0.0
+    return SignalFit(
+        rms,
+        100.0 * rms / size if size > 0.0 else None,
+        100.0 * rms / span if span > 0.0 else None,
+        None if constant else float(np.corrcoef(a, b)[0, 1]),
+    )
+
+
+def truth_error(truth: np.ndarray, estimated: np.ndarray) -> TruthError:
+    """Error of a coordinate, a speed, an acceleration or a moment.
+
+    Args:
+        truth, estimated: (T,) in the same unit; frames in which either is NaN do not count.
+    """
+    error = np.asarray(estimated - truth, dtype=float)
+    error = error[np.isfinite(error)]
+    if not len(error):
+        return TruthError(None, None, None)
+    return TruthError(float(np.sqrt(np.mean(error**2))), float(np.mean(error)), float(np.std(error)))
+
+
 def wrench_fit(measured: np.ndarray, estimated: np.ndarray) -> WrenchFit:
     """RMS difference, the same in percent of the RMS of the measured signal (as the paper's Table II), correlation.
 
     Args:
         measured, estimated: (T,) in N or N m.
     """
-    seen = np.isfinite(measured) & np.isfinite(estimated)
-    if not seen.any():
-        return WrenchFit(None, None, None)
-    a, b = measured[seen], estimated[seen]
-    rms = float(np.sqrt(np.mean((a - b) ** 2)))
-    size = float(np.sqrt(np.mean(a**2)))
-    constant = np.ptp(a) == 0.0 or np.ptp(b) == 0.0
-    return WrenchFit(
-        rms,
-        100.0 * rms / size if size > 0.0 else None,
-        None if constant else float(np.corrcoef(a, b)[0, 1]),
-    )
+    fit = signal_fit(measured, estimated)
+    return WrenchFit(fit.rms, fit.nrms_rms_percent, fit.correlation)

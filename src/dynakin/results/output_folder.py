@@ -6,11 +6,11 @@ import shutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 from dynakin.errors import OutputError
 
-# Every file that an output folder may hold; a folder with anything else in it is the user's, not ours.
 OUTPUT_FILES = (
     "coordinates.mot",
     "speeds.sto",
@@ -24,11 +24,24 @@ OUTPUT_FILES = (
     "config.toml",
     "report.html",
 )
+
+
+@dataclass(frozen=True)
+class FolderKind:
+    """What a folder of one kind may hold: with anything else in it, it is the user's, not ours."""
+
+    files: tuple[str, ...]
+    mark: str
+    """The file by which the kind is known."""
+    what: str
+
+
+RESULTS = FolderKind(OUTPUT_FILES, "metrics.json", "output folder of dynakin")
 # Left by file managers in any folder that somebody has looked at.
 _IGNORED = {".DS_Store", "Thumbs.db", "desktop.ini"}
 
 
-def check_output_writable(folder: str | Path, *, overwrite: bool = True) -> Path:
+def check_output_writable(folder: str | Path, *, kind: FolderKind = RESULTS, overwrite: bool = True) -> Path:
     """Make sure, before anything long is computed, that results can be written to ``folder``.
 
     Creates nothing that stays.
@@ -39,7 +52,7 @@ def check_output_writable(folder: str | Path, *, overwrite: bool = True) -> Path
     """
     folder = Path(folder)
     try:
-        _check_replaceable(folder, overwrite)
+        _check_replaceable(folder, kind, overwrite)
         ancestor = _nearest_existing(folder.absolute().parent)
         if not ancestor.is_dir():
             raise OutputError(f"{folder}: cannot write there, {ancestor} is a file and a folder was expected")
@@ -51,9 +64,9 @@ def check_output_writable(folder: str | Path, *, overwrite: bool = True) -> Path
 
 
 @contextmanager
-def replacing(folder: Path, *, overwrite: bool = True) -> Iterator[Path]:
+def replacing(folder: Path, *, kind: FolderKind = RESULTS, overwrite: bool = True) -> Iterator[Path]:
     """Give a temporary sibling folder to fill; on success it takes the place of ``folder``, on failure it goes."""
-    check_output_writable(folder, overwrite=overwrite)
+    check_output_writable(folder, kind=kind, overwrite=overwrite)
     folder = folder.absolute()
     made: Path | None = None
     try:
@@ -86,7 +99,7 @@ def _swap(made: Path, folder: Path) -> None:
         shutil.rmtree(old.parent, ignore_errors=True)
 
 
-def _check_replaceable(folder: Path, overwrite: bool) -> None:
+def _check_replaceable(folder: Path, kind: FolderKind, overwrite: bool) -> None:
     if not folder.exists():
         return
     if not folder.is_dir():
@@ -94,12 +107,10 @@ def _check_replaceable(folder: Path, overwrite: bool) -> None:
     names = sorted(entry.name for entry in folder.iterdir() if entry.name not in _IGNORED)
     if not names:
         return
-    foreign = [name for name in names if name not in OUTPUT_FILES]
-    if foreign or "metrics.json" not in names:
+    foreign = [name for name in names if name not in kind.files]
+    if foreign or kind.mark not in names:
         what = foreign[0] if foreign else names[0]
-        raise OutputError(
-            f"{folder}: is no output folder of dynakin (it holds {what}); name a new folder or an empty one"
-        )
+        raise OutputError(f"{folder}: is no {kind.what} (it holds {what}); name a new folder or an empty one")
     if not overwrite:
         raise OutputError(f"{folder}: already holds results and overwriting was not asked for")
 

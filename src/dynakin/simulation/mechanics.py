@@ -7,7 +7,7 @@ filter is judged against must not repeat the filter's mistakes. Planar and spati
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -163,14 +163,23 @@ class Dynamics:
     potential: Array
 
 
-def dynamics(tree: Sequence[Segment], motion: Motion, moving: TreeMotion | None = None) -> Dynamics:
+def dynamics(
+    tree: Sequence[Segment],
+    motion: Motion,
+    moving: TreeMotion | None = None,
+    external: Mapping[str, Array] | None = None,
+) -> Dynamics:
     """Newton's and Euler's laws, segment by segment, then the moment of all that hangs on a joint about its
-    axis."""
+    axis.
+
+    external: wrenches (T, 6) from outside on segments, by name, about the ground origin. A joint need not
+    supply what they do, so moments are less by them; the wrench stays the sum of all that acts on the person.
+    Where none is given everything comes through the root.
+    """
     moving = moving or kinematics(tree, motion)
     frames = motion.q.shape[0]
-    load: dict[
-        str, tuple[Array, Array]
-    ] = {}  # force and moment about the ground origin, of a segment and what hangs on it
+    # Force and moment about the ground origin, of a segment and what hangs on it.
+    load: dict[str, tuple[Array, Array]] = {}
     kinetic, potential = np.zeros(frames), np.zeros(frames)
     for segment in tree:
         body = moving.segments[segment.name]
@@ -181,6 +190,9 @@ def dynamics(tree: Sequence[Segment], motion: Motion, moving: TreeMotion | None 
         force = segment.mass * (body.point_acceleration(segment.com) - GRAVITY)
         moment = np.cross(c, force) + (inertia_G @ body.alpha[:, :, None])[:, :, 0] + np.cross(body.omega, spin)
         load[segment.name] = (force, moment)
+        if external and segment.name in external:
+            given = external[segment.name]
+            load[segment.name] = (force - given[:, :3], moment - given[:, 3:])
         kinetic += 0.5 * (segment.mass * np.sum(v * v, axis=1) + np.sum(body.omega * spin, axis=1))
         potential -= segment.mass * (c @ GRAVITY)
     total_force, total_moment = np.zeros((frames, 3)), np.zeros((frames, 3))
@@ -197,4 +209,7 @@ def dynamics(tree: Sequence[Segment], motion: Motion, moving: TreeMotion | None 
         else:
             above = load[segment.parent]
             load[segment.parent] = (above[0] + force, above[1] + moment)
-    return Dynamics(np.hstack([total_force, total_moment]), moments, kinetic, potential)
+    wrench = np.hstack([total_force, total_moment])
+    for given in (external or {}).values():
+        wrench = wrench + given
+    return Dynamics(wrench, moments, kinetic, potential)

@@ -1,59 +1,82 @@
-"""Two force plates, one under each foot, that measure what the simulated person's motion takes."""
+"""Force plates that measure what the simulated person's motion takes, with the errors that plates have."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dynakin.recordings import DEFAULT_THRESHOLD_N, Plate, Surface, plate_from_wrench
+from dynakin.simulation.body import Contact
+from dynakin.simulation.sensors import SensorNoise
+from dynakin.simulation.streams import Streams
 
 Array = NDArray[np.float64]
 
-SIDEWAYS_SHARE = 0.06  # of the vertical force: the feet stand apart and push outward against each other
+_HALF_LENGTH_M, _HALF_WIDTH_M = 0.30, 0.20
 
 
-def split_wrench(wrench: Array, lateral_m: float) -> tuple[Array, Array]:
-    """The wrench (T, 6) about the toe shared equally by the right and the left foot, ``lateral_m`` beside the
-    midline.
+@dataclass(frozen=True)
+class PlateErrors:
+    """What is wrong with a plate for the whole trial: factors (6,) on its channels [fx, fy, fz, and mx, my, mz about
+    the plate's centre], and their drift (6,) in N/s and N m/s."""
 
-    The body is symmetric, so each foot carries half; the sideways forces cancel in the sum, and so do their
-    moments, because both feet press at the same x and y.
-    """
-    half = 0.5 * wrench
-    feet = []
-    # The half wrench acts at some point (x, y, 0) of the sagittal plane; the foot's acts there too, moved by
-    # +-lateral_m along z.
-    lever = half[:, 5] / half[:, 1]  # x of the action line where it meets y = 0: mz = x fy there
-    for side in (1.0, -1.0):
-        force = half[:, :3].copy()
-        force[:, 2] -= side * SIDEWAYS_SHARE * force[:, 1]
-        point = np.stack([lever, np.zeros_like(lever), np.full_like(lever, side * lateral_m)], axis=1)
-        feet.append(np.hstack([force, np.cross(point, force)]))
-    return feet[0], feet[1]
+    gain: Array
+    drift: Array
+
+
+def draw_plate_errors(gains: np.random.Generator, drifts: np.random.Generator, noise: SensorNoise) -> PlateErrors:
+    """The errors of one plate; gains and drifts draw from streams of their own."""
+    per_min = np.repeat([noise.plate_drift_n_per_min, noise.plate_drift_nm_per_min], 3)
+    return PlateErrors(1.0 + noise.plate_gain_sd * gains.standard_normal(6), per_min / 60.0 * drifts.standard_normal(6))
+
+
+def sense_plates(
+    streams: Streams,
+    contacts: Sequence[Contact],
+    carried: Mapping[str, Array],
+    time: Array,
+    origin_L: Array,
+    noise: SensorNoise,
+) -> tuple[tuple[Plate, ...], dict[str, PlateErrors]]:
+    """A plate below each contact, and what is wrong with it, by the plate's name."""
+    plates, errors = [], {}
+    for contact in contacts:
+        own = draw_plate_errors(streams["plate_gain"], streams["plate_drift"], noise)
+        centre_L = contact.centre + origin_L
+        wrench = carried[contact.name]
+        plates.append(
+            measure(streams["plate_noise"], time, wrench, contact.plate, centre_L, origin_L, own, noise),
+        )
+        errors[contact.plate] = own
+    return tuple(plates), errors
 
 
 def measure(
     rng: np.random.Generator,
-    foot_wrench: Array,
+    time: Array,
+    wrench: Array,
     name: str,
     centre: Array,
-    toe: Array,
-    force_sd_n: float,
-    moment_sd_nm: float,
+    origin: Array,
+    errors: PlateErrors,
+    noise: SensorNoise,
 ) -> Plate:
-    """The plate's signals in the laboratory frame, with white noise on force and on the moment about the
-    plate's centre.
+    """The plate's signals in the laboratory frame: gain, drift, white noise and rounding on its six channels.
 
-    foot_wrench: (T, 6) about the toe; centre, toe: (3,) m, the middle of the plate's top and the toe
-    landmark, laboratory.
+    wrench: (T, 6) true, about the ground origin; centre, origin: (3,) m, the middle of the plate's top and the
+    ground origin, laboratory.
     """
-    force = foot_wrench[:, :3] + force_sd_n * rng.standard_normal((len(foot_wrench), 3))
-    about_centre = foot_wrench[:, 3:] + np.cross(toe - centre, foot_wrench[:, :3])
-    about_centre = about_centre + moment_sd_nm * rng.standard_normal(about_centre.shape)
+    about_centre = wrench[:, 3:] + np.cross(origin - centre, wrench[:, :3])
+    channels = np.hstack([wrench[:, :3], about_centre]) * errors.gain + np.outer(time - time[0], errors.drift)
+    force = channels[:, :3] + noise.plate_force_sd_n * rng.standard_normal((len(wrench), 3))
+    about_centre = channels[:, 3:] + noise.plate_moment_sd_nm * rng.standard_normal((len(wrench), 3))
+    force, about_centre = _rounded(force, noise.plate_step_n), _rounded(about_centre, noise.plate_step_nm)
     moment = about_centre + np.cross(centre, force)
-    half_x, half_z = 0.30, 0.20
     corners = centre + np.array(
-        [[half_x, 0.0, half_z], [half_x, 0.0, -half_z], [-half_x, 0.0, -half_z], [-half_x, 0.0, half_z]]
+        [[x * _HALF_LENGTH_M, 0.0, z * _HALF_WIDTH_M] for x, z in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
     )
     return plate_from_wrench(
         name,
@@ -64,3 +87,7 @@ def measure(
         threshold_n=DEFAULT_THRESHOLD_N,
         zero_unloaded=False,
     )
+
+
+def _rounded(values: Array, step: float) -> Array:
+    return values if step == 0.0 else np.round(values / step) * step

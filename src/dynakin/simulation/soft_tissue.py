@@ -15,6 +15,7 @@ from importlib import resources
 import numpy as np
 from numpy.typing import NDArray
 
+from dynakin.errors import ConfigError
 from dynakin.simulation.markers import Site
 from dynakin.simulation.mechanics import Motion
 
@@ -56,13 +57,22 @@ def draw_displacement(
     At full squat, where a coordinate has changed by ``full_change`` (rad) since the first frame, the
     displacement's root mean square over draws is the region's amplitude: ``random_share`` of it wanders (root
     mean square), the rest, taken so that the squares add up, follows the angle.
+
+    Raises:
+        ConfigError: a site's region is not in the list, or what drives it is no coordinate of the body.
     """
     following_share = np.sqrt(1.0 - random_share**2)
     result = np.empty((len(time), len(sites), 3))
     for k, site in enumerate(sites):
-        region = regions()[site.region]
-        j = motion.names.index(region.coordinate)
-        change = (motion.q[:, j] - motion.q[0, j]) / full_change[region.coordinate]
+        region = _region(site)
+        driver = site.driver or region.coordinate
+        if driver not in motion.names or driver not in full_change:
+            raise ConfigError(
+                f"soft tissue: marker {site.name!r} is driven by {driver!r}, expected a coordinate of the body with a "
+                f"full change: {', '.join(full_change) or 'none'}"
+            )
+        j = motion.names.index(driver)
+        change = (motion.q[:, j] - motion.q[0, j]) / full_change[driver]
         direction = rng.standard_normal(3)
         direction = direction / np.linalg.norm(direction)
         frequencies = rng.uniform(*RANDOM_BAND_HZ, RANDOM_TONES)
@@ -71,3 +81,11 @@ def draw_displacement(
         wander = tones.sum(axis=2) * np.sqrt(2.0 / (3.0 * RANDOM_TONES))  # norm of root mean square 1
         result[:, k] = region.amplitude_m * (following_share * np.outer(change, direction) + random_share * wander)
     return result
+
+
+def _region(site: Site) -> Region:
+    if site.region not in regions():
+        raise ConfigError(
+            f"soft tissue: marker {site.name!r} lies in region {site.region!r}, expected one of {', '.join(regions())}"
+        )
+    return regions()[site.region]

@@ -50,6 +50,9 @@ class Spread:
     length: of each length; mass: of each part's mass; size: of the stretch of a part's mass distribution
     along each axis (second moments go with its square); centre: of the centre of mass, over the part's
     length.
+
+    Raises:
+        ConfigError: a value below 0 or above 0.5; the message names it.
     """
 
     length: float = 0.03
@@ -57,31 +60,44 @@ class Spread:
     size: float = 0.05
     centre: float = 0.02
 
+    def __post_init__(self) -> None:
+        for key, value in vars(self).items():
+            if not 0.0 <= value <= 0.5:
+                raise ConfigError(f"spread of the subject: {key} is {value:g}, expected 0 to 0.5")
+
     @classmethod
     def none(cls) -> Spread:
         """The table itself."""
         return cls(0.0, 0.0, 0.0, 0.0)
 
+    def times(self, factor: float) -> Spread:
+        """All of them ``factor`` times as large.
+
+        Raises:
+            ConfigError: the factor is negative, or makes a value too large.
+        """
+        if not factor >= 0.0:
+            raise ConfigError(f"spread of the subject: the factor is {factor:g}, expected 0 or more")
+        return Spread(*(factor * value for value in vars(self).values()))
+
 
 @dataclass(frozen=True)
 class SimulatedSubject:
-    """Lengths (m) and, for each segment, the pseudo-inertia (4, 4) of both sides together about the segment's
-    origin."""
+    """A person before it is put into a model.
+
+    lengths: m, by the names of `FRACTIONS`; parts: pseudo-inertia (4, 4) of one side of each part of the table,
+    about the part's own origin.
+    """
 
     mass_kg: float
     height_m: float
     sex: str | None
     lengths: Mapping[str, float]
-    bodies: Mapping[str, Array]
+    parts: Mapping[str, Array]
 
-    def parameters(self) -> dict[str, float]:
-        """Estimated quantities by the names of the filter's state: length/shank (m), inertia/shank/mass, mx,
-        my, izz (SI)."""
-        named = {f"length/{k}": self.lengths[k] for k in ("foot", "shank", "thigh", "pelvis", "trunk", "upper_arm")}
-        for name, J in self.bodies.items():
-            values = {"mass": J[3, 3], "mx": J[0, 3], "my": J[1, 3], "izz": J[0, 0] + J[1, 1]}
-            named |= {f"inertia/{name}/{k}": float(v) for k, v in values.items()}
-        return named
+    def placed(self, part: str, shift: Array) -> Array:
+        """A part moved to ``shift`` (3,) m."""
+        return affine(self.parts[part], shift=shift)
 
 
 def pseudo_inertia(mass: float, com: Array, inertia: Array) -> Array:
@@ -122,8 +138,9 @@ def draw_subject(
     Raises:
         ConfigError: mass or height not positive, or an unknown sex.
     """
-    if not mass_kg > 0.0 or not height_m > 0.0:
-        raise ConfigError(f"simulated subject: mass_kg is {mass_kg:g}, height_m is {height_m:g}; both must be positive")
+    for key, value in (("mass_kg", mass_kg), ("height_m", height_m)):
+        if not 0.0 < value < np.inf:
+            raise ConfigError(f"simulated subject: {key} is {value:g}, expected a positive number")
     if sex not in ("male", "female", None):
         raise ConfigError(f"simulated subject: sex is {sex!r}, expected male, female or None")
     spread = spread or Spread()
@@ -131,7 +148,7 @@ def draw_subject(
     parts = _draw_parts(rng, load_table(table, sex), lengths, spread)  # type: ignore[arg-type]
     total = sum(J[3, 3] * (2.0 if name in PAIRED else 1.0) for name, J in parts.items())
     parts = {name: J * (mass_kg / total) for name, J in parts.items()}
-    return SimulatedSubject(mass_kg, height_m, sex, lengths, _join(parts, lengths))
+    return SimulatedSubject(mass_kg, height_m, sex, lengths, parts)
 
 
 def _draw_parts(
@@ -153,28 +170,11 @@ def _draw_parts(
     return parts
 
 
-def _join(parts: Mapping[str, Array], lengths: Mapping[str, float]) -> dict[str, Array]:
-    """Parts put into the model's segments, right and left lumped; symmetric about the sagittal plane."""
-    up, side = np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
-    hip, shoulder = 0.5 * lengths["hip_width"] * side, 0.5 * lengths["shoulder_width"] * side
+def both_sides(J: Array) -> Array:
+    """A body and its mirror image in the sagittal plane together."""
+    return J + affine(J, stretch=np.diag([1.0, 1.0, -1.0]))
 
-    def both(J: Array) -> Array:
-        return J + affine(J, stretch=np.diag([1.0, 1.0, -1.0]))
 
-    def at(name: str, shift: Array) -> Array:
-        return affine(parts[name], shift=shift)
-
-    t12, neck = T12_ON_TORSO * lengths["torso"] * up, lengths["torso"] * up
-    middle = {  # the mass distribution of a part on the midline is made symmetric
-        "pelvis": at("pelvis", lengths["pelvis"] * LUMBAR_DIRECTION),
-        "trunk": at("abdomen", t12) + at("thorax", neck) + at("head", neck),
-    }
-    hand = at("hand", -lengths["forearm"] * up)
-    return {
-        "foot": both(at("foot", lengths["foot"] * ANKLE_DIRECTION + hip)),
-        "shank": both(at("shank", lengths["shank"] * up + hip)),
-        "thigh": both(at("thigh", lengths["thigh"] * up + hip)),
-        **{name: 0.5 * both(J) for name, J in middle.items()},
-        "upper_arm": both(at("upper_arm", shoulder)),
-        "forearm": both(affine(parts["forearm"] + hand, shift=shoulder)),
-    }
+def symmetric(J: Array) -> Array:
+    """A body on the midline, its mass distribution made symmetric about the sagittal plane."""
+    return 0.5 * both_sides(J)

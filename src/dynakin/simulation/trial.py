@@ -1,38 +1,136 @@
-"""A simulated squat: a subject, its motion, its sensors."""
+"""A simulated trial: a subject, its motion, its sensors."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dynakin.errors import ConfigError
-from dynakin.recordings import Plate, Recording
-from dynakin.simulation.markers import draw_sites, hip_centres, marker_positions
-from dynakin.simulation.mechanics import Segment, dynamics, kinematics
-from dynakin.simulation.plates import measure, split_wrench
-from dynakin.simulation.sagittal import build_tree
+from dynakin.recordings import Recording
+from dynakin.simulation.bodies import choose_body
+from dynakin.simulation.body import SimulatedBody
+from dynakin.simulation.contacts import contacts_of, mechanical_state
+from dynakin.simulation.mechanics import Motion
+from dynakin.simulation.motion_file import CUTOFF_HZ
+from dynakin.simulation.motions import choose_movement
+from dynakin.simulation.movement import Movement
+from dynakin.simulation.output import save_trial
+from dynakin.simulation.plates import sense_plates
+from dynakin.simulation.sensed_markers import sense_markers
 from dynakin.simulation.sensors import SensorNoise
-from dynakin.simulation.soft_tissue import draw_displacement
-from dynakin.simulation.squat import FULL, balanced_hip, draw_repetitions, squat_motion
-from dynakin.simulation.subject import Spread, draw_subject
-from dynakin.simulation.truth import Truth, label_truth
+from dynakin.simulation.streams import Streams
+from dynakin.simulation.subject import Spread
+from dynakin.simulation.truth import Truth, all_parameters, label_arrays
 
 Array = NDArray[np.float64]
 
-TOE_HEIGHT = 0.025  # of the toe landmark over the floor, of body height
-FOOT_LATERAL = 0.115  # of each foot's middle beside the midline, of body height
-TOE_IN_LABORATORY = (-0.12, -0.60)  # x and z (m) of the toe landmark; the floor is y = 0
+GROUND_IN_LABORATORY = (-0.12, -0.60)  # x and z (m) of the ground origin; the floor is y = 0
+SYNTHETIC_S = 20.0  # duration of a motion that has no end of its own
+LONGEST_FRAMES = 2_000_000
 
 
 @dataclass(frozen=True)
 class SimulatedTrial:
-    """The recording, as a reader would return it, and the truth behind it."""
+    """The recording, as a reader would return it, the truth behind it, and what it was made with."""
 
     recording: Recording
     truth: Truth
+    settings: dict[str, Any]
+
+    def save(self, folder: str | Path) -> Path:
+        """Write recording and truth into a folder; see `dynakin.simulation.output.save_trial`."""
+        return save_trial(self, folder)
+
+
+def simulate(
+    model: str | SimulatedBody = "sagittal7",
+    motion: str | Path | Movement | Callable[[Array], Motion] = "squat",
+    seed: int = 1,
+    duration_s: float | None = None,
+    rate_hz: float = 100.0,
+    mass_kg: float = 70.0,
+    height_m: float = 1.75,
+    sex: str | None = "male",
+    *,
+    noise: SensorNoise | None = None,
+    spread: Spread | None = None,
+    motion_cutoff_hz: float = CUTOFF_HZ,
+) -> SimulatedTrial:
+    """A trial of a subject who does not exist, so that all that is to be estimated is known.
+
+    Same arguments, same arrays. Subject, motion, markers' places and each sensor draw from streams of their
+    own: to switch one sensor's noise off leaves the rest of the trial as it is.
+
+    Args:
+        model: "sagittal7" or "squat7", drawn around the table; or a body of your own, planar or spatial, whose
+            subject then stands for mass, height, sex and spread.
+        motion: "squat", "sit-to-stand" or "sway"; a coordinates file (.mot, .sto) with the model's coordinate
+            names; or a function of times (T,) s that gives a `Motion`.
+        seed: of everything that is drawn.
+        duration_s, rate_hz: length and frame rate; the first frame is at 0 s. None: 20 s, or all of a file.
+        mass_kg, height_m, sex: "male", "female" or None (mean of both), as for `dynakin.Subject`.
+        noise: of the sensors; None: `SensorNoise()`, ``SensorNoise.none()`` for perfect ones.
+        spread: of the subject around the anthropometric table; None: `Spread()`.
+        motion_cutoff_hz: of the low-pass on a coordinates file.
+
+    Raises:
+        ConfigError: a value that makes no trial; the message names the argument.
+    """
+    asked_s = SYNTHETIC_S if duration_s is None else duration_s
+    for key, value in (("rate_hz", rate_hz), ("duration_s", asked_s)):
+        if not 0.0 < value < np.inf:
+            raise ConfigError(f"simulation: {key} is {value:g}, expected a positive number")
+    _frames(asked_s, rate_hz)  # refuses too many before a motion of that length is drawn
+    noise, spread = noise or SensorNoise(), spread or Spread()
+    streams = Streams(seed)
+    body = choose_body(model, streams, mass_kg, height_m, sex, spread)
+    movement = choose_movement(motion, body, streams["motion"], asked_s, motion_cutoff_hz)
+    time = _frames(_length(duration_s, movement), rate_hz)
+    state = mechanical_state(body, movement, time)
+    seen = sense_markers(streams, body, time, state.motion, state.moving, noise)
+    origin_L = np.array([GROUND_IN_LABORATORY[0], -body.floor_m, GROUND_IN_LABORATORY[1]])
+    late = state if noise.plate_lag_s == 0.0 else mechanical_state(body, movement, time - noise.plate_lag_s)
+    plates, errors = sense_plates(streams, contacts_of(body, movement.seat), late.carried, time, origin_L, noise)
+    recording = Recording(
+        name=f"simulated_{movement.name.replace('-', '_')}_{seed}",
+        path=None,
+        time=time,
+        marker_names=seen.names,
+        markers=origin_L + seen.markers,
+        plates=plates,
+        length_unit="m",
+        notes=(f"Simulated {body.name}, seed {seed}: {movement.description or movement.name}.",),
+        subject={"mass_kg": body.subject.mass_kg, "height_m": body.subject.height_m},
+    )
+    truth = Truth(
+        data=label_arrays(body, time, state, seen.sites, seen.skin),
+        parameters=all_parameters(body, seen.sites),
+        origin_L=origin_L,
+        subject=body.subject,
+        tree=body.tree,
+        sites=seen.sites,
+        faults=seen.faults,
+        plate_errors=errors,
+        repetitions=movement.repetitions,
+    )
+    settings = {
+        "model": body.name,
+        "motion": movement.name,
+        "seed": int(seed),
+        "duration_s": float(time[-1]),
+        "rate_hz": float(rate_hz),
+        "mass_kg": float(body.subject.mass_kg),
+        "height_m": float(body.subject.height_m),
+        "sex": body.subject.sex,
+        "spread": None if isinstance(model, SimulatedBody) else dict(vars(spread)),
+        "sensors": noise.as_dict(),
+    }
+    return SimulatedTrial(recording, truth, settings)
 
 
 def simulate_squat(
@@ -46,69 +144,26 @@ def simulate_squat(
     noise: SensorNoise | None = None,
     spread: Spread | None = None,
 ) -> SimulatedTrial:
-    """A squat of a subject who does not exist, so that all that is to be estimated is known.
-
-    Same arguments, same arrays. Subject, motion, markers' places and each sensor draw from streams of their
-    own: to switch one sensor's noise off leaves the rest of the trial as it is.
-
-    Args:
-        seed: of everything that is drawn.
-        duration_s, rate_hz: length and frame rate; the first frame is at 0 s.
-        mass_kg, height_m, sex: "male", "female" or None (mean of both), as for `dynakin.Subject`.
-        noise: of the sensors; None: `SensorNoise()`, ``SensorNoise.none()`` for perfect ones.
-        spread: of the subject around the anthropometric table; None: `Spread()`.
-
-    Raises:
-        ConfigError: a value that makes no trial; the message names the argument.
-    """
-    if not 0.0 < rate_hz < np.inf:
-        raise ConfigError(f"simulated squat: rate_hz is {rate_hz:g}, expected a positive number")
-    noise = noise or SensorNoise()
-    rng = [np.random.default_rng(stream) for stream in np.random.SeedSequence(seed).spawn(6)]
-    subject = draw_subject(rng[0], mass_kg, height_m, sex, spread)
-    tree = build_tree(subject)
-    repetitions = draw_repetitions(rng[1], duration_s)
-    time = np.arange(round(duration_s * rate_hz) + 1) / rate_hz
-    motion = squat_motion(rng[1], tree, time, repetitions)
-    moving = kinematics(tree, motion)
-    forces = dynamics(tree, motion, moving)
-    sites = draw_sites(rng[2], subject)
-    skin = noise.soft_tissue * draw_displacement(
-        rng[3], time, motion, sites, full_squat_change(tree), noise.soft_tissue_random
-    )
-    seen = marker_positions(sites, moving, skin)
-    seen = seen + noise.marker_sd_m * rng[4].standard_normal(seen.shape)
-    virtual = hip_centres(subject, sites, seen)
-    origin_L = np.array([TOE_IN_LABORATORY[0], TOE_HEIGHT * height_m, TOE_IN_LABORATORY[1]])
-    recording = Recording(
-        name=f"simulated_squat_{seed}",
-        path=None,
-        time=time,
-        marker_names=(*(site.name for site in sites), *virtual),
-        markers=origin_L + np.concatenate([seen, np.stack(list(virtual.values()), axis=1)], axis=1),
-        plates=_plates(rng[5], forces.wrench, height_m, origin_L, noise),
-        length_unit="m",
-        notes=(f"Simulated squat, seed {seed}, {len(repetitions)} repetitions.",),
-        subject={"mass_kg": mass_kg, "height_m": height_m},
-    )
-    truth = label_truth(subject, tree, time, motion, moving, forces, sites, skin, origin_L)
-    return SimulatedTrial(recording, truth)
+    """Squats of ``sagittal7``: `simulate` with its first two arguments settled."""
+    return simulate("sagittal7", "squat", seed, duration_s, rate_hz, mass_kg, height_m, sex, noise=noise, spread=spread)
 
 
-def full_squat_change(tree: Sequence[Segment]) -> dict[str, float]:
-    """How far each coordinate goes (rad) from standing to a full squat."""
-    change = {name: float(np.deg2rad(value)) for name, value in FULL.items()}
-    change["hip"] = float(np.sum(balanced_hip(tree)[1:]))
-    return change
+def _length(duration_s: float | None, movement: Movement) -> float:
+    if duration_s is None:
+        return SYNTHETIC_S if movement.end_s is None else movement.end_s
+    if movement.end_s is not None and duration_s > movement.end_s + 1e-9:
+        raise ConfigError(
+            f"simulation: duration_s is {duration_s:g}, expected at most the {movement.end_s:g} s of {movement.name!r}"
+        )
+    return duration_s
 
 
-def _plates(
-    rng: np.random.Generator, wrench: Array, height_m: float, toe: Array, noise: SensorNoise
-) -> tuple[Plate, ...]:
-    """A plate under each foot: "plate 1" the right, "plate 2" the left one."""
-    lateral = FOOT_LATERAL * height_m
-    plates = []
-    for name, side, foot in zip(("plate 1", "plate 2"), (1.0, -1.0), split_wrench(wrench, lateral), strict=True):
-        centre = np.array([toe[0] - 0.10, 0.0, toe[2] + side * lateral])
-        plates.append(measure(rng, foot, name, centre, toe, noise.plate_force_sd_n, noise.plate_moment_sd_nm))
-    return tuple(plates)
+def _frames(duration_s: float, rate_hz: float) -> Array:
+    """Times (T,) from 0, the last one not after the end."""
+    count = int(np.floor(duration_s * rate_hz + 1e-6)) + 1
+    if not 2 <= count <= LONGEST_FRAMES:
+        raise ConfigError(
+            f"simulation: duration_s {duration_s:g} at rate_hz {rate_hz:g} makes {count} frames, expected 2 to "
+            f"{LONGEST_FRAMES}"
+        )
+    return np.arange(count) / rate_hz

@@ -9,8 +9,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from dynakin.simulation.markers import Site, marker_positions, true_joint_centres
-from dynakin.simulation.mechanics import Dynamics, Motion, Segment, TreeMotion
+from dynakin.simulation.body import SimulatedBody
+from dynakin.simulation.contacts import MechanicalState
+from dynakin.simulation.faults import Fault
+from dynakin.simulation.markers import Site, marker_positions
+from dynakin.simulation.mechanics import Segment
+from dynakin.simulation.movement import Repetition
+from dynakin.simulation.plates import PlateErrors
 from dynakin.simulation.subject import SimulatedSubject
 
 Array = NDArray[np.float64]
@@ -18,15 +23,22 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Truth:
-    """What the sensors should have told. Ground frame of the models (X forward, Y up, Z right; origin: the
-    toe landmark), SI.
+    """What the sensors should have told. Ground frame of the models (X forward, Y up, Z right; the planar chains'
+    origin: the toe landmark), SI.
 
-    data: coordinates, speeds, accelerations, moments (time, coordinate), named and signed as in
-    ``sagittal7``; wrench (time, component), ground on person, about the toe; markers (time, marker, axis) on
-    the bones, and soft_tissue, the displacement of each marker from there; joint_centres (time, joint, axis);
-    kinetic_energy, potential_energy (time). parameters: lengths and inertial parameters by the names of the
-    filter's state (length/shank, inertia/shank/izz). origin_L: (3,) m, the toe landmark in the laboratory
-    frame, whose axes are those of the ground frame.
+    Attributes:
+        data: coordinates, speeds, accelerations, moments (time, coordinate), named and signed as in the model;
+            wrench (time, component), ground on person, about the ground origin, and contact_wrench (time,
+            contact, component) of each foot and the seat; markers (time, marker, axis) on the bones, and
+            soft_tissue, the displacement of each marker from there; joint_centres (time, joint, axis);
+            kinetic_energy, potential_energy (time). Moments are net joint moments: what a seat carries no joint
+            below it supplies.
+        parameters: lengths and inertial parameters by the names of the filter's state (length/shank,
+            inertia/shank/izz), and where markers truly are (marker/r_knee/x, m, in their segment's frame, by
+            their names in the recording).
+        origin_L: (3,) m, the ground origin in the laboratory frame, whose axes are those of the ground frame.
+        sites: where the markers are put on; subject, tree: who was measured.
+        faults: gaps, swaps and flying markers; plate_errors: by plate; repetitions: of the movement, where known.
     """
 
     data: xr.Dataset
@@ -34,48 +46,60 @@ class Truth:
     origin_L: Array
     subject: SimulatedSubject
     tree: tuple[Segment, ...]
+    sites: tuple[Site, ...] = ()
+    faults: tuple[Fault, ...] = ()
+    plate_errors: dict[str, PlateErrors] | None = None
+    repetitions: tuple[Repetition, ...] = ()
 
 
-def label_truth(
-    subject: SimulatedSubject,
-    tree: tuple[Segment, ...],
+def label_arrays(
+    body: SimulatedBody,
     time: Array,
-    motion: Motion,
-    moving: TreeMotion,
-    forces: Dynamics,
+    state: MechanicalState,
     sites: Sequence[Site],
     displacement: Array,
-    origin_L: Array,
-) -> Truth:
-    """Put the simulation's arrays under their names; ``displacement`` (T, M, 3) is in the segments'
-    frames."""
+) -> xr.Dataset:
+    """Put the simulation's arrays under their names; ``displacement`` (T, M, 3) is in the segments' frames."""
+    motion, moving, forces, carried = state.motion, state.moving, state.forces, state.carried
     bone = marker_positions(sites, moving)
-    centres = true_joint_centres(subject, moving)
+    centres = {name: moving.segments[segment].point(place) for name, (segment, place) in body.joint_centres.items()}
     by_coordinate, by_marker = ("time", "coordinate"), ("time", "marker", "axis")
-    data = xr.Dataset(
+    unit, force = ("rad", "N m") if not body.translations else ("rad or m", "N m or N")
+    return xr.Dataset(
         {
-            "coordinates": (by_coordinate, motion.q, {"units": "rad"}),
-            "speeds": (by_coordinate, motion.qd, {"units": "rad/s"}),
-            "accelerations": (by_coordinate, motion.qdd, {"units": "rad/s2"}),
-            "moments": (by_coordinate, forces.moments, {"units": "N m"}),
+            "coordinates": (by_coordinate, motion.q, {"units": unit}),
+            "speeds": (by_coordinate, motion.qd, {"units": f"({unit})/s" if " " in unit else f"{unit}/s"}),
+            "accelerations": (by_coordinate, motion.qdd, {"units": f"({unit})/s2" if " " in unit else f"{unit}/s2"}),
+            "moments": (by_coordinate, forces.moments, {"units": force}),
             "wrench": (("time", "component"), forces.wrench, {"units": "N, N m"}),
+            "contact_wrench": (
+                ("time", "contact", "component"),
+                np.stack(list(carried.values()), axis=1),
+                {"units": "N, N m"},
+            ),
             "markers": (by_marker, bone, {"units": "m"}),
             "soft_tissue": (by_marker, marker_positions(sites, moving, displacement) - bone, {"units": "m"}),
             "joint_centres": (
                 ("time", "joint", "axis"),
-                np.stack(list(centres.values()), axis=1),
+                np.stack(list(centres.values()), axis=1) if centres else np.zeros((len(time), 0, 3)),
                 {"units": "m"},
             ),
             "kinetic_energy": ("time", forces.kinetic, {"units": "J"}),
             "potential_energy": ("time", forces.potential, {"units": "J"}),
         },
         coords={
-            "time": time,
+            "time": ("time", time, {"units": "s"}),
             "coordinate": list(motion.names),
             "component": ["fx", "fy", "fz", "mx", "my", "mz"],
+            "contact": list(carried),
             "marker": [site.name for site in sites],
-            "joint": list(centres),
+            "joint": np.array(list(centres), dtype=str),
             "axis": ["x", "y", "z"],
         },
     )
-    return Truth(data, subject.parameters(), origin_L, subject, tree)
+
+
+def all_parameters(body: SimulatedBody, sites: Sequence[Site]) -> dict[str, float]:
+    """Lengths, inertial parameters and marker places by name."""
+    places = {f"marker/{s.name}/{axis}": float(v) for s in sites for axis, v in zip("xyz", s.place, strict=True)}
+    return body.parameters() | places

@@ -1,0 +1,103 @@
+"""`dynakin simulate`: a trial with known truth, as the files that a laboratory would hand over."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from dynakin.cli.console import busy, out, table
+from dynakin.errors import ConfigError
+from dynakin.simulation import (
+    BODIES,
+    MOTIONS,
+    SimulatedTrial,
+    Spread,
+    check_trial_folder,
+    load_sensors,
+)
+from dynakin.simulation import simulate as simulate_trial
+from dynakin.simulation.motion_file import CUTOFF_HZ
+
+
+def simulate(
+    output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the trial.")],
+    model: Annotated[str, typer.Option(help=f"Model whose coordinates move: {' or '.join(BODIES)}.")] = "sagittal7",
+    motion: Annotated[str, typer.Option(help=f"{', '.join(MOTIONS)}, or a coordinates file (.mot, .sto).")] = "squat",
+    seed: Annotated[int, typer.Option(help="Of everything that is drawn at random, from 0.")] = 1,
+    duration: Annotated[float | None, typer.Option(help="Length, s; else 20 s, or all of a file.")] = None,
+    rate: Annotated[float, typer.Option("--rate", help="Frames per second.")] = 100.0,
+    mass: Annotated[float, typer.Option("--mass", help="Body mass, kg.")] = 70.0,
+    height: Annotated[float, typer.Option("--height", help="Body height, m.")] = 1.75,
+    sex: Annotated[str, typer.Option("--sex", help="male, female or mean of both, for the table.")] = "male",
+    spread: Annotated[float, typer.Option(help="Of the subject about the table; 0: none, 1: as people are.")] = 1.0,
+    sensors: Annotated[str, typer.Option(help="none (perfect), default, laboratory, or a .toml file.")] = "default",
+    sensor: Annotated[list[str] | None, typer.Option(help="KEY=VALUE of one sensor error; may be repeated.")] = None,
+    motion_cutoff: Annotated[
+        float, typer.Option("--motion-cutoff-hz", help="Low-pass on a coordinates file, Hz.")
+    ] = CUTOFF_HZ,
+) -> None:
+    """Simulate a trial whose truth is known, and write recording and truth."""
+    check_trial_folder(output)
+    noise = load_sensors(sensors).changed(_pairs(sensor or []))
+    with busy("simulating"):
+        trial = simulate_trial(
+            model,
+            motion,
+            seed,
+            duration,
+            rate,
+            mass,
+            height,
+            None if sex == "mean" else sex,
+            noise=noise,
+            spread=Spread().times(spread),
+            motion_cutoff_hz=motion_cutoff,
+        )
+        folder = trial.save(output)
+    console = out()
+    for note in trial.recording.notes:
+        console.print(note)
+    console.print(_contents(trial, folder))
+    console.print(_how_to_run(trial, folder), soft_wrap=True)
+
+
+def _pairs(texts: Sequence[str]) -> dict[str, object]:
+    """KEY=VALUE texts as numbers by key."""
+    values: dict[str, object] = {}
+    for text in texts:
+        key, equals, number = text.partition("=")
+        try:
+            values[key.strip()] = float(number)
+        except ValueError:
+            equals = ""
+        if not equals:
+            raise ConfigError(f"--sensor: found {text!r}, expected KEY=NUMBER such as marker_sd_m=0")
+    return values
+
+
+def _contents(trial: SimulatedTrial, folder: Path) -> Table:
+    recording, faults = trial.recording, trial.truth.faults
+    rows = table("file", "holds")
+    rows.add_row(
+        str(folder / "markers.trc"),
+        f"{len(recording.marker_names)} markers, {recording.n_frames} frames at {recording.rate:.6g} Hz"
+        + (f", {len(faults)} gaps, swaps and flying markers" if faults else ""),
+    )
+    rows.add_row(str(folder / "forces.mot"), f"{len(recording.plates)} force plates")
+    rows.add_row(str(folder / "truth_*.mot, .sto"), "coordinates, speeds, accelerations, moments, wrench")
+    rows.add_row(str(folder / "truth.json"), "settings, lengths, inertial parameters, marker places, faults")
+    rows.add_row(str(folder / "truth.nc"), "every array of the truth")
+    return rows
+
+
+def _how_to_run(trial: SimulatedTrial, folder: Path) -> str:
+    who = trial.truth.subject
+    sex = f" --sex {who.sex}" if who.sex else ""
+    return (
+        f"To estimate it: dynakin run {folder / 'markers.trc'} --forces {folder / 'forces.mot'} "
+        f"--model {trial.settings['model']} --mass {who.mass_kg:g} --height {who.height_m:g}{sex} -o OUT"
+    )

@@ -1,0 +1,67 @@
+"""Which bodies there are by name, and what a body of a user's own must fulfil."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable
+
+import numpy as np
+
+from dynakin.errors import ConfigError
+from dynakin.simulation import sagittal, squat_chain
+from dynakin.simulation.body import SimulatedBody
+from dynakin.simulation.streams import Streams
+from dynakin.simulation.subject import SimulatedSubject, Spread, draw_subject
+
+BODIES: dict[str, Callable[[SimulatedSubject, np.random.Generator], SimulatedBody]] = {
+    "sagittal7": sagittal.build_body,
+    "squat7": squat_chain.build_body,
+}
+"""Bodies by the name of the model whose coordinates they have: built of a subject, markers put on with the
+generator."""
+
+
+def choose_body(
+    model: str | SimulatedBody,
+    streams: Streams,
+    mass_kg: float,
+    height_m: float,
+    sex: str | None,
+    spread: Spread,
+) -> SimulatedBody:
+    """The body of that name, drawn around the table; one of a user's own is checked and taken as it is.
+
+    Raises:
+        ConfigError: no such body, a subject that cannot be, or a tree that does not hang together.
+    """
+    if isinstance(model, SimulatedBody):
+        _check(model)
+        return model
+    if model not in BODIES:
+        near = difflib.get_close_matches(str(model), BODIES, n=1)
+        hint = f" (did you mean {near[0]!r}?)" if near else ""
+        raise ConfigError(f"simulation: model is {str(model)!r}{hint}, expected {' or '.join(BODIES)}")
+    subject = draw_subject(streams["subject"], mass_kg, height_m, sex, spread)
+    return BODIES[model](subject, streams["sites"])
+
+
+def _check(body: SimulatedBody) -> None:
+    where = f"simulated body {body.name!r}"
+    known: list[str] = []
+    for segment in body.tree:
+        if segment.parent is not None and segment.parent not in known:
+            raise ConfigError(
+                f"{where}: the parent of {segment.name!r} is {segment.parent!r}, expected a segment before it: "
+                f"{', '.join(known) or 'none yet'}"
+            )
+        if not segment.mass > 0.0:
+            raise ConfigError(f"{where}: the mass of {segment.name!r} is {segment.mass:g} kg, expected more than 0")
+        known.append(segment.name)
+    for what, name, segment_name in (
+        *(("marker", site.name, site.segment) for site in body.sites),
+        *(("contact", foot.name, foot.segment) for foot in body.feet if foot.segment is not None),
+    ):
+        if segment_name not in known:
+            raise ConfigError(f"{where}: {what} {name!r} is on {segment_name!r}, expected one of {', '.join(known)}")
+    if not 1 <= len(body.feet) <= 2:
+        raise ConfigError(f"{where}: {len(body.feet)} feet, expected one contact or the right and the left foot")

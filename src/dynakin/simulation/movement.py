@@ -1,0 +1,73 @@
+"""A motion as a function of time: what every motion, drawn or read from a file, gives to the simulator."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dynakin.simulation.jets import Jet
+from dynakin.simulation.mechanics import Motion
+
+Array = NDArray[np.float64]
+
+STANDING_S = 1.5  # quiet standing before anything else: the filter's and the plates' start
+
+
+@dataclass(frozen=True)
+class Repetition:
+    """One repetition of a movement: from start to end (s) the subject leaves and regains its standing; depth: 1 is
+    full."""
+
+    start_s: float
+    end_s: float
+    depth: float
+
+
+@dataclass(frozen=True)
+class Seat:
+    """A chair on a plate of its own: it pushes up, without friction, as much as keeps the feet's centre of
+    pressure from going behind ``feet_rear_x`` (m) on the floor at y = ``floor_m``.
+
+    segment: that sits; point: (3,) m in the ground frame where the seat pushes.
+    """
+
+    segment: str
+    point: Array
+    feet_rear_x: float
+    floor_m: float
+    plate: str = "plate 3"
+
+
+@dataclass(frozen=True)
+class Movement:
+    """Coordinates as functions of time that are at least twice differentiable.
+
+    Attributes:
+        name: of the motion, for the recording's name.
+        at: times (T,) s -> `Motion`; the same times give the same motion.
+        description: one sentence for the recording's notes.
+        repetitions: where they are known.
+        seat: what else than the feet carries the person.
+        end_s: last time at which it is known, None where it has no end.
+    """
+
+    name: str
+    at: Callable[[Array], Motion]
+    description: str = ""
+    repetitions: tuple[Repetition, ...] = ()
+    seat: Seat | None = None
+    end_s: float | None = None
+
+
+def in_order(names: Sequence[str], jets: Mapping[str, Jet]) -> Motion:
+    """Jets by coordinate as a motion with its coordinates in the order of ``names``."""
+    ordered = [jets[name] for name in names]
+    return Motion(
+        tuple(names),
+        np.stack([j.value for j in ordered], axis=1),
+        np.stack([j.rate for j in ordered], axis=1),
+        np.stack([j.second for j in ordered], axis=1),
+    )

@@ -1,0 +1,192 @@
+"""A simulated trial as files: what a laboratory would hand over, and beside it the truth."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from dynakin.recordings import Plate
+from dynakin.results.marker_file import write_trc
+from dynakin.results.output_folder import FolderKind, check_output_writable, replacing
+from dynakin.results.storage_file import write_storage
+from dynakin.results.versions import versions
+
+if TYPE_CHECKING:
+    from dynakin.simulation.trial import SimulatedTrial
+
+Array = NDArray[np.float64]
+
+SCHEMA_VERSION = 1
+
+
+def save_trial(trial: SimulatedTrial, folder: str | Path) -> Path:
+    """Write a trial into ``folder``: all files or none; one that holds an earlier trial is replaced.
+
+    Files: markers.trc (m) and forces.mot (each plate's force, point of application and free moment, laboratory
+    frame), which `dynakin.read` takes; truth_coordinates.mot, truth_speeds.sto, truth_accelerations.sto (degrees,
+    m), truth_moments.sto, truth_wrench.sto (N m, N; ground frame, about its origin); truth.json (settings,
+    parameters, marker places, faults); truth.nc (every array, labelled). The same trial gives the same bytes.
+
+    Raises:
+        OutputError: the folder cannot be written, or holds something that the simulator did not write.
+    """
+    folder = Path(folder).absolute()
+    with replacing(folder, kind=TRIAL) as made:
+        for name, write in _WRITERS.items():
+            write(trial, made / name)
+    return folder
+
+
+def check_trial_folder(folder: str | Path) -> None:
+    """Make sure, before anything is computed, that `save_trial` may write to ``folder``.
+
+    Raises:
+        OutputError: a file is in the way, or the folder holds something that the simulator did not write.
+    """
+    check_output_writable(folder, kind=TRIAL)
+
+
+def _write_markers(trial: SimulatedTrial, path: Path) -> None:
+    recording = trial.recording
+    write_trc(path, recording.time, list(recording.marker_names), recording.markers, unit=recording.length_unit)
+
+
+def _write_forces(trial: SimulatedTrial, path: Path) -> None:
+    """OpenSim's spelling, plates numbered from 1: ground_force_1_vx, ground_force_1_px, ground_torque_1_x."""
+    names, columns = [], []
+    for k, plate in enumerate(trial.recording.plates, start=1):
+        for stem, values in zip(
+            (f"ground_force_{k}_v", f"ground_force_{k}_p", f"ground_torque_{k}_"), _applied(plate), strict=True
+        ):
+            names += [f"{stem}{axis}" for axis in "xyz"]
+            columns.append(values)
+    write_storage(
+        path,
+        "Ground reaction forces",
+        trial.recording.time,
+        names,
+        np.hstack(columns),
+        in_degrees=False,
+        notes=["Ground on person, laboratory frame of the markers (X forward, Y up, Z right). N, m, N m."],
+    )
+
+
+def _applied(plate: Plate) -> tuple[Array, Array, Array]:
+    """Force, point of application and moment about that point, (T, 3) each; where the plate is unloaded the point
+    is its middle and the moment all that is left, so that the wrench stays what it is."""
+    assert plate.corners is not None  # every simulated plate has them
+    middle = plate.corners.mean(axis=0)
+    unloaded = np.isnan(plate.cop).any(axis=1, keepdims=True)
+    point = np.where(unloaded, middle, plate.cop)
+    return plate.force, point, np.where(unloaded, plate.moment - np.cross(point, plate.force), plate.free_moment)
+
+
+def _coordinate_writer(variable: str, title: str, unit: str) -> Callable[[SimulatedTrial, Path], None]:
+    def write(trial: SimulatedTrial, path: Path) -> None:
+        data = trial.truth.data
+        values = data[variable].transpose("time", "coordinate").values.copy()
+        rotation = _rotations(trial)
+        values[:, rotation] = np.degrees(values[:, rotation])
+        write_storage(
+            path,
+            title,
+            data["time"].values,
+            [str(name) for name in data["coordinate"].values],
+            values,
+            in_degrees=True,
+            notes=[f"Truth of {trial.recording.name}. Rotations in degrees{unit}, translations in metres{unit}."],
+        )
+
+    return write
+
+
+def _write_moments(trial: SimulatedTrial, path: Path) -> None:
+    data = trial.truth.data
+    kinds = ["moment" if turns else "force" for turns in _rotations(trial)]
+    names = [f"{name}_{kind}" for name, kind in zip(data["coordinate"].values, kinds, strict=True)]
+    notes = [f"Truth of {trial.recording.name}. Net joint moments in N m, forces in N."]
+    write_storage(
+        path,
+        "Inverse Dynamics Generalized Forces",
+        data["time"].values,
+        names,
+        data["moments"].values,
+        in_degrees=False,
+        notes=notes,
+    )
+
+
+def _write_wrench(trial: SimulatedTrial, path: Path) -> None:
+    data = trial.truth.data
+    notes = [f"Truth of {trial.recording.name}. Ground on person, N and N m about the ground origin, ground frame."]
+    names = [str(name) for name in data["component"].values]
+    write_storage(
+        path, "External wrench", data["time"].values, names, data["wrench"].values, in_degrees=False, notes=notes
+    )
+
+
+def _write_truth(trial: SimulatedTrial, path: Path) -> None:
+    truth = trial.truth
+    content: dict[str, Any] = {
+        "schema_version": SCHEMA_VERSION,
+        "versions": {"dynakin": versions()["dynakin"], "numpy": versions()["numpy"]},
+        "simulation": trial.settings,
+        "notes": list(trial.recording.notes),
+        "ground_origin_in_laboratory_m": truth.origin_L.tolist(),
+        "parameters": truth.parameters,
+        "markers": [
+            {"name": s.name, "segment": s.segment, "place_m": s.place.tolist(), "landmark": s.landmark}
+            for s in truth.sites
+        ],
+        "plates": {
+            name: {"gain": e.gain.tolist(), "drift_per_s": e.drift.tolist()}
+            for name, e in (truth.plate_errors or {}).items()
+        },
+        "repetitions": [asdict(r) for r in truth.repetitions],
+        "faults": [asdict(f) for f in truth.faults],
+    }
+    text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
+    path.write_text(text + "\n", encoding="utf-8", newline="\n")
+
+
+def _write_arrays(trial: SimulatedTrial, path: Path) -> None:
+    data = trial.truth.data.assign_attrs(
+        title=f"truth of {trial.recording.name}",
+        schema_version=SCHEMA_VERSION,
+        frame="ground frame: X forward, Y up, Z right; SI, radians",
+        ground_origin_in_laboratory_m=trial.truth.origin_L.tolist(),
+    )
+    encoding = {
+        name: {"zlib": True, "complevel": 4, "shuffle": True}
+        for name, variable in data.data_vars.items()
+        if variable.dtype.kind == "f" and variable.size > 1000
+    }
+    data.to_netcdf(path, engine="h5netcdf", encoding=encoding)
+
+
+def _rotations(trial: SimulatedTrial) -> NDArray[np.bool_]:
+    """Which coordinates are angles."""
+    lengths = {axis.coordinate for segment in trial.truth.tree for axis in segment.axes if axis.translation}
+    return np.array([str(name) not in lengths for name in trial.truth.data["coordinate"].values])
+
+
+_WRITERS: dict[str, Callable[[SimulatedTrial, Path], None]] = {
+    "markers.trc": _write_markers,
+    "forces.mot": _write_forces,
+    "truth_coordinates.mot": _coordinate_writer("coordinates", "Coordinates", ""),
+    "truth_speeds.sto": _coordinate_writer("speeds", "Speeds", " per second"),
+    "truth_accelerations.sto": _coordinate_writer("accelerations", "Accelerations", " per second squared"),
+    "truth_moments.sto": _write_moments,
+    "truth_wrench.sto": _write_wrench,
+    "truth.json": _write_truth,
+    "truth.nc": _write_arrays,
+}
+TRIAL_FILES = tuple(_WRITERS)
+"""Every file that `save_trial` writes."""
+TRIAL = FolderKind(TRIAL_FILES, "truth.json", "simulated trial")

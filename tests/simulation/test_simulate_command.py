@@ -1,0 +1,69 @@
+"""`dynakin simulate`: files, and one line for what is wrong."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from dynakin.cli import main
+from dynakin.simulation import TRIAL_FILES, SensorNoise, Spread, simulate
+
+
+def test_it_writes_what_the_api_writes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    options = "--model squat7 --motion sway --seed 3 --duration 4 --sensors laboratory --sensor plate_lag_s=0.01"
+    assert main(["simulate", *options.split(), "--spread", "0.5", "--sex", "mean", "-o", str(tmp_path / "cli")]) == 0
+    printed = " ".join(capsys.readouterr().out.split())
+    assert "Simulated squat7, seed 3: standing and swaying." in printed
+    assert "--model squat7 --mass 70 --height 1.75 -o OUT" in printed
+    noise = SensorNoise.laboratory().changed({"plate_lag_s": 0.01})
+    trial = simulate("squat7", "sway", 3, 4.0, sex=None, noise=noise, spread=Spread().times(0.5))
+    trial.save(tmp_path / "api")
+    for name in TRIAL_FILES:
+        assert (tmp_path / "cli" / name).read_bytes() == (tmp_path / "api" / name).read_bytes(), name
+
+
+def test_a_motion_from_its_own_truth(tmp_path: Path) -> None:
+    one, two = tmp_path / "one", tmp_path / "two"
+    assert main(["simulate", "--duration", "5", "-o", str(one)]) == 0
+    assert main(["simulate", "--motion", str(one / "truth_coordinates.mot"), "--seed", "8", "-o", str(two)]) == 0
+    content = json.loads((two / "truth.json").read_text())
+    assert content["simulation"]["duration_s"] == 5.0
+    assert "low-passed at 6 Hz" in content["notes"][0]
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (
+            ["--motion", "jump"],
+            "motion is 'jump', expected squat, sit-to-stand, sway or a .mot or .sto file that exists",
+        ),
+        (["--model", "full"], "model is 'full', expected sagittal7 or squat7"),
+        (["--sensor", "plate_lag_s"], "--sensor: found 'plate_lag_s', expected KEY=NUMBER"),
+        (["--sensor", "plate_lag_s=soon"], "--sensor: found 'plate_lag_s=soon'"),
+        (["--spread", "-1"], "the factor is -1, expected 0 or more"),
+        (["--mass", "0"], "mass_kg is 0, expected a positive number"),
+        (["--sex", "robot"], "sex is 'robot'"),
+        (["--duration", "0"], "duration_s is 0, expected a positive number"),
+        (["--seed", "-3"], "seed is -3"),
+    ],
+)
+def test_what_is_wrong_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], options: list[str], said: str
+) -> None:
+    assert main(["simulate", *options, "-o", str(tmp_path / "out")]) == 2
+    captured = capsys.readouterr()
+    assert captured.err.count("\n") == 1
+    assert captured.err.startswith("error: ")
+    assert said in captured.err
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_folder_of_somebody_elses_is_refused_before_anything_is_computed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "notes.txt").write_text("mine")
+    assert main(["simulate", "-o", str(tmp_path)]) == 2
+    assert "holds notes.txt" in capsys.readouterr().err
