@@ -22,6 +22,7 @@ from dynakin.units import length_factor
 _UNLABELLED = re.compile(r"^\*\d+$|^(unlabell?ed|uname)\W*\d*$", re.IGNORECASE)
 # POINT parameters that list what a model computed
 _COMPUTED = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
+_FASTEST_HZ = 1e5  # no camera comes near: a damaged rate
 
 
 def read_c3d(path: Path, options: ReadOptions | None = None) -> Recording:
@@ -32,36 +33,47 @@ def read_c3d(path: Path, options: ReadOptions | None = None) -> Recording:
     model computed (angles, moments, ...) are left out, and the notes say so.
 
     Raises:
-        RecordingError: no such file, not a C3D, truncated, no or unknown length unit, no points, a plate type
-            other than 1 to 4.
+        RecordingError: no such file, not a C3D, truncated or damaged, no or unknown length unit, no points, a plate
+            type other than 1 to 4.
     """
     path = Path(path)
-    check_c3d_file(path)
+    layout_notes = check_c3d_file(path)
     try:
         data: Any = ezc3d.c3d(str(path))
     except Exception as error:  # ezc3d raises whatever its C++ throws
         raise RecordingError(f"{path}: cannot be read as C3D ({' '.join(str(error).split())})") from error
+    try:
+        return _recording(data, path, options or ReadOptions(), layout_notes)
+    except RecordingError:
+        raise
+    except (ArithmeticError, LookupError, MemoryError, TypeError, ValueError) as error:
+        # What the checks let through: numbers in the parameters that no calculation can use.
+        found = " ".join(f"{type(error).__name__}: {error}".split())
+        raise RecordingError(f"{path}: the C3D's parameters contradict each other ({found})") from error
+
+
+def _recording(data: Any, path: Path, options: ReadOptions, notes: list[str]) -> Recording:
     parameters = Parameters(data["parameters"])
     rate = parameters.number("POINT", "RATE") or float(data["header"]["points"]["frame_rate"])
-    if not rate > 0:
-        raise RecordingError(f"{path}: found point rate {rate:g} Hz, expected more than 0")
+    if not 0 < rate < _FASTEST_HZ:
+        raise RecordingError(f"{path}: found point rate {rate:g} Hz, expected more than 0, less than {_FASTEST_HZ:g}")
     factor, unit = _unit(parameters, path)
 
     points = np.asarray(data["data"]["points"], dtype=float)[:3]  # (3, N, T)
     residual = np.asarray(data["data"]["meta_points"]["residuals"], dtype=float)[0]  # (N, T)
     points[:, residual < 0] = np.nan
-    keep, names, notes = _markers(parameters, points.shape[1], path)
+    keep, names, point_notes = _markers(parameters, points.shape[1], path)
     frames = points.shape[2]
     if frames == 0 or not names:
         raise RecordingError(f"{path}: found {frames} frames of {len(names)} labelled markers, expected some")
     markers, marker_notes = clean_markers(names, np.moveaxis(points[:, keep], 0, -1).swapaxes(0, 1) * factor)
     first = int(data["header"]["points"]["first_frame"])
     if first:
-        notes.append(f"Time 0 is frame {first + 1} of the capture ({first / rate:.4g} s after its start).")
+        point_notes.append(f"Time 0 is frame {first + 1} of the capture ({first / rate:.4g} s after its start).")
 
     analog = np.asarray(data["data"]["analogs"], dtype=float)[0]  # (channels, samples)
     time = np.arange(frames) / rate
-    plates, plate_notes = read_plates(parameters, analog, time, markers, unit, path, options or ReadOptions())
+    plates, plate_notes = read_plates(parameters, analog, time, markers, unit, path, options)
     return Recording(
         name=path.stem,
         path=path,
@@ -70,7 +82,7 @@ def read_c3d(path: Path, options: ReadOptions | None = None) -> Recording:
         markers=markers,
         plates=plates,
         length_unit=unit,
-        notes=tuple(notes + marker_notes + plate_notes),
+        notes=tuple(notes + point_notes + marker_notes + plate_notes),
         subject=_subject(parameters),
         hints={key: word for key in ("X_SCREEN", "Y_SCREEN") if (word := parameters.text("POINT", key))},
     )

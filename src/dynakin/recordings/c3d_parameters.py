@@ -35,6 +35,10 @@ class Parameters:
         except (TypeError, ValueError):
             return np.empty(0)
 
+    def integers(self, group: str, name: str) -> npt.NDArray[np.int64]:
+        """As ``array``, cut to whole numbers; -1 where a value is not finite (counts and types are never negative)."""
+        return np.clip(np.nan_to_num(self.array(group, name), nan=-1, posinf=-1, neginf=-1), -1e9, 1e9).astype(np.int64)
+
     def number(self, group: str, name: str) -> float | None:
         """First value as a number, None where there is none."""
         values = self.array(group, name).ravel()
@@ -47,10 +51,19 @@ class Parameters:
             value = self._groups.get(group, {}).get(name + suffix)
             if value is None:
                 break
-            texts += [str(text).strip() for text in np.ravel(np.asarray(value, dtype=object))]
+            texts += [_printable(str(text)).strip() for text in np.ravel(np.asarray(value, dtype=object))]
         return texts
 
     def text(self, group: str, name: str) -> str:
         """First text, "" where there is none."""
         texts = self.texts(group, name)
         return texts[0] if texts else ""
+
+
+def _printable(text: str) -> str:
+    """A text that is not UTF-8 comes with its bytes as lone surrogates, which nothing can print: Latin-1 then."""
+    try:
+        text.encode()
+    except UnicodeEncodeError:
+        return text.encode("utf-8", "surrogateescape").decode("latin-1")
+    return text

@@ -59,7 +59,9 @@ def read_plates(
     Raises:
         RecordingError: a plate of another type than 1 to 4, or parameters missing.
     """
-    count = int(parameters.number("FORCE_PLATFORM", "USED") or 0)
+    count = int(next(iter(parameters.integers("FORCE_PLATFORM", "USED").ravel()), 0))
+    if count < 0:
+        raise RecordingError(f"{path}: found {count} plates in FORCE_PLATFORM:USED, expected 0 or more")
     if count == 0:
         return (), ["The file has no force plates."]
     per_frame, odd = divmod(analog.shape[1], len(time))
@@ -104,13 +106,13 @@ def _raw(
     length_unit: Literal["mm", "m"],
     path: Path,
 ) -> _Raw:
-    types = parameters.array("FORCE_PLATFORM", "TYPE").ravel()
+    types = parameters.integers("FORCE_PLATFORM", "TYPE").ravel()
     kind = int(types[k]) if k < len(types) else 0
     if kind not in (1, 2, 3, 4):
         raise RecordingError(f"{path}: {name} has type {kind}, expected a force plate of type 1 to 4")
     wanted = 8 if kind == 3 else 6
-    listed = parameters.array("FORCE_PLATFORM", "CHANNEL")
-    per_plate = listed.reshape(listed.shape[0], -1) if listed.size else np.empty((0, 0))
+    listed = parameters.integers("FORCE_PLATFORM", "CHANNEL")
+    per_plate = listed.reshape(listed.shape[0], -1) if listed.size else listed.reshape(0, 0)
     channels = [int(number) - 1 for number in per_plate[:wanted, k]] if k < per_plate.shape[1] else []
     if len(channels) < wanted or min(channels) < 0 or max(channels) >= len(analog):
         numbers = [channel + 1 for channel in channels]
