@@ -11,6 +11,7 @@ import typer
 
 import dynakin
 from dynakin.cli.check import check
+from dynakin.cli.compare import compare
 from dynakin.cli.console import print_error
 from dynakin.cli.demo import demo
 from dynakin.cli.model import model
@@ -30,7 +31,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (run, demo, simulate, check, model):
+for command in (run, demo, compare, simulate, check, model):
     app.command()(command)
 app.command("print-config")(print_config)
 

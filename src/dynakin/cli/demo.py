@@ -1,4 +1,4 @@
-"""`dynakin demo`: a simulated squat whose truth is known, estimated and compared with it."""
+"""`dynakin demo`: a simulated squat whose truth is known, estimated and compared with it and with other methods."""
 
 from __future__ import annotations
 
@@ -8,16 +8,21 @@ from typing import TYPE_CHECKING, Annotated
 
 import numpy as np
 import typer
+import xarray as xr
 from rich.table import Table
 
 from dynakin.cli.console import busy, out, progress_bar, table
 from dynakin.cli.summary import print_summary
+from dynakin.comparison.truth import FIGURES, truth_errors
 from dynakin.filter import Estimator, presets
 from dynakin.model import Subject, load_model
 from dynakin.results import Estimate, check_output_writable, evaluation_window
 
 if TYPE_CHECKING:
+    from dynakin.reference.methods import Lengths
     from dynakin.simulation import Truth
+
+LEG = ("ankle", "knee", "hip")
 
 
 def demo(
@@ -25,8 +30,9 @@ def demo(
     seed: Annotated[int, typer.Option(min=0, help="Of everything that is drawn at random.")] = 1,
     duration: Annotated[float, typer.Option(help="Length of the simulated trial, s.")] = 20.0,
 ) -> None:
-    """Simulate a squat, estimate it, and compare the estimate with the truth."""
-    from dynakin.simulation import simulate_squat  # no other command needs it
+    """Simulate a squat, estimate it, and compare the estimate and the reference methods with the truth."""
+    from dynakin.reference import reference_methods  # no other command needs these
+    from dynakin.simulation import simulate_squat
 
     check_output_writable(output)
     trial = simulate_squat(seed=seed, duration_s=duration)
@@ -34,20 +40,41 @@ def demo(
     subject = Subject(mass_kg=who.mass_kg, height_m=who.height_m, sex=who.sex)
     model = load_model("sagittal7", subject, markers="opencap")
     with progress_bar("estimating") as progress:
-        estimate = Estimator(model, presets.paper()).run(trial.recording, progress=progress)
+        estimator = Estimator(model, presets.paper())
+        estimate = estimator.run(trial.recording, progress=progress)
+    assert estimator.initial is not None
+    methods = {"EKF (paper)": estimate.data}
+    options: tuple[tuple[Lengths, str], ...] = (("constant", "AT (6 Hz)"), ("frame", "classical (6 Hz)"))
+    for lengths, title in options:
+        reference = reference_methods(trial.recording, estimator.initial, model, lengths=lengths)
+        methods[title] = reference.data
     demo_config = {"trial": trial.recording.name, "preset": "paper", "seed": seed, "duration_s": duration}
     estimate = replace(estimate, config=demo_config | estimate.config)
     with busy("writing results and report"):
         folder = estimate.save(output)
     console = out()
+    console.print(methods_by_error(methods, estimate, trial.truth))
     console.print(compared_with_truth(estimate, trial.truth))
     console.print(
-        "The truth comes from a simulation with soft-tissue motion and sensor noise that shares no code with the "
-        "filter. A small distance to the markers does not make angles and moments right: compare the two tables.",
+        "AT: classical angles, low-passed and differentiated, with the table's inertia and constant lengths; "
+        "classical: the same with joints that follow their landmarks. Moments: ankle, knee and hip. "
+        "The truth comes from a simulation with soft-tissue motion and sensor noise that shares no code with the filter. "
+        "A small distance to markers and plates does not make angles, speeds and moments right.",
         style="dim",
     )
     console.print()
     print_summary(estimate, folder)
+
+
+def methods_by_error(methods: dict[str, xr.Dataset], estimate: Estimate, truth: Truth) -> Table:
+    """RMS errors of each method against the simulation's truth, after the adaptation."""
+    window = evaluation_window(estimate.time)
+    columns = tuple(range(1, 1 + len(methods)))
+    rows = table("", *methods, numbers=columns, title="Methods by RMS error against the truth")
+    errors = [truth_errors(name, data, truth.data, window, LEG).values for name, data in methods.items()]
+    for (title, unit), values in zip(FIGURES, zip(*errors, strict=True), strict=True):
+        rows.add_row(f"{title}, {unit}", *(f"{value:.0f}" if value >= 10.0 else f"{value:.2g}" for value in values))
+    return rows
 
 
 def compared_with_truth(estimate: Estimate, truth: Truth) -> Table:
@@ -59,7 +86,7 @@ def compared_with_truth(estimate: Estimate, truth: Truth) -> Table:
         "speed, deg/s",
         "moment, N m",
         numbers=(1, 2, 3),
-        title="RMS error against the truth",
+        title="EKF (paper) by coordinate: RMS error against the truth",
     )
     for name in estimate.coordinate_names:
         errors = [_rms(estimate, truth, variable, name, window) for variable in ("coordinates", "speeds", "moments")]

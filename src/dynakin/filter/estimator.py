@@ -115,12 +115,34 @@ class Estimator:
             priors=self.priors,
             bounds=self.bounds,
         )
+        return self.start_from(initial)
+
+    def start_from(self, initial: InitialModel) -> InitialModel:
+        """Make the filter ready to step from a model that was measured before, or changed since."""
         self._core_model = _core.Model(initial.spec)
         self._filter = _core.Filter(
             self._core_model, self.filter_settings(initial), initial.x0, np.diag(initial.sd0**2)
         )
         self.initial, self._time = initial, None
         return initial
+
+    def run_arrays(self, time: Array, markers: Array, wrench: Array) -> dict[str, Array]:
+        """Run over arrays after `start` or `start_from`, which it needs anew before another run.
+
+        Args:
+            time: (T,) s. markers: (T, M, 3) m, ground frame, in the order of the model's markers. wrench: (T, 6) N and
+                N m, ground on person, about the ground origin. NaN: not measured.
+
+        Returns:
+            Arrays by name, as `_core.Filter.run` gives them.
+
+        Raises:
+            DivergenceError: the filter lost its estimate; the message names the frame.
+        """
+        if self._filter is None:
+            raise ConfigError("run_arrays: the estimator has not been started; call start or start_from first")
+        self._time = float(time[-1])
+        return self._filter.run(*(np.ascontiguousarray(values) for values in (time, markers, wrench)))
 
     def step(self, sample: Sample) -> StepEstimate:
         """Take one sample, after `start`; samples come in the order of their times.

@@ -1,0 +1,219 @@
+"""`dynakin compare`: filters, the table and the classical method beside each other, judged by what was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.padding import Padding
+
+from dynakin.cli.compare_inputs import Case, cases_of, chosen_trials, halves_of
+from dynakin.cli.compare_tables import angle_table, moment_table, table2_table, unseen_table
+from dynakin.cli.console import busy, out, progress_bar
+from dynakin.cli.options import (
+    ForceThreshold,
+    Forward,
+    Height,
+    Markers,
+    Mass,
+    PlateFilter,
+    Sex,
+    Side,
+    Static,
+    TableName,
+    Vertical,
+)
+from dynakin.cli.run import forward_direction
+from dynakin.comparison import (
+    HORIZON_S,
+    Trial,
+    after_adaptation,
+    angle_differences,
+    check_comparison_folder,
+    compare_trial,
+    curves,
+    identify_on,
+    judge,
+    merged,
+    moment_differences,
+    predict_blind,
+    save_comparison,
+    table2,
+    unseen,
+    unseen_figures,
+)
+from dynakin.reference import CUTOFF_HZ
+
+HORIZON_MS = 1000.0 * HORIZON_S
+
+
+def compare(
+    trials: Annotated[
+        list[Path] | None, typer.Argument(metavar="TRIAL...", help="Recordings, or a configuration (.toml) for each.")
+    ] = None,
+    forces: Annotated[list[Path] | None, typer.Option("--forces", help="Ground forces, one a trial, in order.")] = None,
+    model: Annotated[str | None, typer.Option(help="Model: squat7, sagittal7 or a .toml file.")] = None,
+    markers: Markers = None,
+    static: Static = None,
+    mass: Mass = None,
+    height: Height = None,
+    sex: Sex = None,
+    preset: Annotated[list[str] | None, typer.Option(help="Noise settings: paper. May be repeated.")] = None,
+    cutoff: Annotated[float, typer.Option("--cutoff-hz", help="Low-pass of AT and classical, Hz.")] = CUTOFF_HZ,
+    side: Side = None,
+    vertical: Vertical = None,
+    forward: Forward = None,
+    table: TableName = None,
+    plate_filter: PlateFilter = None,
+    force_threshold: ForceThreshold = None,
+    halved: Annotated[
+        bool, typer.Option("--halves", help="Identify on each trial's first half, judge on its second.")
+    ] = False,
+    identify_trial: Annotated[Path | None, typer.Option("--identify-on", help="Trial to identify on.")] = None,
+    test_trial: Annotated[Path | None, typer.Option("--test-on", help="Trial to judge on, from markers alone.")] = None,
+    not_seen: Annotated[
+        bool, typer.Option("--unseen", help="Plates withheld, markers left out one by one, and ahead of time.")
+    ] = False,
+    horizon: Annotated[float, typer.Option("--horizon-ms", help="How far ahead --unseen looks, ms.")] = HORIZON_MS,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder for tables and curves.")] = None,
+) -> None:
+    """Compare the filter with the table and the classical method, over one or many trials (the paper's Table II)."""
+    if output is not None:
+        check_comparison_folder(output)
+    given = {
+        "model": model,
+        "markers": markers,
+        "static": static,
+        "mass_kg": mass,
+        "height_m": height,
+        "sex": sex,
+        "side": side,
+        "vertical": vertical,
+        "forward": forward_direction(forward),
+        "table": table,
+        "plate_filter_hz": plate_filter,
+        "force_threshold_n": force_threshold,
+    }
+    chosen = chosen_trials(trials or [], identify_trial, test_trial, halved or not_seen)
+    cases = cases_of(chosen, forces or [], preset or [], cutoff, given)
+    console = out()
+    tables: dict[str, Sequence[Any]] = {}
+    more: dict[str, Any] = {"settings": settings_of(cases)}
+    if identify_trial is not None:
+        tables |= print_held_out(console, [(cases[0], cases[1], False)])
+    else:
+        compared = compare_cases(cases)
+        tables |= print_comparison(console, compared)
+        if halved:
+            tables |= print_held_out(console, [(*halves_of(case), True) for case in cases])
+        if not_seen:
+            tables |= print_unseen(console, cases, horizon)
+        tables |= print_repetitions(console, compared)
+        more["trials"] = [told(trial) for trial in compared]
+    if output is not None:
+        save_comparison(output, tables, more)
+        console.print(f"Tables  {output}", soft_wrap=True)
+
+
+def compare_cases(cases: Sequence[Case]) -> list[Trial]:
+    """All methods on all trials."""
+    compared = []
+    for case in cases:
+        with progress_bar(case.recording.name) as progress:
+            compared.append(compare_trial(case.recording, case.setup, static=case.static, progress=progress))
+    return compared
+
+
+def print_comparison(console: Console, compared: Sequence[Trial]) -> dict[str, Sequence[Any]]:
+    """Table II, angles and moments on screen; the rows by the name of their file."""
+    rows, angles, moments = table2(compared), angle_differences(compared), moment_differences(compared)
+    first = compared[0]
+    if len(compared) == 1:
+        seconds = first.time[first.window]
+        title = f"{first.name}: {seconds[0]:g} to {seconds[-1]:g} s"
+    else:
+        title = f"{len(compared)} trials, mean ± standard deviation, each after its adaptation"
+    console.print(table2_table(rows, title))
+    if angles:
+        console.print(angle_table(angles))
+    if moments:
+        console.print(moment_table(moments))
+    for trial in compared:
+        for note in trial.notes:
+            text = note if len(compared) == 1 else f"{trial.name}: {note}"
+            console.print(Padding(text, (0, 0, 0, 2)), style="dim")
+    return {"table2": rows, "angles": angles, "moments": moments}
+
+
+def print_held_out(console: Console, pairs: Sequence[tuple[Case, Case, bool]]) -> dict[str, Sequence[Any]]:
+    """Identified on one, judged on the other; (identifying, judging, of one recording) each."""
+    tables = []
+    for learning, judging, same in pairs:
+        with busy(f"{judging.recording.name}: judging what was identified"):
+            identified = identify_on(learning.recording, learning.setup, static=learning.static, same_recording=same)
+            blind = predict_blind(identified, judging.recording)
+            tables.append(judge(blind, judging.recording))
+    names = f"{pairs[0][0].recording.name} -> {pairs[0][1].recording.name}"
+    title = f"Identified -> judged from markers alone: {names if len(pairs) == 1 else f'{len(pairs)} trials'}"
+    rows = merged(tables)
+    console.print(table2_table(rows, title))
+    for note in blind.notes:
+        console.print(Padding(note, (0, 0, 0, 2)), style="dim")
+    return {"held_out": rows}
+
+
+def print_unseen(console: Console, cases: Sequence[Case], horizon_ms: float) -> dict[str, Sequence[Any]]:
+    """What no filter could follow, because it was not given."""
+    figures = []
+    for case in cases:
+        with progress_bar(f"{case.recording.name}: leaving markers out") as progress:
+            figures.append(
+                unseen_figures(
+                    case.recording,
+                    case.setup,
+                    static=case.static,
+                    horizon_s=horizon_ms / 1000.0,
+                    progress=progress,
+                )
+            )
+    rows = unseen(figures)
+    console.print(unseen_table(rows))
+    return {"unseen": rows}
+
+
+def print_repetitions(console: Console, compared: Sequence[Trial]) -> dict[str, Sequence[Any]]:
+    """How many squats were found; their mean curves are for the file."""
+    rows = []
+    for trial in compared:
+        found = after_adaptation(trial)
+        rows += curves(trial, found)
+        times = ", ".join(f"{r.start_s:.1f} to {r.end_s:.1f} s" for r in found)
+        console.print(f"{trial.name}: {len(found)} squats after the adaptation" + (f" ({times})" if found else ""))
+    return {"repetitions": rows}
+
+
+def settings_of(cases: Sequence[Case]) -> list[dict[str, Any]]:
+    """The configuration of each trial as used."""
+    return [
+        case.config.as_used()
+        | {"output": None, "cutoff_hz": case.setup.cutoff_hz}
+        | {"presets": {name: noise.model_dump(mode="json") for name, noise in case.setup.noise.items()}}
+        for case in cases
+    ]
+
+
+def told(trial: Trial) -> dict[str, Any]:
+    """What is written of a trial beside its figures."""
+    seconds = trial.time[trial.window]
+    return {
+        "name": trial.name,
+        "window": {"start_s": float(seconds[0]), "end_s": float(seconds[-1])},
+        "mass_kg": trial.mass_kg,
+        "methods": [method.name for method in trial.methods],
+        "repetitions": [asdict(repetition) for repetition in after_adaptation(trial)],
+        "notes": list(trial.notes),
+    }

@@ -1,0 +1,50 @@
+"""What a comparison is made with: the model, the noise presets beside each other, and the reference's cut-off."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from dynakin.errors import ConfigError
+from dynakin.filter import Estimator, Noise, presets
+from dynakin.model import Bounds, ModelDefinition, Priors
+from dynakin.reference import CUTOFF_HZ
+
+
+@dataclass(frozen=True, eq=False)
+class Setup:
+    """How every trial of a comparison is worked on.
+
+    Attributes:
+        definition: what `load_model` returns.
+        noise: settings of each filter that is compared, by the name of its preset.
+        cutoff_hz: of the reference methods' zero-lag low-pass, Hz.
+        priors, bounds, side, vertical, forward: as `Estimator` takes them.
+    """
+
+    definition: ModelDefinition
+    noise: Mapping[str, Noise] = field(default_factory=lambda: {"paper": presets.paper()})
+    cutoff_hz: float = CUTOFF_HZ
+    priors: Priors | None = None
+    bounds: Bounds | None = None
+    side: str = "auto"
+    vertical: str = "auto"
+    forward: str | tuple[float, float, float] = "auto"
+
+    def __post_init__(self) -> None:
+        if not self.noise:
+            raise ConfigError("comparison: no preset was given, expected at least one")
+        if not self.cutoff_hz > 0.0:
+            raise ConfigError(f"comparison: the cut-off is {self.cutoff_hz:g} Hz, expected a positive number")
+
+    def estimator(self, preset: str) -> Estimator:
+        """A filter with the noise of one of the presets, not started yet."""
+        return Estimator(
+            self.definition,
+            self.noise[preset],
+            priors=self.priors,
+            bounds=self.bounds,
+            side=self.side,
+            vertical=self.vertical,
+            forward=self.forward,
+        )

@@ -1,0 +1,115 @@
+"""`dynakin compare` as a user calls it, on a short simulated trial."""
+
+from __future__ import annotations
+
+import csv
+import json
+from pathlib import Path
+
+import pytest
+
+from dynakin.cli import main
+from dynakin.simulation import save_trial, simulate_squat
+
+Said = pytest.CaptureFixture[str]
+
+
+@pytest.fixture(scope="module")
+def trial(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """Arguments that name a trial of 10 s and how it is worked on."""
+    folder = tmp_path_factory.mktemp("trial") / "squat"
+    save_trial(simulate_squat(seed=4, duration_s=10.0, mass_kg=70.0), folder)
+    return [str(folder / "markers.trc"), "--forces", str(folder / "forces.mot")]
+
+
+SUBJECT = ["--model", "sagittal7", "--markers", "opencap", "--mass", "70", "--height", "1.75", "--sex", "male"]
+
+
+def rows_of(path: Path) -> list[dict[str, str]]:
+    with path.open() as file:
+        return list(csv.DictReader(file))
+
+
+def test_one_trial_gives_table_ii_on_screen_and_as_files(trial: list[str], tmp_path: Path, capsys: Said) -> None:
+    out = tmp_path / "comparison"
+    assert main(["compare", *trial, *SUBJECT, "-o", str(out)]) == 0
+    told = capsys.readouterr().out
+    for word in ("EKF (paper)", "AT (6 Hz)", "classical (6 Hz)", "FY", "N m", "knee", "squats after the adaptation"):
+        assert word in told
+    rows = rows_of(out / "table2.csv")
+    assert {row["quantity"] for row in rows} >= {"markers", "fx", "fy", "mz", "r_knee"}
+    summary = json.loads((out / "comparison.json").read_text())
+    assert summary["schema_version"] == 1 and summary["trials"][0]["window"]["start_s"] == 2.0
+    assert float(rows[0]["rms"]) == summary["table2"][0]["rms"]
+    curves = rows_of(out / "repetitions.csv")
+    assert len(curves) % 101 == 0 and {row["quantity"] for row in curves} >= {"knee", "knee/moment", "fy"}
+    assert not (out / "held_out.csv").exists()
+
+
+def test_many_trials_give_mean_and_deviation(trial: list[str], tmp_path: Path, capsys: Said) -> None:
+    markers, _, forces = trial
+    out = tmp_path / "comparison"
+    both = [markers, markers, "--forces", forces, "--forces", forces]
+    assert main(["compare", *both, *SUBJECT, "--cutoff-hz", "8", "-o", str(out)]) == 0
+    assert "2 trials, mean ± standard deviation" in capsys.readouterr().out
+    row = rows_of(out / "table2.csv")[0]
+    assert row["n"] == "2" and float(row["rms_sd"]) == 0.0  # the same trial twice
+    assert any(row["method"] == "AT (8 Hz)" for row in rows_of(out / "table2.csv"))
+
+
+def test_halves_and_unseen_stand_beside_persistence(trial: list[str], tmp_path: Path, capsys: Said) -> None:
+    out = tmp_path / "comparison"
+    assert main(["compare", *trial, *SUBJECT, "--halves", "--unseen", "--horizon-ms", "50", "-o", str(out)]) == 0
+    told = capsys.readouterr().out
+    assert "markers, second half" in " ".join(told.split()) and "50 ms ahead" in told
+    assert {row["method"] for row in rows_of(out / "held_out.csv")} >= {"EKF (paper), table", "persistence: mean"}
+    yardsticks = {row["yardstick"] for row in rows_of(out / "unseen.csv")}
+    assert yardsticks == {"plates withheld", "marker left out", "50 ms ahead"}
+
+
+def test_identified_on_one_trial_and_judged_on_another(trial: list[str], tmp_path: Path, capsys: Said) -> None:
+    folder = tmp_path / "other"
+    save_trial(simulate_squat(seed=4, duration_s=9.0, mass_kg=70.0), folder)
+    pair = ["--identify-on", trial[0], "--test-on", str(folder / "markers.trc")]
+    forces = ["--forces", trial[2], "--forces", str(folder / "forces.mot")]
+    assert main(["compare", *pair, *forces, *SUBJECT, "-o", str(tmp_path / "out")]) == 0
+    assert "judged from markers alone" in capsys.readouterr().out
+    rows = rows_of(tmp_path / "out" / "held_out.csv")
+    assert {row["quantity"] for row in rows} == {"fx", "fy", "mz"}
+
+
+def test_a_configuration_may_stand_for_a_trial(trial: list[str], tmp_path: Path) -> None:
+    config = tmp_path / "squat.toml"
+    lines = [f'trial = "{trial[0]}"', f'forces = "{trial[2]}"', 'model = "sagittal7"', 'markers = "opencap"']
+    config.write_text("\n".join([*lines, "mass_kg = 70.0"]))
+    assert main(["compare", str(config)]) == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["compare"], "no trial was given"),
+        (["compare", "{trial}"], "model is missing"),
+        (["compare", "{trial}", "--model", "sagittal7"], "no force plates"),
+        (["compare", "{trial}", "{trial}", "--forces", "{forces}", "--model", "sagittal7"], "given once for 2 trials"),
+        (["compare", "--identify-on", "{trial}", "--model", "sagittal7"], "--test-on is missing"),
+        (["compare", "{trial}", "--identify-on", "{trial}", "--test-on", "{trial}"], "stands alone"),
+        (["compare", "{trial}", "--model", "sagittal7", "--preset", "best"], "preset 'best' is unknown"),
+        (["compare", "{trial}", "--model", "sagittal7", "--cutoff-hz", "0"], "cut-off is 0 Hz"),
+        (["compare", "{trial}", "--forces", "{forces}", *SUBJECT, "--unseen", "--horizon-ms", "0"], "horizon is 0 s"),
+        (["compare", "no.c3d", "--model", "sagittal7"], "no.c3d"),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line(arguments: list[str], expected: str, trial: list[str], capsys: Said) -> None:
+    known = {"{trial}": trial[0], "{forces}": trial[2]}
+    assert main([known.get(word, word) for word in arguments]) == 2
+    said = capsys.readouterr().err
+    assert said.startswith("error: ") and said.count("\n") == 1
+    assert expected in said
+
+
+def test_a_folder_of_somebody_else_is_left_alone(trial: list[str], tmp_path: Path, capsys: Said) -> None:
+    (tmp_path / "thesis.txt").write_text("mine")
+    assert main(["compare", *trial, *SUBJECT, "-o", str(tmp_path)]) == 2
+    assert "thesis.txt" in capsys.readouterr().err
+    assert [entry.name for entry in tmp_path.iterdir()] == ["thesis.txt"]

@@ -1,0 +1,25 @@
+"""A simulated trial and its comparison, made once."""
+
+from __future__ import annotations
+
+import pytest
+
+import dynakin
+from dynakin.comparison import Setup, Trial, compare_trial
+from dynakin.simulation import SimulatedTrial, simulate_squat
+
+
+@pytest.fixture(scope="session")
+def simulated() -> SimulatedTrial:
+    return simulate_squat(seed=3, duration_s=12.0, mass_kg=70.0)
+
+
+@pytest.fixture(scope="session")
+def setup() -> Setup:
+    subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
+    return Setup(dynakin.load_model("sagittal7", subject, markers="opencap"))
+
+
+@pytest.fixture(scope="session")
+def compared(simulated: SimulatedTrial, setup: Setup) -> Trial:
+    return compare_trial(simulated.recording, setup)

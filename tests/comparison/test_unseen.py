@@ -1,0 +1,77 @@
+"""Yardsticks that following cannot satisfy."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dynakin.comparison import Setup, unseen, unseen_figures
+from dynakin.comparison.extrapolation import extrapolated, held, line, persisted
+from dynakin.errors import ConfigError, RecordingError
+from dynakin.filter import Noise
+from dynakin.simulation import SensorNoise, SimulatedTrial, simulate_squat
+
+
+def test_a_straight_line_is_extrapolated_exactly_and_persistence_lags_by_the_span() -> None:
+    time = np.arange(50) / 100.0
+    signal = (3.0 + 2.0 * time)[:, None] * np.array([1.0, -1.0])
+    ahead, before = extrapolated(time, signal, 10), persisted(signal, 10)
+    assert np.isnan(ahead[:11]).all() and np.isnan(before[:10]).all()
+    assert np.allclose(ahead[11:], signal[11:])
+    assert np.allclose(signal[10:] - before[10:], [0.2, -0.2])
+    assert np.allclose(line(time, signal, 20), signal)
+    assert np.array_equal(held(signal, 20), np.repeat(signal[20:21], 50, axis=0))
+
+
+def test_what_is_held_is_the_last_value_that_was_seen() -> None:
+    signal = np.array([[1.0], [2.0], [np.nan], [np.nan], [5.0]])
+    assert np.array_equal(held(signal, 3), np.full((5, 1), 2.0))
+
+
+def test_rows_hold_every_yardstick_beside_what_raw_data_foretell(simulated: SimulatedTrial, setup: Setup) -> None:
+    rows = unseen([unseen_figures(simulated.recording, setup)])
+    methods = {"EKF (paper)", "persistence", "linear extrapolation"}
+    for yardstick in ("plates withheld", "marker left out", "100 ms ahead"):
+        assert {row.method for row in rows if row.yardstick == yardstick} == methods
+    assert all(row.rms.mean is not None and row.rms.mean > 0.0 for row in rows)
+    assert {row.quantity for row in rows if row.yardstick == "plates withheld"} == {"fx", "fy", "mz"}
+    left_out = [row for row in rows if row.yardstick == "marker left out" and row.method == "persistence"]
+    assert left_out[0].quantity == "markers"
+    assert left_out[0].rms.mean == pytest.approx(np.mean([row.rms.mean for row in left_out[1:]]))
+
+
+def test_a_marker_left_out_is_predicted_by_the_others_alone(simulated: SimulatedTrial, setup: Setup) -> None:
+    recording = simulated.recording
+    name = "r_thigh2"
+    column = recording.marker_names.index(name)
+    moved = recording.markers.copy()
+    moved[recording.time > 3.0, column] += 0.5  # m; nobody can foretell it, so it must all be error
+    both = [unseen_figures(r, setup) for r in (recording, replace(recording, markers=moved))]
+    honest, shifted = (figures["marker left out", name, "EKF (paper)"] for figures in both)
+    assert honest is not None and honest < 60.0
+    assert shifted is not None and shifted > 400.0
+
+
+def test_a_filter_whose_noise_fits_foretells_what_the_paper_s_gains_do_not(setup: Setup) -> None:
+    trial = simulate_squat(seed=2, duration_s=8.0, mass_kg=70.0, noise=SensorNoise.none())
+    # The same noise of the accelerations as the paper's, but coordinates and speeds that follow from them.
+    smooth = Noise(coordinate=1e-10, speed=1e-8, acceleration=1e3, marker_place=1e-8, force=100.0, moment=100.0)
+    figures = unseen_figures(trial.recording, replace(setup, noise={**setup.noise, "smooth": smooth}))
+    for yardstick, quantity in (
+        ("100 ms ahead", "markers"),
+        ("marker left out", "markers"),
+        ("plates withheld", "fy"),
+    ):
+        of = {m: figures[yardstick, quantity, m] for m in ("EKF (smooth)", "EKF (paper)", "persistence")}
+        assert of["EKF (smooth)"] < 0.3 * of["persistence"], yardstick  # type: ignore[operator]
+        assert of["EKF (smooth)"] < 0.7 * of["EKF (paper)"], yardstick  # type: ignore[operator]
+    assert figures["100 ms ahead", "markers", "EKF (paper)"] > figures["100 ms ahead", "markers", "persistence"]  # type: ignore[operator]
+
+
+def test_what_cannot_be_judged_is_refused(simulated: SimulatedTrial, setup: Setup) -> None:
+    with pytest.raises(ConfigError, match="horizon is 20 s"):
+        unseen_figures(simulated.recording, setup, horizon_s=20.0)
+    with pytest.raises(RecordingError, match="too short to leave a marker out"):
+        unseen_figures(simulated.recording.window(0.0, 3.0), setup)
