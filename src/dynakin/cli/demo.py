@@ -58,7 +58,7 @@ def demo(
     console.print(
         "AT: classical angles, low-passed and differentiated, with the table's inertia and constant lengths; "
         "classical: the same with joints that follow their landmarks. Moments: ankle, knee and hip. "
-        "The truth comes from a simulation with soft-tissue motion and sensor noise that shares no code with the filter. "
+        "The truth comes from a simulation with soft tissue and sensor noise that shares no code with the filter. "
         "A small distance to markers and plates does not make angles, speeds and moments right.",
         style="dim",
     )
