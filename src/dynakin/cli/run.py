@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from dynakin.cli.console import busy, progress_bar
+from dynakin.cli.console import busy, out, progress_bar
 from dynakin.cli.options import (
     Force,
     ForceThreshold,
@@ -30,6 +30,7 @@ from dynakin.config import RunConfig, make_config, read_config
 from dynakin.filter import Estimator
 from dynakin.model import load_model
 from dynakin.recordings import read
+from dynakin.report import save_figures
 from dynakin.results import Estimate, check_output_writable
 
 
@@ -50,6 +51,9 @@ def run(
     plate_filter: PlateFilter = None,
     force_threshold: ForceThreshold = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder for the results.")] = None,
+    figures: Annotated[
+        Path | None, typer.Option(help="Also write figures for papers (SVG, PDF, PNG) into this folder.")
+    ] = None,
 ) -> None:
     """Estimate coordinates, moments, lengths and masses from a recording, and write a report."""
     given = {
@@ -76,6 +80,10 @@ def run(
     with busy("writing results and report"):
         folder = estimate.save(config.output)
     print_summary(estimate, folder)
+    if figures is not None:
+        with busy("drawing figures"):
+            written = save_figures(estimate, figures)
+        out().print(f"Figures  {figures} ({len(written)} files)", soft_wrap=True)
 
 
 def configure(trial: Path, given: dict[str, Any]) -> RunConfig:

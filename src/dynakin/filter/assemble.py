@@ -92,6 +92,8 @@ def _dataset(
     data["state_sd"] = (("time", "element"), arrays["state_sd"])
     for name in ("nis", "n_rows", "log_likelihood", "constrained", "step_us"):
         data[name] = ("time", arrays[name])
+    data["joint_centres"] = (("time", "joint", "axis"), _joint_centres(arrays["state"], model), {"units": "m"})
+    names, parents, segments = _joints(spec)
     coords = {
         "time": recording.time,
         "coordinate": model.coordinate_names,
@@ -101,6 +103,9 @@ def _dataset(
         "marker_axes_modelled": ("axis", axes),
         "component": list(COMPONENTS),
         "element": list(model.layout.names),
+        "joint": names,
+        "joint_parent": ("joint", parents),
+        "joint_segment": ("joint", segments),
     }
     return xr.Dataset(data, coords=coords)
 
@@ -120,6 +125,24 @@ def _coordinate_blocks(arrays: Mapping[str, Array], model: _core.Model) -> dict[
         sd[:, free] = arrays["state_sd"][:, offset : offset + size]
         blocks[name], blocks[f"{name}_sd"] = value, sd
     return blocks
+
+
+def _joint_centres(states: Array, model: _core.Model) -> Array:
+    """Origins (T, S, 3) m of all segments, ground frame: the joints by which they hang."""
+    return np.stack([_core.segment_poses(model, state)[1] for state in states])
+
+
+def _joints(spec: _core.ModelSpec) -> tuple[list[str], list[int], list[str]]:
+    """Name, number of the parent joint (-1: ground) and segment of each joint; a hinge is named as its coordinate."""
+    segments = [segment.name for segment in spec.segments]
+    names = []
+    for segment in spec.segments:
+        coordinates = {axis.coordinate for axis in segment.axes}
+        names.append(coordinates.pop() if len(coordinates) == 1 else segment.name)
+    if len(set(names)) < len(names):
+        names = segments
+    parents = [segments.index(s.parent) if s.parent in segments else -1 for s in spec.segments]
+    return names, parents, segments
 
 
 def _types(spec: _core.ModelSpec) -> list[str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from dynakin.report.convergence import convergence
 from dynakin.report.labels import (
     COMPONENT_LABELS,
     listed,
@@ -19,16 +20,20 @@ from dynakin.results import Estimate
 from dynakin.results.consistency import CONSISTENT
 from dynakin.results.metrics import evaluation_window, speed_consistency, window_consistency
 
+# Expected one frame ahead against seen: further apart than this, the estimate follows the measurements.
+FOLLOWING = 4.0
+
 Level = Literal["good", "note", "warning"]
 
 
 @dataclass(frozen=True)
 class Insight:
-    """One finding: how much it matters, a short title, and a sentence or two."""
+    """One finding: how much it matters, a short title, a sentence or two, and what to try, where something helps."""
 
     level: Level
     title: str
     text: str
+    advice: str = ""
 
 
 def what_was_run(estimate: Estimate) -> str:
@@ -44,13 +49,23 @@ def what_was_run(estimate: Estimate) -> str:
     )
 
 
+def in_short(found: list[Insight]) -> str:
+    """One sentence for who reads no further: what holds, and what does not."""
+    titles = [insight.title[:1].lower() + insight.title[1:] for insight in found if insight.level == "warning"]
+    if not titles:
+        return "Nothing in this run speaks against using it."
+    return f"{sentence(plural(len(titles), 'finding'))} to look at before using this run: {listed(titles, 8)}."
+
+
 def insights(estimate: Estimate, metrics: dict[str, Any]) -> list[Insight]:
     """All findings, in the order of the report."""
     found = [
         _markers(estimate, metrics),
         _wrench(metrics),
+        _prediction(metrics),
         _consistency(estimate, metrics),
         _speeds(estimate),
+        *_constants(estimate),
         _bounds(estimate),
         _joint_limits(estimate),
         _missing(estimate, metrics),
@@ -67,14 +82,23 @@ def _markers(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
         return None
     rms = {name: value for name, value in metrics["markers"]["rms_mm"].items() if value is not None}
     worst = max(rms, key=lambda name: rms[name])
-    ahead = metrics["prediction"]["markers"]["mean_rms_mm"]
+    names = short_marker_names(estimate.marker_names)
+    middle = sorted(rms.values())[len(rms) // 2]
+    apart = [names[name] for name, value in rms.items() if value > max(10.0, 2.5 * middle)]
+    stand = "stands" if len(apart) == 1 else "stand"
+    advice = ""
+    if apart:
+        advice = (
+            f"{listed(apart)} {stand} out: look at the film whether swapped, on another segment than the marker set "
+            "says, or moving with the skin; a larger variance under noise.marker makes the filter trust it less."
+        )
     return Insight(
         "good" if mean < 15.0 else "warning",  # the paper's own figure: below 15 mm
         "Markers",
         f"The model’s markers lie {number(mean, 'mm')} from the measured ones (RMS, mean of "
-        f"{plural(len(rms), 'marker')}); worst is {short_marker_names(estimate.marker_names)[worst]} with "
-        f"{number(rms[worst], 'mm')}. Expected one frame ahead, before it was seen: {number(ahead, 'mm')}. "
+        f"{plural(len(rms), 'marker')}); worst is {names[worst]} with {number(rms[worst], 'mm')}. "
         "This is the fit to what the filter was given, not the accuracy of angles or moments.",
+        advice,
     )
 
 
@@ -94,17 +118,73 @@ def _wrench(metrics: dict[str, Any]) -> Insight | None:
     )
 
 
+def _prediction(metrics: dict[str, Any]) -> Insight | None:
+    """How much of the fit is the model, and how much is following the measurement of the same frame."""
+    ahead, fitted = metrics["prediction"]["wrench"]["rms"], metrics["wrench"]["rms"]
+    ratio = {name: ahead[name] / fitted[name] for name in fitted if fitted[name] and ahead.get(name) is not None}
+    markers = metrics["prediction"]["markers"]["mean_rms_mm"]
+    if markers is None or not ratio:
+        return None
+    parts = [f"{COMPONENT_LABELS[name][0].lower()} {number(ahead[name], COMPONENT_LABELS[name][1])}" for name in ratio]
+    text = (
+        f"One frame ahead, before it is seen, the model misses by {number(markers, 'mm')} (markers), {listed(parts)}."
+    )
+    worst = max(ratio, key=lambda name: ratio[name])
+    if ratio[worst] <= FOLLOWING:
+        return Insight("good", "One frame ahead", f"{text} That is about as good as after it is seen.")
+    return Insight(
+        "warning",
+        "One frame ahead",
+        f"{text} That is {ratio[worst]:.0f} times as far as after it is seen ({COMPONENT_LABELS[worst][0].lower()}): "
+        "the good fit above comes from following each measurement, less from a model that explains the movement.",
+        "Smaller process noise (noise.coordinate, noise.speed, noise.acceleration) lets the model carry more.",
+    )
+
+
 def _consistency(estimate: Estimate, metrics: dict[str, Any]) -> Insight:
     found = window_consistency(estimate, evaluation_window(estimate.time))
     ratio = metrics["consistency"]["mean_nis_per_dof"]
     good = ratio is not None and CONSISTENT[0] <= ratio <= CONSISTENT[1] and "not white" not in found.verdict
     figure = "" if ratio is None else f" (Mean normalised innovation squared {number(ratio)}, 1 is right.)"
-    return Insight("good" if good else "warning", "Uncertainty", found.verdict + figure)
+    advice = ""
+    if ratio is not None and ratio < CONSISTENT[0]:
+        advice = "Smaller noise.coordinate, noise.speed and noise.acceleration; then a smaller noise.marker_scale."
+    elif ratio is not None and ratio > CONSISTENT[1]:
+        advice = "A larger noise.marker_scale, noise.force and noise.moment; look for markers that fit badly first."
+    return Insight("good" if good else "warning", "Uncertainty", found.verdict + figure, advice)
 
 
 def _speeds(estimate: Estimate) -> Insight | None:
     _, verdict = speed_consistency(estimate, evaluation_window(estimate.time))
-    return Insight("warning", "Speeds", verdict) if verdict else None
+    advice = "Smaller noise.coordinate and noise.speed tie each speed to its coordinate."
+    return Insight("warning", "Speeds", verdict, advice) if verdict else None
+
+
+def _constants(estimate: Estimate) -> list[Insight]:
+    """What became of lengths, masses and moments of inertia."""
+    names = short_marker_names(estimate.marker_names)
+    found = []
+    for group in convergence(estimate):
+        title, change = sentence(group.title), number(group.largest_change_percent, digits=2)
+        shrunk = f"the standard deviations ended at {100.0 * group.sd_left:.0f} % of where they began"
+        if group.verdict == "moving":
+            still = [parameter_label(p, names) for p in group.moving]
+            verb = "was" if len(still) == 1 else "were"
+            text = f"Not settled: {listed(still)} {verb} still moving in the last quarter of the recording."
+            advice = "A longer recording, or one with more repetitions."
+            found.append(Insight("warning", title, text, advice))
+        elif group.verdict == "untaught":
+            source = "measured at the start" if group.title == "lengths" else "of the anthropometric table"
+            text = (
+                f"These are the values {source}, not identified ones: none of {group.count} changed by more than "
+                f"{change} %, and {shrunk}."
+            )
+            advice = "" if group.title == "lengths" else "Smaller process noise, and a livelier movement with the arms."
+            found.append(Insight("note", title, text, advice))
+        else:
+            text = f"Settled: {group.count}, changed from the start by up to {change} %; {shrunk}."
+            found.append(Insight("good", title, text))
+    return found
 
 
 def _bounds(estimate: Estimate) -> Insight:
@@ -118,6 +198,7 @@ def _bounds(estimate: Estimate) -> Insight:
         "Bounds",
         f"{len(stuck)} of {len(free)} estimated parameters end on a bound: {listed(stuck)}. The data ask for a value "
         "that the person cannot have, so the model or the noise settings do not fit there.",
+        "Check the mass, the height and the markers of those segments; then the film for a marker off its place.",
     )
 
 

@@ -90,6 +90,12 @@ def number(value: float | None, unit: str = "", digits: int = 3) -> str:
     return f"{text} {unit}" if unit else text
 
 
+def signed_percent(value: float) -> str:
+    """`+0.7 %`, `−0.2 %`, `0.0 %`."""
+    text = f"{value:+.1f}"
+    return "0.0 %" if float(text) == 0.0 else f"{text} %".replace("-", "−")
+
+
 def listed(items: list[str], limit: int = 6) -> str:
     """`a, b and c`; the rest of a long list only counted."""
     if len(items) > limit:

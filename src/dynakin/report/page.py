@@ -8,8 +8,9 @@ from typing import Any
 import jinja2
 import tomli_w
 
-from dynakin.report.insights import insights, what_was_run
+from dynakin.report.insights import in_short, insights, what_was_run
 from dynakin.report.labels import listed, number, parameter_label, short_marker_names
+from dynakin.report.playback import playback
 from dynakin.report.sections import sections
 from dynakin.results import Estimate, compute_metrics
 from dynakin.results.config_file import plain
@@ -41,7 +42,9 @@ def render_report(estimate: Estimate, *, metrics: dict[str, Any] | None = None) 
         what_was_run=what_was_run(estimate),
         figures=_headline(estimate, metrics),
         insights=found,
+        in_short=in_short(found),
         warnings=sum(insight.level == "warning" for insight in found),
+        player=playback(estimate),
         sections=sections(estimate, metrics),
         key_labels=KEY_LABELS,
         messages=estimate.messages,

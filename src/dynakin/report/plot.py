@@ -17,6 +17,7 @@ from matplotlib.ticker import MaxNLocator
 MEASURED = "#9a9a9a"
 ESTIMATED = "#0072B2"
 LIMIT = "#D55E00"
+REFERENCE = "#B34700"  # the classical method, always dashed
 INK, QUIET, GRID = "#1d2530", "#5c6773", "#e4e8ec"
 
 _STYLE: dict[Any, Any] = {
@@ -43,6 +44,19 @@ _STYLE: dict[Any, Any] = {
     "axes.axisbelow": True,
     "axes.unicode_minus": True,
 }
+FILE_STYLE: dict[Any, Any] = {
+    **_STYLE,
+    "pdf.fonttype": 42,  # letters stay letters, as journals ask
+    "axes.titlesize": 8.5,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.titlecolor": INK,
+    "legend.fontsize": 8,
+    "legend.labelcolor": INK,
+    "legend.frameon": False,
+    "savefig.facecolor": "white",
+}
+"""Of the figures that are written as files of their own."""
 _MOST_POINTS = 700
 _GROUP_ID = re.compile(r' id="(?:figure|axes|patch|matplotlib\.axis|xtick|ytick|line2d|text|[A-Za-z]+Collection)_\d+"')
 _LONG_NUMBER = re.compile(r"-?\d+\.\d{3,}")

@@ -7,8 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from dynakin.report import figures
-from dynakin.report.figures import Panel
+from dynakin.report import panels as charts
 from dynakin.report.labels import (
     COMPONENT_LABELS,
     is_planar,
@@ -16,8 +15,10 @@ from dynakin.report.labels import (
     number,
     sentence,
     short_marker_names,
+    signed_percent,
     words,
 )
+from dynakin.report.panels import Panel
 from dynakin.results import AXES, COMPONENTS, Estimate, Parameter
 
 
@@ -54,11 +55,11 @@ def marker_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
     measured = estimate.data["markers_measured"].values
     estimated = estimate.data["markers_estimated"].values
     rms = {names[name]: value for name, value in metrics["markers"]["rms_mm"].items()}
-    wide = [figures.rms_bars("rms", rms)]
-    wide.append(figures.plane_paths("paths", list(names.values()), measured[:, :, :2], estimated[:, :, :2]))
+    wide = [charts.rms_bars("rms", rms)]
+    wide.append(charts.plane_paths("paths", list(names.values()), measured[:, :, :2], estimated[:, :, :2]))
     directions = {"x": "forward", "y": "up", "z": "right"}
     folded = [
-        figures.compared(
+        charts.compared(
             f"marker-{index}-{axis}",
             f"{names[name]}, {directions[axis]}",
             "mm",
@@ -96,7 +97,7 @@ def wrench_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
         seen = measured[:, k] if np.isfinite(measured[:, k]).any() else None
         note = f"{component}, RMS difference {number(rms[component], unit)}" if component in rms else component
         panels.append(
-            figures.compared(f"wrench-{component}", title, unit, estimate.time, seen, estimated[:, k], note=note)
+            charts.compared(f"wrench-{component}", title, unit, estimate.time, seen, estimated[:, k], note=note)
         )
     place = "the toe, where the model stands on the ground" if is_planar(estimate) else "the ground’s origin"
     return Section(
@@ -120,14 +121,13 @@ def angle_section(estimate: Estimate) -> Section:
         locked = not np.any(sd > 0.0)
         note = f"locked at {number(float(values[0]), unit)}" if locked else moved
         panels.append(
-            figures.compared(
-                f"angle-{name}", sentence(words(name)), unit, estimate.time, None, values, note=note, sd=sd
-            )
+            charts.compared(f"angle-{name}", sentence(words(name)), unit, estimate.time, None, values, note=note, sd=sd)
         )
     return Section(
         "angles",
         "Joint angles" if estimate.is_rotation().all() else "Joint coordinates",
-        "The band is two standard deviations wide on either side, as the filter itself believes.",
+        "The band is two standard deviations wide on either side, as the filter itself believes. One that would hide "
+        "the line is not drawn; its size (2 sd, median) stands above the panel.",
         panels,
         key=("estimated", "band"),
     )
@@ -140,7 +140,7 @@ def moment_section(estimate: Estimate) -> Section:
         unit = "N m" if estimate.is_rotation()[index] else "N"
         values = estimate.data["moments"].values[:, index]
         panels.append(
-            figures.compared(
+            charts.compared(
                 f"moment-{name}",
                 sentence(words(name)),
                 unit,
@@ -199,10 +199,10 @@ def _parameter_panel(estimate: Estimate, p: Parameter, title: str, factor: float
     change = p.change_percent()
     note = f"{number(factor * p.initial)} to {number(factor * p.value, unit)}"
     if change is not None:
-        note += f" ({change:+.1f} %)".replace("-", "−")
+        note += f" ({signed_percent(change)})"
     if p.at_bound:
         note += ", on its bound"
-    return figures.parameter_path(
+    return charts.parameter_path(
         p.name,
         title,
         unit,

@@ -34,6 +34,7 @@ class Estimate:
     markers_measured, markers_estimated, markers_predicted        (time, marker, axis)        m
     wrench_measured, wrench_estimated, wrench_predicted           (time, component)           N or N m
     state, state_sd                                               (time, element)             as the element's own
+    joint_centres                                                 (time, joint, axis)         m
     nis, n_rows, log_likelihood                                   (time,)                     1
     ============================================================  ==========================  =====================
 

@@ -1,0 +1,62 @@
+"""Did the filter learn the constants? Each kind has settled, is still moving, or was never told anything."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from dynakin.results import Estimate, Parameter
+
+# A constant that still moves by this share of its size in the last quarter of the recording has not settled: over a
+# recording as long again it would move by several per cent.
+MOVING = 0.01
+# A standard deviation that shrinks by less than this says that the recording told nothing about the constant.
+TAUGHT = 0.05
+
+Verdict = Literal["settled", "moving", "untaught"]
+
+
+@dataclass(frozen=True)
+class Convergence:
+    """What became of one kind of constant.
+
+    ``largest_change_percent`` is the largest change from the start, ``sd_left`` the median of last over first standard
+    deviation, ``moving`` those that had not settled.
+    """
+
+    title: str
+    count: int
+    verdict: Verdict
+    largest_change_percent: float
+    sd_left: float
+    moving: tuple[Parameter, ...]
+
+
+def convergence(estimate: Estimate) -> list[Convergence]:
+    """Lengths, masses, and moments of inertia; a kind that was not estimated is left out."""
+    free = [p for p in estimate.parameters if p.estimated and p.initial != 0.0]
+    inertial = [p for p in free if p.kind == "inertia"]
+    groups = {
+        "lengths": [p for p in free if p.kind == "length"],
+        "masses": [p for p in inertial if p.name.endswith("/mass")],
+        "moments of inertia": [p for p in inertial if p.name.rpartition("/")[2] in ("ixx", "iyy", "izz")],
+    }
+    return [_judge(estimate, title, group) for title, group in groups.items() if group]
+
+
+def _judge(estimate: Estimate, title: str, group: list[Parameter]) -> Convergence:
+    moving, left, largest = [], [], 0.0
+    for p in group:
+        path = estimate.data["state"].sel(element=p.name).values
+        sd = estimate.data["state_sd"].sel(element=p.name).values
+        late = path[3 * len(path) // 4 :]
+        if np.ptp(late) > MOVING * abs(p.initial) and not p.at_bound:
+            moving.append(p)
+        left.append(float(sd[-1] / sd[0]) if sd[0] > 0.0 else 1.0)
+        largest = max(largest, abs(p.change_percent() or 0.0))
+    sd_left = float(np.median(left))
+    still = largest < 100.0 * MOVING
+    verdict: Verdict = "moving" if moving else "untaught" if sd_left > 1.0 - TAUGHT and still else "settled"
+    return Convergence(title, len(group), verdict, largest, sd_left, tuple(moving))

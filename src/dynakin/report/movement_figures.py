@@ -1,0 +1,178 @@
+"""Figures 4 to 7 of the paper: markers over a cycle, joint angles, wrench, knee moment."""
+
+from __future__ import annotations
+
+import numpy as np
+import xarray as xr
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+
+from dynakin.report.body import chain_of, colours_of, floor_height, marker_segments
+from dynakin.report.cycle import middle_cycle
+from dynakin.report.labels import COMPONENT_LABELS, moment_note, number, sentence, words
+from dynakin.report.panels import band_is_too_wide
+from dynakin.report.plot import ESTIMATED, INK, MEASURED, QUIET, REFERENCE
+from dynakin.results import COMPONENTS, Estimate, evaluation_window
+from dynakin.results.fit import signal_fit
+
+_PICTURES = 6
+_DASHED = (0, (4, 1.6))
+
+
+def markers_figure(estimate: Estimate, reference: xr.Dataset | None = None) -> Figure | None:
+    """Figure 4: the stick figure and the markers, measured (hollow) and estimated (filled), over one cycle."""
+    cycle = middle_cycle(estimate)
+    frames = np.linspace(cycle.start, cycle.stop - 1, _PICTURES).astype(int)
+    chain, colours, carriers = chain_of(estimate), colours_of(estimate), marker_segments(estimate)
+    measured = estimate.data["markers_measured"].values[:, :, :2]
+    estimated = estimate.data["markers_estimated"].values[:, :, :2]
+    paint = [colours.get(carriers.get(name, ""), INK) for name in estimate.marker_names]
+    shown = np.concatenate([measured[frames], estimated[frames], chain.points[frames][:, :, :2]], axis=1)
+    width = max(float(np.nanmax(shown[k, :, 0]) - np.nanmin(shown[k, :, 0])) for k in range(_PICTURES))
+    floor = floor_height(estimate)
+    figure = Figure(figsize=(7.2, 3.1), layout="constrained")
+    axes = figure.add_subplot()
+    for place, frame in enumerate(frames):
+        middle = 0.5 * (np.nanmax(shown[place, :, 0]) + np.nanmin(shown[place, :, 0]))
+        moved = np.array([1.22 * width * place - middle, 0.0])
+        lines = [chain.points[frame][[b.start, b.end], :2] + moved for b in chain.bones]
+        axes.add_collection(LineCollection(lines, colors=[colours[b.segment] for b in chain.bones], linewidths=3.2))
+        (x, y), seen = (estimated[frame] + moved).T, (measured[frame] + moved).T
+        axes.scatter(x, y, s=11, c=paint, zorder=3, linewidths=0)
+        axes.scatter(seen[0], seen[1], s=26, facecolors="none", edgecolors=INK, linewidths=0.7, zorder=4)
+        text = f"{estimate.time[frame]:.2f} s"
+        axes.text(1.22 * width * place, floor - 0.09, text, ha="center", va="top", color=QUIET)
+    span = (-0.62 * width, (1.22 * (_PICTURES - 1) + 0.62) * width)
+    axes.plot(span, [floor, floor], color="#b8c0c8", linewidth=1.0, zorder=0)
+    axes.plot([span[0], span[0] + 0.5], [floor - 0.32] * 2, color=QUIET, linewidth=1.6)
+    axes.text(span[0] + 0.55, floor - 0.32, "0.5 m", va="center", color=QUIET)
+    axes.set_aspect("equal")
+    axes.set_xlim(span)
+    axes.set_ylim(floor - 0.42, float(np.nanmax(shown[:, :, 1])) + 0.08)
+    axes.axis("off")
+    axes.set_title("Markers over one cycle: measured (hollow) and estimated (filled, in the segment’s colour)")
+    names = dict.fromkeys(b.segment for b in chain.bones)
+    letters = sum(len(name) + 4 for name in names)
+    at, step = span[0] + 1.0, (span[1] - span[0] - 1.0) / max(letters, 1)
+    for name in names:
+        axes.text(at, floor - 0.32, words(name), color=colours[name], va="center", weight="bold")
+        at += (len(name) + 4) * step
+    return figure
+
+
+def angles_figure(estimate: Estimate, reference: xr.Dataset | None = None) -> Figure | None:
+    """Figure 5: every free coordinate with its band, beside the classical method's."""
+    free = [
+        k for k in range(len(estimate.coordinate_names)) if np.any(_by_coordinate(estimate, "coordinates_sd")[:, k])
+    ]
+    if not free:
+        return None
+    classical = None if reference is None else reference.get("coordinates_unfiltered", reference.get("coordinates"))
+    columns = min(4, len(free))
+    rows = -(-len(free) // columns)
+    figure = Figure(figsize=(7.2, 0.5 + 1.75 * rows), layout="constrained")
+    every = figure.subplots(rows, columns, squeeze=False).ravel()
+    window = evaluation_window(estimate.time)
+    values, sd = _by_coordinate(estimate, "coordinates"), _by_coordinate(estimate, "coordinates_sd")
+    for axes, k in zip(every, free, strict=False):
+        name = estimate.coordinate_names[k]
+        factor, unit = (180.0 / np.pi, "deg") if estimate.is_rotation()[k] else (1000.0, "mm")
+        title, notes = sentence(words(name)), []
+        if classical is not None and name in classical["coordinate"].values:
+            other = factor * classical.sel(coordinate=name).values
+            axes.plot(estimate.time, other, color=REFERENCE, linewidth=1.0, linestyle=_DASHED, zorder=3)
+            rms = signal_fit(factor * values[window, k], other[window]).rms
+            notes.append(f"RMS difference {number(rms, unit)}")
+        axes.plot(estimate.time, factor * values[:, k], color=ESTIMATED, linewidth=1.2)
+        axes.margins(y=0.12)
+        half = 2.0 * factor * sd[:, k]
+        low, high = factor * values[:, k] - half, factor * values[:, k] + half
+        if not band_is_too_wide(factor * values[:, k], factor * sd[:, k]):
+            axes.fill_between(estimate.time, low, high, color=ESTIMATED, alpha=0.18, linewidth=0)
+            notes.append(f"2 sd: {number(float(np.median(half)), unit, digits=2)}")
+        else:  # it would press the line flat
+            notes.append(f"2 sd: {number(float(np.median(half)), unit, digits=2)} (too wide)")
+        axes.set_xlabel("\n".join(notes))
+        axes.set_title(f"{title}, {unit}")
+        axes.set_xlim(float(estimate.time[0]), float(estimate.time[-1]))
+    for axes in every[len(free) :]:
+        axes.set_visible(False)
+    figure.supxlabel("time, s", fontsize=8, color=QUIET)
+    _key(figure, every[0], band=True, other="" if classical is None else "classical method")
+    return figure
+
+
+def wrench_figure(estimate: Estimate, reference: xr.Dataset | None = None) -> Figure | None:
+    """Figure 6: the wrench as measured, estimated, and from the table and classical angles ("AT")."""
+    measured = estimate.data["wrench_measured"].transpose("time", "component").values
+    estimated = estimate.data["wrench_estimated"].transpose("time", "component").values
+    shown = [k for k in range(len(COMPONENTS)) if np.isfinite(estimated[:, k]).any()]
+    if not shown:
+        return None
+    at = None if reference is None else reference["wrench_estimated"].transpose("time", "component").values
+    figure = Figure(figsize=(7.2, 0.5 + 1.35 * len(shown)), layout="constrained")
+    every = figure.subplots(len(shown), 1, sharex=True, squeeze=False).ravel()
+    window = evaluation_window(estimate.time)
+    for axes, k in zip(every, shown, strict=True):
+        title, unit = COMPONENT_LABELS[COMPONENTS[k]]
+        axes.plot(estimate.time, measured[:, k], color=MEASURED, linewidth=2.8, solid_capstyle="round")
+        if at is not None:
+            axes.plot(estimate.time, at[:, k], color=REFERENCE, linewidth=0.9, linestyle=_DASHED)
+        axes.plot(estimate.time, estimated[:, k], color=ESTIMATED, linewidth=1.0)
+        rms = [f"EKF {number(signal_fit(measured[window, k], estimated[window, k]).rms, unit)}"]
+        if at is not None:
+            rms.append(f"AT {number(signal_fit(measured[window, k], at[window, k]).rms, unit)}")
+        axes.set_title(f"{title} {COMPONENTS[k]}, {unit}")
+        if np.isfinite(measured[:, k]).any():
+            axes.set_title(f"RMS difference: {', '.join(rms)}", loc="right", color=QUIET, weight="normal", fontsize=8)
+        axes.set_xlim(float(estimate.time[0]), float(estimate.time[-1]))
+    every[-1].set_xlabel("time, s")
+    _key(figure, every[0], measured=True, other="" if at is None else "AT: table and classical angles")
+    return figure
+
+
+def knee_moment_figure(estimate: Estimate, reference: xr.Dataset | None = None) -> Figure | None:
+    """Figure 7: the moment about each knee, estimated, and from the table and classical angles ("AT")."""
+    names = [name for name in estimate.coordinate_names if "knee" in name]
+    if not names:
+        return None
+    figure = Figure(figsize=(4.6, 0.5 + 2.3 * len(names)), layout="constrained")
+    every = figure.subplots(len(names), 1, sharex=True, squeeze=False).ravel()
+    window = evaluation_window(estimate.time)
+    for axes, name in zip(every, names, strict=True):
+        moment = estimate.data["moments"].sel(coordinate=name).values
+        axes.plot(estimate.time, moment, color=ESTIMATED, linewidth=1.2)
+        note = moment_note(estimate, name)
+        axes.set_title(f"{sentence(words(name))} moment, N m{f' ({note})' if note else ''}")
+        if reference is not None and name in reference["coordinate"].values:
+            other = reference["moments"].sel(coordinate=name).values
+            axes.plot(estimate.time, other, color=REFERENCE, linewidth=1.0, linestyle=_DASHED)
+            fit = signal_fit(moment[window], other[window])
+            axes.set_xlabel(
+                f"time, s\nRMS difference {number(fit.rms, 'N m')}, "
+                f"{number(fit.nrms_rms_percent, digits=2)} % of the EKF’s RMS"
+            )
+        else:
+            axes.set_xlabel("time, s")
+        axes.set_xlim(float(estimate.time[0]), float(estimate.time[-1]))
+    _key(figure, every[0], other="" if reference is None else "AT: table and classical angles")
+    return figure
+
+
+def _by_coordinate(estimate: Estimate, name: str) -> np.ndarray:
+    return np.asarray(estimate.data[name].transpose("time", "coordinate").values)
+
+
+def _key(figure: Figure, axes: Axes, *, measured: bool = False, band: bool = False, other: str = "") -> None:
+    """One line of words above the panels, each with the line that it names."""
+    handles: list[Artist] = []
+    if measured:
+        handles += axes.plot([], [], color=MEASURED, linewidth=2.8, label="measured")
+    handles += axes.plot([], [], color=ESTIMATED, linewidth=1.4, label="EKF")
+    if band:
+        handles.append(axes.fill_between([], [], [], color=ESTIMATED, alpha=0.18, label="± 2 standard deviations"))
+    if other:
+        handles += axes.plot([], [], color=REFERENCE, linewidth=1.2, linestyle=_DASHED, label=other)
+    figure.legend(handles=handles, loc="outside upper left", ncols=4, borderaxespad=0.2, columnspacing=1.8)

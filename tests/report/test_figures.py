@@ -1,0 +1,107 @@
+"""The paper's figures as files: which are there, what they say, and how labels keep apart."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from dynakin.errors import ConfigError, OutputError
+from dynakin.report.cycle import middle_cycle
+from dynakin.report.direct_labels import spread
+from dynakin.report.figures import FIGURES, save_figures
+from dynakin.results import Estimate
+
+
+def words_in(path: Path) -> str:
+    return " | ".join(re.findall(r"<text[^>]*>([^<]*)</text>", path.read_text(encoding="utf-8")))
+
+
+@pytest.fixture(scope="module")
+def reference(jointed: Estimate) -> xr.Dataset:
+    """A made reference: five degrees, 10 N m of moment and 20 of each wrench component off."""
+    data = jointed.data
+    made = {
+        "coordinates": data["coordinates"] + np.radians(5.0),
+        "moments": data["moments"] + 10.0,
+        "wrench_estimated": data["wrench_measured"] + 20.0,
+    }
+    return xr.Dataset(made)
+
+
+@pytest.fixture(scope="module")
+def saved(jointed: Estimate, reference: xr.Dataset, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("figures")
+    written = save_figures(jointed, folder, ("svg",), reference=reference)
+    assert [path.stem for path in written] == list(FIGURES)
+    return folder
+
+
+def test_differences_to_the_reference_are_said_with_their_unit(saved: Path) -> None:
+    assert words_in(saved / "figure5_angles.svg").count("RMS difference 5.00 deg") == 7
+    assert "AT 20.0 N m" in words_in(saved / "figure6_wrench.svg")
+    assert "RMS difference 10.0 N m" in words_in(saved / "figure7_knee_moment.svg")
+
+
+def test_lines_of_segments_are_named_where_they_end(saved: Path) -> None:
+    lengths = words_in(saved / "figure8_lengths_and_masses.svg")
+    assert "thigh 516 ± 17 mm (+20.0 %)" in lengths and "bound +20 %" in lengths
+    assert len(re.findall(r"± [\d.]+ kg m² ", words_in(saved / "figure9_inertias.svg"))) == 7
+    markers = words_in(saved / "figure4_markers.svg")
+    assert "0.5 m" in markers and "shank" in markers and markers.count(" s |") == 6
+
+
+def test_formats_and_what_is_left_out(jointed: Estimate, tmp_path: Path) -> None:
+    bare = replace(
+        jointed,
+        parameters=[p for p in jointed.parameters if p.kind == "marker"],
+        data=jointed.data.assign(wrench_estimated=jointed.data["wrench_estimated"] * np.nan),
+    )
+    bare = replace(bare, data=bare.data.sel(coordinate=["toe", "hip"]))
+    written = save_figures(bare, tmp_path / "new", ("pdf", "png"))
+    assert sorted(path.name for path in written) == [
+        "figure4_markers.pdf",
+        "figure4_markers.png",
+        "figure5_angles.pdf",
+        "figure5_angles.png",
+    ]
+    assert written[0].read_bytes()[:4] == b"%PDF"
+
+
+def test_wrong_requests_are_refused(jointed: Estimate, reference: xr.Dataset, tmp_path: Path) -> None:
+    with pytest.raises(ConfigError, match="'jpg' is not known, expected some of svg, pdf, png"):
+        save_figures(jointed, tmp_path, ("jpg",))
+    with pytest.raises(ConfigError, match="reference has 100 frames, expected the estimate's 1201"):
+        save_figures(jointed, tmp_path, ("svg",), reference=reference.isel(time=slice(100)))
+    (tmp_path / "file").touch()
+    with pytest.raises(OutputError, match="cannot write figures there"):
+        save_figures(jointed, tmp_path / "file", ("svg",))
+
+
+def test_same_estimate_same_files(jointed: Estimate, saved: Path, tmp_path: Path, reference: xr.Dataset) -> None:
+    save_figures(jointed, tmp_path, ("svg",), reference=reference)
+    for name in ("figure4_markers.svg", "figure8_lengths_and_masses.svg"):
+        assert (tmp_path / name).read_bytes() == (saved / name).read_bytes()
+
+
+def test_cycle_goes_from_rest_to_rest(jointed: Estimate) -> None:
+    cycle = middle_cycle(jointed)  # squats of 3 s from 1.5 s on; the middle one of three and a half
+    knee = jointed.data["coordinates"].sel(coordinate="knee").values[cycle]
+    assert jointed.time[cycle][0] == pytest.approx(4.5, abs=0.3)
+    assert len(knee) == pytest.approx(300, abs=60)
+    assert np.argmax(knee) == pytest.approx(len(knee) / 2, abs=5)
+    still = jointed.data.assign(coordinates=jointed.data["coordinates"] * 0.0)
+    assert middle_cycle(replace(jointed, data=still)) == slice(0, 1201)
+
+
+def test_labels_keep_apart_and_in_order() -> None:
+    wanted = np.array([0.5, 0.1, 0.51, 0.5, 0.9])
+    placed = spread(wanted, 0.1)
+    assert np.all(np.diff(np.sort(placed)) >= 0.1 - 1e-12)
+    assert placed[1] == 0.1 and placed[4] == 0.9
+    assert placed[0] < placed[3] < placed[2]
+    assert placed[[0, 2, 3]].mean() == pytest.approx(wanted[[0, 2, 3]].mean())
