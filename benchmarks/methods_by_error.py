@@ -13,14 +13,13 @@ from collections import defaultdict
 import numpy as np
 
 import dynakin
-from dynakin.comparison.truth import FIGURES, truth_errors
+from dynakin.comparison.truth import FIGURES, LEG, truth_errors
 from dynakin.reference import bodies_of, identify, reference_methods, table_dynamics
 from dynakin.reference.methods import plane_wrench
 from dynakin.simulation import simulate_squat
 
 SUBJECT = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
 START_S = 2.0
-LEG = ("ankle", "knee", "hip")
 
 
 def one_trial(seed: int) -> dict[str, tuple[float, ...]]:

@@ -6,10 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from dynakin.comparison.truth import FIGURES, truth_errors
+from dynakin.comparison.truth import FIGURES, LEG, truth_errors
 from dynakin.simulation import simulate_squat
-
-LEG = ("ankle", "knee", "hip")
 
 
 @pytest.fixture(scope="module")

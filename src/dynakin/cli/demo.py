@@ -13,16 +13,14 @@ from rich.table import Table
 
 from dynakin.cli.console import busy, out, progress_bar, table
 from dynakin.cli.summary import print_summary
-from dynakin.comparison.truth import FIGURES, truth_errors
+from dynakin.comparison.truth import FIGURES, LEG, truth_errors
 from dynakin.filter import Estimator, presets
 from dynakin.model import Subject, load_model
-from dynakin.results import Estimate, check_output_writable, evaluation_window
+from dynakin.results import Estimate, check_output_writable, evaluation_window, truth_error
 
 if TYPE_CHECKING:
     from dynakin.reference.methods import Lengths
     from dynakin.simulation import Truth
-
-LEG = ("ankle", "knee", "hip")
 
 
 def demo(
@@ -88,14 +86,9 @@ def compared_with_truth(estimate: Estimate, truth: Truth) -> Table:
         numbers=(1, 2, 3),
         title="EKF (paper) by coordinate: RMS error against the truth",
     )
+    kinds = ("coordinates", "speeds", "moments")
     for name in estimate.coordinate_names:
-        errors = [_rms(estimate, truth, variable, name, window) for variable in ("coordinates", "speeds", "moments")]
+        pairs = ((truth.data[kind].sel(coordinate=name), estimate.data[kind].sel(coordinate=name)) for kind in kinds)
+        errors = np.array([truth_error(true.values[window], given.values[window]).rms for true, given in pairs], float)
         rows.add_row(name, f"{np.degrees(errors[0]):.1f}", f"{np.degrees(errors[1]):.0f}", f"{errors[2]:.1f}")
     return rows
-
-
-def _rms(estimate: Estimate, truth: Truth, variable: str, name: str, window: np.ndarray) -> float:
-    error = (estimate.data[variable].sel(coordinate=name).values - truth.data[variable].sel(coordinate=name).values)[
-        window
-    ]
-    return float(np.sqrt(np.mean(error**2)))

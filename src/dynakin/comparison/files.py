@@ -3,21 +3,20 @@
 from __future__ import annotations
 
 import csv
-import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from dynakin.comparison.statistics import Spread
-from dynakin.errors import OutputError
 from dynakin.results.json_files import write_metrics
+from dynakin.results.output_folder import FolderKind, check_output_writable, replacing
 from dynakin.results.versions import versions
 
 SCHEMA_VERSION = 1
 FILES = ("table2.csv", "angles.csv", "moments.csv", "held_out.csv", "unseen.csv", "repetitions.csv", "comparison.json")
-"""All that such a folder may hold; anything else in it is the user's."""
 _SUMMARY = "comparison.json"
+COMPARISON = FolderKind(FILES, _SUMMARY, "comparison of dynakin")
 
 
 def flat(row: Any) -> dict[str, Any]:
@@ -32,27 +31,13 @@ def flat(row: Any) -> dict[str, Any]:
     return found
 
 
-def check_comparison_folder(folder: Path) -> None:
+def check_comparison_folder(folder: str | Path) -> None:
     """Make sure, before anything long is computed, that a comparison can be written to ``folder``.
 
     Raises:
         OutputError: a file is in the way, the place cannot be written, or the folder holds something else.
     """
-    if folder.exists() and not folder.is_dir():
-        raise OutputError(f"{folder}: is a file, a folder for the comparison was expected")
-    names = sorted(entry.name for entry in folder.iterdir()) if folder.exists() else []
-    foreign = [name for name in names if name not in FILES]
-    if names and (foreign or _SUMMARY not in names):
-        what = (foreign or names)[0]
-        raise OutputError(f"{folder}: is no comparison of dynakin (it holds {what}); name a new folder or an empty one")
-    above = folder.absolute()
-    while not above.exists():
-        above = above.parent
-    try:
-        with tempfile.TemporaryDirectory(prefix=".dynakin-", dir=above):
-            pass
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot write there ({error.strerror or error})") from None
+    check_output_writable(folder, kind=COMPARISON)
 
 
 def save_comparison(
@@ -60,8 +45,7 @@ def save_comparison(
 ) -> Path:
     """Write each table as ``NAME.csv``, and all of them with ``more`` into ``comparison.json``.
 
-    An earlier comparison is replaced; a CSV without rows is not written. All files are written before the first takes
-    the place of an old one.
+    An earlier comparison is replaced as a whole; a CSV without rows is not written.
 
     Args:
         tables: rows, dataclasses, by the name of their file: table2, angles, moments, held_out, unseen, repetitions.
@@ -71,23 +55,13 @@ def save_comparison(
         OutputError: as `check_comparison_folder`.
     """
     folder = Path(folder)
-    check_comparison_folder(folder)
     plain = {name: [flat(row) for row in rows] for name, rows in tables.items() if rows}
     summary = {"schema_version": SCHEMA_VERSION, "versions": versions(), **(more or {})}
     summary |= {name: rows for name, rows in plain.items() if name != "repetitions"}  # curves are long: CSV only
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryDirectory(prefix=".dynakin-", dir=folder) as made:
-            for name, rows in plain.items():
-                _write_csv(Path(made) / f"{name}.csv", rows)
-            write_metrics(summary, Path(made) / _SUMMARY)
-            written = {entry.name for entry in Path(made).iterdir()}
-            for name in sorted(written):
-                (Path(made) / name).replace(folder / name)
-        for name in set(FILES) - written:
-            (folder / name).unlink(missing_ok=True)
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot write the comparison there ({error.strerror or error})") from None
+    with replacing(folder, kind=COMPARISON) as made:
+        for name, rows in plain.items():
+            _write_csv(made / f"{name}.csv", rows)
+        write_metrics(summary, made / _SUMMARY)
     return folder
 
 

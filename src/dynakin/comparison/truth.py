@@ -11,6 +11,9 @@ import xarray as xr
 
 Array = npt.NDArray[np.float64]
 
+LEG = ("ankle", "knee", "hip")
+"""Joints of a leg in the built-in planar models."""
+
 # (title, unit) of the figures of `truth_errors`, in their order.
 FIGURES = (
     ("angles", "deg"),

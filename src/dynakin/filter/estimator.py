@@ -85,16 +85,15 @@ class Estimator:
             DivergenceError: the filter lost its estimate; the message names the frame.
         """
         initial = self.start(recording, static=static)
-        assert self._filter is not None and self._core_model is not None
+        assert self._core_model is not None
         markers, wrench = recording_arrays(recording, initial)
         check = check_plates(recording, initial.ground, initial.mass_kg)
         if check.refusal:
             raise RecordingError(f"{recording.path or recording.name}: {check.refusal}")
         try:
-            arrays = self._filter.run(np.ascontiguousarray(recording.time), markers, wrench, progress)
+            arrays = self.run_arrays(recording.time, markers, wrench, progress)
         except ValueError as error:  # a frame that the core refuses, named by it
             raise RecordingError(f"{recording.path or recording.name}: {error}") from None
-        self._time = float(recording.time[-1])
         return assemble(
             arrays, self._core_model, initial, recording, (markers, wrench), self.settings(), check.messages
         )
@@ -126,7 +125,9 @@ class Estimator:
         self.initial, self._time = initial, None
         return initial
 
-    def run_arrays(self, time: Array, markers: Array, wrench: Array) -> dict[str, Array]:
+    def run_arrays(
+        self, time: Array, markers: Array, wrench: Array, progress: Progress | None = None
+    ) -> dict[str, Array]:
         """Run over arrays after `start` or `start_from`, which it needs anew before another run.
 
         Args:
@@ -141,8 +142,10 @@ class Estimator:
         """
         if self._filter is None:
             raise ConfigError("run_arrays: the estimator has not been started; call start or start_from first")
+        time, markers, wrench = (np.ascontiguousarray(values) for values in (time, markers, wrench))
+        arrays = self._filter.run(time, markers, wrench, progress)
         self._time = float(time[-1])
-        return self._filter.run(*(np.ascontiguousarray(values) for values in (time, markers, wrench)))
+        return arrays
 
     def step(self, sample: Sample) -> StepEstimate:
         """Take one sample, after `start`; samples come in the order of their times.

@@ -8,6 +8,7 @@ import xarray as xr
 
 from dynakin.model import InitialModel
 from dynakin.results import Event, Parameter
+from dynakin.results.records import EventKind
 
 
 def events_of(data: xr.Dataset, parameters: list[Parameter], initial: InitialModel) -> list[Event]:
@@ -35,23 +36,21 @@ def _missing(data: xr.Dataset) -> list[Event]:
 
 def _coordinates_at_bounds(data: xr.Dataset, initial: InitialModel) -> list[Event]:
     state = data["state"].values
-    _, size = 0, int(data["coordinate"].size)
+    free = [coordinate.name for coordinate in initial.spec.coordinates if not coordinate.locked]
     events = []
-    for k, name in enumerate(initial.names[:size]):
-        if "/" in name:
-            break  # the free coordinates come first
+    for k, name in enumerate(free):  # the state begins with them
         held = (state[:, k] <= initial.lower[k]) | (state[:, k] >= initial.upper[k])
         events += _stretches(data["time"].values, held, "at_bound", name, "held at its joint limit")
     return events
 
 
 def _stretches(
-    time: npt.NDArray[np.float64], flags: npt.NDArray[np.bool_], kind: str, subject: str, what: str
+    time: npt.NDArray[np.float64], flags: npt.NDArray[np.bool_], kind: EventKind, subject: str, what: str
 ) -> list[Event]:
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     events = []
     for first, end in zip(edges[::2], edges[1::2], strict=True):
         n = int(end - first)
         text = f"{what} for {n} frame{'s' if n > 1 else ''}, {time[first]:.2f} to {time[end - 1]:.2f} s"
-        events.append(Event(float(time[first]), int(first), kind, subject, text))  # type: ignore[arg-type]
+        events.append(Event(float(time[first]), int(first), kind, subject, text))
     return events
