@@ -33,9 +33,12 @@ Filter::Filter(const Model& model, const FilterSettings& settings, const Eigen::
     : model_(model),
       settings_(checked(settings, model_)),
       dx_(Eigen::VectorXd::Zero(model.state_size())),
+      step_(dx_),
       predicted_(Eigen::VectorXd::Zero(Measurement::channel_count(model))),
       measurement_(model_, settings_),
-      update_(model.state_size(), settings.chunk_rows, measurement_.max_rows()) {
+      gate_(model_),
+      update_(model.state_size(), settings.chunk_rows, measurement_.max_rows()),
+      projection_(model_, settings_) {
   reset(x0, P0);
 }
 
@@ -56,15 +59,17 @@ void Filter::reset(const Eigen::VectorXd& x, const Eigen::MatrixXd& P) {
   const Eigen::VectorXd scale = P.diagonal().cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd correlation = scale.asDiagonal() * P * scale.asDiagonal();
   if (correlation.llt().info() != Eigen::Success) throw std::invalid_argument("P0: not positive definite");
-  x_ = x;
-  P_ = P;
+  x_ = x0_ = x_before_ = x;
+  P_ = P0_ = P_before_ = P;
+  unbelieved_s_ = 0.0;
   last_ = StepReport{};
 }
 
 void Filter::predict(double dt) {
   if (!(dt >= 0.0) || !std::isfinite(dt))
     throw std::invalid_argument("dt: expected 0 s or more, found " + std::to_string(dt));
-  predict_diagonal(model_, dt, settings_.process_variance, x_, P_);
+  dynakin::predict(model_, settings_, dt, x_, P_);
+  unbelieved_s_ += dt;
 }
 
 StepReport Filter::update(const Eigen::Ref<const MarkerMatrix>& markers, const Vector6& wrench) {
@@ -74,27 +79,93 @@ StepReport Filter::update(const Eigen::Ref<const MarkerMatrix>& markers, const V
   if (markers.array().isInf().any() || wrench.array().isInf().any())
     throw std::invalid_argument("markers or wrench: infinite, expected a number, or NaN where nothing is measured");
   if (last_.diverged()) return last_;
+  StepReport report;
   measurement_.linearise(x_, markers, wrench);
   predicted_ = measurement_.predicted();
-  const UpdateSums sums = update_.apply(measurement_.blocks(), P_, dx_);
-  retract(x_, dx_);
-
-  StepReport report;
-  report.rows = sums.rows;
-  report.nis = sums.nis;
-  report.log_likelihood = -0.5 * (sums.nis + sums.log_determinant + sums.rows * std::log(2.0 * std::numbers::pi));
-  if (!sums.factored) {
+  gate_.judge(settings_, measurement_.blocks(), P_);
+  if (settings_.recovery.enabled) report.tracking = believe(markers);
+  if (report.tracking != Tracking::found) sums_ = correct(markers, wrench);
+  report.rows = sums_.rows;
+  report.nis = sums_.nis;
+  report.log_likelihood = -0.5 * (sums_.nis + sums_.log_determinant + sums_.rows * std::log(2.0 * std::numbers::pi));
+  if (!sums_.factored) {
     report.status = StepStatus::innovation_not_definite;
-  } else if (!x_.allFinite() || !std::isfinite(sums.nis)) {  // asked before a bound could hide what is lost
+  } else if (!dx_.allFinite() || !x_.allFinite() || !std::isfinite(sums_.nis)) {  // before a bound could hide it
     report.status = StepStatus::not_finite;
   } else {
-    if (settings_.constraint == ConstraintKind::gain)
-      report.constrained = constraint_.apply(settings_, sums.nis, x_, P_);
+    constrain(sums_.nis, report);
     report.status = check();
-    if (report.status == StepStatus::ok && sums.rows == 0) report.status = StepStatus::no_measurement;
+    if (report.status == StepStatus::ok && sums_.rows == 0) report.status = StepStatus::no_measurement;
+  }
+  if (report.broken() && settings_.recovery.enabled) {
+    x_ = x0_;
+    P_ = P0_;
+    unbelieved_s_ = k_infinity;
+    report.tracking = Tracking::restarted;
   }
   last_ = report;
   return report;
+}
+
+void Filter::leave_out_refused() {
+  const auto& verdicts = gate_.verdicts();
+  for (std::size_t sensor = 0; sensor < verdicts.size(); ++sensor)
+    if (verdicts[sensor] == Verdict::refused) measurement_.leave_out(static_cast<int>(sensor));
+  if (settings_.wrench_needs_markers && gate_.markers_refused() == gate_.markers_measured())
+    measurement_.leave_out(static_cast<int>(verdicts.size()) - 1);
+}
+
+// P is corrected and dx_ is what the state has still to take. A state that is known badly is linearised again where the
+// measurements have it.
+UpdateSums Filter::correct(const MarkerRef& markers, const Vector6& wrench) {
+  constexpr int most_iterations = 8;
+  const double known =
+      P_.diagonal().head(model_.n_free()).size() == 0 ? 0.0 : std::sqrt(P_.diagonal().head(model_.n_free()).maxCoeff());
+  if (known > settings_.iterate_beyond) return iterate(markers, wrench, most_iterations);
+  leave_out_refused();
+  return update_.apply(measurement_.blocks(), P_, dx_);
+}
+
+// Gauss-Newton steps of the one update (iterated extended Kalman filter, Bell and Cathey 1993), from a measurement that
+// has been linearised at x_. The sums are those of the first step: of the innovation as it was predicted.
+UpdateSums Filter::iterate(const MarkerRef& markers, const Vector6& wrench, int most) {
+  constexpr double settled = 1e-6;  // rad or m
+  x_before_ = x_;
+  P_before_ = P_;
+  UpdateSums first;
+  for (int k = 0;; ++k) {
+    leave_out_refused();
+    if (k > 0) measurement_.shift_innovations(dx_);
+    step_ = dx_;
+    const UpdateSums sums = update_.apply(measurement_.blocks(), P_, dx_);
+    if (k == 0) {
+      first = sums;
+      step_.setZero();
+    }
+    step_ -= dx_;
+    const bool done = !sums.factored || k + 1 == most || step_.head(model_.n_free()).cwiseAbs().maxCoeff() < settled;
+    if (!sums.factored) first.factored = false;
+    if (done) break;
+    x_ = x_before_ + dx_;
+    P_ = P_before_;
+    measurement_.linearise(x_, markers, wrench);
+  }
+  x_ = x_before_;
+  return first;
+}
+
+void Filter::constrain(double nis, StepReport& report) {
+  if (settings_.constraint == ConstraintKind::sigmoid) {
+    report.constrained = sigmoid_.apply(settings_, dx_, x_, P_);
+    return;
+  }
+  retract(x_, dx_);
+  if (settings_.constraint == ConstraintKind::gain) report.constrained = gain_.apply(settings_, nis, x_, P_);
+  if (settings_.constraint == ConstraintKind::projection) {
+    const ProjectionReport projected = projection_.apply(x_, P_);
+    report.constrained = projected.active;
+    report.constraints_met = projected.solved;
+  }
 }
 
 StepStatus Filter::check() const {

@@ -68,8 +68,10 @@ void forward_kinematics(const Model& model, const StateRef& x, KinematicState& o
   for (std::size_t m = 0; m < model.markers().size(); ++m) {
     const Marker& marker = model.markers()[m];
     Vector3 p = marker.position;
-    for (int k = 0; k < 3; ++k)
+    for (int k = 0; k < 3; ++k) {
       if (marker.column[k] != k_none) p(k) = x(marker.column[k]);
+      if (marker.soft_tissue[k] != k_none) p(k) += x(marker.soft_tissue[k]);
+    }
     const SegmentState& segment = out.segments[marker.segment];
     out.markers[m] = segment.p_GB + segment.R_GB * p;
   }
@@ -97,7 +99,8 @@ void marker_jacobian(const Model& model, const KinematicState& state, int marker
         out.col(column_slot[c]) += state.placements[i][k].screw.lin;
   }
   for (int k = 0; k < 3; ++k)
-    if (site.column[k] != k_none) out.col(column_slot[site.column[k]]) += state.segments[site.segment].R_GB.col(k);
+    for (const int c : {site.column[k], site.soft_tissue[k]})
+      if (c != k_none) out.col(column_slot[c]) += state.segments[site.segment].R_GB.col(k);
 }
 
 }  // namespace dynakin

@@ -29,7 +29,10 @@ Measurement::Measurement(const Model& model, const FilterSettings& settings)
       wrench_used_(model.spec().wrench_measured),
       wrench_scratch_(6, model.state_size()),
       kinematics_(model),
+      late_kinematics_(model),
       dynamics_(model),
+      late_dynamics_(model),
+      late_state_(model.state_size()),
       predicted_(channel_count(model)) {
   wrench_covariance_ = carried(settings.wrench_covariance, settings.reference_point, wrench_used_);
   wrench_scratch_.setZero();
@@ -62,7 +65,21 @@ void Measurement::evaluate(const Eigen::VectorXd& x) {
   subtree_dynamics(model_, x, kinematics_, dynamics_);
   const int n_markers = static_cast<int>(model_.markers().size());
   for (int m = 0; m < n_markers; ++m) predicted_.segment<3>(3 * m) = kinematics_.markers[m];
-  predicted_.segment<6>(3 * n_markers) = dynamics_.wrench.vector();
+  auto wrench = predicted_.segment<6>(3 * n_markers);
+  if (model_.delay_column() == k_none) {
+    wrench = dynamics_.wrench.vector();
+  } else {
+    const int n = model_.n_free();
+    const double d = x(model_.delay_column());
+    late_state_ = x;
+    late_state_.segment(0, n) += d * (0.5 * d * x.segment(2 * n, n) - x.segment(n, n));
+    late_state_.segment(n, n) -= d * x.segment(2 * n, n);
+    forward_kinematics(model_, late_state_, late_kinematics_);
+    subtree_dynamics(model_, late_state_, late_kinematics_, late_dynamics_);
+    wrench = late_dynamics_.wrench.vector();
+  }
+  for (int k = 0; k < 6; ++k)
+    if (const int c = model_.offset_columns()[k]; c != k_none) wrench(k) += x(c);
   predicted_(3 * n_markers + 6) = dynamics_.mass;
 }
 
@@ -72,6 +89,12 @@ void Measurement::linearise(const Eigen::VectorXd& x, const Eigen::Ref<const Mar
   for (std::size_t m = 0; m < model_.markers().size(); ++m) marker_rows(static_cast<int>(m), markers.col(m));
   wrench_rows(wrench);
   if (blocks_.size() > model_.markers().size() + 1) mass_rows();
+}
+
+void Measurement::shift_innovations(const Eigen::VectorXd& d) {
+  for (RowBlock& block : blocks_)
+    for (std::size_t c = 0; c < block.columns->size(); ++c)
+      block.v.head(block.rows) += block.H.col(c).head(block.rows) * d((*block.columns)[c]);
 }
 
 void Measurement::marker_rows(int marker, const Vector3& measured) {
@@ -103,15 +126,34 @@ void Measurement::wrench_rows(const Vector6& measured) {
   for (int k = 0; k < 6; ++k)
     if (wrench_used_[k] && !std::isnan(measured(k))) component[block.rows++] = k;
   if (block.rows == 0) return;
-  wrench_jacobian(model_, kinematics_, dynamics_, wrench_scratch_);
+  if (model_.delay_column() == k_none)
+    wrench_jacobian(model_, kinematics_, dynamics_, wrench_scratch_);
+  else
+    delayed_jacobian();
+  for (int k = 0; k < 6; ++k)
+    if (const int c = model_.offset_columns()[k]; c != k_none) wrench_scratch_.col(c) = Vector6::Unit(k);
   const std::vector<int>& columns = *block.columns;
   for (std::size_t c = 0; c < columns.size(); ++c)
     for (int r = 0; r < block.rows; ++r) block.H(r, c) = wrench_scratch_(component[r], columns[c]);
-  const Vector6 predicted = dynamics_.wrench.vector();
+  const Vector6 predicted = predicted_.segment<6>(3 * n_markers);
   for (int r = 0; r < block.rows; ++r) {
     block.v(r) = measured(component[r]) - predicted(component[r]);
     block.channel[r] = 3 * n_markers + component[r];
     for (int s = 0; s < block.rows; ++s) block.R(r, s) = wrench_covariance_(component[r], component[s]);
+  }
+}
+
+// The plates saw q - d qd + d^2/2 qdd, qd - d qdd and qdd: the chain rule through that.
+void Measurement::delayed_jacobian() {
+  auto& J = wrench_scratch_;
+  wrench_jacobian(model_, late_kinematics_, late_dynamics_, J);
+  const int n = model_.n_free(), c = model_.delay_column();
+  const double d = late_state_(c);
+  J.col(c).setZero();
+  for (int i = 0; i < n; ++i) {
+    J.col(c) -= J.col(i) * late_state_(n + i) + J.col(n + i) * late_state_(2 * n + i);
+    J.col(2 * n + i) += d * (0.5 * d * J.col(i) - J.col(n + i));
+    J.col(n + i) -= d * J.col(i);
   }
 }
 

@@ -44,6 +44,8 @@ Vector3 unit(const Vector3& direction, const std::string& where) {
   return direction;
 }
 
+constexpr const char* axis_names[3] = {"x", "y", "z"};
+
 std::vector<int> sorted(const std::set<int>& columns) {
   std::vector<int> list;
   for (int c : columns)
@@ -63,7 +65,9 @@ Model::Model(const ModelSpec& spec) : spec_(spec) {
   compile_coordinates();
   compile_parameters();
   compile_markers();
+  compile_soft_tissue();
   compile_segments();
+  compile_plates();
   compile_columns();
 }
 
@@ -94,12 +98,11 @@ void Model::compile_parameters() {
 }
 
 void Model::compile_markers() {
-  static constexpr const char* axis_names[3] = {"x", "y", "z"};
   std::vector<std::string> names;
   for (const MarkerSpec& m : spec_.markers) {
     const std::string where = "marker '" + m.name + "'";
     check_finite(m.position, where + ": position");
-    Marker marker{m.name, find(spec_.segments, m.segment, where, "segment"), m.position, {}, m.measured, 0};
+    Marker marker{m.name, find(spec_.segments, m.segment, where, "segment"), m.position, {}, {}, m.measured, 0};
     for (int k = 0; k < 3; ++k) {
       marker.n_measured += m.measured[k];
       marker.column[k] = m.estimated[k] ? layout_.size() + static_cast<int>(names.size()) : k_none;
@@ -108,6 +111,31 @@ void Model::compile_markers() {
     markers_.push_back(marker);
   }
   layout_.append("markers", names);
+}
+
+void Model::compile_soft_tissue() {
+  std::vector<std::string> names;
+  for (std::size_t m = 0; m < markers_.size(); ++m)
+    for (int k = 0; k < 3; ++k) {
+      const bool moves = spec_.markers[m].soft_tissue[k];
+      markers_[m].soft_tissue[k] = moves ? layout_.size() + static_cast<int>(names.size()) : k_none;
+      if (moves) names.push_back("soft_tissue/" + markers_[m].name + "/" + axis_names[k]);
+    }
+  layout_.append("soft_tissue", names);
+}
+
+void Model::compile_plates() {
+  static constexpr const char* component_names[6] = {"fx", "fy", "fz", "mx", "my", "mz"};
+  std::vector<std::string> names;
+  for (int k = 0; k < 6; ++k) {
+    offset_columns_[k] = spec_.wrench_offset[k] ? layout_.size() + static_cast<int>(names.size()) : k_none;
+    if (spec_.wrench_offset[k]) names.push_back(std::string("plates/") + component_names[k]);
+  }
+  if (spec_.wrench_delay) {
+    delay_column_ = layout_.size() + static_cast<int>(names.size());
+    names.push_back("plates/delay");
+  }
+  layout_.append("plates", names);
 }
 
 void Model::compile_segments() {
@@ -176,10 +204,13 @@ void Model::compile_columns() {
     wrench.insert(geometry[i].begin(), geometry[i].end());
     wrench.insert(s.inertia_column.begin(), s.inertia_column.end());
   }
+  wrench.insert(offset_columns_.begin(), offset_columns_.end());
+  wrench.insert(delay_column_);
   wrench_columns_ = sorted(wrench);
   for (const Marker& m : markers_) {
     std::set<int> columns = geometry[m.segment];
     columns.insert(m.column.begin(), m.column.end());
+    columns.insert(m.soft_tissue.begin(), m.soft_tissue.end());
     marker_columns_.push_back(sorted(columns));
   }
 }

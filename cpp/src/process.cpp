@@ -1,11 +1,38 @@
 #include "dynakin/process.hpp"
 
-namespace dynakin {
+#include <cmath>
 
-void predict_diagonal(const Model& model, double dt, const Eigen::VectorXd& process_variance, Eigen::VectorXd& x,
-                      Eigen::MatrixXd& P) {
-  const int n = model.n_free();
-  const int rest = model.state_size() - 3 * n;
+namespace dynakin {
+namespace {
+
+// Noise of density w[0] on the rate of q, w[1] on that of qd, w[2] (the jerk) on that of qdd, integrated over dt.
+void add_chain_noise(const Eigen::VectorXd& density, int n, double dt, Eigen::MatrixXd& P) {
+  const double d2 = dt * dt, d3 = d2 * dt;
+  for (int i = 0; i < n; ++i) {
+    const double w0 = density(i), w1 = density(n + i), w2 = density(2 * n + i);
+    const double q_qd = w1 * d2 / 2.0 + w2 * d2 * d2 / 8.0, q_qdd = w2 * d3 / 6.0, qd_qdd = w2 * d2 / 2.0;
+    P(i, i) += w0 * dt + w1 * d3 / 3.0 + w2 * d3 * d2 / 20.0;
+    P(n + i, n + i) += w1 * dt + w2 * d3 / 3.0;
+    P(2 * n + i, 2 * n + i) += w2 * dt;
+    P(n + i, i) += q_qd;
+    P(i, n + i) += q_qd;
+    P(2 * n + i, i) += q_qdd;
+    P(i, 2 * n + i) += q_qdd;
+    P(2 * n + i, n + i) += qd_qdd;
+    P(n + i, 2 * n + i) += qd_qdd;
+  }
+}
+
+// Variance that white noise of this density leaves after dt on a state that decays at this rate.
+double decayed_noise(double density, double rate, double dt) {
+  return rate == 0.0 ? density * dt : -density * std::expm1(-2.0 * rate * dt) / (2.0 * rate);
+}
+
+}  // namespace
+
+void predict(const Model& model, const FilterSettings& settings, double dt, Eigen::VectorXd& x, Eigen::MatrixXd& P) {
+  const int n = model.n_free(), size = model.state_size();
+  const int rest = size - 3 * n;
   const double half = 0.5 * dt * dt;
 
   x.segment(0, n) += dt * x.segment(n, n) + half * x.segment(2 * n, n);
@@ -18,8 +45,28 @@ void predict_diagonal(const Model& model, double dt, const Eigen::VectorXd& proc
   top.middleRows(0, n) += dt * top.middleRows(n, n) + half * top.middleRows(2 * n, n);
   top.middleRows(n, n) += dt * top.middleRows(2 * n, n);
   for (int j = 1; j < 3 * n; ++j) top.col(j).head(j) = top.row(j).head(j).transpose();
+  for (int i = 3 * n; i < size; ++i) {
+    if (settings.decay_rate(i) == 0.0) continue;
+    const double kept = std::exp(-settings.decay_rate(i) * dt);
+    x(i) *= kept;
+    P.col(i) *= kept;
+    P.row(i) *= kept;  // the corner above is made from the one below
+  }
   P.topRightCorner(3 * n, rest) = P.bottomLeftCorner(rest, 3 * n).transpose();
-  P.diagonal() += process_variance;
+  P.diagonal() += settings.process_variance;
+  add_chain_noise(settings.process_density, n, dt, P);
+  for (int i = 3 * n; i < size; ++i)
+    if (settings.process_density(i) > 0.0)
+      P(i, i) += decayed_noise(settings.process_density(i), settings.decay_rate(i), dt);
+}
+
+void transpose_transition(const Model& model, const FilterSettings& settings, double dt,
+                          Eigen::Ref<Eigen::VectorXd> x) {
+  const int n = model.n_free();
+  x.segment(2 * n, n) += dt * x.segment(n, n) + 0.5 * dt * dt * x.segment(0, n);
+  x.segment(n, n) += dt * x.segment(0, n);
+  for (int i = 3 * n; i < model.state_size(); ++i)
+    if (settings.decay_rate(i) != 0.0) x(i) *= std::exp(-settings.decay_rate(i) * dt);
 }
 
 }  // namespace dynakin

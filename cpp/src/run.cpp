@@ -32,7 +32,10 @@ RunRecord::RunRecord(const Model& model, std::size_t frames)
       log_likelihood(frames),
       step_us(frames),
       rows(frames),
-      constrained(frames) {}
+      constrained(frames),
+      verdicts(frames * (model.markers().size() + 1)),
+      tracking(frames),
+      constraints_met(frames) {}
 
 void run_frames(Filter& filter, const double* time, const double* markers, const double* wrench, std::size_t first,
                 std::size_t end, RunRecord& record) {
@@ -54,13 +57,18 @@ void run_frames(Filter& filter, const double* time, const double* markers, const
     record.log_likelihood[k] = report.log_likelihood;
     record.rows[k] = report.rows;
     record.constrained[k] = report.constrained;
+    record.tracking[k] = static_cast<std::uint8_t>(report.tracking);
+    record.constraints_met[k] = report.constraints_met;
+    std::transform(filter.verdicts().begin(), filter.verdicts().end(),
+                   record.verdicts.begin() + static_cast<std::ptrdiff_t>(k * filter.verdicts().size()),
+                   [](Verdict verdict) { return static_cast<std::uint8_t>(verdict); });
     std::copy_n(filter.predicted().data(), m, record.markers_predicted.data() + k * m);
     std::copy_n(filter.predicted().data() + m, 6, record.wrench_predicted.data() + 6 * k);
     Eigen::Map<Eigen::VectorXd>(record.state.data() + k * n, n) = filter.state();
     Eigen::Map<Eigen::VectorXd>(record.state_sd.data() + k * n, n) = filter.covariance().diagonal().cwiseSqrt();
     const Measurement& now = filter.evaluate();
     std::copy_n(now.predicted().data(), m, record.markers_estimated.data() + k * m);
-    std::copy_n(now.predicted().data() + m, 6, record.wrench_estimated.data() + 6 * k);
+    Eigen::Map<Vector6>(record.wrench_estimated.data() + 6 * k) = now.dynamics().wrench.vector();
     joint_moments(model, now.kinematics(), now.dynamics(), nullptr,
                   Eigen::Map<Eigen::VectorXd>(record.moments.data() + k * nc, nc));
   }

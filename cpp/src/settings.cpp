@@ -22,6 +22,8 @@ void FilterSettings::check(const Model& model) const {
   const int n = model.state_size();
   const auto& names = model.layout().names();
   check_size("process_variance", process_variance, n);
+  check_size("process_density", process_density, n);
+  check_size("decay_rate", decay_rate, n);
   check_size("marker_variance", marker_variance, static_cast<Eigen::Index>(model.markers().size()));
   check_size("lower", lower, n);
   check_size("upper", upper, n);
@@ -29,6 +31,13 @@ void FilterSettings::check(const Model& model) const {
     if (!(process_variance(i) >= 0.0) || std::isinf(process_variance(i)))
       fail("process_variance",
            "of '" + names[i] + "' is " + std::to_string(process_variance(i)) + ", expected 0 or more");
+    if (!(process_density(i) >= 0.0) || std::isinf(process_density(i)))
+      fail("process_density",
+           "of '" + names[i] + "' is " + std::to_string(process_density(i)) + ", expected 0 or more");
+    const bool decays = decay_rate(i) != 0.0;
+    if (!(decay_rate(i) >= 0.0) || std::isinf(decay_rate(i)) || (decays && i < 3 * model.n_free()))
+      fail("decay_rate", "of '" + names[i] + "' is " + std::to_string(decay_rate(i)) +
+                             (i < 3 * model.n_free() ? ", expected 0: motion does not decay" : ", expected 0 or more"));
     if (!(lower(i) <= upper(i)))
       fail("bounds", "of '" + names[i] + "' are " + std::to_string(lower(i)) + " and " + std::to_string(upper(i)) +
                          ", expected lower <= upper");
@@ -57,6 +66,20 @@ void FilterSettings::check(const Model& model) const {
     fail("total_mass", "is " + std::to_string(*total_mass) + " kg, expected more than 0");
   if (total_mass && !(total_mass_variance > 0.0))
     fail("total_mass_variance", "is " + std::to_string(total_mass_variance) + ", expected more than 0");
+  if (equality.rows() > 0 && equality.cols() != n)
+    fail("equality", "expected " + std::to_string(n) + " columns, found " + std::to_string(equality.cols()));
+  check_size("equality_value", equality_value, equality.rows());
+  if (!equality.allFinite() || !equality_value.allFinite()) fail("equality", "is not finite");
+  if (equality.rows() > 0 && constraint != ConstraintKind::projection)
+    fail("equality", "needs constraint 'projection'");
+  for (const GateLimits& gate : {marker_gate, wrench_gate})
+    for (double limit : gate)
+      if (!(limit > 0.0)) fail("gate", "is " + std::to_string(limit) + ", expected more than 0");
+  if (!(iterate_beyond > 0.0))
+    fail("iterate_beyond", "is " + std::to_string(iterate_beyond) + ", expected more than 0");
+  for (double value : {recovery.blind_s, recovery.coordinate_sd, recovery.speed_sd, recovery.acceleration_sd})
+    if (!(value > 0.0) || std::isinf(value))
+      fail("recovery", "holds " + std::to_string(value) + ", expected more than 0");
   if (chunk_rows < 1) fail("chunk_rows", "is " + std::to_string(chunk_rows) + ", expected 1 or more");
 }
 

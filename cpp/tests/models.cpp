@@ -95,6 +95,9 @@ FilterSettings settings_for(const Model& model) {
   const int n = model.state_size();
   FilterSettings settings;
   settings.process_variance = Eigen::VectorXd::Constant(n, 1e-4);
+  settings.process_density = Eigen::VectorXd::Zero(n);
+  settings.decay_rate = Eigen::VectorXd::Zero(n);
+  settings.equality.resize(0, n);
   settings.marker_variance = Eigen::VectorXd::Constant(static_cast<Eigen::Index>(model.markers().size()), 1e-4);
   settings.wrench_covariance.diagonal() << 4.0, 4.0, 4.0, 1.0, 1.0, 1.0;
   settings.reference_point = Vector3(0.1, 0.0, 0.2);

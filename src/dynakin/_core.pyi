@@ -185,7 +185,7 @@ class ParameterSpec:
 class MarkerSpec:
     """A marker site on a segment (m, segment frame)."""
 
-    def __init__(self, name: str, segment: str, position: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C')], measured: Sequence[bool] = [True, True, True], estimated: Sequence[bool] = [True, True, True]) -> None: ...
+    def __init__(self, name: str, segment: str, position: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C')], measured: Sequence[bool] = [True, True, True], estimated: Sequence[bool] = [True, True, True], soft_tissue: Sequence[bool] = [False, False, False]) -> None: ...
 
     @property
     def name(self) -> str: ...
@@ -217,6 +217,12 @@ class MarkerSpec:
     @estimated.setter
     def estimated(self, arg: Sequence[bool], /) -> None: ...
 
+    @property
+    def soft_tissue(self) -> list[bool]: ...
+
+    @soft_tissue.setter
+    def soft_tissue(self, arg: Sequence[bool], /) -> None: ...
+
     def __getstate__(self) -> tuple: ...
 
     def __setstate__(self, arg: tuple, /) -> None: ...
@@ -224,7 +230,7 @@ class MarkerSpec:
 class ModelSpec:
     """A model as plain data; Model checks and compiles it."""
 
-    def __init__(self, name: str, coordinates: Sequence[CoordinateSpec], parameters: Sequence[ParameterSpec], segments: Sequence[SegmentSpec], markers: Sequence[MarkerSpec], gravity: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C')] = ..., wrench_measured: Sequence[bool] = [True, True, True, True, True, True]) -> None: ...
+    def __init__(self, name: str, coordinates: Sequence[CoordinateSpec], parameters: Sequence[ParameterSpec], segments: Sequence[SegmentSpec], markers: Sequence[MarkerSpec], gravity: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C')] = ..., wrench_measured: Sequence[bool] = [True, True, True, True, True, True], wrench_offset: Sequence[bool] = [False, False, False, False, False, False], wrench_delay: bool = False) -> None: ...
 
     @property
     def name(self) -> str: ...
@@ -267,6 +273,18 @@ class ModelSpec:
 
     @wrench_measured.setter
     def wrench_measured(self, arg: Sequence[bool], /) -> None: ...
+
+    @property
+    def wrench_offset(self) -> list[bool]: ...
+
+    @wrench_offset.setter
+    def wrench_offset(self, arg: Sequence[bool], /) -> None: ...
+
+    @property
+    def wrench_delay(self) -> bool: ...
+
+    @wrench_delay.setter
+    def wrench_delay(self, arg: bool, /) -> None: ...
 
     def __getstate__(self) -> tuple: ...
 
@@ -344,10 +362,15 @@ def marker_jacobian(model: Model, x: Annotated[NDArray[numpy.float64], dict(shap
 def wrench_jacobian(model: Model, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]:
     """d wrench / dx (6, n), dense: for tests and study."""
 
+class RecoverySettings:
+    """When the motion counts as lost, and how it is sought anew."""
+
+    def __init__(self, blind_s: float = 0.2, coordinate_sd: float = 0.5, speed_sd: float = 2.0, acceleration_sd: float = 20.0) -> None: ...
+
 class FilterSettings:
     """Noise, bounds and constraints of a Filter, SI units."""
 
-    def __init__(self, process_variance: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], marker_variance: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], wrench_covariance: Annotated[NDArray[numpy.float64], dict(shape=(6, 6), order='F')], reference_point: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C')], total_mass: float | None, total_mass_variance: float, lower: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], upper: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], constraint: str = 'gain', chunk_rows: int = 28) -> None: ...
+    def __init__(self, process_variance: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], marker_variance: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], wrench_covariance: Annotated[NDArray[numpy.float64], dict(shape=(6, 6), order='F')], reference_point: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C')], total_mass: float | None, total_mass_variance: float, lower: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], upper: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], constraint: str = 'gain', chunk_rows: int = 28, process_density: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')] | None = None, decay_rate: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')] | None = None, equality: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='F')] | None = None, equality_value: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')] | None = None, marker_gate: Sequence[float] | None = None, wrench_gate: Sequence[float] | None = None, wrench_needs_markers: bool = False, iterate_beyond: float = float('inf'), recovery: RecoverySettings | None = None) -> None: ...
 
     @property
     def process_variance(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]: ...
@@ -374,12 +397,19 @@ class StepReport:
     def diverged(self) -> bool: ...
 
     @property
+    def tracking(self) -> str:
+        """following, doubtful, lost, found or restarted"""
+
+    @property
     def n_rows(self) -> int:
         """measured rows that were used"""
 
     @property
     def constrained(self) -> int:
-        """elements moved onto a bound"""
+        """elements moved onto a bound, or constraints that bind"""
+
+    @property
+    def constraints_met(self) -> bool: ...
 
     @property
     def nis(self) -> float:
@@ -400,6 +430,12 @@ class Filter:
     @property
     def covariance(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='F')]:
         """P (n, n)"""
+
+    @property
+    def verdicts(self) -> list[str]:
+        """
+        missing, accepted or refused: each marker in the last update and, last, the plates
+        """
 
     def reset(self, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], P: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='F')]) -> None: ...
 

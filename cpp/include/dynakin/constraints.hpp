@@ -1,4 +1,4 @@
-// Constraints by restricting the Kalman gain (6)-(9).
+// Bounds kept by restricting the Kalman gain (6)-(9), and by a smooth map; projection.hpp has the default.
 #pragma once
 
 #include <Eigen/Core>
@@ -19,6 +19,20 @@ class GainConstraint {
 
  private:
   Eigen::VectorXd correction_;
+};
+
+// Smooth bounds (Joukov et al. 2015): an element between finite bounds moves as lower + (upper - lower) sigmoid(theta),
+// and the filter corrects theta. Its covariance is kept in units of the element, so it scales with the slope.
+class SigmoidBounds {
+ public:
+  explicit SigmoidBounds(int state_size) : slope_(Eigen::VectorXd::Ones(state_size)) {}
+
+  // x, which lies between its bounds, moved by dx along the map; P scaled to the slope there. Returns how many elements
+  // lie so close to a bound that the slope has all but vanished.
+  int apply(const FilterSettings& settings, const Eigen::VectorXd& dx, Eigen::VectorXd& x, Eigen::MatrixXd& P);
+
+ private:
+  Eigen::VectorXd slope_;
 };
 
 }  // namespace dynakin

@@ -6,8 +6,10 @@
 #include <string>
 
 #include "dynakin/constraints.hpp"
+#include "dynakin/gate.hpp"
 #include "dynakin/measurement.hpp"
 #include "dynakin/process.hpp"
+#include "dynakin/projection.hpp"
 #include "dynakin/update.hpp"
 
 namespace dynakin {
@@ -15,14 +17,24 @@ namespace dynakin {
 enum class StepStatus { ok, no_measurement, innovation_not_definite, not_finite, variance_not_positive };
 const char* describe(StepStatus status);
 
+// What the filter makes of its own estimate. doubtful: most markers were refused, so nothing of the frame was used;
+// lost: so for longer than recovery.blind_s, the motion is held; found: sought anew in this frame, and found;
+// restarted: the numbers had broken down, everything starts again from x0.
+enum class Tracking : std::uint8_t { following, doubtful, lost, found, restarted };
+const char* describe(Tracking tracking);
+
 struct StepReport {
   StepStatus status = StepStatus::ok;
-  int rows = 0;                 // measured in this step
-  int constrained = 0;          // elements moved onto a bound
+  Tracking tracking = Tracking::following;
+  int rows = 0;                 // measured in this step, and believed
+  int constrained = 0;          // elements moved onto a bound; with projection: active constraints
+  bool constraints_met = true;  // false: no state within reach kept them all, bounds were kept one by one
   double nis = 0.0;             // normalised innovation squared, over all rows
   double log_likelihood = 0.0;  // of the innovation
 
-  bool diverged() const { return status != StepStatus::ok && status != StepStatus::no_measurement; }
+  // Given up: the status says why. With recovery the filter starts again instead, and the status says why it had to.
+  bool diverged() const { return broken() && tracking != Tracking::restarted; }
+  bool broken() const { return status != StepStatus::ok && status != StepStatus::no_measurement; }
 };
 
 class DivergenceError : public std::runtime_error {
@@ -52,19 +64,35 @@ class Filter {
   const Eigen::MatrixXd& covariance() const { return P_; }
   // z predicted before the last update, all channels.
   const Eigen::VectorXd& predicted() const { return predicted_; }
+  // What became of each marker and, last, of the plates in the last update.
+  const std::vector<Verdict>& verdicts() const { return gate_.verdicts(); }
   // Kinematics and dynamics at the present state, for what is reported of it.
   const Measurement& evaluate();
 
  private:
+  using MarkerRef = Eigen::Ref<const MarkerMatrix>;
+  Tracking believe(const MarkerRef& markers);
+  void leave_out_refused();
+  UpdateSums correct(const MarkerRef& markers, const Vector6& wrench);
+  UpdateSums iterate(const MarkerRef& markers, const Vector6& wrench, int most);
+  void constrain(double nis, StepReport& report);
+  void hold_motion();
+  bool seek_motion(const MarkerRef& markers);
+  int refuse_misfits(const MarkerRef& markers);
   StepStatus check() const;
 
   const Model model_;  // copies: a filter stands alone
   const FilterSettings settings_;
-  Eigen::VectorXd x_, dx_, predicted_;
-  Eigen::MatrixXd P_;
+  Eigen::VectorXd x_, dx_, step_, predicted_, x0_, x_before_;
+  Eigen::MatrixXd P_, P0_, P_before_;
   Measurement measurement_;
+  Gate gate_;
   ChunkedUpdate update_;
-  GainConstraint constraint_{model_.state_size()};
+  GainConstraint gain_{model_.state_size()};
+  SigmoidBounds sigmoid_{model_.state_size()};
+  Projection projection_;
+  UpdateSums sums_;
+  double unbelieved_s_ = 0.0;  // since a frame whose markers were believed
   StepReport last_;
 };
 

@@ -29,7 +29,12 @@ class Measurement {
   static int channel_count(const Model& model) { return 3 * static_cast<int>(model.markers().size()) + 7; }
   int max_rows() const { return max_rows_; }
   const std::vector<RowBlock>& blocks() const { return blocks_; }
-  // z predicted at the state of the last evaluate(), all channels (also those that are not measured).
+  // Takes a sensor's rows out of this frame: a marker's, or with n_markers the plates'.
+  void leave_out(int sensor) { blocks_[sensor].rows = 0; }
+  // v + H d: innovations as seen from a state that lies d before the one of the last linearise().
+  void shift_innovations(const Eigen::VectorXd& d);
+  // z predicted at the state of the last evaluate(), all channels (also those that are not measured). Its wrench is
+  // what the plates should say: late by their delay, with their slow error; dynamics().wrench is the body's own.
   const Eigen::VectorXd& predicted() const { return predicted_; }
   const KinematicState& kinematics() const { return kinematics_; }
   const DynamicState& dynamics() const { return dynamics_; }
@@ -42,6 +47,7 @@ class Measurement {
  private:
   void marker_rows(int marker, const Vector3& measured);
   void wrench_rows(const Vector6& measured);
+  void delayed_jacobian();
   void mass_rows();
 
   const Model& model_;
@@ -51,8 +57,9 @@ class Measurement {
   std::vector<std::vector<int>> slot_;  // a marker: state column -> place in its list
   MarkerMatrix marker_scratch_;
   Eigen::Matrix<double, 6, Eigen::Dynamic> wrench_scratch_;
-  KinematicState kinematics_;
-  DynamicState dynamics_;
+  KinematicState kinematics_, late_kinematics_;
+  DynamicState dynamics_, late_dynamics_;
+  Eigen::VectorXd late_state_;  // as it was when the plates measured; used where their delay is estimated
   Eigen::VectorXd predicted_;
   std::vector<RowBlock> blocks_;
   int max_rows_ = 0;

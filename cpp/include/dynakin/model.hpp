@@ -40,7 +40,8 @@ struct Marker {
   std::string name;
   int segment;
   Vector3 position;
-  std::array<int, 3> column;  // in x, k_none where fixed
+  std::array<int, 3> column;       // in x, k_none where fixed
+  std::array<int, 3> soft_tissue;  // columns of its displacement from there, k_none where it has none
   std::array<bool, 3> measured;
   int n_measured;
 };
@@ -77,6 +78,9 @@ class Model {
   const std::vector<int>& marker_columns(int marker) const { return marker_columns_[marker]; }
   const std::vector<int>& wrench_columns() const { return wrench_columns_; }
   const std::vector<int>& mass_columns() const { return mass_columns_; }
+  // Columns of the plates' slow error and of their delay, k_none where they are not estimated.
+  const std::array<int, 6>& offset_columns() const { return offset_columns_; }
+  int delay_column() const { return delay_column_; }
 
   int coordinate_column(int coordinate) const { return coordinates_[coordinate].index; }
   int speed_column(int coordinate) const { return shifted(coordinate, n_free_); }
@@ -93,6 +97,8 @@ class Model {
   void compile_parameters();
   void compile_segments();
   void compile_markers();
+  void compile_soft_tissue();
+  void compile_plates();
   void compile_columns();
 
   ModelSpec spec_;
@@ -105,6 +111,8 @@ class Model {
   std::vector<Parameter> parameters_;
   std::vector<std::vector<int>> marker_columns_;
   std::vector<int> wrench_columns_, mass_columns_;
+  std::array<int, 6> offset_columns_{};
+  int delay_column_ = k_none;
 };
 
 }  // namespace dynakin

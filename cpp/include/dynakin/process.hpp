@@ -1,14 +1,19 @@
-// How the state moves between frames: constant acceleration for the coordinates, constants for the rest (4).
+// How the state moves between frames: constant acceleration for the coordinates (4), decay for soft tissue and plate
+// errors, constants for the rest.
 #pragma once
 
 #include <Eigen/Core>
 
-#include "dynakin/model.hpp"
+#include "dynakin/settings.hpp"
 
 namespace dynakin {
 
-// x <- f(x), P <- F P F' + Q with the paper's diagonal Q. F is never formed: it only mixes the first three blocks of P.
-void predict_diagonal(const Model& model, double dt, const Eigen::VectorXd& process_variance, Eigen::VectorXd& x,
-                      Eigen::MatrixXd& P);
+// x <- f(x), P <- F P F' + Q over dt. F is never formed: it mixes the first three blocks of P and scales what decays.
+// Q is the sum of a diagonal added at each call, the paper's, and of continuous white noise integrated over dt, which
+// makes two half steps equal one (docs/derivations.md).
+void predict(const Model& model, const FilterSettings& settings, double dt, Eigen::VectorXd& x, Eigen::MatrixXd& P);
+
+// x <- F' x: the backward pass of a smoother.
+void transpose_transition(const Model& model, const FilterSettings& settings, double dt, Eigen::Ref<Eigen::VectorXd> x);
 
 }  // namespace dynakin

@@ -2,13 +2,15 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "dynakin/filter.hpp"
 
 namespace dynakin {
 
-// Row-major arrays, a row a frame. "predicted": before the frame is used; "estimated": after.
+// Row-major arrays, a row a frame. "predicted": before the frame is used; "estimated": after; the
+// wrench then is the body's own, without what the plates are thought to add.
 struct RunRecord {
   RunRecord(const Model& model, std::size_t frames);
 
@@ -18,6 +20,8 @@ struct RunRecord {
   std::vector<double> moments;                               // (frames, coordinates)
   std::vector<double> nis, log_likelihood, step_us;
   std::vector<int> rows, constrained;
+  std::vector<std::uint8_t> verdicts;  // (frames, markers + 1), of each marker and, last, of the plates
+  std::vector<std::uint8_t> tracking, constraints_met;
 };
 
 // Frames first to end - 1; frame 0 is an update only, the others step by the difference of their times.

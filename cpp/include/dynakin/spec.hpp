@@ -64,6 +64,7 @@ struct MarkerSpec {
   Vector3 position = Vector3::Zero();                  // m, in the segment frame
   std::array<bool, 3> measured = {true, true, true};   // ground axes that the recording measures
   std::array<bool, 3> estimated = {true, true, true};  // axes of the segment along which the place is estimated
+  std::array<bool, 3> soft_tissue{};                   // axes along which it also moves with skin and muscle
 };
 
 struct ModelSpec {
@@ -74,6 +75,8 @@ struct ModelSpec {
   std::vector<MarkerSpec> markers;
   Vector3 gravity{0.0, -9.80665, 0.0};  // m/s^2, ground frame
   std::array<bool, 6> wrench_measured = {true, true, true, true, true, true};
+  std::array<bool, 6> wrench_offset{};  // components whose slow error, about the ground origin, is estimated
+  bool wrench_delay = false;            // whether the plates' delay behind the markers is estimated
 };
 
 }  // namespace dynakin

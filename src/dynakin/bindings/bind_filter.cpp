@@ -20,8 +20,11 @@ using Array3 = nb::ndarray<const double, nb::ndim<3>, nb::c_contig, nb::device::
 
 ConstraintKind constraint_kind(const std::string& name) {
   if (name == "gain") return ConstraintKind::gain;
+  if (name == "projection") return ConstraintKind::projection;
+  if (name == "sigmoid") return ConstraintKind::sigmoid;
   if (name == "none") return ConstraintKind::none;
-  throw nb::value_error(("constraint: expected 'gain' or 'none', found '" + name + "'").c_str());
+  throw nb::value_error(
+      ("constraint: expected 'projection', 'gain', 'sigmoid' or 'none', found '" + name + "'").c_str());
 }
 
 // A (M, 3) row-major array is a (3, M) column-major matrix.
@@ -65,6 +68,9 @@ nb::dict run(Filter& filter, const Array1& time, const Array3& markers, const Ar
   out["step_us"] = owned(std::move(record.step_us), {frames});
   out["n_rows"] = owned(std::move(record.rows), {frames});
   out["constrained"] = owned(std::move(record.constrained), {frames});
+  out["verdicts"] = owned(std::move(record.verdicts), {frames, n_markers + 1});
+  out["tracking"] = owned(std::move(record.tracking), {frames});
+  out["constraints_met"] = owned(std::move(record.constraints_met), {frames});
   return out;
 }
 
@@ -79,27 +85,55 @@ void bind_filter(nb::module_& m) {
     }
   });
 
+  nb::class_<RecoverySettings>(m, "RecoverySettings", "When the motion counts as lost, and how it is sought anew.")
+      .def(
+          "__init__",
+          [](RecoverySettings* self, double blind_s, double coordinate_sd, double speed_sd, double acceleration_sd) {
+            new (self) RecoverySettings{true, blind_s, coordinate_sd, speed_sd, acceleration_sd};
+          },
+          nb::arg("blind_s") = RecoverySettings{}.blind_s, nb::arg("coordinate_sd") = RecoverySettings{}.coordinate_sd,
+          nb::arg("speed_sd") = RecoverySettings{}.speed_sd,
+          nb::arg("acceleration_sd") = RecoverySettings{}.acceleration_sd);
+
   nb::class_<FilterSettings>(m, "FilterSettings", "Noise, bounds and constraints of a Filter, SI units.")
       .def(
           "__init__",
           [](FilterSettings* self, Eigen::VectorXd process_variance, Eigen::VectorXd marker_variance,
              const Matrix6& wrench_covariance, const Vector3& reference_point, std::optional<double> total_mass,
              double total_mass_variance, Eigen::VectorXd lower, Eigen::VectorXd upper, const std::string& constraint,
-             int chunk_rows) {
-            new (self) FilterSettings{std::move(process_variance),
-                                      std::move(marker_variance),
-                                      wrench_covariance,
-                                      reference_point,
-                                      total_mass,
-                                      total_mass_variance,
-                                      std::move(lower),
-                                      std::move(upper),
-                                      constraint_kind(constraint),
-                                      chunk_rows};
+             int chunk_rows, std::optional<Eigen::VectorXd> process_density, std::optional<Eigen::VectorXd> decay_rate,
+             std::optional<Eigen::MatrixXd> equality, std::optional<Eigen::VectorXd> equality_value,
+             std::optional<GateLimits> marker_gate, std::optional<GateLimits> wrench_gate, bool wrench_needs_markers,
+             double iterate_beyond, std::optional<RecoverySettings> recovery) {
+            const Eigen::VectorXd none = Eigen::VectorXd::Zero(process_variance.size());
+            auto* s = new (self) FilterSettings;
+            s->process_variance = std::move(process_variance);
+            s->process_density = process_density.value_or(none);
+            s->decay_rate = decay_rate.value_or(none);
+            s->marker_variance = std::move(marker_variance);
+            s->wrench_covariance = wrench_covariance;
+            s->reference_point = reference_point;
+            s->total_mass = total_mass;
+            s->total_mass_variance = total_mass_variance;
+            s->lower = std::move(lower);
+            s->upper = std::move(upper);
+            s->constraint = constraint_kind(constraint);
+            s->equality = equality.value_or(Eigen::MatrixXd(0, none.size()));
+            s->equality_value = equality_value.value_or(Eigen::VectorXd(0));
+            s->marker_gate = marker_gate.value_or(no_gate);
+            s->wrench_gate = wrench_gate.value_or(no_gate);
+            s->wrench_needs_markers = wrench_needs_markers;
+            s->iterate_beyond = iterate_beyond;
+            if (recovery) s->recovery = *recovery;
+            s->chunk_rows = chunk_rows;
           },
           nb::arg("process_variance"), nb::arg("marker_variance"), nb::arg("wrench_covariance"),
           nb::arg("reference_point"), nb::arg("total_mass").none(), nb::arg("total_mass_variance"), nb::arg("lower"),
-          nb::arg("upper"), nb::arg("constraint") = "gain", nb::arg("chunk_rows") = FilterSettings{}.chunk_rows)
+          nb::arg("upper"), nb::arg("constraint") = "gain", nb::arg("chunk_rows") = FilterSettings{}.chunk_rows,
+          nb::arg("process_density") = nb::none(), nb::arg("decay_rate") = nb::none(), nb::arg("equality") = nb::none(),
+          nb::arg("equality_value") = nb::none(), nb::arg("marker_gate") = nb::none(),
+          nb::arg("wrench_gate") = nb::none(), nb::arg("wrench_needs_markers") = false,
+          nb::arg("iterate_beyond") = k_infinity, nb::arg("recovery") = nb::none())
       .def_ro("process_variance", &FilterSettings::process_variance, nb::rv_policy::copy)
       .def_ro("marker_variance", &FilterSettings::marker_variance, nb::rv_policy::copy)
       .def_ro("wrench_covariance", &FilterSettings::wrench_covariance, nb::rv_policy::copy)
@@ -109,8 +143,12 @@ void bind_filter(nb::module_& m) {
   nb::class_<StepReport>(m, "StepReport", "What one step did.")
       .def_prop_ro("status", [](const StepReport& r) { return std::string(describe(r.status)); })
       .def_prop_ro("diverged", &StepReport::diverged)
+      .def_prop_ro(
+          "tracking", [](const StepReport& r) { return std::string(describe(r.tracking)); },
+          "following, doubtful, lost, found or restarted")
       .def_ro("n_rows", &StepReport::rows, "measured rows that were used")
-      .def_ro("constrained", &StepReport::constrained, "elements moved onto a bound")
+      .def_ro("constrained", &StepReport::constrained, "elements moved onto a bound, or constraints that bind")
+      .def_ro("constraints_met", &StepReport::constraints_met)
       .def_ro("nis", &StepReport::nis, "normalised innovation squared, summed over the rows")
       .def_ro("log_likelihood", &StepReport::log_likelihood);
 
@@ -119,6 +157,14 @@ void bind_filter(nb::module_& m) {
            nb::arg("model"), nb::arg("settings"), nb::arg("x0"), nb::arg("P0"))
       .def_prop_ro("state", &Filter::state, nb::rv_policy::copy, "x (n,)")
       .def_prop_ro("covariance", &Filter::covariance, nb::rv_policy::copy, "P (n, n)")
+      .def_prop_ro(
+          "verdicts",
+          [](const Filter& f) {
+            std::vector<std::string> words;
+            for (Verdict verdict : f.verdicts()) words.emplace_back(describe(verdict));
+            return words;
+          },
+          "missing, accepted or refused: each marker in the last update and, last, the plates")
       .def("reset", &Filter::reset, nb::arg("x"), nb::arg("P"))
       .def("predict", &Filter::predict, nb::arg("dt"), "Moves the state by dt seconds.")
       .def(

@@ -107,32 +107,37 @@ void bind_spec(nb::module_& m) {
   using Flags3 = std::array<bool, 3>;
   nb::class_<MarkerSpec> marker(m, "MarkerSpec", "A marker site on a segment (m, segment frame).");
   marker
-      .def(nb::init<std::string, std::string, Vector3, Flags3, Flags3>(), nb::arg("name"), nb::arg("segment"),
+      .def(nb::init<std::string, std::string, Vector3, Flags3, Flags3, Flags3>(), nb::arg("name"), nb::arg("segment"),
            nb::arg("position"), nb::arg("measured") = Flags3{true, true, true},
-           nb::arg("estimated") = Flags3{true, true, true})
+           nb::arg("estimated") = Flags3{true, true, true}, nb::arg("soft_tissue") = Flags3{})
       .def_rw("name", &MarkerSpec::name)
       .def_rw("segment", &MarkerSpec::segment)
       .def_rw("position", &MarkerSpec::position, nb::rv_policy::copy)
       .def_rw("measured", &MarkerSpec::measured)
-      .def_rw("estimated", &MarkerSpec::estimated);
+      .def_rw("estimated", &MarkerSpec::estimated)
+      .def_rw("soft_tissue", &MarkerSpec::soft_tissue);
   picklable(marker, &MarkerSpec::name, &MarkerSpec::segment, &MarkerSpec::position, &MarkerSpec::measured,
-            &MarkerSpec::estimated);
+            &MarkerSpec::estimated, &MarkerSpec::soft_tissue);
 
   using Flags6 = std::array<bool, 6>;
   nb::class_<ModelSpec> model(m, "ModelSpec", "A model as plain data; Model checks and compiles it.");
   model
       .def(nb::init<std::string, std::vector<CoordinateSpec>, std::vector<ParameterSpec>, std::vector<SegmentSpec>,
-                    std::vector<MarkerSpec>, Vector3, Flags6>(),
+                    std::vector<MarkerSpec>, Vector3, Flags6, Flags6, bool>(),
            nb::arg("name"), nb::arg("coordinates"), nb::arg("parameters"), nb::arg("segments"), nb::arg("markers"),
            nb::arg("gravity") = Vector3(0.0, -9.80665, 0.0),
-           nb::arg("wrench_measured") = Flags6{true, true, true, true, true, true})
+           nb::arg("wrench_measured") = Flags6{true, true, true, true, true, true}, nb::arg("wrench_offset") = Flags6{},
+           nb::arg("wrench_delay") = false)
       .def_rw("name", &ModelSpec::name)
       .def_rw("coordinates", &ModelSpec::coordinates)
       .def_rw("parameters", &ModelSpec::parameters)
       .def_rw("segments", &ModelSpec::segments)
       .def_rw("markers", &ModelSpec::markers)
       .def_rw("gravity", &ModelSpec::gravity, nb::rv_policy::copy)
-      .def_rw("wrench_measured", &ModelSpec::wrench_measured);
+      .def_rw("wrench_measured", &ModelSpec::wrench_measured)
+      .def_rw("wrench_offset", &ModelSpec::wrench_offset)
+      .def_rw("wrench_delay", &ModelSpec::wrench_delay);
   picklable(model, &ModelSpec::name, &ModelSpec::coordinates, &ModelSpec::parameters, &ModelSpec::segments,
-            &ModelSpec::markers, &ModelSpec::gravity, &ModelSpec::wrench_measured);
+            &ModelSpec::markers, &ModelSpec::gravity, &ModelSpec::wrench_measured, &ModelSpec::wrench_offset,
+            &ModelSpec::wrench_delay);
 }

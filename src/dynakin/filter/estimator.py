@@ -12,7 +12,8 @@ from dynakin import _core
 from dynakin.errors import ConfigError, DivergenceError, RecordingError
 from dynakin.filter import presets
 from dynakin.filter.assemble import assemble
-from dynakin.filter.noise import Noise
+from dynakin.filter.extend import continuous_noise, extended, initial_covariance
+from dynakin.filter.noise import Noise, gate_limits
 from dynakin.filter.samples import Sample, recording_arrays, sample_arrays
 from dynakin.model import Bounds, InitialModel, ModelDefinition, Priors, initialise
 from dynakin.recordings import Recording, check_plates
@@ -118,9 +119,10 @@ class Estimator:
 
     def start_from(self, initial: InitialModel) -> InitialModel:
         """Make the filter ready to step from a model that was measured before, or changed since."""
+        initial = extended(initial, self.noise)
         self._core_model = _core.Model(initial.spec)
         self._filter = _core.Filter(
-            self._core_model, self.filter_settings(initial), initial.x0, np.diag(initial.sd0**2)
+            self._core_model, self.filter_settings(initial), initial.x0, initial_covariance(initial, self.noise)
         )
         self.initial, self._time = initial, None
         return initial
@@ -200,17 +202,32 @@ class Estimator:
                 f"noise.marker: {', '.join(sorted(unknown))} not among the markers used; expected some of "
                 f"{', '.join(initial.recorded_markers)}"
             )
-        variance = self.noise.marker_scale * initial.marker_variance
+        noise, layout = self.noise, self._core_model.layout
+        variance = noise.marker_scale * initial.marker_variance
+        if noise.marker_sd_m is not None:
+            variance[:] = noise.marker_sd_m**2
         for k, name in enumerate(initial.recorded_markers):
             variance[k] = self.noise.marker.get(name, variance[k])
+        density, decay = continuous_noise(initial, noise, layout)
         return _core.FilterSettings(
-            process_variance=self.noise.process_variance(self._core_model.layout),
+            process_variance=noise.process_variance(layout),
+            process_density=density,
+            decay_rate=decay,
             marker_variance=variance,
-            wrench_covariance=self.noise.wrench_covariance(),
-            reference_point=np.array(self.noise.reference_point_m, dtype=float),
-            total_mass=initial.mass_kg,
-            total_mass_variance=self.noise.total_mass,
+            wrench_covariance=noise.wrench_covariance(),
+            reference_point=np.array(self._reference_point(), dtype=float),
+            total_mass=initial.mass_kg if noise.total_mass_use == "frame" else None,
+            total_mass_variance=noise.total_mass,
             lower=initial.lower,
             upper=initial.upper,
-            constraint=self.noise.constraint,
+            constraint=noise.constraint,
+            marker_gate=gate_limits(noise.marker_gate),
+            wrench_gate=gate_limits(noise.wrench_gate),
+            wrench_needs_markers=noise.recover,
+            iterate_beyond=np.inf if noise.iterate_beyond is None else noise.iterate_beyond,
+            recovery=_core.RecoverySettings(blind_s=noise.blind_s) if noise.recover else None,
         )
+
+    def _reference_point(self) -> tuple[float, float, float]:
+        point = self.noise.reference_point_m
+        return (0.0, 0.0, 0.0) if point == "auto" else point

@@ -1,4 +1,4 @@
-"""What the filter is told about noise: process and measurement variances, and how constraints are kept."""
+"""What the filter is told about noise: process and measurement, what it doubts, and how constraints are kept."""
 
 from __future__ import annotations
 
@@ -7,15 +7,20 @@ from typing import Annotated, Literal
 import numpy as np
 import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field
+from scipy.stats import chi2
 
 from dynakin import _core
 
+Array = npt.NDArray[np.float64]
 Variance = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
 PositiveVariance = Annotated[float, Field(gt=0.0)]
+Deviation = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]
+Seconds = Annotated[float, Field(gt=0.0, allow_inf_nan=False)]
+Probability = Annotated[float, Field(ge=0.0, lt=1.0)]
 
 
 class Noise(BaseModel):
-    """Variances in SI units squared. The defaults are the paper's Table I, Q added at each step."""
+    """SI units; what is called a variance is squared. The defaults are the paper's Table I, Q added at each step."""
 
     model_config = ConfigDict(extra="forbid", frozen=True)
 
@@ -31,7 +36,22 @@ class Noise(BaseModel):
     """Q of each local marker coordinate, m^2 a step."""
     inertia: Variance = 0.0
     """Q of each inertial parameter: constants."""
+    jerk: Variance = 0.0
+    """Spectral density of the jerk of each rotation, rad^2/s^5: white jerk keeps angles, speeds and accelerations
+    derivatives of each other at any time step."""
+    jerk_translation: Variance = 0.0
+    """The same of each translation, m^2/s^5."""
 
+    soft_tissue: Deviation = 0.0
+    """Standard deviation of the displacement of skin and flesh under each marker, as a fraction of the size that its
+    marker set declares; 0: none is estimated."""
+    soft_tissue_least_m: Deviation = 0.0
+    """The least such standard deviation, m: what stands in for a foot or a joint that is not as the model has it."""
+    soft_tissue_time_s: Seconds = 1.0
+    """Time constant of that displacement (first-order Gauss-Markov process)."""
+
+    marker_sd_m: Annotated[float, Field(gt=0.0)] | None = None
+    """Noise of the cameras, m, for all markers; not given: R of the marker set, which holds soft tissue too."""
     marker_scale: PositiveVariance = 1.0
     """Factor on the R of all markers that the marker set gives."""
     marker: dict[str, PositiveVariance] = {}
@@ -39,27 +59,71 @@ class Noise(BaseModel):
     force: PositiveVariance = 0.1
     """R of each force component of the total wrench, N^2."""
     moment: PositiveVariance = 0.1
-    """R of each moment component, (N m)^2."""
-    reference_point_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    """Where the wrench's noise is declared, in the ground frame."""
+    """R of each moment component about the reference point, (N m)^2."""
+    reference_point_m: tuple[float, float, float] | Literal["auto"] = (0.0, 0.0, 0.0)
+    """Where the wrench's noise is declared, in the ground frame; auto: the mean centre of pressure of the first
+    second."""
+    plate_force: Deviation = 0.0
+    """Standard deviation of a slow error of each force (plates and model alike), N; 0: none is estimated."""
+    plate_moment: Deviation = 0.0
+    """The same of each moment about the ground origin, N m."""
+    plate_time_s: Seconds = 1.0
+    """Time constant of that slow error."""
+    plate_delay_s: Deviation = 0.0
+    """Prior standard deviation of the plates' delay behind the markers, s; 0: none is estimated."""
     total_mass: PositiveVariance = 1e-4
-    """R of the total mass as a soft constraint at each frame, kg^2."""
+    """Variance of the declared total mass, kg^2."""
+    total_mass_use: Literal["frame", "prior"] = "frame"
+    """Whether the total mass is measured at each frame (5), or known once, at the start."""
 
-    constraint: Literal["gain", "none"] = "gain"
-    """How bounds are kept: by restricting the gain (7), or not at all."""
+    marker_gate: Probability = 0.0
+    """A marker is refused where its innovation is less likely than this; 0: never."""
+    wrench_gate: Probability = 0.0
+    """The same for the plates."""
+    recover: bool = False
+    """Whether a motion that most markers contradict, or that was not seen for blind_s, is sought anew."""
+    blind_s: Seconds = 0.2
+    """How long the motion is believed without markers that fit, s."""
+    iterate_beyond: Annotated[float, Field(gt=0.0)] | None = None
+    """Standard deviation of a coordinate (rad or m) beyond which an update is linearised anew; not given: never."""
 
-    def process_variance(self, layout: _core.StateLayout) -> npt.NDArray[np.float64]:
-        """Diagonal of Q (n,) in the order of the state."""
-        by_block = {
-            "coordinates": self.coordinate,
-            "speeds": self.speed,
-            "accelerations": self.acceleration,
-            "lengths": self.length,
-            "markers": self.marker_place,
-            "inertia": self.inertia,
-        }
-        return np.concatenate([np.full(size, by_block[name]) for name, (_, size) in layout.blocks.items()])
+    constraint: Literal["projection", "gain", "sigmoid", "none"] = "gain"
+    """How bounds are kept: by projection in the metric of P^-1, by restricting the gain (7), by a smooth map, or not
+    at all."""
 
-    def wrench_covariance(self) -> npt.NDArray[np.float64]:
+    def process_variance(self, layout: _core.StateLayout) -> Array:
+        """Diagonal of Q (n,) a step, in the order of the state."""
+        return _by_block(
+            layout,
+            {
+                "coordinates": self.coordinate,
+                "speeds": self.speed,
+                "accelerations": self.acceleration,
+                "lengths": self.length,
+                "markers": self.marker_place,
+                "inertia": self.inertia,
+            },
+        )
+
+    def wrench_covariance(self) -> Array:
         """R (6, 6) of the total wrench about the reference point."""
         return np.diag([self.force] * 3 + [self.moment] * 3)
+
+    def plate_sd(self) -> Array:
+        """Standard deviations (6,) of the plates' slow error, N and N m."""
+        return np.array([self.plate_force] * 3 + [self.plate_moment] * 3)
+
+    def soft_tissue_sd(self, declared_m: Array) -> Array:
+        """Standard deviation (M,) m of each marker's displacement; 0 where none is estimated."""
+        if self.soft_tissue == 0.0 and self.soft_tissue_least_m == 0.0:
+            return np.zeros(len(declared_m))
+        return np.maximum(self.soft_tissue * declared_m, self.soft_tissue_least_m)
+
+
+def gate_limits(probability: float) -> list[float] | None:
+    """Largest normalised innovation squared that is believed of 1 to 6 rows; None: no gate."""
+    return None if probability == 0.0 else [float(chi2.isf(probability, rows)) for rows in range(1, 7)]
+
+
+def _by_block(layout: _core.StateLayout, values: dict[str, float]) -> Array:
+    return np.concatenate([np.full(size, values.get(name, 0.0)) for name, (_, size) in layout.blocks.items()])

@@ -31,6 +31,7 @@ class InitialModel:
         lower, upper: (n,) bounds of (9), infinite where there are none.
         table: (n,) values of the inertia table, NaN for elements that it does not hold.
         marker_variance: (M,) m^2, R of each marker as its set gives it.
+        soft_tissue_m: (M,) declared size of the displacement of skin and flesh under each marker.
         ground: ground frame whose origin is the model's ground landmark (the toe).
         recorded_markers: names in the recording, in the order of spec.markers.
         side: "right", "left" or "both".
@@ -48,6 +49,7 @@ class InitialModel:
     upper: Array
     table: Array
     marker_variance: Array
+    soft_tissue_m: Array
     ground: GroundFrame
     recorded_markers: tuple[str, ...]
     side: str

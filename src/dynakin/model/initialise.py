@@ -65,6 +65,7 @@ def initialise(
         upper=upper,
         table=in_layout(names, plan.table_values(), np.nan),
         marker_variance=np.array([site.variance for site in plan.sites]),
+        soft_tissue_m=np.array([site.soft_tissue_m for site in plan.sites]),
         ground=rest.ground,
         recorded_markers=tuple(site.recorded for site in plan.sites),
         side=rest.side,

@@ -23,6 +23,7 @@ class Marker(Strict):
     left: tuple[str, ...] = ()
     centre: tuple[str, ...] = ()
     variance: Annotated[float, Field(gt=0.0)] | None = None  # m^2, R of the measurement
+    soft_tissue_mm: Annotated[float, Field(ge=0.0)] = 10.0  # how far skin and flesh move here, at full squat
     reason: str = ""
     landmark_only: bool = False  # virtual, or used for a joint centre only
 

@@ -24,6 +24,7 @@ class Site:
     segment: str
     position: Array  # (3,) m, segment frame
     variance: float  # m^2
+    soft_tissue_m: float  # declared size of the displacement of skin and flesh
 
 
 @dataclass(frozen=True, eq=False)

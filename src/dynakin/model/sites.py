@@ -133,5 +133,5 @@ def place_sites(
             )
         assert c.marker.variance is not None  # the schema asks for it
         name = c.marker.aliases(c.key[1])[0]
-        sites.append(Site(name, c.recorded, c.segment, local, c.marker.variance))
+        sites.append(Site(name, c.recorded, c.segment, local, c.marker.variance, 1e-3 * c.marker.soft_tissue_mm))
     return sites, messages

@@ -1,0 +1,39 @@
+// Which sensors to believe: innovation, its covariance, test ratio, accepted or refused.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "dynakin/measurement.hpp"
+
+namespace dynakin {
+
+enum class Verdict : std::uint8_t { missing, accepted, refused };
+const char* describe(Verdict verdict);
+
+class Gate {
+ public:
+  explicit Gate(const Model& model);
+
+  // Normalised innovation squared of each sensor alone, at the predicted state, against the limit for its number of
+  // rows. The rows stay as they are.
+  void judge(const FilterSettings& settings, const std::vector<RowBlock>& blocks, const Eigen::MatrixXd& P);
+  // Takes a refusal of all markers back, or refuses one more, for reasons of the caller's.
+  void accept_measured();
+  void refuse(int marker);
+  // A sensor a marker, then the plates.
+  const std::vector<Verdict>& verdicts() const { return verdicts_; }
+  int markers_measured() const { return measured_; }
+  int markers_refused() const { return refused_; }
+
+ private:
+  Verdict judge(const RowBlock& block, const GateLimits& limits, const Eigen::MatrixXd& P);
+
+  int n_markers_;
+  int measured_ = 0, refused_ = 0;
+  std::vector<Verdict> verdicts_;
+  Eigen::Matrix<double, 6, Eigen::Dynamic> HP_;
+};
+
+}  // namespace dynakin

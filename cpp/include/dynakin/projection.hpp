@@ -1,0 +1,54 @@
+// Constraints by projection: the nearest state, in the metric of P^-1, that keeps bounds, equalities and physical
+// consistency.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "dynakin/consistency.hpp"
+#include "dynakin/half_space.hpp"
+#include "dynakin/settings.hpp"
+
+namespace dynakin {
+
+struct ProjectionReport {
+  int active = 0;      // inequalities that hold the state back
+  bool solved = true;  // false: the constraints leave no state within reach, and bounds were kept one by one
+};
+
+// Dual active-set method (Goldfarb and Idnani 1983) for min (y - x)' P^-1 (y - x); it needs columns of P only, adds the
+// worst violated constraint and drops those whose multiplier would turn negative. It starts from the constraints that
+// were active the last time. Inequalities move the mean only (docs/derivations.md); equalities condition P too.
+class Projection {
+ public:
+  Projection(const Model& model, const FilterSettings& settings);
+
+  ProjectionReport apply(Eigen::VectorXd& x, Eigen::MatrixXd& P);
+  const Consistency& consistency() const { return consistency_; }
+
+ private:
+  struct Active {
+    HalfSpace row;
+    int kind;  // state column with its bound, or k_equality, k_cut
+    double multiplier;
+  };
+  void keep_equalities(Eigen::VectorXd& x, Eigen::MatrixXd& P);
+  void warm_start(const Eigen::MatrixXd& P, Eigen::VectorXd& x);
+  bool worst_violation(const Eigen::VectorXd& x, const Eigen::MatrixXd& P, Active& out) const;
+  bool add(Active incoming, const Eigen::MatrixXd& P, Eigen::VectorXd& x);
+  bool push(const Active& active, const Eigen::MatrixXd& P);
+  void drop(int k);
+  bool factor();
+  void fall_back(Eigen::VectorXd& x) const;
+
+  const FilterSettings& settings_;
+  const Consistency consistency_;
+  std::vector<Active> active_, before_;
+  int capacity_;
+  int k_ = 0;                    // active constraints
+  Eigen::MatrixXd PN_;           // (n, capacity): P a of each active constraint
+  Eigen::MatrixXd gram_, chol_;  // N' P N and its factor
+  Eigen::VectorXd Pa_, step_, r_, last_;
+};
+
+}  // namespace dynakin

@@ -1,0 +1,91 @@
+"""From the model that was measured to the one that is filtered: soft tissue, plate errors and what is known at first."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin import _core
+from dynakin.filter.noise import Noise
+from dynakin.model import InitialModel
+
+Array = npt.NDArray[np.float64]
+
+
+def extended(initial: InitialModel, noise: Noise) -> InitialModel:
+    """The same model with the states that these noise settings ask for; places, bounds and priors follow their names.
+
+    Displacements of soft tissue and errors of the plates start at 0 with the standard deviations declared.
+    """
+    spec = initial.spec
+    sd = noise.soft_tissue_sd(initial.soft_tissue_m)
+    markers = spec.markers
+    for marker, value in zip(markers, sd, strict=True):
+        marker.soft_tissue = [bool(axis and value > 0.0) for axis in marker.estimated]
+    spec.markers = markers
+    spec.wrench_offset = [
+        bool(seen and value > 0.0) for seen, value in zip(spec.wrench_measured, noise.plate_sd(), strict=True)
+    ]
+    spec.wrench_delay = noise.plate_delay_s > 0.0
+    names = list(_core.Model(spec).layout.names)
+    first = dict(zip(initial.names, range(len(initial.names)), strict=True))
+    added = _added_sd(spec, noise, sd)
+
+    def carried(values: Array, otherwise: float) -> Array:
+        return np.array([values[first[name]] if name in first else otherwise for name in names])
+
+    return replace(
+        initial,
+        spec=spec,
+        names=tuple(names),
+        x0=carried(initial.x0, 0.0),
+        sd0=np.array([initial.sd0[first[name]] if name in first else added[name] for name in names]),
+        lower=carried(initial.lower, -np.inf),
+        upper=carried(initial.upper, np.inf),
+        table=carried(initial.table, np.nan),
+    )
+
+
+def _added_sd(spec: _core.ModelSpec, noise: Noise, soft_tissue: Array) -> dict[str, float]:
+    sd = {
+        f"soft_tissue/{marker.name}/{axis}": float(value)
+        for marker, value in zip(spec.markers, soft_tissue, strict=True)
+        for axis in "xyz"
+    }
+    sd |= {
+        f"plates/{name}": float(value)
+        for name, value in zip(("fx", "fy", "fz", "mx", "my", "mz"), noise.plate_sd(), strict=True)
+    }
+    return sd | {"plates/delay": noise.plate_delay_s}
+
+
+def initial_covariance(initial: InitialModel, noise: Noise) -> Array:
+    """P0 (n, n): the priors, and with `total_mass_use` "prior" the total mass as one piece of information on it."""
+    covariance = np.diag(initial.sd0**2)
+    if noise.total_mass_use == "frame":
+        return covariance
+    masses = np.array([float(name.startswith("inertia/") and name.endswith("/mass")) for name in initial.names])
+    spread = covariance @ masses
+    variance = float(masses @ spread)
+    if variance > 0.0:
+        covariance -= np.outer(spread, spread) / (variance + noise.total_mass)
+    return covariance
+
+
+def continuous_noise(initial: InitialModel, noise: Noise, layout: _core.StateLayout) -> tuple[Array, Array]:
+    """Density (n,) of the white noise that drives each element, and the rate (n,) 1/s at which it decays."""
+    density, decay = np.zeros(layout.size), np.zeros(layout.size)
+    kinds = {axis.coordinate: axis.kind for segment in initial.spec.segments for axis in segment.axes}
+    offset, size = layout.blocks["accelerations"]
+    for k in range(offset, offset + size):
+        coordinate = layout.names[k].removesuffix("/acceleration")
+        density[k] = noise.jerk if kinds[coordinate] == "rotation" else noise.jerk_translation
+    for block, time in (("soft_tissue", noise.soft_tissue_time_s), ("plates", noise.plate_time_s)):
+        offset, size = layout.blocks[block]
+        for k in range(offset, offset + size):
+            if layout.names[k] != "plates/delay":
+                decay[k] = 1.0 / time
+                density[k] = 2.0 * initial.sd0[k] ** 2 / time
+    return density, decay
