@@ -1,5 +1,7 @@
 #include "dynakin/dynamics.hpp"
 
+#include "force_derivatives.hpp"
+
 namespace dynakin {
 namespace {
 
@@ -24,12 +26,13 @@ SpatialInertia to_ground(const InertiaVector& phi, const SegmentState& s) {
   return out;
 }
 
-// Force that an axis (or length) displacement, rate and second rate each ask of the subtree behind it.
+}  // namespace
+
 Force by_position(const SubtreeState& t, const Motion& S, const Motion& Sd, const Motion& Sdd) {
   return cross_dual(S, t.force) + t.inertia * Sdd + t.response * Sd;
 }
 
-// Columns of the wrench for the ten numbers of one segment: f = Y(v, a) phi.
+// f = Y(v, a) phi.
 void inertia_columns(const Segment& segment, const SegmentState& s,
                      Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>> out) {
   const Vector3& w = s.velocity.ang;
@@ -58,8 +61,6 @@ void inertia_columns(const Segment& segment, const SegmentState& s,
     out.col(column[k_ixx + k]) = Force{Vector3::Zero(), s.R_GB * (times(al_B) + w_B.cross(times(w_B)))}.vector();
   }
 }
-
-}  // namespace
 
 void subtree_dynamics(const Model& model, const StateRef& x, const KinematicState& state, DynamicState& out) {
   const int n = static_cast<int>(model.segments().size());

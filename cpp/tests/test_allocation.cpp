@@ -5,6 +5,7 @@
 
 #include "check.hpp"
 #include "dynakin/filter.hpp"
+#include "dynakin/moment_derivatives.hpp"
 #include "models.hpp"
 
 #ifdef DYNAKIN_COUNT_ALLOCATIONS
@@ -54,6 +55,23 @@ void check_no_allocation(const dynakin::ModelSpec& spec) {
   }
 }
 
+void check_moments_allocate_nothing(const dynakin::ModelSpec& spec) {
+  using namespace dynakin;
+  const Model model(spec);
+  const Eigen::VectorXd x = model.initial_state();
+  KinematicState kinematics(model);
+  DynamicState dynamics(model);
+  MomentWorkspace work(model);
+  const std::vector<Force> external(model.segments().size(), {Vector3::Ones(), Vector3::Ones()});
+  Eigen::MatrixXd jacobian(model.coordinates().size(), model.state_size());
+  forward_kinematics(model, x, kinematics);
+  subtree_dynamics(model, x, kinematics, dynamics);
+  const long before = allocations;
+  moment_jacobian(model, x, kinematics, dynamics, &external, work, jacobian);
+  CHECK(allocations == before);
+  CHECK(jacobian.allFinite() && jacobian.norm() > 0.0);
+}
+
 }  // namespace
 
 TEST(the_counter_sees_allocations) {
@@ -68,4 +86,8 @@ TEST(the_counter_sees_allocations) {
 
 TEST(a_planar_step_allocates_nothing) { check_no_allocation(planar_chain()); }
 TEST(a_spatial_step_allocates_nothing) { check_no_allocation(spatial_tree()); }
+TEST(the_moments_derivatives_allocate_nothing) {
+  check_moments_allocate_nothing(planar_chain());
+  check_moments_allocate_nothing(spatial_tree());
+}
 #endif

@@ -356,6 +356,11 @@ def joint_moments(model: Model, x: Annotated[NDArray[numpy.float64], dict(shape=
     Joint moments (1), (C,), N m or N, less the external wrenches (S, 6) that act on the segments, if given.
     """
 
+def moment_jacobian(model: Model, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)], external: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')] | None = None) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]:
+    """
+    d joint_moments / dx (C, n), N m or N per unit of x; the external wrenches (S, 6) stay while x varies.
+    """
+
 def marker_jacobian(model: Model, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]:
     """d p_GM / dx (3 M, n), dense: for tests and study."""
 

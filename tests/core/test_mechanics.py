@@ -133,6 +133,7 @@ def test_a_state_of_another_size_is_an_error(size):
         _core.coordinates,
         _core.marker_jacobian,
         _core.wrench_jacobian,
+        _core.moment_jacobian,
         _core.total_mass,
     ):
         with pytest.raises(ValueError, match=str(n)):

@@ -8,6 +8,7 @@
 
 #include "arrays.hpp"
 #include "dynakin/measurement.hpp"
+#include "dynakin/moment_derivatives.hpp"
 #include "module.hpp"
 
 using namespace dynakin;
@@ -61,21 +62,34 @@ RowMatrix dense_wrench_jacobian(const Model& model, const StateRef& x) {
   return J;
 }
 
-Eigen::VectorXd moments(const Model& model, const StateRef& x, const std::optional<RowMatrix>& external) {
-  const At at(model, x);
-  Eigen::VectorXd tau(model.coordinates().size());
-  if (!external) {
-    joint_moments(model, at.kinematics, at.dynamics, nullptr, tau);
-    return tau;
-  }
+using External = std::optional<std::vector<Force>>;
+
+External external_of(const Model& model, const std::optional<RowMatrix>& external) {
+  if (!external) return std::nullopt;
   const auto n = static_cast<Eigen::Index>(model.segments().size());
   if (external->rows() != n || external->cols() != 6)
     throw std::invalid_argument("external: expected a wrench a segment (" + std::to_string(n) + ", 6)");
   std::vector<Force> wrenches;
   for (Eigen::Index i = 0; i < n; ++i)
     wrenches.push_back({external->row(i).head<3>().transpose(), external->row(i).tail<3>().transpose()});
-  joint_moments(model, at.kinematics, at.dynamics, &wrenches, tau);
+  return wrenches;
+}
+
+Eigen::VectorXd moments(const Model& model, const StateRef& x, const std::optional<RowMatrix>& external) {
+  const At at(model, x);
+  const External wrenches = external_of(model, external);
+  Eigen::VectorXd tau(model.coordinates().size());
+  joint_moments(model, at.kinematics, at.dynamics, wrenches ? &*wrenches : nullptr, tau);
   return tau;
+}
+
+RowMatrix dense_moment_jacobian(const Model& model, const StateRef& x, const std::optional<RowMatrix>& external) {
+  const At at(model, x);
+  const External wrenches = external_of(model, external);
+  MomentWorkspace work(model);
+  Eigen::MatrixXd J(model.coordinates().size(), model.state_size());
+  moment_jacobian(model, x, at.kinematics, at.dynamics, wrenches ? &*wrenches : nullptr, work, J);
+  return J;
 }
 
 nb::tuple segment_poses(const Model& model, const StateRef& x) {
@@ -117,6 +131,8 @@ void bind_mechanics(nb::module_& m) {
   m.def("total_mass", [](const Model& model, const StateRef& x) { return At(model, x).dynamics.mass; }, model, x, "kg");
   m.def("joint_moments", &moments, model, x, nb::arg("external") = nb::none(),
         "Joint moments (1), (C,), N m or N, less the external wrenches (S, 6) that act on the segments, if given.");
+  m.def("moment_jacobian", &dense_moment_jacobian, model, x, nb::arg("external") = nb::none(),
+        "d joint_moments / dx (C, n), N m or N per unit of x; the external wrenches (S, 6) stay while x varies.");
   m.def("marker_jacobian", &dense_marker_jacobian, model, x, "d p_GM / dx (3 M, n), dense: for tests and study.");
   m.def("wrench_jacobian", &dense_wrench_jacobian, model, x, "d wrench / dx (6, n), dense: for tests and study.");
 }
