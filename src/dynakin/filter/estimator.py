@@ -208,6 +208,7 @@ class Estimator:
             variance[:] = noise.marker_sd_m**2
         for k, name in enumerate(initial.recorded_markers):
             variance[k] = self.noise.marker.get(name, variance[k])
+        point = noise.reference_point_m
         density, decay = continuous_noise(initial, noise, layout)
         return _core.FilterSettings(
             process_variance=noise.process_variance(layout),
@@ -215,7 +216,7 @@ class Estimator:
             decay_rate=decay,
             marker_variance=variance,
             wrench_covariance=noise.wrench_covariance(),
-            reference_point=np.array(self._reference_point(), dtype=float),
+            reference_point=initial.plate_centre if point == "auto" else np.array(point, dtype=float),
             total_mass=initial.mass_kg if noise.total_mass_use == "frame" else None,
             total_mass_variance=noise.total_mass,
             lower=initial.lower,
@@ -227,7 +228,3 @@ class Estimator:
             iterate_beyond=np.inf if noise.iterate_beyond is None else noise.iterate_beyond,
             recovery=_core.RecoverySettings(blind_s=noise.blind_s) if noise.recover else None,
         )
-
-    def _reference_point(self) -> tuple[float, float, float]:
-        point = self.noise.reference_point_m
-        return (0.0, 0.0, 0.0) if point == "auto" else point
