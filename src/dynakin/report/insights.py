@@ -17,8 +17,10 @@ from dynakin.report.labels import (
     words,
 )
 from dynakin.results import Estimate
+from dynakin.results.bounds import counts_in_words
 from dynakin.results.consistency import CONSISTENT
-from dynakin.results.metrics import evaluation_window, speed_consistency, window_consistency
+from dynakin.results.metrics import ADAPTATION_S, evaluation_window, speed_consistency, window_consistency
+from dynakin.results.soft_tissue import excess_in_words
 
 # Expected one frame ahead against seen: further apart than this, the estimate follows the measurements.
 FOLLOWING = 4.0
@@ -65,8 +67,10 @@ def insights(estimate: Estimate, metrics: dict[str, Any]) -> list[Insight]:
         _prediction(metrics),
         _consistency(estimate, metrics),
         _speeds(estimate),
+        _adaptation(metrics),
         *_constants(estimate),
-        _bounds(estimate),
+        _bounds(estimate, metrics),
+        _soft_tissue(estimate, metrics),
         _joint_limits(estimate),
         _missing(estimate, metrics),
         _gated(estimate),
@@ -187,18 +191,71 @@ def _constants(estimate: Estimate) -> list[Insight]:
     return found
 
 
-def _bounds(estimate: Estimate) -> Insight:
+def _bounds(estimate: Estimate, metrics: dict[str, Any]) -> Insight:
     free = [p for p in estimate.parameters if p.estimated]
     names = short_marker_names(estimate.marker_names)
     stuck = [parameter_label(p, names) for p in free if p.at_bound]
+    passing = {n: entry for n, entry in metrics["bounds"]["parameters"].items() if not entry["at_end"]}
+    for_a_time = ""
+    if passing:
+        most = max(passing, key=lambda name: passing[name]["share_of_time"])
+        label = next(parameter_label(p, names) for p in free if p.name == most)
+        share = number(100.0 * passing[most]["share_of_time"], "%", digits=2)
+        for_a_time = (
+            f" {plural(len(passing), 'other')} touched a bound and left it (longest: {label}, {share} of the time)."
+        )
     if not stuck:
-        return Insight("good", "Bounds", f"None of the {len(free)} estimated parameters ends on its bound.")
+        return Insight("good", "Bounds", f"None of the {len(free)} estimated parameters ends on its bound.{for_a_time}")
+    counts = counts_in_words(metrics["bounds"]["by_kind"], "at_end")
     return Insight(
         "warning",
         "Bounds",
-        f"{len(stuck)} of {len(free)} estimated parameters end on a bound: {listed(stuck)}. The data ask for a value "
-        "that the person cannot have, so the model or the noise settings do not fit there.",
+        f"{len(stuck)} of {len(free)} estimated parameters end on a bound ({counts}): {listed(stuck)}. The data ask "
+        f"for a value that the person cannot have, so the model or the noise settings do not fit there.{for_a_time}",
         "Check the mass, the height and the markers of those segments; then the film for a marker off its place.",
+    )
+
+
+def _adaptation(metrics: dict[str, Any]) -> Insight:
+    """When the estimate settled, beside the time from which the figures are taken."""
+    found = metrics["adaptation"]
+    if found["after_s"] is None:
+        lost = any(misfit["after_s"] is None for misfit in found["misfits"].values())
+        return Insight("warning" if lost else "note", "Adaptation", found["verdict"])
+    if found["after_s"] <= ADAPTATION_S:
+        return Insight("good", "Adaptation", found["verdict"])
+    return Insight(
+        "note",
+        "Adaptation",
+        f"{found['verdict']} The figures of this page are taken from {metrics['window']['start_s']:.4g} s on and hold "
+        "part of that.",
+    )
+
+
+def _soft_tissue(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
+    """Markers that move on their segments further than skin does."""
+    names = short_marker_names(estimate.marker_names)
+    markers = {names[name]: found for name, found in metrics["soft_tissue"]["markers"].items()}
+    moved = {name: found["max_mm"] for name, found in markers.items() if found["max_mm"] is not None}
+    if not moved:
+        return None
+    text = excess_in_words(markers)
+    if text:
+        return Insight(
+            "warning",
+            "Soft tissue",
+            text,
+            "Look whether each sits on the segment that the marker set says. If so, the segment is not as rigid as the "
+            "model’s (a trunk that bends), or its angle is estimated wrongly and the marker’s place makes up for it.",
+        )
+    most = max(moved, key=lambda name: moved[name])
+    declared = markers[most]["declared_mm"]
+    beside = "" if declared is None else f" (declared {number(declared, 'mm', digits=2)})"
+    return Insight(
+        "good",
+        "Soft tissue",
+        f"No marker moves further on its segment than skin does; furthest is {most} with "
+        f"{number(moved[most], 'mm', digits=2)}{beside}.",
     )
 
 
