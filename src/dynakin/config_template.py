@@ -23,7 +23,7 @@ _TABLES: dict[str, type[BaseModel]] = {"noise": Noise, "priors": Priors, "bounds
 _WIDTH = 110
 
 
-def config_template(preset: str = "paper") -> str:
+def config_template(preset: str = "default") -> str:
     """A configuration file with every key, its meaning and its default.
 
     Raises:

@@ -62,7 +62,7 @@ def compare(
     mass: Mass = None,
     height: Height = None,
     sex: Sex = None,
-    preset: Annotated[list[str] | None, typer.Option(help="Noise settings: paper. May be repeated.")] = None,
+    preset: Annotated[list[str] | None, typer.Option(help="Noise settings: default, paper. May be repeated.")] = None,
     cutoff: Annotated[float, typer.Option("--cutoff-hz", help="Low-pass of AT and classical, Hz.")] = CUTOFF_HZ,
     side: Side = None,
     vertical: Vertical = None,

@@ -9,7 +9,12 @@ import numpy as np
 from dynakin.results.estimate import Estimate
 from dynakin.results.records import ParameterKind
 
-KIND_WORDS: dict[ParameterKind, str] = {"length": "lengths", "marker": "marker places", "inertia": "inertial numbers"}
+KIND_WORDS: dict[ParameterKind, str] = {
+    "length": "lengths",
+    "marker": "marker places",
+    "inertia": "inertial numbers",
+    "plates": "plate errors",
+}
 # A constraint that is solved for may stop short of the bound by rounding: this share of the interval.
 ON_THE_BOUND = 1e-9
 
@@ -35,7 +40,7 @@ def parameter_bounds(estimate: Estimate, window: np.ndarray) -> dict[str, Any]:
     shares = bound_shares(estimate, window)
     kinds = {}
     for kind in get_args(ParameterKind):
-        group = [p for p in estimate.parameters if p.kind == kind and p.estimated]
+        group = [p for p in estimate.parameters if p.kind == kind and p.estimated and p.lower is not None]
         if group:
             kinds[kind] = {
                 "estimated": len(group),
