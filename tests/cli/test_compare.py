@@ -34,7 +34,7 @@ def test_one_trial_gives_table_ii_on_screen_and_as_files(trial: list[str], tmp_p
     out = tmp_path / "comparison"
     assert main(["compare", *trial, *SUBJECT, "-o", str(out)]) == 0
     told = capsys.readouterr().out
-    for word in ("EKF (paper)", "AT (6 Hz)", "classical (6 Hz)", "FY", "N m", "knee", "squats after the adaptation"):
+    for word in ("EKF (default)", "AT (6 Hz)", "classical (6 Hz)", "FY", "N m", "knee", "squats after the adaptation"):
         assert word in told
     rows = rows_of(out / "table2.csv")
     assert {row["quantity"] for row in rows} >= {"markers", "fx", "fy", "mz", "r_knee"}
@@ -66,9 +66,9 @@ def test_halves_and_unseen_stand_beside_persistence(trial: list[str], tmp_path: 
     assert main(["compare", *trial, *SUBJECT, "--halves", "--unseen", "--horizon-ms", "50", "-o", str(out)]) == 0
     told = capsys.readouterr().out
     assert "markers, second half" in " ".join(told.split()) and "50 ms ahead" in told
-    assert {row["method"] for row in rows_of(out / "held_out.csv")} >= {"EKF (paper), table", "persistence: mean"}
+    assert {row["method"] for row in rows_of(out / "held_out.csv")} >= {"EKF (default), table", "persistence: mean"}
     page = (out / "report.html").read_text()
-    assert "EKF (paper), identified" in page and "50 ms ahead" in page
+    assert "EKF (default), identified" in page and "50 ms ahead" in page
     yardsticks = {row["yardstick"] for row in rows_of(out / "unseen.csv")}
     assert yardsticks == {"plates withheld", "marker left out", "50 ms ahead"}
 

@@ -88,7 +88,7 @@ class Estimator:
         """
         initial = self.start(recording, static=static)
         assert self._core_model is not None
-        markers, wrench = recording_arrays(recording, initial)
+        markers, wrench = recording_arrays(recording, initial, gaps=self.noise.recover)
         check = check_plates(recording, initial.ground, initial.mass_kg)
         if check.refusal:
             raise RecordingError(f"{recording.path or recording.name}: {check.refusal}")

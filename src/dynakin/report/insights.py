@@ -28,6 +28,30 @@ FOLLOWING = 4.0
 Level = Literal["good", "note", "warning"]
 
 
+# How the sentences begin that a run says of its plates as a whole.
+PLATE_WORDS = ("The plates are ", "Warning: the plates carry ")
+
+# What to try: with the paper's process noise, with white jerk.
+ADVICE = {
+    "follows": (
+        "Smaller process noise (noise.coordinate, noise.speed, noise.acceleration) lets the model carry more.",
+        "A smaller noise.jerk lets the model carry more.",
+    ),
+    "cautious": (
+        "Smaller noise.coordinate, noise.speed and noise.acceleration; then a smaller noise.marker_scale.",
+        "A smaller noise.marker_sd_m and noise.jerk; then a smaller noise.soft_tissue.",
+    ),
+    "overconfident": (
+        "A larger noise.marker_scale, noise.force and noise.moment; look for markers that fit badly first.",
+        "A larger noise.soft_tissue, noise.force and noise.moment; look for markers that fit badly first.",
+    ),
+    "speeds": (
+        "Smaller noise.coordinate and noise.speed tie each speed to its coordinate.",
+        "A live estimate steps where a measurement corrects it; smoothing (--smooth) does not.",
+    ),
+}
+
+
 @dataclass(frozen=True)
 class Insight:
     """One finding: how much it matters, a short title, a sentence or two, and what to try, where something helps."""
@@ -63,8 +87,8 @@ def insights(estimate: Estimate, metrics: dict[str, Any]) -> list[Insight]:
     """All findings, in the order of the report."""
     found = [
         _markers(estimate, metrics),
-        _wrench(metrics),
-        _prediction(metrics),
+        _wrench(estimate, metrics),
+        _prediction(estimate, metrics),
         _consistency(estimate, metrics),
         _speeds(estimate),
         _adaptation(metrics),
@@ -106,10 +130,12 @@ def _markers(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     )
 
 
-def _wrench(metrics: dict[str, Any]) -> Insight | None:
+def _wrench(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     rms = metrics["wrench"]["rms"]
+    told = [text for text in estimate.messages if text.startswith(PLATE_WORDS)]
     if not rms:
-        return Insight("note", "Force plates", "No wrench was compared: none was measured, or none is modelled.")
+        text = " ".join(told) or "No wrench was compared: none was measured, or none is modelled."
+        return Insight("warning" if told else "note", "Force plates", text.removeprefix("Warning: "))
     text = [
         f"{COMPONENT_LABELS[name][0].lower()} {number(value, COMPONENT_LABELS[name][1])}"
         + (f" ({number(share, digits=2)} %)" if (share := metrics["wrench"]["nrms_percent"][name]) is not None else "")
@@ -118,11 +144,12 @@ def _wrench(metrics: dict[str, Any]) -> Insight | None:
     return Insight(
         "note",
         "Force plates",
-        f"RMS difference between the model’s wrench and the plates’: {listed(text)}; percent of the measured RMS.",
+        f"RMS difference between the model’s wrench and the plates’: {listed(text)}; percent of the measured RMS."
+        + "".join(f" {sentence}" for sentence in told),
     )
 
 
-def _prediction(metrics: dict[str, Any]) -> Insight | None:
+def _prediction(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     """How much of the fit is the model, and how much is following the measurement of the same frame."""
     ahead, fitted = metrics["prediction"]["wrench"]["rms"], metrics["wrench"]["rms"]
     ratio = {name: ahead[name] / fitted[name] for name in fitted if fitted[name] and ahead.get(name) is not None}
@@ -141,7 +168,7 @@ def _prediction(metrics: dict[str, Any]) -> Insight | None:
         "One frame ahead",
         f"{text} That is {ratio[worst]:.0f} times as far as after it is seen ({COMPONENT_LABELS[worst][0].lower()}): "
         "the good fit above comes from following each measurement, less from a model that explains the movement.",
-        "Smaller process noise (noise.coordinate, noise.speed, noise.acceleration) lets the model carry more.",
+        _advice(estimate, "follows"),
     )
 
 
@@ -152,16 +179,21 @@ def _consistency(estimate: Estimate, metrics: dict[str, Any]) -> Insight:
     figure = "" if ratio is None else f" (Mean normalised innovation squared {number(ratio)}, 1 is right.)"
     advice = ""
     if ratio is not None and ratio < CONSISTENT[0]:
-        advice = "Smaller noise.coordinate, noise.speed and noise.acceleration; then a smaller noise.marker_scale."
+        advice = _advice(estimate, "cautious")
     elif ratio is not None and ratio > CONSISTENT[1]:
-        advice = "A larger noise.marker_scale, noise.force and noise.moment; look for markers that fit badly first."
+        advice = _advice(estimate, "overconfident")
     return Insight("good" if good else "warning", "Uncertainty", found.verdict + figure, advice)
 
 
 def _speeds(estimate: Estimate) -> Insight | None:
     _, verdict = speed_consistency(estimate, evaluation_window(estimate.time))
-    advice = "Smaller noise.coordinate and noise.speed tie each speed to its coordinate."
-    return Insight("warning", "Speeds", verdict, advice) if verdict else None
+    return Insight("warning", "Speeds", verdict, _advice(estimate, "speeds")) if verdict else None
+
+
+def _advice(estimate: Estimate, finding: str) -> str:
+    """What to try, for the process model of this run: the paper's, or white jerk."""
+    white_jerk = float(estimate.config.get("noise", {}).get("jerk", 0.0)) > 0.0
+    return ADVICE[finding][int(white_jerk)]
 
 
 def _constants(estimate: Estimate) -> list[Insight]:
@@ -183,7 +215,7 @@ def _constants(estimate: Estimate) -> list[Insight]:
                 f"These are the values {source}, not identified ones: none of {group.count} changed by more than "
                 f"{change} %, and {shrunk}."
             )
-            advice = "" if group.title == "lengths" else "Smaller process noise, and a livelier movement with the arms."
+            advice = "" if group.title == "lengths" else "A livelier movement, with the arms too; then smaller noise."
             found.append(Insight("note", title, text, advice))
         else:
             text = f"Settled: {group.count}, changed from the start by up to {change} %; {shrunk}."
