@@ -29,9 +29,32 @@ Projection::Projection(const Model& model, const FilterSettings& settings)
   r_.setZero(capacity_);
 }
 
-ProjectionReport Projection::apply(Eigen::VectorXd& x, Eigen::MatrixXd& P) {
+ProjectionReport Projection::apply(Eigen::VectorXd& x, Eigen::MatrixXd& P, FrameTape* tape) {
+  keep_equalities(x, P, tape);
+  const ProjectionReport report = bound(x, P);
+  if (tape && report.solved && k_ > 0) {  // else what moved the mean is no P N' u
+    tape->pulled = true;
+    tape->pull.setZero();
+    for (int k = 0; k < k_; ++k)
+      for (int i = 0; i < active_[k].row.size; ++i)
+        tape->pull(active_[k].row.index[i]) += active_[k].multiplier * active_[k].row.value[i];
+  }
+  return report;
+}
+
+void Projection::save(Memory& out) const {
+  out.active.assign(active_.begin(), active_.begin() + k_);
+  out.last = last_;
+}
+
+void Projection::restore(const Memory& memory) {
+  k_ = static_cast<int>(memory.active.size());
+  std::copy(memory.active.begin(), memory.active.end(), active_.begin());
+  last_ = memory.last;
+}
+
+ProjectionReport Projection::bound(Eigen::VectorXd& x, const Eigen::MatrixXd& P) {
   ProjectionReport report;
-  keep_equalities(x, P);
   warm_start(P, x);
   Active worst;
   for (int round = 0; report.solved && worst_violation(x, P, worst); ++round)
@@ -46,14 +69,16 @@ ProjectionReport Projection::apply(Eigen::VectorXd& x, Eigen::MatrixXd& P) {
 }
 
 // x + P a (b - a x) / a' P a, and P without what it had along a. A row that already holds for sure is left alone.
-void Projection::keep_equalities(Eigen::VectorXd& x, Eigen::MatrixXd& P) {
+void Projection::keep_equalities(Eigen::VectorXd& x, Eigen::MatrixXd& P, FrameTape* tape) {
   for (Eigen::Index r = 0; r < settings_.equality.rows(); ++r) {
     const auto a = settings_.equality.row(r);
     Pa_.noalias() = P * a.transpose();
     const double aPa = a.dot(Pa_);
     const double most = (a.transpose().array().square() * P.diagonal().array()).sum();
     if (!(aPa > dependent * most)) continue;
-    x += Pa_ * ((settings_.equality_value(r) - a.dot(x)) / aPa);
+    const double missing = settings_.equality_value(r) - a.dot(x);
+    if (tape) tape->add_equality(a.transpose(), Pa_, aPa, missing);
+    x += Pa_ * (missing / aPa);
     P.selfadjointView<Eigen::Lower>().rankUpdate(Pa_, -1.0 / aPa);
     P.triangularView<Eigen::StrictlyUpper>() = P.transpose();
   }
