@@ -10,7 +10,7 @@
 namespace dynakin {
 
 // With lambda and Lambda at a frame whose filtered state and covariance are x and P, the smoothed ones are x - P lambda
-// and P - P Lambda P. No predicted covariance is inverted (docs/derivations.md, section 11). Allocates at construction.
+// and P - P Lambda P. No predicted covariance is inverted (docs/derivations.md, section 9). Allocates at construction.
 class BackwardPass {
  public:
   // max_rows: of one chunk. Without covariance Lambda is not carried. Throws std::invalid_argument where constraints
