@@ -82,16 +82,13 @@ def figures(method: str, given: dict[str, Array], trial: SimulatedTrial, names: 
     )  # fmt: skip
 
 
-def blocks(arrays: dict[str, Array], initial: InitialModel, smoothed: bool = False) -> dict[str, Array]:
+def blocks(arrays: dict[str, Array], initial: InitialModel) -> dict[str, Array]:
     """The core's arrays by the names of the outputs."""
-    prefix = "smoothed_" if smoothed else ""
     n = sum(not c.locked for c in initial.spec.coordinates)
-    found = {"moments": arrays[f"{prefix}moments"]}
-    if f"{prefix}moments_sd" in arrays:
-        found["moments_sd"] = arrays[f"{prefix}moments_sd"]
+    found = {"moments": arrays["moments"], "moments_sd": arrays["moments_sd"]}
     for k, name in enumerate(("coordinates", "speeds", "accelerations")):
-        found[name] = arrays[f"{prefix}state"][:, k * n : (k + 1) * n]
-        found[f"{name}_sd"] = arrays[f"{prefix}state_sd"][:, k * n : (k + 1) * n]
+        found[name] = arrays["state"][:, k * n : (k + 1) * n]
+        found[f"{name}_sd"] = arrays["state_sd"][:, k * n : (k + 1) * n]
     return found
 
 
@@ -104,8 +101,13 @@ def one_trial(model: str, seed: int, duration: float, changes: dict[str, float])
         estimator = dynakin.Estimator(definition, Noise(**values))
         initial = estimator.start_from(off_by(estimator.start(trial.recording), seed))
         names = tuple(c.name for c in initial.spec.coordinates if not c.locked)
-        arrays = estimator.run_arrays(trial.recording.time, *recording_arrays(trial.recording, initial))
+        measured = recording_arrays(trial.recording, initial)
+        arrays = estimator.run_arrays(trial.recording.time, *measured)
         found.append(figures(name, blocks(arrays, initial), trial, names))
+        if name == "default":
+            estimator.start_from(initial)
+            arrays = estimator.run_smoothed_arrays(trial.recording.time, *measured)
+            found.append(figures("default, smoothed", blocks(arrays, initial), trial, names))
     at = reference_methods(trial.recording, initial, definition).data.sel(coordinate=list(names))
     given = {
         n: at[n].transpose("time", "coordinate").values for n in ("coordinates", "speeds", "accelerations", "moments")

@@ -46,6 +46,8 @@ class RunConfig(Strict):
 
     preset: str = "default"
     """Noise settings to start from; [noise] changes single ones."""
+    smooth: bool = False
+    """Estimate each frame from all frames, those after it too. Not given: as it would be live."""
     side: Literal["auto", "right", "left", "both"] = "auto"
     """Which side's markers a model uses that has one leg for both: auto (fewest gaps), right, left, both."""
     vertical: str = "auto"

@@ -45,6 +45,7 @@ def run(
     height: Height = None,
     sex: Sex = None,
     preset: Preset = None,
+    smooth: Annotated[bool | None, typer.Option("--smooth", help="Estimate each frame from all frames.")] = None,
     side: Side = None,
     vertical: Vertical = None,
     forward: Forward = None,
@@ -69,6 +70,7 @@ def run(
         "height_m": height,
         "sex": sex,
         "preset": preset,
+        "smooth": smooth,
         "side": side,
         "vertical": vertical,
         "forward": forward_direction(forward),
@@ -125,7 +127,7 @@ def estimate_from(config: RunConfig, progress: Callable[[int, int], None] | None
         vertical=config.vertical,
         forward=config.forward,
     )
-    estimate = estimator.run(recording, static=static, progress=progress)
+    estimate = estimator.run(recording, static=static, smooth=config.smooth, progress=progress)
     estimate = replace(estimate, config=config.as_used() | estimate.config)
     assert estimator.initial is not None
     return estimate, trial_of({config.preset: estimate}, estimator.initial, model, whatever=True)

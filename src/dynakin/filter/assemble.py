@@ -75,6 +75,7 @@ def _dataset(
     for block, values in _coordinate_blocks(arrays, model).items():
         data[block] = (("time", "coordinate"), values)
     data["moments"] = (("time", "coordinate"), arrays["moments"])
+    data["moments_sd"] = (("time", "coordinate"), arrays["moments_sd"])
     missing = np.count_nonzero(np.isnan(measured[0]), axis=2, keepdims=True) > 0
     for name, values in (
         ("measured", np.where(missing, np.nan, measured[0])),
@@ -88,6 +89,8 @@ def _dataset(
         ("predicted", arrays["wrench_predicted"]),
     ):
         data[f"wrench_{name}"] = (("time", "component"), np.where(modelled, values, np.nan))
+    data["markers_sd"] = (("time", "marker", "axis"), np.where(axes, arrays["markers_sd"], np.nan))
+    data["wrench_sd"] = (("time", "component"), np.where(modelled, arrays["wrench_sd"], np.nan))
     data["state"] = (("time", "element"), arrays["state"])
     data["state_sd"] = (("time", "element"), arrays["state_sd"])
     for name in ("nis", "n_rows", "log_likelihood", "constrained", "constraints_met", "tracking", "step_us"):

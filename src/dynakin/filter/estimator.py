@@ -16,6 +16,7 @@ from dynakin.filter.assemble import assemble
 from dynakin.filter.extend import continuous_noise, extended, initial_covariance
 from dynakin.filter.noise import Noise, gate_limits
 from dynakin.filter.samples import Sample, foreign_load, recording_arrays, sample_arrays
+from dynakin.filter.smoothing import check_can_smooth, smoothed
 from dynakin.model import Bounds, InitialModel, ModelDefinition, Priors, initialise
 from dynakin.recordings import Recording, check_plates
 from dynakin.results import Estimate
@@ -73,19 +74,27 @@ class Estimator:
         self._time: float | None = None
 
     def run(
-        self, recording: Recording, *, static: Recording | None = None, progress: Progress | None = None
+        self,
+        recording: Recording,
+        *,
+        static: Recording | None = None,
+        smooth: bool = False,
+        progress: Progress | None = None,
     ) -> Estimate:
         """Estimate a whole recording.
 
         Args:
             recording: markers and plates, as `read` gives them.
             static: the same person and markers, standing: lengths and marker places are taken from it.
+            smooth: whether each frame is estimated from all frames, those after it too (`filter.smoothing`).
             progress: called with (frames done, frames in all) now and then.
 
         Raises:
             ModelError, RecordingError: model, markers, plates and recording do not fit.
             DivergenceError: the filter lost its estimate; the message names the frame.
         """
+        if smooth:
+            check_can_smooth(self.noise)
         initial = self.start(recording, static=static)
         assert self._core_model is not None
         markers, wrench = recording_arrays(recording, initial, gaps=self.noise.recover)
@@ -108,12 +117,15 @@ class Estimator:
                 self.start_from(initial)
                 shifted = in_step(recording.time, wrench, shift)
                 arrays = self.run_arrays(recording.time, markers, shifted, progress)
+            wrench = shifted if shift else wrench
+            delay = self._delay(arrays)
+            if smooth:
+                self.start_from(initial)
+                arrays = self.run_smoothed_arrays(recording.time, markers, wrench, progress)
         except ValueError as error:  # a frame that the core refuses, named by it
             raise RecordingError(f"{recording.path or recording.name}: {error}") from None
         if not foreign:
-            notes += in_words(shift, self._delay(arrays))
-        if shift:
-            wrench = shifted
+            notes += in_words(shift, delay)
         return assemble(arrays, self._core_model, initial, recording, (markers, wrench), self.settings(), notes)
 
     def start(self, recording: Recording, *, static: Recording | None = None) -> InitialModel:
@@ -162,9 +174,25 @@ class Estimator:
         if self._filter is None:
             raise ConfigError("run_arrays: the estimator has not been started; call start or start_from first")
         time, markers, wrench = (np.ascontiguousarray(values) for values in (time, markers, wrench))
-        arrays = self._filter.run(time, markers, wrench, progress)
+        arrays = self._filter.run(time, markers, wrench, progress, output_sd=True)
         self._time = float(time[-1])
         return arrays
+
+    def run_smoothed_arrays(
+        self, time: Array, markers: Array, wrench: Array, progress: Progress | None = None
+    ) -> dict[str, Array]:
+        """`run_arrays`, then backwards over the same frames: the smoothed arrays take the places of the filtered.
+
+        Raises:
+            ConfigError: the bounds are kept in a way that has no smoother. DivergenceError: as `run_arrays`.
+        """
+        if self._filter is None:
+            raise ConfigError("run_smoothed_arrays: the estimator has not been started; call start or start_from first")
+        check_can_smooth(self.noise)
+        time, markers, wrench = (np.ascontiguousarray(values) for values in (time, markers, wrench))
+        arrays = self._filter.run_smoothed(time, markers, wrench, progress)
+        self._time = float(time[-1])
+        return smoothed(arrays)
 
     def step(self, sample: Sample) -> StepEstimate:
         """Take one sample, after `start`; samples come in the order of their times.

@@ -51,7 +51,7 @@ def recording_arrays(recording: Recording, initial: InitialModel, *, gaps: bool 
     )
     seen = np.isfinite(markers).all(axis=2)
     blind = np.flatnonzero(np.count_nonzero(seen, axis=1) == 0)
-    if len(blind) and (not gaps or len(blind) == len(seen)):
+    if len(blind) and (not gaps or not seen.any()):
         k = int(blind[0])
         raise RecordingError(
             f"{where}: frame {k + 1} ({recording.time[k]:.3f} s) has none of the model's {seen.shape[1]} markers, "

@@ -134,8 +134,8 @@ def _wrench(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     rms = metrics["wrench"]["rms"]
     told = [text for text in estimate.messages if text.startswith(PLATE_WORDS)]
     if not rms:
-        text = " ".join(told) or "No wrench was compared: none was measured, or none is modelled."
-        return Insight("warning" if told else "note", "Force plates", text.removeprefix("Warning: "))
+        why = " ".join(told) or "No wrench was compared: none was measured, or none is modelled."
+        return Insight("warning" if told else "note", "Force plates", why.removeprefix("Warning: "))
     text = [
         f"{COMPONENT_LABELS[name][0].lower()} {number(value, COMPONENT_LABELS[name][1])}"
         + (f" ({number(share, digits=2)} %)" if (share := metrics["wrench"]["nrms_percent"][name]) is not None else "")

@@ -143,6 +143,9 @@ def knee_moment_figure(estimate: Estimate, comparison: Trial | None = None) -> F
     for axes, name in zip(every, names, strict=True):
         moment = estimate.data["moments"].sel(coordinate=name).values
         axes.plot(estimate.time, moment, color=ESTIMATED, linewidth=1.2)
+        if "moments_sd" in estimate.data:
+            sd = estimate.data["moments_sd"].sel(coordinate=name).values
+            axes.fill_between(estimate.time, moment - 2.0 * sd, moment + 2.0 * sd, color=ESTIMATED, alpha=0.2, lw=0)
         note = moment_note(estimate, name)
         axes.set_title(f"{sentence(words(name))} moment, N m{f' ({note})' if note else ''}")
         if at is not None:

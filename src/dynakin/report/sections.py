@@ -135,6 +135,7 @@ def angle_section(estimate: Estimate) -> Section:
 def moment_section(estimate: Estimate) -> Section:
     """Moments, each with what it stands for."""
     panels = []
+    deviations = estimate.data["moments_sd"].values if "moments_sd" in estimate.data else None
     for index, name in enumerate(estimate.coordinate_names):
         unit = "N m" if estimate.is_rotation()[index] else "N"
         values = estimate.data["moments"].values[:, index]
@@ -147,6 +148,7 @@ def moment_section(estimate: Estimate) -> Section:
                 None,
                 values,
                 note=moment_note(estimate, name),
+                sd=deviations[:, index] if deviations is not None else None,
             )
         )
     text = "What the muscles and ligaments do about each joint, in the direction in which its coordinate grows."
@@ -155,7 +157,8 @@ def moment_section(estimate: Estimate) -> Section:
             " The model has one leg and one arm for both sides, so theirs are the sums of both. At the toe there is no "
             "joint: its “moment” is the ground’s about the toe."
         )
-    return Section("moments", "Joint moments", text, panels, key=("estimated",))
+    key = ("estimated",) if deviations is None else ("estimated", "band")
+    return Section("moments", "Joint moments", text, panels, key=key)
 
 
 def length_section(estimate: Estimate) -> Section:

@@ -30,6 +30,7 @@ def save_estimate(estimate: Estimate, folder: Path, *, overwrite: bool = True, c
         motion_files.write_accelerations(estimate, made / "accelerations.sto")
         motion_files.write_moments(estimate, made / "moments.sto")
         motion_files.write_wrench(estimate, made / "wrench.sto")
+        motion_files.write_deviations(estimate, made / "uncertainty.sto")
         write_curves(made / "repetitions.csv", curve_points(estimate.recording.name, curves))
         write_markers(estimate, made / "markers.trc")
         write_parameters(estimate, made / "parameters.json")
