@@ -39,9 +39,9 @@ void Gate::accept_measured() {
   refused_ = 0;
 }
 
-void Gate::refuse(int marker) {
-  refused_ += verdicts_[marker] == Verdict::accepted;
-  verdicts_[marker] = Verdict::refused;
+void Gate::decide(int marker, Verdict verdict) {
+  refused_ += (verdict == Verdict::refused) - (verdicts_[marker] == Verdict::refused);
+  verdicts_[marker] = verdict;
 }
 
 Verdict Gate::judge(const RowBlock& block, const GateLimits& limits, const Eigen::MatrixXd& P) {

@@ -47,6 +47,7 @@ Measurement::Measurement(const Model& model, const FilterSettings& settings)
     blocks_.back().columns = &columns;
     blocks_.back().H.setZero(3, columns.size());
     max_rows_ += model.markers()[m].n_measured;
+    markers_in_use_ += model.markers()[m].n_measured > 0 && std::isfinite(settings.marker_variance(m));
   }
   marker_scratch_.setZero(3, widest);
   blocks_.emplace_back();

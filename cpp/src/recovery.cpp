@@ -22,17 +22,19 @@ const char* describe(Tracking tracking) {
 }
 
 // Believes a frame if at most half of its markers are refused. Where that has not been so for longer than blind_s, the
-// markers may be right and the motion wrong: it is held, and sought from the markers alone.
+// markers may be right and the motion wrong: it is held, and sought from the markers alone. A motion that is held is so
+// uncertain that no gate would refuse a marker: it has to be found, not merely agreed with.
 Tracking Filter::believe(const MarkerRef& markers) {
   const int measured = gate_.markers_measured();
   const int plates = static_cast<int>(model_.markers().size());
-  if (measured > 0 && 2 * gate_.markers_refused() <= measured) {
+  const bool held = last_.tracking == Tracking::lost || last_.tracking == Tracking::restarted;
+  if (!held && measured > 0 && 2 * gate_.markers_refused() <= measured) {
     unbelieved_s_ = 0.0;
     return Tracking::following;
   }
-  if (unbelieved_s_ > settings_.recovery.blind_s) {
+  if (held || unbelieved_s_ > settings_.recovery.blind_s) {
     hold_motion();
-    if (2 * measured >= plates && seek_motion(markers)) {
+    if (2 * measured >= measurement_.markers_in_use() && (seek_motion(markers) || seek_motion_from_start(markers))) {
       unbelieved_s_ = 0.0;
       return Tracking::found;
     }
@@ -67,10 +69,11 @@ void Filter::hold_motion() {
   }
 }
 
-// Fits the motion to the markers, leaves out those that do not fit, and fits again. On success state and covariance are
+// Fits the motion to the markers, leaves out those that do not fit, and fits again, until the same ones fit: a marker
+// astray pulls others from their places at first, and these are taken back. On success state and covariance are
 // those before the fit, with its correction in dx_, and the misfits are refused; otherwise nothing has changed.
 bool Filter::seek_motion(const MarkerRef& markers) {
-  constexpr int rounds = 3, most_iterations = 20;
+  constexpr int rounds = 6, most_iterations = 20;
   const Vector6 no_wrench = Vector6::Constant(std::nan(""));
   const Eigen::VectorXd held = x_;
   const Eigen::MatrixXd wide = P_;
@@ -78,13 +81,14 @@ bool Filter::seek_motion(const MarkerRef& markers) {
   for (int round = 0; round < rounds; ++round) {
     x_ = held;
     P_ = wide;
+    measurement_.admit_all();
     measurement_.linearise(x_, markers, no_wrench);
     sums_ = iterate(markers, no_wrench, most_iterations);
     retract(x_, dx_);
     if (!sums_.factored || !x_.allFinite()) break;
-    const int misfits = refuse_misfits(markers);
+    const bool settled = !judge_by_distance(markers);
     if (2 * gate_.markers_refused() > gate_.markers_measured()) break;
-    if (misfits > 0) continue;
+    if (!settled) continue;
     x_ = held;  // dx_ is still to be taken
     return true;
   }
@@ -94,17 +98,27 @@ bool Filter::seek_motion(const MarkerRef& markers) {
   return false;
 }
 
+// The same from the posture of the first frame: the one held may be too far from where the person is now.
+bool Filter::seek_motion_from_start(const MarkerRef& markers) {
+  const int n = model_.n_free();
+  const Eigen::VectorXd held = x_.head(n);
+  x_.head(n) = x0_.head(n);
+  if (seek_motion(markers)) return true;
+  x_.head(n) = held;
+  return false;
+}
+
 // Refuses the markers that lie further from where the fit has them, soft tissue left out, than noise, place and soft
-// tissue explain. Returns how many are refused anew.
-int Filter::refuse_misfits(const MarkerRef& markers) {
+// tissue explain, and accepts the others. True where a verdict changed.
+bool Filter::judge_by_distance(const MarkerRef& markers) {
   x_before_ = x_;
   for (const Marker& marker : model_.markers())
     for (int c : marker.soft_tissue)
       if (c != k_none) x_before_(c) = 0.0;
-  int misfits = 0;
+  bool changed = false;
   measurement_.evaluate(x_before_);
   for (std::size_t m = 0; m < model_.markers().size(); ++m) {
-    if (gate_.verdicts()[m] != Verdict::accepted) continue;
+    if (gate_.verdicts()[m] == Verdict::missing) continue;
     const Marker& marker = model_.markers()[m];
     double variance = 0.0;
     for (int k = 0; k < 3; ++k)
@@ -114,11 +128,12 @@ int Filter::refuse_misfits(const MarkerRef& markers) {
     double distance = 0.0;
     for (int k = 0; k < 3; ++k)
       if (marker.measured[k]) distance += std::pow(markers(k, m) - measurement_.kinematics().markers[m](k), 2);
-    if (distance <= settings_.marker_gate[marker.n_measured - 1] * variance) continue;
-    gate_.refuse(static_cast<int>(m));
-    ++misfits;
+    const bool fits = distance <= settings_.marker_gate[marker.n_measured - 1] * variance;
+    const Verdict verdict = fits ? Verdict::accepted : Verdict::refused;
+    changed = changed || verdict != gate_.verdicts()[m];
+    gate_.decide(static_cast<int>(m), verdict);
   }
-  return misfits;
+  return changed;
 }
 
 }  // namespace dynakin

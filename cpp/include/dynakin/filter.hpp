@@ -18,8 +18,8 @@ enum class StepStatus { ok, no_measurement, innovation_not_definite, not_finite,
 const char* describe(StepStatus status);
 
 // What the filter makes of its own estimate. doubtful: most markers were refused, so nothing of the frame was used;
-// lost: so for longer than recovery.blind_s, the motion is held; found: sought anew in this frame, and found;
-// restarted: the numbers had broken down, everything starts again from x0.
+// lost: so for longer than recovery.blind_s, the motion is held until it is found; found: sought anew in this frame,
+// and found; restarted: the numbers had broken down, everything starts again from x0, and the motion is to be found.
 enum class Tracking : std::uint8_t { following, doubtful, lost, found, restarted };
 const char* describe(Tracking tracking);
 
@@ -94,7 +94,8 @@ class Filter {
   void constrain(double nis, StepReport& report);
   void hold_motion();
   bool seek_motion(const MarkerRef& markers);
-  int refuse_misfits(const MarkerRef& markers);
+  bool seek_motion_from_start(const MarkerRef& markers);
+  bool judge_by_distance(const MarkerRef& markers);
   StepStatus check() const;
 
   const Model model_;  // copies: a filter stands alone

@@ -19,9 +19,9 @@ class Gate {
   // Normalised innovation squared of each sensor alone, at the predicted state, against the limit for its number of
   // rows. The rows stay as they are.
   void judge(const FilterSettings& settings, const std::vector<RowBlock>& blocks, const Eigen::MatrixXd& P);
-  // Takes a refusal of all markers back, or refuses one more, for reasons of the caller's.
+  // Takes the refusals of all markers back, or decides on a measured one, for reasons of the caller's.
   void accept_measured();
-  void refuse(int marker);
+  void decide(int marker, Verdict verdict);
   // A sensor a marker, then the plates.
   const std::vector<Verdict>& verdicts() const { return verdicts_; }
   int markers_measured() const { return measured_; }

@@ -29,6 +29,8 @@ class Measurement {
 
   static int channel_count(const Model& model) { return 3 * static_cast<int>(model.markers().size()) + 7; }
   int max_rows() const { return max_rows_; }
+  // Markers of which the recording measures something, with finite noise.
+  int markers_in_use() const { return markers_in_use_; }
   const std::vector<RowBlock>& blocks() const { return blocks_; }
   // Takes a sensor's rows out of this frame, a marker's or with n_markers the plates': also when it is linearised anew,
   // until all are admitted again.
@@ -69,7 +71,7 @@ class Measurement {
   Eigen::VectorXd predicted_;
   std::vector<RowBlock> blocks_;
   std::vector<char> left_out_;  // a sensor each
-  int max_rows_ = 0;
+  int max_rows_ = 0, markers_in_use_ = 0;
 };
 
 }  // namespace dynakin
