@@ -7,7 +7,11 @@
 namespace dynakin {
 namespace {
 
-bool is_planar(const Segment& segment) {
+// Nothing out of the plane is estimated or measured. Where it is measured, the numbers that are not estimated count
+// too.
+bool is_planar(const Model& model, const Segment& segment) {
+  const auto& measured = model.spec().wrench_measured;
+  if (measured[2] || measured[3] || measured[4]) return false;
   for (int k : {k_mz, k_ixx, k_iyy, k_ixy, k_ixz, k_iyz})
     if (segment.inertia_column[k] != k_none) return false;
   return true;
@@ -20,7 +24,7 @@ Consistency::Consistency(const Model& model) : model_(model) {
     const Segment& segment = model.segments()[i];
     const auto& columns = segment.inertia_column;
     if (std::all_of(columns.begin(), columns.end(), [](int c) { return c == k_none; })) continue;
-    Body body{static_cast<int>(i), is_planar(segment), Eigen::Vector4d::Ones(), margin};
+    Body body{static_cast<int>(i), is_planar(model, segment), Eigen::Vector4d::Ones(), margin};
     // The diagonal of J at the start sets the units; a body without extent keeps ones.
     const Eigen::Vector4d diagonal = pseudo_inertia(body, segment.inertia).diagonal();
     for (int k = 0; k < 4; ++k) body.scale(k) = diagonal(k) > 0.0 ? 1.0 / std::sqrt(diagonal(k)) : 1.0;

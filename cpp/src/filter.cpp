@@ -59,6 +59,7 @@ void Filter::reset(const Eigen::VectorXd& x, const Eigen::MatrixXd& P) {
   const Eigen::VectorXd scale = P.diagonal().cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd correlation = scale.asDiagonal() * P * scale.asDiagonal();
   if (correlation.llt().info() != Eigen::Success) throw std::invalid_argument("P0: not positive definite");
+  projection_.forget();
   x_ = x0_ = x_before_ = x;
   P_ = P0_ = P_before_ = P;
   unbelieved_s_ = 0.0;
@@ -81,6 +82,7 @@ StepReport Filter::update(const Eigen::Ref<const MarkerMatrix>& markers, const V
   if (last_.diverged()) return last_;
   StepReport report;
   if (tape_) tape_->clear();
+  measurement_.admit_all();
   measurement_.linearise(x_, markers, wrench);
   predicted_ = measurement_.predicted();
   gate_.judge(settings_, measurement_.blocks(), P_);
@@ -145,7 +147,8 @@ UpdateSums Filter::iterate(const MarkerRef& markers, const Vector6& wrench, int 
       step_.setZero();
     }
     step_ -= dx_;
-    const bool done = !sums.factored || k + 1 == most || step_.head(model_.n_free()).cwiseAbs().maxCoeff() < settled;
+    const bool done =
+        !sums.factored || k + 1 == most || step_.head(model_.n_free()).lpNorm<Eigen::Infinity>() < settled;
     if (!sums.factored) first.factored = false;
     if (done) break;
     x_ = x_before_ + dx_;
@@ -172,7 +175,9 @@ void Filter::constrain(double nis, StepReport& report) {
 
 StepStatus Filter::check() const {
   if (!x_.allFinite() || !P_.allFinite()) return StepStatus::not_finite;
-  if ((P_.diagonal().array() <= 0.0).any()) return StepStatus::variance_not_positive;
+  const double least = P_.diagonal().minCoeff();
+  const bool may_be_sure = settings_.equality.rows() > 0;  // of an element that an equality alone decides
+  if (least < 0.0 || (least == 0.0 && !may_be_sure)) return StepStatus::variance_not_positive;
   return StepStatus::ok;
 }
 

@@ -33,7 +33,8 @@ Measurement::Measurement(const Model& model, const FilterSettings& settings)
       dynamics_(model),
       late_dynamics_(model),
       late_state_(model.state_size()),
-      predicted_(channel_count(model)) {
+      predicted_(channel_count(model)),
+      left_out_(model.markers().size() + 1) {
   wrench_covariance_ = carried(settings.wrench_covariance, settings.reference_point, wrench_used_);
   wrench_scratch_.setZero();
   std::size_t widest = 0;
@@ -102,7 +103,7 @@ void Measurement::marker_rows(int marker, const Vector3& measured) {
   block.rows = 0;
   const double variance = settings_.marker_variance(marker);
   const Marker& site = model_.markers()[marker];
-  if (std::isinf(variance)) return;
+  if (std::isinf(variance) || left_out_[marker]) return;
   for (int k = 0; k < 3; ++k)
     if (site.measured[k] && std::isnan(measured(k))) return;
   auto J = marker_scratch_.leftCols(block.H.cols());
@@ -122,6 +123,7 @@ void Measurement::wrench_rows(const Vector6& measured) {
   const int n_markers = static_cast<int>(model_.markers().size());
   RowBlock& block = blocks_[n_markers];
   block.rows = 0;
+  if (left_out_[n_markers]) return;
   std::array<int, 6> component{};
   for (int k = 0; k < 6; ++k)
     if (wrench_used_[k] && !std::isnan(measured(k))) component[block.rows++] = k;

@@ -15,7 +15,7 @@ constexpr double dependent = 1e-12;  // of a' P a: what is left of it when the o
 }  // namespace
 
 Projection::Projection(const Model& model, const FilterSettings& settings)
-    : settings_(settings), consistency_(model), last_(model.initial_state()) {
+    : settings_(settings), consistency_(model), last_(model.initial_state()), start_(last_) {
   const int n = model.state_size();
   // No more than n constraints can bind at once; far fewer do, and the small factors stay small.
   capacity_ = std::min(n, 96);
@@ -26,13 +26,20 @@ Projection::Projection(const Model& model, const FilterSettings& settings)
   chol_.setZero(capacity_, capacity_);
   Pa_.setZero(n);
   step_.setZero(n);
+  wanted_.setZero(n);
   r_.setZero(capacity_);
 }
 
+void Projection::forget() {
+  k_ = 0;
+  last_ = start_;
+}
+
 ProjectionReport Projection::apply(Eigen::VectorXd& x, Eigen::MatrixXd& P, FrameTape* tape) {
-  keep_equalities(x, P, tape);
-  const ProjectionReport report = bound(x, P);
-  if (tape && report.solved && k_ > 0) {  // else what moved the mean is no P N' u
+  const bool equal = keep_equalities(x, P, tape);
+  ProjectionReport report = bound(x, P);
+  report.solved = report.solved && equal;
+  if (tape && k_ > 0) {  // else nothing moved the mean, or no P N' u
     tape->pulled = true;
     tape->pull.setZero();
     for (int k = 0; k < k_; ++k)
@@ -55,11 +62,16 @@ void Projection::restore(const Memory& memory) {
 
 ProjectionReport Projection::bound(Eigen::VectorXd& x, const Eigen::MatrixXd& P) {
   ProjectionReport report;
+  wanted_ = x;
   warm_start(P, x);
   Active worst;
   for (int round = 0; report.solved && worst_violation(x, P, worst); ++round)
     report.solved = round < 8 * capacity_ && add(worst, P, x);
-  if (!report.solved) fall_back(x);
+  if (!report.solved) {
+    x = wanted_;
+    k_ = 0;
+    fall_back(x);
+  }
   for (int k = 0; k < k_; ++k)  // to the last bit
     if (const int i = active_[k].kind; i != k_cut) x(i) = active_[k].row.value[0] * active_[k].row.bound;
   x = x.cwiseMax(settings_.lower).cwiseMin(settings_.upper);  // what is left is rounding
@@ -68,20 +80,34 @@ ProjectionReport Projection::bound(Eigen::VectorXd& x, const Eigen::MatrixXd& P)
   return report;
 }
 
-// x + P a (b - a x) / a' P a, and P without what it had along a. A row that already holds for sure is left alone.
-void Projection::keep_equalities(Eigen::VectorXd& x, Eigen::MatrixXd& P, FrameTape* tape) {
+// x + P a (b - a x) / a' P a, and P without what it had along a. A row of which P leaves nothing open is left alone;
+// false where it does not hold.
+bool Projection::keep_equalities(Eigen::VectorXd& x, Eigen::MatrixXd& P, FrameTape* tape) {
+  bool all_hold = true;
   for (Eigen::Index r = 0; r < settings_.equality.rows(); ++r) {
     const auto a = settings_.equality.row(r);
+    const double missing = settings_.equality_value(r) - a.dot(x);
     Pa_.noalias() = P * a.transpose();
     const double aPa = a.dot(Pa_);
     const double most = (a.transpose().array().square() * P.diagonal().array()).sum();
-    if (!(aPa > dependent * most)) continue;
-    const double missing = settings_.equality_value(r) - a.dot(x);
+    if (!(aPa > dependent * most)) {
+      const double size = (a.transpose().array() * x.array()).abs().sum() + std::abs(settings_.equality_value(r));
+      all_hold = all_hold && std::abs(missing) <= rounding * size;
+      continue;
+    }
     if (tape) tape->add_equality(a.transpose(), Pa_, aPa, missing);
     x += Pa_ * (missing / aPa);
+    for (Eigen::Index i = 0; i < x.size(); ++i) {
+      // An element that the equality decides alone: nothing is left, rounding neither.
+      if (Pa_(i) * Pa_(i) < (1.0 - dependent) * P(i, i) * aPa) continue;
+      P.row(i).setZero();
+      P.col(i).setZero();
+      Pa_(i) = 0.0;
+    }
     P.selfadjointView<Eigen::Lower>().rankUpdate(Pa_, -1.0 / aPa);
     P.triangularView<Eigen::StrictlyUpper>() = P.transpose();
   }
+  return all_hold;
 }
 
 // The bounds that were active before, less those that would hold the state back from where it wants to go anyway:

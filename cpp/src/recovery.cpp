@@ -90,6 +90,7 @@ bool Filter::seek_motion(const MarkerRef& markers) {
   }
   x_ = held;
   P_ = wide;
+  measurement_.linearise(x_, markers, no_wrench);
   return false;
 }
 

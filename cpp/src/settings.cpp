@@ -16,6 +16,8 @@ void check_size(const std::string& name, const Eigen::VectorXd& value, Eigen::In
     fail(name, "expected " + std::to_string(expected) + " numbers, found " + std::to_string(value.size()));
 }
 
+bool holds(const Block& block, int element) { return element >= block.offset && element < block.offset + block.size; }
+
 }  // namespace
 
 void FilterSettings::check(const Model& model) const {
@@ -34,10 +36,10 @@ void FilterSettings::check(const Model& model) const {
     if (!(process_density(i) >= 0.0) || std::isinf(process_density(i)))
       fail("process_density",
            "of '" + names[i] + "' is " + std::to_string(process_density(i)) + ", expected 0 or more");
-    const bool decays = decay_rate(i) != 0.0;
-    if (!(decay_rate(i) >= 0.0) || std::isinf(decay_rate(i)) || (decays && i < 3 * model.n_free()))
+    const bool may_decay = holds(model.layout().block("soft_tissue"), i) || holds(model.layout().block("plates"), i);
+    if (!(decay_rate(i) >= 0.0) || std::isinf(decay_rate(i)) || (decay_rate(i) > 0.0 && !may_decay))
       fail("decay_rate", "of '" + names[i] + "' is " + std::to_string(decay_rate(i)) +
-                             (i < 3 * model.n_free() ? ", expected 0: motion does not decay" : ", expected 0 or more"));
+                             (may_decay ? ", expected 0 or more" : ", expected 0: only soft tissue and plates decay"));
     if (!(lower(i) <= upper(i)))
       fail("bounds", "of '" + names[i] + "' are " + std::to_string(lower(i)) + " and " + std::to_string(upper(i)) +
                          ", expected lower <= upper");

@@ -8,6 +8,7 @@
 #include "dynakin/fixed_lag.hpp"
 #include "dynakin/moment_derivatives.hpp"
 #include "dynakin/output_sd.hpp"
+#include "dynakin/projection.hpp"
 #include "models.hpp"
 
 #ifdef DYNAKIN_COUNT_ALLOCATIONS
@@ -54,6 +55,73 @@ void check_no_allocation(const dynakin::ModelSpec& spec) {
     CHECK(allocations == before);
     CHECK(!report.diverged());
     CHECK(report.constrained > 0 || k > 0);
+  }
+}
+
+// White jerk, soft tissue, slow and late plates, gates with refusals, an equality, bounds that bind, recovery at hand.
+void check_no_allocation_with_everything_on(dynakin::ModelSpec spec) {
+  using namespace dynakin;
+  for (MarkerSpec& m : spec.markers) m.soft_tissue = m.estimated;
+  spec.wrench_offset = spec.wrench_measured;
+  spec.wrench_delay = true;
+  const Model model(spec);
+  const int n = model.state_size(), n_free = model.n_free();
+  FilterSettings settings = settings_for(model);
+  settings.process_variance.setZero();
+  settings.process_density.segment(2 * n_free, n_free).setConstant(100.0);
+  for (const char* name : {"soft_tissue", "plates"}) {
+    const Block& block = model.layout().block(name);
+    settings.process_density.segment(block.offset, block.size).setConstant(1e-4);
+    settings.decay_rate.segment(block.offset, block.size).setConstant(2.0);
+  }
+  settings.constraint = ConstraintKind::projection;
+  settings.equality = Eigen::MatrixXd::Zero(2, n);
+  settings.equality(0, 0) = 1.0;
+  settings.equality(0, 1) = -1.0;
+  settings.equality(1, 3 * n_free) = 1.0;
+  settings.equality_value = settings.equality * model.initial_state();
+  settings.upper = model.initial_state().array() + 0.002;
+  settings.marker_gate = {6.6, 9.2, 11.3, 13.3, 15.1, 16.8};
+  settings.wrench_gate = settings.marker_gate;
+  settings.recovery.enabled = true;
+  settings.iterate_beyond = 0.05;
+  Eigen::MatrixXd P = prior_for(model);
+  P.diagonal().tail(n - 3 * n_free) *= 0.01;  // inertia that markers and plates pull at, and that stays possible
+  auto markers = markers_at(model, model.initial_state());
+  markers.row(0).array() += 0.01;
+  Filter filter(model, settings, model.initial_state(), P);
+  int refused = 0, constrained = 0, iterated = 0;
+  for (int k = 0; k < 40; ++k) {
+    if (k == 10) markers.col(1).setConstant(std::nan(""));
+    if (k == 20) markers.col(0).array() += 0.5;
+    const Vector6 wrench = Vector6::Constant(k % 8 == 0 ? 1e5 : 10.0);
+    iterated += filter.covariance().diagonal().head(n_free).maxCoeff() > 0.0025;
+    const long before = allocations;
+    const StepReport report = filter.step(0.01, markers, wrench);
+    CHECK(allocations == before);
+    CHECK(!report.broken() && report.tracking == Tracking::following);
+    constrained += report.constrained;
+    for (Verdict verdict : filter.verdicts()) refused += verdict == Verdict::refused;
+  }
+  CHECK(refused > 10 && constrained > 10 && iterated > 0);
+}
+
+// An impossible body is cut back to a possible one in each frame.
+void check_keeping_bodies_possible_allocates_nothing(const dynakin::ModelSpec& spec) {
+  using namespace dynakin;
+  const Model model(spec);
+  const FilterSettings settings = settings_for(model);
+  Projection projection(model, settings);
+  Eigen::MatrixXd P = prior_for(model);
+  for (int k = 0; k < 10; ++k) {
+    Eigen::VectorXd x = model.initial_state();
+    const Block& block = model.layout().block("inertia");
+    x(block.offset + 1) += 2.0 + 0.1 * k;  // first moment of the first segment
+    CHECK(!projection.consistency().holds(x));
+    const long before = allocations;
+    const ProjectionReport report = projection.apply(x, P);
+    CHECK(allocations == before);
+    CHECK(report.solved && report.active > 0 && projection.consistency().holds(x));
   }
 }
 
@@ -121,6 +189,12 @@ TEST(the_counter_sees_allocations) {
 
 TEST(a_planar_step_allocates_nothing) { check_no_allocation(planar_chain()); }
 TEST(a_spatial_step_allocates_nothing) { check_no_allocation(spatial_tree()); }
+TEST(a_planar_step_with_everything_on_allocates_nothing) { check_no_allocation_with_everything_on(planar_chain()); }
+TEST(a_spatial_step_with_everything_on_allocates_nothing) { check_no_allocation_with_everything_on(spatial_tree()); }
+TEST(keeping_bodies_possible_allocates_nothing) {
+  check_keeping_bodies_possible_allocates_nothing(planar_chain());
+  check_keeping_bodies_possible_allocates_nothing(spatial_tree());
+}
 TEST(the_moments_derivatives_allocate_nothing) {
   check_moments_allocate_nothing(planar_chain());
   check_moments_allocate_nothing(spatial_tree());

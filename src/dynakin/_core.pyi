@@ -367,6 +367,16 @@ def marker_jacobian(model: Model, x: Annotated[NDArray[numpy.float64], dict(shap
 def wrench_jacobian(model: Model, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]:
     """d wrench / dx (6, n), dense: for tests and study."""
 
+def plates(model: Model, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(6), order='C')]:
+    """
+    What the plates should say (6,): the wrench, late by their delay, with their slow error.
+    """
+
+def plates_jacobian(model: Model, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]:
+    """
+    d plates / dx (6, n) as the filter has it; components that are not measured are 0.
+    """
+
 class RecoverySettings:
     """When the motion counts as lost, and how it is sought anew."""
 

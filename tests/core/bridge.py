@@ -34,9 +34,14 @@ def to_core(spec: Spec) -> _core.ModelSpec:
         coordinates=[_core.CoordinateSpec(c.name, c.value, c.locked) for c in spec.coordinates],
         parameters=[_core.ParameterSpec(p.name, p.value, p.estimated) for p in spec.parameters],
         segments=segments,
-        markers=[_core.MarkerSpec(m.name, m.segment, m.position, m.measured, m.estimated) for m in spec.markers],
+        markers=[
+            _core.MarkerSpec(m.name, m.segment, m.position, m.measured, m.estimated, m.soft_tissue)
+            for m in spec.markers
+        ],
         gravity=spec.gravity,
         wrench_measured=spec.wrench_measured,
+        wrench_offset=spec.wrench_offset,
+        wrench_delay=spec.wrench_delay,
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from dataclasses import dataclass
 
 import numpy as np
@@ -140,12 +141,27 @@ def planar_model(seed: int, n_segments: int = 0) -> Spec:
     return Spec(name, coordinates, parameters, segments, markers, wrench_measured=list(PLANAR_WRENCH))
 
 
+def with_slow_errors(spec: Spec, seed: int, delay: bool = True) -> Spec:
+    """The same model with soft tissue under some markers' axes, and plates that err slowly and come late."""
+    spec, rng = deepcopy(spec), np.random.default_rng(seed)
+    for marker in spec.markers:
+        in_plane = marker.measured if marker.measured == PLANE else [True] * 3
+        marker.soft_tissue = [bool(axis and rng.random() < 0.7) for axis in in_plane]
+    spec.markers[0].soft_tissue = list(spec.markers[0].measured)
+    spec.wrench_offset = [bool(seen and rng.random() < 0.8) for seen in spec.wrench_measured]
+    spec.wrench_delay = delay
+    return spec
+
+
 def random_state(layout: Layout, rng: Generator) -> NDArray:
     """A state far from rest, with parameters somewhat away from the specification's."""
     x = layout.initial_state()
     for block, size in (("coordinates", 1.0), ("speeds", 2.0), ("accelerations", 10.0), ("markers", 0.02)):
         here = layout.block(block)
         x[here] += rng.uniform(-size, size, x[here].size)
+    x[layout.block("soft_tissue")] = rng.normal(size=layout.blocks["soft_tissue"][1]) * 0.02
+    plates = layout.block("plates")
+    x[plates] = [0.03 if name == "plates/delay" else 20.0 * rng.normal() for name in layout.names[plates]]
     for block, size in (("lengths", 0.1), ("inertia", 0.02)):  # a body of 2 % other numbers can still exist
         here = layout.block(block)
         x[here] *= rng.uniform(1 - size, 1 + size, x[here].size)
@@ -182,9 +198,15 @@ def trial(spec: Spec, seed: int, frames: int = 300, uneven: bool = True, gaps: b
         truth[:, here] *= rng.uniform(1 - relative, 1 + relative, layout.blocks[block][1])
     here = layout.block("markers")
     truth[:, here] += rng.normal(size=layout.blocks["markers"][1]) * 0.01
+    slow = np.array([*layout.names[layout.block("soft_tissue")], *layout.names[layout.block("plates")]])
+    amplitude = np.array([0.005 if name.startswith("soft") else 3.0 for name in slow])
+    wave = amplitude * np.sin(np.outer(time, rng.uniform(1, 3, slow.size)) + rng.uniform(0, 6, slow.size))
+    wave[:, slow == "plates/delay"] = 0.008
+    n_tissue = layout.blocks["soft_tissue"][1]
+    truth[:, layout.block("soft_tissue")], truth[:, layout.block("plates")] = wave[:, :n_tissue], wave[:, n_tissue:]
     markers = measurement.marker_positions(layout, truth)
     markers = markers + rng.normal(size=markers.shape) * 0.002
-    wrench = measurement.wrench(layout, truth) + rng.normal(size=(frames, 6)) * 2.0
+    wrench = measurement.plates(layout, truth) + rng.normal(size=(frames, 6)) * 2.0
     if gaps:
         for k in range(len(spec.markers)):
             start = int(rng.integers(frames))
@@ -207,6 +229,9 @@ def prior_sd(layout: Layout) -> NDArray:
     start = layout.initial_state()
     for block, size in (("coordinates", 0.05), ("speeds", 0.3), ("accelerations", 2.0), ("markers", 0.02)):
         sd[layout.block(block)] = size
+    sd[layout.block("soft_tissue")] = 0.005
+    plates = layout.block("plates")
+    sd[plates] = [0.01 if name == "plates/delay" else 3.0 for name in layout.names[plates]]
     for block in ("lengths", "inertia"):
         here = layout.block(block)
         sd[here] = 0.05 * np.abs(start[here]) + 0.01
@@ -244,3 +269,27 @@ def settings(spec: Spec, seed: int, bounds: bool = True, total_mass: bool = True
         "upper": upper,
         "constraint": "gain",
     }
+
+
+def continuous(spec: Spec, seed: int, constraint: str = "none", **changes) -> dict:
+    """Settings with white jerk and slow errors that decay, known by their spectral densities."""
+    rng = np.random.default_rng(seed)
+    layout = Layout(spec)
+    density, decay = np.zeros(layout.size), np.zeros(layout.size)
+    density[layout.block("accelerations")] = 100.0 * rng.uniform(0.5, 2.0, layout.blocks["accelerations"][1])
+    sd = prior_sd(layout)
+    for block in ("soft_tissue", "plates"):
+        for k in np.arange(layout.size)[layout.block(block)]:
+            if layout.names[k] != "plates/delay":
+                decay[k] = rng.uniform(0.5, 3.0)
+                density[k] = 2.0 * sd[k] ** 2 * decay[k]
+    return (
+        settings(spec, seed)
+        | {
+            "process_variance": np.zeros(layout.size),
+            "process_density": density,
+            "decay_rate": decay,
+            "constraint": constraint,
+        }
+        | changes
+    )

@@ -8,11 +8,13 @@ from oracle import measurement
 from oracle.state import Layout
 
 from core.bridge import model_of
-from core.random_models import planar_model, random_state, spatial_model
+from core.random_models import planar_model, random_state, spatial_model, with_slow_errors
 from dynakin import _core
 
 MODELS = [planar_model(s) for s in range(5)] + [spatial_model(s) for s in range(16)]
-BLOCKS = ("coordinates", "speeds", "accelerations", "lengths", "markers", "inertia")
+SLOW = [with_slow_errors(spec, k) for k, spec in enumerate(MODELS)]
+OFFSETS_ONLY = with_slow_errors(planar_model(3), 7, delay=False)
+BLOCKS = ("coordinates", "speeds", "accelerations", "lengths", "markers", "soft_tissue", "inertia", "plates")
 
 
 def central_differences(function, x):
@@ -34,7 +36,7 @@ def compare(name, actual, expected, relative, scale):
     np.testing.assert_allclose(actual, expected, rtol=0, atol=tolerance, err_msg=name)
 
 
-@pytest.mark.parametrize("spec", MODELS, ids=lambda s: s.name)
+@pytest.mark.parametrize("spec", [*MODELS, *SLOW[::3]], ids=lambda s: s.name)
 def test_derivatives(spec):
     model, layout = model_of(spec), Layout(spec)
     rng = np.random.default_rng(21)
@@ -44,13 +46,50 @@ def test_derivatives(spec):
         size = max(1.0, np.abs(_core.wrench(model, x)).max())
         marker_differences = central_differences(lambda z: _core.marker_positions(model, z), x)
         wrench_differences = central_differences(lambda z: _core.wrench(model, z), x)
-        exact = measurement.value_and_jacobian(layout, x)[1][:-1]
+        exact = np.vstack(
+            [
+                measurement.jacobian(lambda z: measurement.marker_positions(layout, z), x),
+                measurement.jacobian(lambda z: measurement.wrench(layout, z), x),
+            ]
+        )
         for block in BLOCKS:
             b = layout.block(block)
             compare(f"markers/{block}", markers[:, b], marker_differences[:, b], 1e-6, 1.0)
             compare(f"markers/{block}", markers[:, b], exact[:-6, b], 1e-11, 1.0)
             compare(f"wrench/{block}", force[:, b], wrench_differences[:, b], 1e-6, size)
             compare(f"wrench/{block}", force[:, b], exact[-6:, b], 1e-11, 1.0)
+
+
+@pytest.mark.parametrize("spec", [*SLOW, OFFSETS_ONLY], ids=lambda s: s.name)
+def test_derivatives_of_what_the_plates_say(spec):
+    """All columns, those of the motion too: the plates' delay mixes them."""
+    model, layout = model_of(spec), Layout(spec)
+    rng = np.random.default_rng(25)
+    seen = np.array(spec.wrench_measured)
+    for _ in range(3):
+        x = random_state(layout, rng)
+        rows = _core.plates_jacobian(model, x)
+        size = max(1.0, np.abs(_core.plates(model, x)).max())
+        differences = central_differences(lambda z: _core.plates(model, z), x)[seen]
+        exact = measurement.jacobian(lambda z: measurement.plates(layout, z), x)[seen]
+        assert not rows[~seen].any()
+        for block in BLOCKS:
+            b = layout.block(block)
+            compare(f"plates/{block}", rows[seen][:, b], differences[:, b], 1e-6, size)
+            compare(f"plates/{block}", rows[seen][:, b], exact[:, b], 1e-11, 1.0)
+    assert exact[:, layout.block("plates")].any()
+
+
+def test_plates_without_delay_or_error_say_the_wrench():
+    model, layout = model_of(MODELS[0]), Layout(MODELS[0])
+    x = random_state(layout, np.random.default_rng(26))
+    np.testing.assert_array_equal(_core.plates(model, x), _core.wrench(model, x))
+    slow = model_of(SLOW[0])
+    there = np.array([list(slow.layout.names).index(name) for name in layout.names])
+    y = slow.initial_state()
+    y[there] = x
+    np.testing.assert_allclose(_core.plates(slow, y), _core.wrench(model, x), rtol=1e-14)
+    np.testing.assert_array_equal(_core.wrench(slow, y), _core.wrench(model, x))
 
 
 @pytest.mark.parametrize("spec", MODELS[::4], ids=lambda s: s.name)

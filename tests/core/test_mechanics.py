@@ -8,13 +8,14 @@ from oracle import measurement
 from oracle.state import Layout, unpack
 
 from core.bridge import close, model_of
-from core.random_models import planar_model, random_state, spatial_model
+from core.random_models import planar_model, random_state, spatial_model, with_slow_errors
 from dynakin import _core
 
 PLANAR = [planar_model(s) for s in range(6)] + [planar_model(50, n_segments=7)]
 SPATIAL = [spatial_model(s) for s in range(20)]
 IDENTITY = [spatial_model(s, nonlinear=False) for s in range(100, 108)]
-MODELS = PLANAR + SPATIAL + IDENTITY
+SLOW = [with_slow_errors(spec, k) for k, spec in enumerate(PLANAR[::3] + SPATIAL[::3])]
+MODELS = PLANAR + SPATIAL + IDENTITY + SLOW
 
 
 def test_the_random_models_hold_what_they_should():
@@ -84,6 +85,7 @@ def test_equals_the_oracle(spec):
             np.testing.assert_array_equal(actual, expected)
         close(_core.marker_positions(model, x), measurement.marker_positions(layout, x), 1e-11)
         close(_core.wrench(model, x), measurement.wrench(layout, x), 1e-11)
+        close(_core.plates(model, x), measurement.plates(layout, x), 1e-11)
         close(_core.joint_moments(model, x), measurement.joint_moments(layout, x), 1e-11)
         assert _core.total_mass(model, x) == pytest.approx(measurement.total_mass(layout, x), rel=1e-14)
 
@@ -133,6 +135,8 @@ def test_a_state_of_another_size_is_an_error(size):
         _core.coordinates,
         _core.marker_jacobian,
         _core.wrench_jacobian,
+        _core.plates,
+        _core.plates_jacobian,
         _core.moment_jacobian,
         _core.total_mass,
     ):

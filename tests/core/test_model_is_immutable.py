@@ -9,10 +9,10 @@ import pytest
 from oracle.state import Layout
 
 from core.bridge import filter_of, model_of, to_core
-from core.random_models import planar_model, random_state, settings, spatial_model, trial
+from core.random_models import planar_model, random_state, settings, spatial_model, trial, with_slow_errors
 from dynakin import _core
 
-SPECS = [planar_model(1), *(spatial_model(s) for s in (2, 5, 6, 9))]
+SPECS = [planar_model(1), *(spatial_model(s) for s in (2, 5, 6, 9)), with_slow_errors(planar_model(2), 2)]
 each_spec = pytest.mark.parametrize("spec", SPECS, ids=lambda s: s.name)
 
 
@@ -21,7 +21,7 @@ def as_data(thing):
     fields = {
         "coordinates": ("name", "value", "locked"),
         "parameters": ("name", "value", "estimated"),
-        "markers": ("name", "segment", "position", "measured", "estimated"),
+        "markers": ("name", "segment", "position", "measured", "estimated", "soft_tissue"),
         "segments": ("name", "parent", "rotation", "translation", "inertia", "inertia_estimated"),
     }
     parts = {
@@ -37,6 +37,8 @@ def as_data(thing):
         "name": thing.name,
         "gravity": _plain(thing.gravity),
         "wrench_measured": _plain(thing.wrench_measured),
+        "wrench_offset": _plain(thing.wrench_offset),
+        "wrench_delay": thing.wrench_delay,
     }
 
 
@@ -71,7 +73,7 @@ def test_each_part_of_a_specification_survives_pickling():
     for part, keys in (
         (spec.coordinates[0], ("name", "value", "locked")),
         (spec.parameters[0], ("name", "value", "estimated")),
-        (spec.markers[0], ("name", "segment", "position", "measured", "estimated")),
+        (spec.markers[0], ("name", "segment", "position", "measured", "estimated", "soft_tissue")),
         (segment.axes[0], ("coordinate", "kind", "direction", "coefficients", "scale")),
         (segment, ("name", "parent", "rotation", "translation", "inertia", "inertia_estimated")),
     ):

@@ -8,11 +8,12 @@ from oracle import measurement, mechanics
 from oracle.state import Layout, unpack
 
 from core.bridge import close, model_of
-from core.random_models import planar_model, random_state, spatial_model
+from core.random_models import planar_model, random_state, spatial_model, with_slow_errors
 from core.test_derivatives import BLOCKS, central_differences, compare
 from dynakin import _core
 
 MODELS = [planar_model(s) for s in range(6)] + [planar_model(50, n_segments=7)] + [spatial_model(s) for s in range(30)]
+MODELS += [with_slow_errors(spec, k) for k, spec in enumerate(MODELS[::8])]
 
 
 def moments_less_external(layout, x, external):

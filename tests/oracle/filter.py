@@ -1,4 +1,4 @@
-"""The paper's constrained extended Kalman filter, dense and as in a textbook: (2)-(8).
+"""The constrained extended Kalman filter, dense and as in a textbook: the paper's (2)-(8), and what was added to it.
 
 No sparsity, no chunks: one F, one H, one S a frame, the missing rows cut out of them.
 """
@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from oracle import measurement
+from oracle import measurement, process, projection, sensors, sigmoid
 from oracle.state import Layout
 
 
@@ -28,6 +28,13 @@ class Settings:
     lower: NDArray | None = None
     upper: NDArray | None = None
     constraint: str = "gain"
+    process_density: NDArray | None = None  # (n,) white noise on each element's rate
+    decay_rate: NDArray | None = None  # (n,) 1/s
+    equality: NDArray | None = None  # (k, n) with projection
+    equality_value: NDArray | None = None  # (k,)
+    marker_gate: list[float] | None = None  # for 1 to 6 rows
+    wrench_gate: list[float] | None = None
+    wrench_needs_markers: bool = False
 
 
 @dataclass
@@ -36,14 +43,7 @@ class Report:
     nis: float
     log_likelihood: float
     constrained: int
-
-
-def carried_to_origin(covariance: NDArray, r: NDArray) -> NDArray:
-    """From a wrench about the point r to the same wrench about the origin: m_O = m_r + r x f; (6, 6)."""
-    x, y, z = r
-    carry = np.eye(6)
-    carry[3:, :3] = [[0, -z, y], [z, 0, -x], [-y, x, 0]]
-    return carry @ covariance @ carry.T
+    verdicts: list[str]
 
 
 class Filter:
@@ -55,67 +55,36 @@ class Filter:
         self.state = np.array(x0, float)
         self.covariance = np.array(P0, float)
 
-    def transition(self, dt: float) -> NDArray:
-        """F of (4): constant acceleration for the coordinates, constant everything else."""
-        F = np.eye(self.layout.size)
-        q, qd, qdd = (
-            np.arange(self.layout.size)[self.layout.block(b)] for b in ("coordinates", "speeds", "accelerations")
-        )
-        F[q, qd] = dt
-        F[qd, qdd] = dt
-        F[q, qdd] = dt**2 / 2
-        return F
-
     def predict(self, dt: float) -> None:
-        F = self.transition(dt)
+        nothing = np.zeros(self.layout.size)
+        density, decay = self.settings.process_density, self.settings.decay_rate
+        F, Q = process.transition(
+            self.layout, nothing if density is None else density, nothing if decay is None else decay, dt
+        )
         self.state = F @ self.state
-        self.covariance = F @ self.covariance @ F.T + np.diag(self.settings.process_variance)
+        self.covariance = F @ self.covariance @ F.T + Q + np.diag(self.settings.process_variance)
 
     def measurement_rows(self, markers: NDArray, wrench: NDArray) -> tuple[NDArray, NDArray, NDArray]:
         """z, R of all 3 M + 7 rows (R of absent ones is arbitrary) and which are present."""
-        s, n_markers = self.settings, len(self.spec.markers)
-        rows = 3 * n_markers + 7
-        z, R, present = np.zeros(rows), np.eye(rows), np.zeros(rows, bool)
-        for k, marker in enumerate(self.spec.markers):
-            here = slice(3 * k, 3 * k + 3)
-            measured = np.array(marker.measured, bool)
-            seen = np.isfinite(markers[k][measured]).all() and np.isfinite(s.marker_variance[k])
-            present[here] = measured & seen
-            z[here] = markers[k]
-            if seen:
-                R[here, here] = np.eye(3) * s.marker_variance[k]
-        here = slice(3 * n_markers, 3 * n_markers + 6)
-        R[here, here], known = self.wrench_noise()
-        present[here] = np.array(self.spec.wrench_measured, bool) & np.isfinite(wrench) & known
-        z[here] = wrench
-        if s.total_mass is not None and np.isfinite(s.total_mass_variance):
-            z[-1], R[-1, -1], present[-1] = s.total_mass, s.total_mass_variance, True
-        return z, R, present
-
-    def wrench_noise(self) -> tuple[NDArray, NDArray]:
-        """Covariance at the origin, and which components have a finite variance there.
-
-        An infinite variance of a force is carried by its lever into the moments, which are then unknown too.
-        """
-        block = np.array(self.settings.wrench_covariance, float)
-        infinite = np.isinf(np.diag(block))
-        block[infinite, :] = 0.0
-        block[:, infinite] = 0.0
-        reached = carried_to_origin(np.diag(infinite.astype(float)), self.settings.reference_point)
-        return carried_to_origin(block, self.settings.reference_point), np.diag(reached) == 0
+        return sensors.rows(self.spec, self.settings, markers, wrench)
 
     def update(self, markers: NDArray, wrench: NDArray) -> Report:
         z, R, present = self.measurement_rows(markers, wrench)
         h, H = measurement.value_and_jacobian(self.layout, self.state)
-        z, h, H, R = z[present], h[present], H[present], R[np.ix_(present, present)]
-        x, P = self.state, self.covariance
-        v = z - h
+        x, P, v = self.state, self.covariance, z - h
+        verdicts = sensors.verdicts(self.settings, v, H, P, R, present)
+        use = sensors.believed(self.settings, verdicts, present)
+        v, H, R = v[use], H[use], R[np.ix_(use, use)]
         S = H @ P @ H.T + R
         K = np.linalg.solve(S, H @ P).T
         weighted = np.linalg.solve(S, v)  # S^-1 v
         nis = float(v @ weighted)
         m = len(v)
         log_likelihood = -0.5 * (nis + np.linalg.slogdet(S)[1] + m * np.log(2 * np.pi))
+        if self.settings.constraint == "sigmoid":
+            bounds = sigmoid.Map(*self.bounds())
+            self.state, self.covariance = sigmoid.update(bounds, x, P, v, H, R)
+            return Report(m, nis, log_likelihood, int(bounds.at_edge(self.state).sum()), verdicts)
         updated = x + K @ v
         beyond, limit = self.beyond_bounds(updated)
         if len(beyond) and nis > 0:
@@ -126,20 +95,33 @@ class Filter:
             updated = x + K @ v
         updated[beyond] = limit  # equal but for rounding; with nothing measured the mean alone moves
         I_KH = np.eye(self.layout.size) - K @ H
-        self.covariance = I_KH @ P @ I_KH.T + K @ R @ K.T  # Joseph: right for every gain
-        self.covariance = (self.covariance + self.covariance.T) / 2
-        self.state = updated
-        return Report(m, nis, log_likelihood, len(beyond))
+        P = I_KH @ P @ I_KH.T + K @ R @ K.T  # Joseph: right for every gain
+        self.state, self.covariance = updated, (P + P.T) / 2
+        constrained = self.project() if self.settings.constraint == "projection" else len(beyond)
+        return Report(m, nis, log_likelihood, constrained, verdicts)
+
+    def project(self) -> int:
+        """Equalities condition mean and covariance, inequalities move the mean; how many of the latter bind."""
+        s = self.settings
+        if s.equality is not None:
+            self.state, P = projection.condition(self.state, self.covariance, s.equality, s.equality_value)
+            self.covariance = (P + P.T) / 2
+        A, b = projection.bounds_as_rows(*self.bounds())
+        self.state, active = projection.nearest(self.state, self.covariance, A, b)
+        return int(active.sum())
+
+    def bounds(self) -> tuple[NDArray, NDArray]:
+        """(n,) each, infinite where there is none."""
+        s, n = self.settings, self.layout.size
+        lower = np.full(n, -np.inf) if s.lower is None else np.asarray(s.lower)
+        upper = np.full(n, np.inf) if s.upper is None else np.asarray(s.upper)
+        return lower, upper
 
     def beyond_bounds(self, x: NDArray) -> tuple[NDArray, NDArray]:
         """Indices of the elements that the constraint (9) stops, and the bound that each lands on."""
-        n = self.layout.size
-        s = self.settings
-        if s.constraint != "gain":
+        if self.settings.constraint != "gain":
             return np.zeros(0, int), np.zeros(0)
-        lower = np.full(n, -np.inf) if s.lower is None else np.asarray(s.lower)
-        upper = np.full(n, np.inf) if s.upper is None else np.asarray(s.upper)
-        clipped = np.clip(x, lower, upper)
+        clipped = np.clip(x, *self.bounds())
         beyond = np.flatnonzero(clipped != x)
         return beyond, clipped[beyond]
 
@@ -160,6 +142,7 @@ class Filter:
         out["state_sd"] = np.sqrt(np.diagonal(out["covariance"], axis1=1, axis2=2))
         for when, x in (("predicted", out["state_predicted"]), ("estimated", out["state"])):
             out[f"markers_{when}"] = measurement.marker_positions(self.layout, x)
-            out[f"wrench_{when}"] = measurement.wrench(self.layout, x)
+        out["wrench_predicted"] = measurement.plates(self.layout, out["state_predicted"])
+        out["wrench_estimated"] = measurement.wrench(self.layout, out["state"])
         out["moments"] = measurement.joint_moments(self.layout, out["state"])
         return out

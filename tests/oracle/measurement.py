@@ -13,8 +13,12 @@ from oracle.state import Layout, unpack
 COMPLEX_STEP = 1e-30
 
 
-def _kinematics(layout: Layout, x: NDArray) -> tuple:
+def _kinematics(layout: Layout, x: NDArray, late: bool = False) -> tuple:
+    """``late``: as it was a delay of the plates ago, at constant acceleration."""
     values = unpack(layout, x)
+    if late:
+        d = values.delay[..., None]
+        values.q, values.qd = values.q - d * values.qd + d**2 / 2 * values.qdd, values.qd - d * values.qdd
     kin = mechanics.kinematics(layout.spec, values.q, values.qd, values.qdd, values.parameters)
     return values, kin
 
@@ -22,13 +26,19 @@ def _kinematics(layout: Layout, x: NDArray) -> tuple:
 def marker_positions(layout: Layout, x: NDArray) -> NDArray:
     """(..., M, 3) m, ground frame."""
     values, kin = _kinematics(layout, x)
-    return mechanics.marker_positions(layout.spec, kin, values.markers)
+    return mechanics.marker_positions(layout.spec, kin, values.markers + values.soft_tissue)
 
 
 def wrench(layout: Layout, x: NDArray) -> NDArray:
     """(..., 6) N, N m about the ground's origin, ground on person."""
     values, kin = _kinematics(layout, x)
     return mechanics.total_wrench(layout.spec, kin, values.inertia)
+
+
+def plates(layout: Layout, x: NDArray) -> NDArray:
+    """(..., 6) N, N m: what the plates should say, the body's wrench of a delay ago and their slow error."""
+    values, kin = _kinematics(layout, x, late=True)
+    return mechanics.total_wrench(layout.spec, kin, values.inertia) + values.offset
 
 
 def joint_moments(layout: Layout, x: NDArray) -> NDArray:
@@ -43,13 +53,10 @@ def total_mass(layout: Layout, x: NDArray) -> NDArray:
 
 
 def everything(layout: Layout, x: NDArray) -> NDArray:
-    """[3 M marker numbers, 6 of the wrench, total mass], (..., 3 M + 7), measured or not."""
-    values, kin = _kinematics(layout, x)
-    markers = mechanics.marker_positions(layout.spec, kin, values.markers)
-    force = mechanics.total_wrench(layout.spec, kin, values.inertia)
-    mass = values.inertia[..., :, 0].sum(axis=-1)[..., None]
+    """[3 M marker numbers, 6 of the plates, total mass], (..., 3 M + 7), measured or not."""
+    markers = marker_positions(layout, x)
     flat = markers.reshape(*markers.shape[:-2], 3 * markers.shape[-2])
-    return np.concatenate([flat, force, mass], axis=-1)
+    return np.concatenate([flat, plates(layout, x), total_mass(layout, x)[..., None]], axis=-1)
 
 
 def value_and_jacobian(layout: Layout, x: NDArray) -> tuple[NDArray, NDArray]:

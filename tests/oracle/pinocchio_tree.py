@@ -77,7 +77,12 @@ def solve(spec: Any, values: Values) -> dict[str, NDArray]:
     return {
         "rotations": np.array([p.rotation for p in poses]),
         "origins": np.array([p.translation for p in poses]),
-        "markers": np.array([poses[names.index(m.segment)].act(values.markers[i]) for i, m in enumerate(spec.markers)]),
+        "markers": np.array(
+            [
+                poses[names.index(m.segment)].act(values.markers[i] + values.soft_tissue[i])
+                for i, m in enumerate(spec.markers)
+            ]
+        ),
         "wrench": tau[:6].copy(),
         "moments": moments,
     }

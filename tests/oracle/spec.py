@@ -62,6 +62,7 @@ class Marker:
     position: NDArray
     measured: list[bool] = field(default_factory=lambda: [True] * 3)
     estimated: list[bool] = field(default_factory=lambda: [False] * 3)
+    soft_tissue: list[bool] = field(default_factory=lambda: [False] * 3)
 
 
 @dataclass
@@ -73,3 +74,5 @@ class Spec:
     markers: list[Marker]
     gravity: NDArray = field(default_factory=lambda: np.array([0.0, -9.80665, 0.0]))
     wrench_measured: list[bool] = field(default_factory=lambda: [True] * 6)
+    wrench_offset: list[bool] = field(default_factory=lambda: [False] * 6)
+    wrench_delay: bool = False

@@ -1,4 +1,4 @@
-"""The state x = [q, qd, qdd, L, p, phi] (3): its names in order, and what they mean for a specification."""
+"""The state (3) with soft tissue and plate errors: its names in order, and what they mean for a specification."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from oracle.spec import INERTIA_NAMES
 
+WRENCH_NAMES = ("fx", "fy", "fz", "mx", "my", "mz")
+
 
 @dataclass
 class Values:
@@ -20,7 +22,10 @@ class Values:
     qdd: NDArray
     parameters: dict[str, NDArray]  # (...) m
     markers: NDArray  # (..., M, 3) m, in the segments' frames
+    soft_tissue: NDArray  # (..., M, 3) m, displacement from there
     inertia: NDArray  # (..., S, 10)
+    offset: NDArray  # (..., 6) N and N m, the plates' slow error about the ground's origin
+    delay: NDArray  # (...) s, of the plates behind the markers
 
 
 class Layout:
@@ -40,12 +45,20 @@ class Layout:
                 for a in range(3)
                 if m.estimated[a]
             ],
+            "soft_tissue": [
+                (f"soft_tissue/{m.name}/{'xyz'[a]}", ("soft_tissue", k, a))
+                for k, m in enumerate(spec.markers)
+                for a in range(3)
+                if m.soft_tissue[a]
+            ],
             "inertia": [
                 (f"inertia/{s.name}/{INERTIA_NAMES[a]}", ("inertia", k, a))
                 for k, s in enumerate(spec.segments)
                 for a in range(10)
                 if s.inertia_estimated[a]
             ],
+            "plates": [(f"plates/{WRENCH_NAMES[a]}", ("offset", a)) for a in range(6) if spec.wrench_offset[a]]
+            + [("plates/delay", ("delay",))] * bool(spec.wrench_delay),
         }
         self.names = [name for block in entries.values() for name, _ in block]
         self.targets = [target for block in entries.values() for _, target in block]
@@ -64,11 +77,11 @@ class Layout:
         """x of the specification's own values, at rest."""
         spec = self.spec
         fixed = unpack(self, np.zeros(self.size), values_of_spec=True)
-        x = []
-        for target in self.targets:
-            block = getattr(fixed, target[0])
-            x.append(block[target[1:] if len(target) > 2 else target[1]])
         assert len(spec.coordinates) == len(fixed.q)
+        x = []
+        for block, *where in self.targets:
+            values = getattr(fixed, block)
+            x.append(values[where[0]] if block == "parameters" else values[tuple(where)])
         return np.array(x, float)
 
 
@@ -88,7 +101,10 @@ def unpack(layout: Layout, x: NDArray, values_of_spec: bool = False) -> Values:
         qdd=filled(np.zeros(n), (n,)),
         parameters={p.name: np.full(batch, p.value, dtype) for p in spec.parameters},
         markers=filled([m.position for m in spec.markers], (len(spec.markers), 3)),
+        soft_tissue=filled(np.zeros((len(spec.markers), 3)), (len(spec.markers), 3)),
         inertia=filled([s.inertia for s in spec.segments], (len(spec.segments), 10)),
+        offset=filled(np.zeros(6), (6,)),
+        delay=np.zeros(batch, dtype),
     )
     if values_of_spec:
         return values

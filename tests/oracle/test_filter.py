@@ -7,7 +7,8 @@ import pytest
 from core.random_models import planar_model, settings, spatial_model, trial
 
 from oracle import measurement
-from oracle.filter import Filter, Settings, carried_to_origin
+from oracle.filter import Filter, Settings
+from oracle.sensors import carried_to_origin
 from oracle.state import Layout
 
 

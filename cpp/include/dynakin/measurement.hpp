@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <vector>
 
 #include "dynakin/dynamics.hpp"
@@ -29,8 +30,13 @@ class Measurement {
   static int channel_count(const Model& model) { return 3 * static_cast<int>(model.markers().size()) + 7; }
   int max_rows() const { return max_rows_; }
   const std::vector<RowBlock>& blocks() const { return blocks_; }
-  // Takes a sensor's rows out of this frame: a marker's, or with n_markers the plates'.
-  void leave_out(int sensor) { blocks_[sensor].rows = 0; }
+  // Takes a sensor's rows out of this frame, a marker's or with n_markers the plates': also when it is linearised anew,
+  // until all are admitted again.
+  void leave_out(int sensor) {
+    left_out_[sensor] = 1;
+    blocks_[sensor].rows = 0;
+  }
+  void admit_all() { std::fill(left_out_.begin(), left_out_.end(), 0); }
   // v + H d: innovations as seen from a state that lies d before the one of the last linearise().
   void shift_innovations(const Eigen::VectorXd& d);
   // z predicted at the state of the last evaluate(), all channels (also those that are not measured). Its wrench is
@@ -62,6 +68,7 @@ class Measurement {
   Eigen::VectorXd late_state_;  // as it was when the plates measured; used where their delay is estimated
   Eigen::VectorXd predicted_;
   std::vector<RowBlock> blocks_;
+  std::vector<char> left_out_;  // a sensor each
   int max_rows_ = 0;
 };
 

@@ -14,7 +14,8 @@ namespace dynakin {
 
 struct ProjectionReport {
   int active = 0;      // inequalities that hold the state back
-  bool solved = true;  // false: the constraints leave no state within reach, and bounds were kept one by one
+  bool solved = true;  // false: no state within reach keeps all constraints. Bounds and consistency are kept all the
+                       // same, one by one
 };
 
 // Dual active-set method (Goldfarb and Idnani 1983) for min (y - x)' P^-1 (y - x); it needs columns of P only, adds the
@@ -29,6 +30,8 @@ class Projection {
   };
   Projection(const Model& model, const FilterSettings& settings);
 
+  // What the last frames left: the constraints to start from, and a state that kept them.
+  void forget();
   // Equalities, then inequalities; what they do is written to the tape, if there is one.
   ProjectionReport apply(Eigen::VectorXd& x, Eigen::MatrixXd& P, FrameTape* tape = nullptr);
   // Inequalities alone.
@@ -43,7 +46,7 @@ class Projection {
   const Consistency& consistency() const { return consistency_; }
 
  private:
-  void keep_equalities(Eigen::VectorXd& x, Eigen::MatrixXd& P, FrameTape* tape);
+  bool keep_equalities(Eigen::VectorXd& x, Eigen::MatrixXd& P, FrameTape* tape);
   void warm_start(const Eigen::MatrixXd& P, Eigen::VectorXd& x);
   bool worst_violation(const Eigen::VectorXd& x, const Eigen::MatrixXd& P, Active& out) const;
   bool add(Active incoming, const Eigen::MatrixXd& P, Eigen::VectorXd& x);
@@ -59,7 +62,8 @@ class Projection {
   int k_ = 0;                    // active constraints
   Eigen::MatrixXd PN_;           // (n, capacity): P a of each active constraint
   Eigen::MatrixXd gram_, chol_;  // N' P N and its factor
-  Eigen::VectorXd Pa_, step_, r_, last_;
+  Eigen::VectorXd Pa_, step_, r_, wanted_, last_;
+  const Eigen::VectorXd start_;
 };
 
 }  // namespace dynakin

@@ -62,6 +62,36 @@ RowMatrix dense_wrench_jacobian(const Model& model, const StateRef& x) {
   return J;
 }
 
+// Of the filter's own measurement, with nothing but the plates in it.
+struct PlatesAt {
+  PlatesAt(const Model& model, const StateRef& x) : settings(blind(model)), measurement(model, settings) {
+    check_size(model, x);
+    measurement.linearise(x, MarkerMatrix::Zero(3, model.markers().size()), Vector6::Zero());
+  }
+  static FilterSettings blind(const Model& model) {
+    FilterSettings settings;
+    settings.marker_variance.setConstant(model.markers().size(), k_infinity);
+    return settings;
+  }
+  FilterSettings settings;
+  Measurement measurement;
+};
+
+Vector6 plates(const Model& model, const StateRef& x) {
+  return PlatesAt(model, x).measurement.predicted().segment<6>(3 * model.markers().size());
+}
+
+RowMatrix plates_jacobian(const Model& model, const StateRef& x) {
+  const PlatesAt at(model, x);
+  const auto n_markers = static_cast<int>(model.markers().size());
+  const RowBlock& block = at.measurement.blocks()[n_markers];
+  RowMatrix J = RowMatrix::Zero(6, model.state_size());
+  for (int r = 0; r < block.rows; ++r)
+    for (std::size_t c = 0; c < block.columns->size(); ++c)
+      J(block.channel[r] - 3 * n_markers, (*block.columns)[c]) = block.H(r, c);
+  return J;
+}
+
 using External = std::optional<std::vector<Force>>;
 
 External external_of(const Model& model, const std::optional<RowMatrix>& external) {
@@ -135,4 +165,8 @@ void bind_mechanics(nb::module_& m) {
         "d joint_moments / dx (C, n), N m or N per unit of x; the external wrenches (S, 6) stay while x varies.");
   m.def("marker_jacobian", &dense_marker_jacobian, model, x, "d p_GM / dx (3 M, n), dense: for tests and study.");
   m.def("wrench_jacobian", &dense_wrench_jacobian, model, x, "d wrench / dx (6, n), dense: for tests and study.");
+  m.def("plates", &plates, model, x,
+        "What the plates should say (6,): the wrench, late by their delay, with their slow error.");
+  m.def("plates_jacobian", &plates_jacobian, model, x,
+        "d plates / dx (6, n) as the filter has it; components that are not measured are 0.");
 }

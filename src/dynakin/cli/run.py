@@ -26,11 +26,12 @@ from dynakin.cli.options import (
     Vertical,
 )
 from dynakin.cli.summary import print_summary
+from dynakin.comparison import Trial, trial_of
 from dynakin.config import RunConfig, make_config, read_config
 from dynakin.filter import Estimator
 from dynakin.model import load_model
 from dynakin.recordings import read
-from dynakin.report import save_figures
+from dynakin.report import read_sensitivity, save_figures
 from dynakin.results import Estimate, check_output_writable
 
 
@@ -54,6 +55,9 @@ def run(
     figures: Annotated[
         Path | None, typer.Option(help="Also write figures for papers (SVG, PDF, PNG) into this folder.")
     ] = None,
+    sensitivity: Annotated[
+        Path | None, typer.Option(help="Criterion over the gains (.csv, .nc): draw it too, the paper's Figure 3.")
+    ] = None,
 ) -> None:
     """Estimate coordinates, moments, lengths and masses from a recording, and write a report."""
     given = {
@@ -75,14 +79,17 @@ def run(
     }
     config = configure(trial, given)
     check_output_writable(config.output)
+    if sensitivity is not None and figures is None:
+        raise typer.BadParameter("--sensitivity is a figure for papers, expected --figures FOLDER with it")
+    grid = None if sensitivity is None else read_sensitivity(sensitivity)
     with progress_bar("estimating") as progress:
-        estimate = estimate_from(config, progress)
+        estimate, comparison = estimate_from(config, progress)
     with busy("writing results and report"):
-        folder = estimate.save(config.output)
+        folder = estimate.save(config.output, comparison=comparison)
     print_summary(estimate, folder)
     if figures is not None:
         with busy("drawing figures"):
-            written = save_figures(estimate, figures)
+            written = save_figures(estimate, figures, comparison=comparison, sensitivity=grid)
         out().print(f"Figures  {figures} ({len(written)} files)", soft_wrap=True)
 
 
@@ -94,8 +101,9 @@ def configure(trial: Path, given: dict[str, Any]) -> RunConfig:
     return make_config({"trial": trial} | options, "run")
 
 
-def estimate_from(config: RunConfig, progress: Callable[[int, int], None] | None = None) -> Estimate:
-    """Read, load, estimate: what a configuration asks for, with it kept in the result.
+def estimate_from(config: RunConfig, progress: Callable[[int, int], None] | None = None) -> tuple[Estimate, Trial]:
+    """Read, load, estimate: what a configuration asks for, with it kept in the result; and the same recording by the
+    reference methods.
 
     Raises:
         DynakinError: anything that is wrong with the input, in one line.
@@ -118,7 +126,9 @@ def estimate_from(config: RunConfig, progress: Callable[[int, int], None] | None
         forward=config.forward,
     )
     estimate = estimator.run(recording, static=static, progress=progress)
-    return replace(estimate, config=config.as_used() | estimate.config)
+    estimate = replace(estimate, config=config.as_used() | estimate.config)
+    assert estimator.initial is not None
+    return estimate, trial_of({config.preset: estimate}, estimator.initial, model, whatever=True)
 
 
 def forward_direction(text: str | None) -> str | tuple[float, ...] | None:

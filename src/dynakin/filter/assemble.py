@@ -90,8 +90,11 @@ def _dataset(
         data[f"wrench_{name}"] = (("time", "component"), np.where(modelled, values, np.nan))
     data["state"] = (("time", "element"), arrays["state"])
     data["state_sd"] = (("time", "element"), arrays["state_sd"])
-    for name in ("nis", "n_rows", "log_likelihood", "constrained", "step_us"):
+    for name in ("nis", "n_rows", "log_likelihood", "constrained", "constraints_met", "tracking", "step_us"):
         data[name] = ("time", arrays[name])
+    data["verdict"] = (("time", "sensor"), arrays["verdicts"])
+    if any(any(marker.soft_tissue) for marker in spec.markers):
+        data["soft_tissue_amplitude"] = ("marker", initial.soft_tissue_m, {"units": "m"})
     data["joint_centres"] = (("time", "joint", "axis"), _joint_centres(arrays["state"], model), {"units": "m"})
     names, parents, segments = _joints(spec)
     coords = {
@@ -100,6 +103,7 @@ def _dataset(
         "coordinate_type": ("coordinate", _types(spec)),
         "marker": list(initial.recorded_markers),
         "axis": list(AXES),
+        "sensor": [*initial.recorded_markers, "plates"],
         "marker_axes_modelled": ("axis", axes),
         "component": list(COMPONENTS),
         "element": list(model.layout.names),

@@ -11,10 +11,11 @@ import numpy.typing as npt
 from dynakin import _core
 from dynakin.errors import ConfigError, DivergenceError, RecordingError
 from dynakin.filter import presets
+from dynakin.filter.alignment import PASSES, delay_of, in_step, in_words, is_late
 from dynakin.filter.assemble import assemble
 from dynakin.filter.extend import continuous_noise, extended, initial_covariance
 from dynakin.filter.noise import Noise, gate_limits
-from dynakin.filter.samples import Sample, recording_arrays, sample_arrays
+from dynakin.filter.samples import Sample, foreign_load, recording_arrays, sample_arrays
 from dynakin.model import Bounds, InitialModel, ModelDefinition, Priors, initialise
 from dynakin.recordings import Recording, check_plates
 from dynakin.results import Estimate
@@ -38,11 +39,11 @@ class StepEstimate:
 
 
 class Estimator:
-    """Estimates movement and what drives it with the paper's constrained extended Kalman filter.
+    """Estimates movement and what drives it with one constrained extended Kalman filter.
 
     Args:
         model: what `load_model` returns.
-        noise: variances; the paper's Table I where not given.
+        noise: `presets.default()` where not given.
         priors, bounds: prior standard deviations and half widths of (9); see `dynakin.model.priors`.
         side: limb markers of a lumped model ("auto", "right", "left", "both").
         vertical, forward: laboratory directions, found in the recording where "auto".
@@ -60,7 +61,7 @@ class Estimator:
         forward: str | tuple[float, float, float] = "auto",
     ) -> None:
         self.model = model
-        self.noise = noise or presets.paper()
+        self.noise = noise or presets.default()
         self.priors = priors or Priors()
         self.bounds = bounds or Bounds()
         self.side = side
@@ -87,17 +88,33 @@ class Estimator:
         """
         initial = self.start(recording, static=static)
         assert self._core_model is not None
-        markers, wrench = recording_arrays(recording, initial)
+        markers, wrench = recording_arrays(recording, initial, gaps=self.noise.recover)
         check = check_plates(recording, initial.ground, initial.mass_kg)
         if check.refusal:
             raise RecordingError(f"{recording.path or recording.name}: {check.refusal}")
+        notes = list(check.messages)
+        foreign = foreign_load(check, initial.mass_kg, self.noise.plate_load_tolerance)
+        if foreign:
+            wrench[:] = np.nan
+            notes.append(foreign)
+        shift = 0.0
         try:
             arrays = self.run_arrays(recording.time, markers, wrench, progress)
+            for _ in range(PASSES):
+                delay = self._delay(arrays)
+                if delay is None or not is_late(delay) or foreign:
+                    break
+                shift += delay[0]
+                self.start_from(initial)
+                shifted = in_step(recording.time, wrench, shift)
+                arrays = self.run_arrays(recording.time, markers, shifted, progress)
         except ValueError as error:  # a frame that the core refuses, named by it
             raise RecordingError(f"{recording.path or recording.name}: {error}") from None
-        return assemble(
-            arrays, self._core_model, initial, recording, (markers, wrench), self.settings(), check.messages
-        )
+        if not foreign:
+            notes += in_words(shift, self._delay(arrays))
+        if shift:
+            wrench = shifted
+        return assemble(arrays, self._core_model, initial, recording, (markers, wrench), self.settings(), notes)
 
     def start(self, recording: Recording, *, static: Recording | None = None) -> InitialModel:
         """Measure the model on a recording (or the first seconds of a live one) and make the filter ready to step.
@@ -181,6 +198,10 @@ class Estimator:
             report,
         )
 
+    def _delay(self, arrays: dict[str, Array]) -> tuple[float, float] | None:
+        assert self.initial is not None
+        return delay_of(self.initial, arrays["state"][-1], arrays["state_sd"][-1])
+
     def settings(self) -> dict[str, object]:
         """What was asked for, as plain data: written into the outputs."""
         return {
@@ -203,19 +224,17 @@ class Estimator:
                 f"{', '.join(initial.recorded_markers)}"
             )
         noise, layout = self.noise, self._core_model.layout
-        variance = noise.marker_scale * initial.marker_variance
-        if noise.marker_sd_m is not None:
-            variance[:] = noise.marker_sd_m**2
-        for k, name in enumerate(initial.recorded_markers):
-            variance[k] = self.noise.marker.get(name, variance[k])
+        point = noise.reference_point_m
         density, decay = continuous_noise(initial, noise, layout)
         return _core.FilterSettings(
             process_variance=noise.process_variance(layout),
             process_density=density,
             decay_rate=decay,
-            marker_variance=variance,
+            marker_variance=noise.marker_variance(
+                initial.recorded_markers, initial.marker_variance, initial.soft_tissue_m
+            ),
             wrench_covariance=noise.wrench_covariance(),
-            reference_point=np.array(self._reference_point(), dtype=float),
+            reference_point=initial.plate_centre if point == "auto" else np.array(point, dtype=float),
             total_mass=initial.mass_kg if noise.total_mass_use == "frame" else None,
             total_mass_variance=noise.total_mass,
             lower=initial.lower,
@@ -227,7 +246,3 @@ class Estimator:
             iterate_beyond=np.inf if noise.iterate_beyond is None else noise.iterate_beyond,
             recovery=_core.RecoverySettings(blind_s=noise.blind_s) if noise.recover else None,
         )
-
-    def _reference_point(self) -> tuple[float, float, float]:
-        point = self.noise.reference_point_m
-        return (0.0, 0.0, 0.0) if point == "auto" else point

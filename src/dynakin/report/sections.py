@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,35 +17,35 @@ from dynakin.report.labels import (
     signed_percent,
     words,
 )
+from dynakin.report.method_sections import methods_section
 from dynakin.report.panels import Panel
-from dynakin.results import AXES, COMPONENTS, Estimate, Parameter
+from dynakin.report.repetition_sections import repetition_section
+from dynakin.report.section import Section
+from dynakin.results import AXES, COMPONENTS, Estimate, Parameter, estimate_curves, repetitions_of
+
+if TYPE_CHECKING:
+    from dynakin.comparison import Trial
 
 
-@dataclass(frozen=True)
-class Section:
-    """A heading, a paragraph, and panels; ``folded`` ones open on a click; ``key`` names the lines."""
+def sections(estimate: Estimate, metrics: dict[str, Any], comparison: Trial | None = None) -> list[Section]:
+    """All sections in order; one without anything to show is left out.
 
-    anchor: str
-    title: str
-    text: str
-    panels: list[Panel] = field(default_factory=list)
-    wide: list[Panel] = field(default_factory=list)
-    folded: list[Panel] = field(default_factory=list)
-    folded_title: str = ""
-    key: tuple[str, ...] = ()
-
-
-def sections(estimate: Estimate, metrics: dict[str, Any]) -> list[Section]:
-    """All sections in order; one without anything to show is left out."""
+    Args:
+        comparison: this estimate beside the reference methods, for a section on them.
+    """
+    found = repetitions_of(estimate) if comparison is None else comparison.repetitions
+    curves = estimate_curves(estimate) if comparison is None else comparison.curves()
     every = [
         marker_section(estimate, metrics),
         wrench_section(estimate, metrics),
         angle_section(estimate),
         moment_section(estimate),
+        repetition_section(estimate, found, curves),
+        *([] if comparison is None else [methods_section(comparison)]),
         length_section(estimate),
         mass_section(estimate),
     ]
-    return [section for section in every if section.panels or section.wide]
+    return [section for section in every if not section.empty]
 
 
 def marker_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +14,7 @@ import xarray as xr
 from dynakin.results.records import Event, Parameter, Timing
 
 if TYPE_CHECKING:
+    from dynakin.comparison import Trial
     from dynakin.recordings import GroundFrame, Recording
 
 AXES = ("x", "y", "z")
@@ -80,21 +83,29 @@ class Estimate:
         return np.asarray(self.data["marker_axes_modelled"].values, dtype=bool)
 
     def metrics(self) -> dict[str, Any]:
-        """The content of ``metrics.json`` (see `dynakin.results.metrics`)."""
+        """The content of ``metrics.json`` (see `dynakin.results.metrics`); computed once, a copy is given."""
+        return deepcopy(self._metrics)
+
+    @cached_property
+    def _metrics(self) -> dict[str, Any]:
         from dynakin.results.metrics import compute_metrics
 
         return compute_metrics(self)
 
-    def save(self, folder: str | Path, *, overwrite: bool = True) -> Path:
+    def save(self, folder: str | Path, *, overwrite: bool = True, comparison: Trial | None = None) -> Path:
         """Write every output file into ``folder`` and return it.
 
         All files are first written into a temporary folder beside it, which then takes its place: a failure leaves
         what was there. A folder that exists is replaced only if ``overwrite`` is true and it is empty or holds
         nothing but an earlier output of dynakin.
 
+        Args:
+            comparison: this estimate beside the reference methods (`dynakin.comparison.trial_of`), for the report and
+                for ``repetitions.csv``.
+
         Raises:
             OutputError: the folder cannot be written or holds something else.
         """
         from dynakin.results.save import save_estimate
 
-        return save_estimate(self, Path(folder), overwrite=overwrite)
+        return save_estimate(self, Path(folder), overwrite=overwrite, comparison=comparison)

@@ -18,6 +18,7 @@ OUTPUT_FILES = (
     "moments.sto",
     "markers.trc",
     "wrench.sto",
+    "repetitions.csv",
     "parameters.json",
     "metrics.json",
     "estimate.nc",
