@@ -81,8 +81,8 @@ StepReport Filter::update(const Eigen::Ref<const MarkerMatrix>& markers, const V
     throw std::invalid_argument("markers or wrench: infinite, expected a number, or NaN where nothing is measured");
   if (last_.diverged()) return last_;
   StepReport report;
-  measurement_.admit_all();
   if (tape_) tape_->clear();
+  measurement_.admit_all();
   measurement_.linearise(x_, markers, wrench);
   predicted_ = measurement_.predicted();
   gate_.judge(settings_, measurement_.blocks(), P_);

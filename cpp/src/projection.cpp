@@ -39,7 +39,7 @@ ProjectionReport Projection::apply(Eigen::VectorXd& x, Eigen::MatrixXd& P, Frame
   const bool equal = keep_equalities(x, P, tape);
   ProjectionReport report = bound(x, P);
   report.solved = report.solved && equal;
-  if (tape && report.solved && k_ > 0) {  // else what moved the mean is no P N' u
+  if (tape && k_ > 0) {  // else nothing moved the mean, or no P N' u
     tape->pulled = true;
     tape->pull.setZero();
     for (int k = 0; k < k_; ++k)

@@ -1,33 +1,34 @@
-"""Trials for the smoother's tests, with all blocks of the state, and the linear problem that a filter made of them."""
+"""Trials for the smoother's tests, and the linear problem that a filter made of them."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from oracle.filter import carried_to_origin
-from oracle.smoother import Frame, transition
+from oracle import measurement, process, sensors
+from oracle.smoother import Frame
 from oracle.state import Layout
 
-from core.bridge import to_core
-from core.random_models import Trial, settings, trial
+from core.bridge import filter_of, model_of
+from core.random_models import Trial, continuous, settings, trial, with_slow_errors
 from dynakin import _core
-
-TISSUE_SD, TISSUE_S = 0.01, 0.5
-PLATE_SD, PLATE_S = 3.0, 0.7
 
 
 @dataclass
 class Case:
-    model: _core.Model
+    spec: Any
     data: Trial
     options: dict[str, Any]
 
+    @property
+    def model(self) -> _core.Model:
+        return model_of(self.spec)
+
     def filter(self, chunk_rows: int = 28, **changes: Any) -> _core.Filter:
-        options = self.options | {"chunk_rows": chunk_rows} | changes
-        return _core.Filter(self.model, _core.FilterSettings(**options), self.data.x0, self.data.P0)
+        return filter_of(self.spec, self.options | changes, self.data.x0, self.data.P0, chunk_rows)
 
     def smoothed(self, frames: int | None = None, stretch: int = 0, **changes: Any) -> dict[str, NDArray]:
         d = self.data
@@ -41,42 +42,19 @@ def case(
 ) -> Case:
     """A trial with gaps and uneven steps.
 
-    ``states``: "all" adds soft tissue under every other marker and the plates' errors, and takes white jerk.
+    ``states``: "all" adds soft tissue and the plates' errors, and takes white jerk.
     """
-    data = trial(spec, seed, frames)
-    options = settings(spec, seed, bounds=bounds) | {"constraint": "none"}
-    core = to_core(spec)
     if states == "all":
-        markers = core.markers
-        for marker in markers[::2]:
-            marker.soft_tissue = list(marker.estimated)
-        core.markers = markers
-        core.wrench_offset = [bool(m) for m in spec.wrench_measured]
-        core.wrench_delay = delay
-    model = _core.Model(core)
-    names = list(model.layout.names)
-    there = [names.index(name) for name in Layout(spec).names]
-
-    def carried(values: NDArray, otherwise: NDArray | float) -> NDArray:
-        out = np.zeros(len(names)) + otherwise
-        out[there] = values
-        return out
-
-    tissue = np.array([name.startswith("soft_tissue/") for name in names])
-    plates = np.array([name.startswith("plates/") and name != "plates/delay" for name in names])
-    late = np.array([name == "plates/delay" for name in names])
-    for key, otherwise in (("process_variance", 0.0), ("lower", -np.inf), ("upper", np.inf)):
-        options[key] = carried(options[key], otherwise)
-    added_sd = TISSUE_SD * tissue + PLATE_SD * plates + 0.005 * late
-    sd = carried(np.sqrt(np.diag(data.P0)), added_sd)
-    data = replace(data, x0=carried(data.x0, 0.0), P0=np.diag(sd**2))
-    options["decay_rate"] = tissue / TISSUE_S + plates / PLATE_S
-    options["process_density"] = 2.0 * added_sd**2 * options["decay_rate"]
-    if states == "all":
-        offset, size = model.layout.blocks["accelerations"]
-        options["process_variance"] = np.zeros(len(names))
-        options["process_density"][offset : offset + size] = 100.0
-    return Case(model, data, options | changes)
+        spec = with_slow_errors(spec, seed, delay)
+        options = continuous(spec, seed)
+    else:
+        options = settings(spec, seed)
+        nothing = np.zeros(Layout(spec).size)
+        options |= {"constraint": "none", "process_density": nothing, "decay_rate": nothing}
+    if not bounds:
+        n = Layout(spec).size
+        options |= {"lower": np.full(n, -np.inf), "upper": np.full(n, np.inf)}
+    return Case(spec, trial(spec, seed, frames), options | changes)
 
 
 @dataclass
@@ -92,7 +70,7 @@ class Walk:
 
 
 def walk(case: Case, **changes: Any) -> Walk:
-    """The filter step by step; linearised, like the filter, at its own predictions (without a delay of the plates)."""
+    """The filter step by step; linearised, like the filter, at its own predictions."""
     f, d = case.filter(**changes), case.data
     before, after, frames, reports = [], [], [], []
     for k in range(len(d.time)):
@@ -108,38 +86,9 @@ def walk(case: Case, **changes: Any) -> Walk:
 
 def linearised(case: Case, x: NDArray, k: int, dt: float) -> Frame:
     """F, Q of the step to frame k and H, R, z of what it measures, linear about x."""
-    model, o = case.model, case.options
-    spec = model.spec
-    n_free = model.layout.blocks["coordinates"][1]
-    F, Q = transition(n_free, o["decay_rate"], o["process_density"], dt)
-    Q = Q + np.diag(o["process_variance"])
-    J = _core.marker_jacobian(model, x)
-    shown = _core.marker_positions(model, x)
-    H, R, v = [], [], []
-    for m, marker in enumerate(spec.markers):
-        axes = np.flatnonzero(marker.measured)
-        if np.isnan(case.data.markers[k, m, axes]).any():
-            continue
-        H += [J[3 * m + a] for a in axes]
-        R.append(np.eye(len(axes)) * o["marker_variance"][m])
-        v += list((case.data.markers[k, m] - shown[m])[axes])
-    used = np.array(spec.wrench_measured) & ~np.isnan(case.data.wrench[k])
-    JW, expected = _core.wrench_jacobian(model, x), _core.wrench(model, x)
-    names = list(model.layout.names)
-    for c, component in enumerate(("fx", "fy", "fz", "mx", "my", "mz")):
-        if f"plates/{component}" in names:
-            JW[c, names.index(f"plates/{component}")] = 1.0
-            expected[c] += x[names.index(f"plates/{component}")]
-    H += list(JW[used])
-    R.append(carried_to_origin(o["wrench_covariance"], o["reference_point"])[np.ix_(used, used)])
-    v += list((case.data.wrench[k] - expected)[used])
-    if o["total_mass"] is not None:
-        H.append(np.array([float(n.startswith("inertia/") and n.endswith("/mass")) for n in names]))
-        R.append(np.array([[o["total_mass_variance"]]]))
-        v.append(o["total_mass"] - _core.total_mass(model, x))
-    H = np.array(H).reshape(-1, len(x))
-    block, at = np.zeros((len(v), len(v))), 0
-    for part in R:
-        block[at : at + len(part), at : at + len(part)] = part
-        at += len(part)
-    return Frame(F, Q, H, block, np.array(v) + H @ x)
+    layout, o = Layout(case.spec), case.options
+    F, Q = process.transition(layout, o["process_density"], o["decay_rate"], dt)
+    h, H = measurement.value_and_jacobian(layout, x)
+    z, R, present = sensors.rows(case.spec, SimpleNamespace(**o), case.data.markers[k], case.data.wrench[k])
+    z = (z - h + H @ x)[present]
+    return Frame(F, Q + np.diag(o["process_variance"]), H[present], R[np.ix_(present, present)], z)

@@ -18,6 +18,9 @@ CASES = {
     "spatial, linear axes": lambda: case(spatial_model(4, nonlinear=False), 31, FRAMES),
     "spatial, axis functions": lambda: case(spatial_model(6), 31, FRAMES),
     "planar, all blocks": lambda: case(planar_model(50, n_segments=3), 31, FRAMES, states="all"),
+    "planar, all blocks, plates late": lambda: case(
+        planar_model(50, n_segments=4), 31, FRAMES, states="all", delay=True
+    ),
     "spatial, all blocks": lambda: case(spatial_model(9), 31, FRAMES, states="all", total_mass=None),
 }
 each_case = pytest.mark.parametrize("name", CASES)
@@ -60,13 +63,6 @@ def test_equals_one_dense_regression_over_all_frames(name, chunk_rows):
 @each_case
 def test_equals_rauch_tung_striebel(name):
     c, w, _, _ = solved(name)
-    expected = rauch_tung_striebel(w.x, w.P, w.x_predicted, w.P_predicted, [f.F for f in w.frames])
-    assert_equal(c.smoothed(), *expected, 1e-8)
-
-
-def test_equals_rauch_tung_striebel_where_the_plates_are_late():
-    c = case(planar_model(50, n_segments=4), 31, FRAMES, states="all", delay=True)
-    w = walk(c)
     expected = rauch_tung_striebel(w.x, w.P, w.x_predicted, w.P_predicted, [f.F for f in w.frames])
     assert_equal(c.smoothed(), *expected, 1e-8)
 

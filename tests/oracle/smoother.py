@@ -6,19 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve, expm
+from scipy.linalg import cho_factor, cho_solve
 
 
 @dataclass
 class Frame:
-    """x = F x_before + input + noise of covariance Q (not in the first frame), then z = H x + noise of covariance R."""
+    """x = F x_before + noise of covariance Q (not in the first frame), then z = H x + noise of covariance R."""
 
     F: NDArray
     Q: NDArray
     H: NDArray
     R: NDArray
     z: NDArray
-    shift: NDArray | float = 0.0
 
 
 def solve_scaled(S: NDArray, b: NDArray) -> NDArray:
@@ -38,7 +37,7 @@ def batch(x0: NDArray, P0: NDArray, frames: list[Frame]) -> tuple[NDArray, NDArr
             mean[here], joint[here, here] = x0, P0
             continue
         before = slice(k * n - n, k * n)
-        mean[here] = frame.F @ mean[before] + frame.shift
+        mean[here] = frame.F @ mean[before]
         joint[here, : k * n] = frame.F @ joint[before, : k * n]
         joint[: k * n, here] = joint[here, : k * n].T
         joint[here, here] = frame.F @ joint[before, before] @ frame.F.T + frame.Q
@@ -69,16 +68,3 @@ def rauch_tung_striebel(
         xs[k] = x[k] + C @ (xs[k + 1] - x_predicted[k + 1])
         Ps[k] = P[k] + C @ (Ps[k + 1] - P_predicted[k + 1]) @ C.T
     return xs, Ps
-
-
-def transition(n_free: int, decay: NDArray, density: NDArray, dt: float) -> tuple[NDArray, NDArray]:
-    """F and Q over dt of dx/dt = A x + white noise of this spectral density, by van Loan's matrix exponential."""
-    n = len(decay)
-    A = -np.diag(decay)
-    for i in range(2 * n_free):
-        A[i, i + n_free] = 1.0
-    block = np.block([[-A, np.diag(density)], [np.zeros((n, n)), A.T]]) * dt
-    exponential = expm(block)
-    F = exponential[n:, n:].T
-    Q = F @ exponential[:n, n:]
-    return F, (Q + Q.T) / 2
