@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +13,7 @@ from dynakin.filter import presets
 from dynakin.filter.alignment import PASSES, delay_of, in_step, in_words, is_late
 from dynakin.filter.assemble import assemble
 from dynakin.filter.extend import continuous_noise, extended, initial_covariance
+from dynakin.filter.live import StepEstimate, deviations_of, step_estimate
 from dynakin.filter.noise import Noise, gate_limits
 from dynakin.filter.samples import Sample, foreign_load, recording_arrays, sample_arrays
 from dynakin.filter.smoothing import check_can_smooth, smoothed
@@ -25,20 +25,6 @@ Array = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]
 
 
-@dataclass(frozen=True)
-class StepEstimate:
-    """What one live step gives: all coordinates of the model in order, and how well the sample was expected."""
-
-    time_s: float
-    coordinates: Array  # (C,) rad or m
-    speeds: Array  # (C,)
-    accelerations: Array  # (C,)
-    moments: Array  # (C,) N m or N
-    wrench: Array  # (6,) N, N m, about the model's ground origin
-    markers: Array  # (M, 3) m, ground frame
-    report: _core.StepReport
-
-
 class Estimator:
     """Estimates movement and what drives it with one constrained extended Kalman filter.
 
@@ -48,6 +34,7 @@ class Estimator:
         priors, bounds: prior standard deviations and half widths of (9); see `dynakin.model.priors`.
         side: limb markers of a lumped model ("auto", "right", "left", "both").
         vertical, forward: laboratory directions, found in the recording where "auto".
+        lag: frames by which `delayed` lies behind `step`, for smoothing while it is measured; 0: none.
     """
 
     def __init__(
@@ -60,7 +47,10 @@ class Estimator:
         side: str = "auto",
         vertical: str = "auto",
         forward: str | tuple[float, float, float] = "auto",
+        lag: int = 0,
     ) -> None:
+        if lag < 0:
+            raise ConfigError(f"lag is {lag}, expected 0 frames or more")
         self.model = model
         self.noise = noise or presets.default()
         self.priors = priors or Priors()
@@ -68,8 +58,10 @@ class Estimator:
         self.side = side
         self.vertical = vertical
         self.forward = forward
+        self.lag = lag
         self.initial: InitialModel | None = None
         self._filter: _core.Filter | None = None
+        self._lag: _core.FixedLag | None = None
         self._core_model: _core.Model | None = None
         self._time: float | None = None
 
@@ -106,27 +98,35 @@ class Estimator:
         if foreign:
             wrench[:] = np.nan
             notes.append(foreign)
-        shift = 0.0
         try:
-            arrays = self.run_arrays(recording.time, markers, wrench, progress)
-            for _ in range(PASSES):
-                delay = self._delay(arrays)
-                if delay is None or not is_late(delay) or foreign:
-                    break
-                shift += delay[0]
-                self.start_from(initial)
-                shifted = in_step(recording.time, wrench, shift)
-                arrays = self.run_arrays(recording.time, markers, shifted, progress)
-            wrench = shifted if shift else wrench
-            delay = self._delay(arrays)
+            arrays, wrench, clock = self._in_step(initial, recording.time, markers, wrench, progress)
             if smooth:
                 self.start_from(initial)
                 arrays = self.run_smoothed_arrays(recording.time, markers, wrench, progress)
         except ValueError as error:  # a frame that the core refuses, named by it
             raise RecordingError(f"{recording.path or recording.name}: {error}") from None
-        if not foreign:
-            notes += in_words(shift, delay)
-        return assemble(arrays, self._core_model, initial, recording, (markers, wrench), self.settings(), notes)
+        config = self.settings() | {"smooth": smooth}
+        notes += [] if foreign else clock
+        return assemble(arrays, self._core_model, initial, recording, (markers, wrench), config, notes)
+
+    def _in_step(
+        self, initial: InitialModel, time: Array, markers: Array, wrench: Array, progress: Progress | None
+    ) -> tuple[dict[str, Array], Array, list[str]]:
+        """`run_arrays`, again with the plates brought into step where they turn out to lag.
+
+        Returns:
+            The arrays, the wrench (T, 6) as the last run took it, and what there is to say of the plates' clock.
+        """
+        arrays, shift, taken = self.run_arrays(time, markers, wrench, progress), 0.0, wrench
+        for _ in range(PASSES):
+            delay = self._delay(arrays)
+            if delay is None or not is_late(delay):
+                break
+            shift += delay[0]
+            taken = in_step(time, wrench, shift)
+            self.start_from(initial)
+            arrays = self.run_arrays(time, markers, taken, progress)
+        return arrays, taken, in_words(shift, self._delay(arrays))
 
     def start(self, recording: Recording, *, static: Recording | None = None) -> InitialModel:
         """Measure the model on a recording (or the first seconds of a live one) and make the filter ready to step.
@@ -153,6 +153,9 @@ class Estimator:
         self._filter = _core.Filter(
             self._core_model, self.filter_settings(initial), initial.x0, initial_covariance(initial, self.noise)
         )
+        if self.lag:
+            check_can_smooth(self.noise)
+        self._lag = _core.FixedLag(self._filter, self.lag) if self.lag else None
         self.initial, self._time = initial, None
         return initial
 
@@ -207,24 +210,40 @@ class Estimator:
         if dt < 0.0:
             raise RecordingError(f"sample at {sample.time_s} s: older than the one before, at {self._time} s")
         markers, wrench = sample_arrays(sample, self.initial)
-        if self._time is not None:
-            self._filter.predict(dt)
-        report = self._filter.update(markers, wrench)
+        if self._lag is not None:
+            report = self._lag.step(dt, markers, wrench)
+        else:
+            if self._time is not None:
+                self._filter.predict(dt)
+            report = self._filter.update(markers, wrench)
         if report.diverged:
             raise DivergenceError(f"the filter diverged at {sample.time_s} s: {report.status}")
         self._time = sample.time_s
-        model, x = self._core_model, self._filter.state
-        q, qd, qdd = _core.coordinates(model, x)
-        return StepEstimate(
-            sample.time_s,
-            q,
-            qd,
-            qdd,
-            _core.joint_moments(model, x),
-            _core.wrench(model, x),
-            _core.marker_positions(model, x),
-            report,
-        )
+        return step_estimate(self._core_model, sample.time_s, self._filter.state, report)
+
+    def delayed(self) -> StepEstimate | None:
+        """The frame that lies ``lag`` frames back, smoothed by all samples until now; None before there is one.
+
+        Its ``time_s`` is its own: the delay is the last sample's time less that.
+
+        Raises:
+            ConfigError: the estimator was made without a lag.
+        """
+        if self._lag is None or self._core_model is None or self._time is None:
+            raise ConfigError("delayed: expected Estimator(..., lag=frames), started and stepped")
+        if not self._lag.ready:
+            return None
+        return step_estimate(self._core_model, self._time - self._lag.delay_s, self._lag.state, None)
+
+    def deviations(self) -> dict[str, Array]:
+        """Standard deviations of the present estimate, as it was last stepped: propagated now, not in every step.
+
+        Returns:
+            coordinates, speeds, accelerations, moments (C,), of all coordinates of the model; wrench (6,).
+        """
+        if self._filter is None or self._core_model is None:
+            raise ConfigError("deviations: the estimator has not been started; call start(recording) first")
+        return deviations_of(self._core_model, self._filter.state, self._filter.covariance)
 
     def _delay(self, arrays: dict[str, Array]) -> tuple[float, float] | None:
         assert self.initial is not None
