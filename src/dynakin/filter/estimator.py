@@ -114,7 +114,11 @@ class Estimator:
             notes += in_words(shift, self._delay(arrays))
         if shift:
             wrench = shifted
-        return assemble(arrays, self._core_model, initial, recording, (markers, wrench), self.settings(), notes)
+        assert self._filter is not None
+        covariances = (initial_covariance(initial, self.noise), self._filter.covariance)
+        return assemble(
+            arrays, self._core_model, initial, recording, (markers, wrench), self.settings(), notes, covariances
+        )
 
     def start(self, recording: Recording, *, static: Recording | None = None) -> InitialModel:
         """Measure the model on a recording (or the first seconds of a live one) and make the filter ready to step.
