@@ -17,6 +17,7 @@ from dynakin.comparison import trial_of
 from dynakin.comparison.coverage import block_coverage, parameter_coverage
 from dynakin.comparison.truth import FIGURES, LEG, parameter_errors, truth_errors
 from dynakin.filter import Estimator, presets
+from dynakin.identifiability import identifiability
 from dynakin.model import Subject, load_model
 from dynakin.results import Estimate, check_output_writable, evaluation_window, truth_error
 
@@ -46,7 +47,7 @@ def demo(
     comparison = trial_of({"paper": estimate}, estimator.initial, model)
     methods = {method.name: method.data for method in comparison.methods}
     with busy("writing results and report"):
-        folder = estimate.save(output, comparison=comparison)
+        folder = estimate.save(output, comparison=comparison, identifiability=identifiability(estimator, estimate))
     console = out()
     console.print(methods_by_error(methods, estimate, trial.truth))
     console.print(compared_with_truth(estimate, trial.truth))

@@ -29,6 +29,7 @@ from dynakin.cli.summary import print_summary
 from dynakin.comparison import Trial, trial_of
 from dynakin.config import RunConfig, make_config, read_config
 from dynakin.filter import Estimator
+from dynakin.identifiability import Identifiability, identifiability
 from dynakin.model import load_model
 from dynakin.recordings import read
 from dynakin.report import read_sensitivity, save_figures
@@ -85,9 +86,9 @@ def run(
         raise typer.BadParameter("--sensitivity is a figure for papers, expected --figures FOLDER with it")
     grid = None if sensitivity is None else read_sensitivity(sensitivity)
     with progress_bar("estimating") as progress:
-        estimate, comparison = estimate_from(config, progress)
+        estimate, comparison, told = estimate_from(config, progress)
     with busy("writing results and report"):
-        folder = estimate.save(config.output, comparison=comparison)
+        folder = estimate.save(config.output, comparison=comparison, identifiability=told)
     print_summary(estimate, folder)
     if figures is not None:
         with busy("drawing figures"):
@@ -103,9 +104,11 @@ def configure(trial: Path, given: dict[str, Any]) -> RunConfig:
     return make_config({"trial": trial} | options, "run")
 
 
-def estimate_from(config: RunConfig, progress: Callable[[int, int], None] | None = None) -> tuple[Estimate, Trial]:
-    """Read, load, estimate: what a configuration asks for, with it kept in the result; and the same recording by the
-    reference methods.
+def estimate_from(
+    config: RunConfig, progress: Callable[[int, int], None] | None = None
+) -> tuple[Estimate, Trial, Identifiability]:
+    """Read, load, estimate: what a configuration asks for, with it kept in the result; the same recording by the
+    reference methods; and what it tells of the constants.
 
     Raises:
         DynakinError: anything that is wrong with the input, in one line.
@@ -130,7 +133,8 @@ def estimate_from(config: RunConfig, progress: Callable[[int, int], None] | None
     estimate = estimator.run(recording, static=static, smooth=config.smooth, progress=progress)
     estimate = replace(estimate, config=config.as_used() | estimate.config)
     assert estimator.initial is not None
-    return estimate, trial_of({config.preset: estimate}, estimator.initial, model, whatever=True)
+    comparison = trial_of({config.preset: estimate}, estimator.initial, model, whatever=True)
+    return estimate, comparison, identifiability(estimator, estimate)
 
 
 def forward_direction(text: str | None) -> str | tuple[float, ...] | None:

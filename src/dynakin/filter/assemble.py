@@ -27,6 +27,7 @@ def assemble(
     measured: tuple[Array, Array],
     config: dict[str, Any],
     notes: Sequence[str],
+    covariances: tuple[Array, Array],
 ) -> Estimate:
     """Label what `Filter.run` returned and keep what is needed to judge it.
 
@@ -35,9 +36,13 @@ def assemble(
         measured: markers (T, M, 3) and wrench (T, 6), as the filter took them.
         config: what was asked for, as plain data.
         notes: sentences of the plates' check.
+        covariances: P (n, n) before the first frame and after the last.
     """
     data = _dataset(arrays, model, initial, recording, measured)
-    parameters = parameters_of(initial, arrays["state"][-1], arrays["state_sd"][-1])
+    for name, covariance in zip(("initial_covariance", "final_covariance"), covariances, strict=True):
+        data[name] = (("element", "element_"), covariance)
+    prior_sd = np.sqrt(np.diag(covariances[0]))
+    parameters = parameters_of(initial, arrays["state"][-1], arrays["state_sd"][-1], prior_sd)
     config = config | {
         "mass_kg": initial.mass_kg,
         "height_m": initial.height_m,
@@ -110,6 +115,7 @@ def _dataset(
         "marker_axes_modelled": ("axis", axes),
         "component": list(COMPONENTS),
         "element": list(model.layout.names),
+        "element_": list(model.layout.names),
         "joint": names,
         "joint_parent": ("joint", parents),
         "joint_segment": ("joint", segments),

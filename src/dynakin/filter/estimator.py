@@ -107,7 +107,9 @@ class Estimator:
             raise RecordingError(f"{recording.path or recording.name}: {error}") from None
         config = self.settings() | {"smooth": smooth}
         notes += [] if foreign else clock
-        return assemble(arrays, self._core_model, initial, recording, (markers, wrench), config, notes)
+        assert self._filter is not None
+        covariances = (initial_covariance(initial, self.noise), self._filter.covariance)
+        return assemble(arrays, self._core_model, initial, recording, (markers, wrench), config, notes, covariances)
 
     def _in_step(
         self, initial: InitialModel, time: Array, markers: Array, wrench: Array, progress: Progress | None

@@ -16,11 +16,11 @@ _INERTIA_UNITS = {"mass": "kg", "mx": "kg m", "my": "kg m", "mz": "kg m"}
 _PLATE_UNITS = {"delay": "s", "fx": "N", "fy": "N", "fz": "N"}
 
 
-def parameters_of(initial: InitialModel, state: Array, sd: Array) -> list[Parameter]:
+def parameters_of(initial: InitialModel, state: Array, sd: Array, prior_sd: Array) -> list[Parameter]:
     """Every length, marker place and inertial parameter in the state, and the lengths that were held fixed.
 
     Args:
-        state, sd: (n,) the last frame's.
+        state, sd: (n,) the last frame's. prior_sd: (n,) before the first.
     """
     segments = {marker.name: marker.segment for marker in initial.spec.markers}
     found = []
@@ -43,6 +43,7 @@ def parameters_of(initial: InitialModel, state: Array, sd: Array) -> list[Parame
                 upper=_finite(initial.upper[k]),
                 at_bound=bool(state[k] <= initial.lower[k] or state[k] >= initial.upper[k]),
                 estimated=True,
+                prior_sd=float(prior_sd[k]),
             )
         )
     for length in initial.spec.parameters:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from dynakin.report import panels as charts
+from dynakin.report.identifiability_section import identifiability_section
 from dynakin.report.labels import (
     COMPONENT_LABELS,
     is_planar,
@@ -44,6 +45,7 @@ def sections(estimate: Estimate, metrics: dict[str, Any], comparison: Trial | No
         *([] if comparison is None else [methods_section(comparison)]),
         length_section(estimate),
         mass_section(estimate),
+        identifiability_section(estimate, metrics),
     ]
     return [section for section in every if not section.empty]
 

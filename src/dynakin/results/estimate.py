@@ -15,6 +15,7 @@ from dynakin.results.records import Event, Parameter, Timing
 
 if TYPE_CHECKING:
     from dynakin.comparison import Trial
+    from dynakin.identifiability import Identifiability
     from dynakin.recordings import GroundFrame, Recording
 
 AXES = ("x", "y", "z")
@@ -37,6 +38,7 @@ class Estimate:
     markers_measured, markers_estimated, markers_predicted        (time, marker, axis)        m
     wrench_measured, wrench_estimated, wrench_predicted           (time, component)           N or N m
     state, state_sd                                               (time, element)             as the element's own
+    initial_covariance, final_covariance                          (element, element_)         as the elements' own
     joint_centres                                                 (time, joint, axis)         m
     nis, n_rows, log_likelihood                                   (time,)                     1
     ============================================================  ==========================  =====================
@@ -92,7 +94,14 @@ class Estimate:
 
         return compute_metrics(self)
 
-    def save(self, folder: str | Path, *, overwrite: bool = True, comparison: Trial | None = None) -> Path:
+    def save(
+        self,
+        folder: str | Path,
+        *,
+        overwrite: bool = True,
+        comparison: Trial | None = None,
+        identifiability: Identifiability | None = None,
+    ) -> Path:
         """Write every output file into ``folder`` and return it.
 
         All files are first written into a temporary folder beside it, which then takes its place: a failure leaves
@@ -102,10 +111,14 @@ class Estimate:
         Args:
             comparison: this estimate beside the reference methods (`dynakin.comparison.trial_of`), for the report and
                 for ``repetitions.csv``.
+            identifiability: what this trial tells and what would tell more (`dynakin.identifiability`), for the report
+                and for ``metrics.json``.
 
         Raises:
             OutputError: the folder cannot be written or holds something else.
         """
         from dynakin.results.save import save_estimate
 
-        return save_estimate(self, Path(folder), overwrite=overwrite, comparison=comparison)
+        return save_estimate(
+            self, Path(folder), overwrite=overwrite, comparison=comparison, identifiability=identifiability
+        )

@@ -14,6 +14,7 @@ from dynakin.results.consistency import Consistency, consistency
 from dynakin.results.estimate import COMPONENTS, Estimate
 from dynakin.results.fit import WrenchFit, marker_rms_mm, wrench_fit
 from dynakin.results.kinematic_consistency import mismatch_in_words, speed_mismatch
+from dynakin.results.learned import learned
 from dynakin.results.soft_tissue import soft_tissue
 
 SCHEMA_VERSION = 1
@@ -50,6 +51,7 @@ def compute_metrics(estimate: Estimate) -> dict[str, Any]:
         "adaptation": adaptation(estimate),
         "bounds": parameter_bounds(estimate, window),
         "soft_tissue": soft_tissue(estimate, window),
+        "identifiability": learned(estimate),
         "events": _events(estimate),
         "timing": asdict(estimate.timing),
     }

@@ -16,13 +16,23 @@ from dynakin.results.output_folder import replacing
 
 if TYPE_CHECKING:
     from dynakin.comparison import Trial
+    from dynakin.identifiability import Identifiability
 
 
-def save_estimate(estimate: Estimate, folder: Path, *, overwrite: bool = True, comparison: Trial | None = None) -> Path:
+def save_estimate(
+    estimate: Estimate,
+    folder: Path,
+    *,
+    overwrite: bool = True,
+    comparison: Trial | None = None,
+    identifiability: Identifiability | None = None,
+) -> Path:
     """See `dynakin.results.Estimate.save`."""
     from dynakin.report import write_report  # the report is made from results, so it comes after them
 
     metrics = estimate.metrics()
+    if identifiability is not None:
+        metrics["identifiability"] = identifiability.as_dict()
     curves = estimate_curves(estimate) if comparison is None else comparison.curves()
     with replacing(folder, overwrite=overwrite) as made:
         motion_files.write_coordinates(estimate, made / "coordinates.mot")
