@@ -69,7 +69,7 @@ void Filter::reset(const Eigen::VectorXd& x, const Eigen::MatrixXd& P) {
 void Filter::predict(double dt) {
   if (!(dt >= 0.0) || !std::isfinite(dt))
     throw std::invalid_argument("dt: expected 0 s or more, found " + std::to_string(dt));
-  dynakin::predict(model_, settings_, dt, x_, P_);
+  dynakin::predict(model_, settings_, dt, step_, x_, P_);
   unbelieved_s_ += dt;
 }
 

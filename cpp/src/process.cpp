@@ -32,7 +32,8 @@ double decayed_noise(double density, double rate, double dt) {
 
 }  // namespace
 
-void predict(const Model& model, const FilterSettings& settings, double dt, Eigen::VectorXd& x, Eigen::MatrixXd& P) {
+void predict(const Model& model, const FilterSettings& settings, double dt, Eigen::VectorXd& scratch,
+             Eigen::VectorXd& x, Eigen::MatrixXd& P) {
   const int n = model.n_free(), size = model.state_size();
   const int rest = size - 3 * n;
   const double half = 0.5 * dt * dt;
@@ -47,12 +48,15 @@ void predict(const Model& model, const FilterSettings& settings, double dt, Eige
   top.middleRows(0, n) += dt * top.middleRows(n, n) + half * top.middleRows(2 * n, n);
   top.middleRows(n, n) += dt * top.middleRows(2 * n, n);
   for (int j = 1; j < 3 * n; ++j) top.col(j).head(j) = top.row(j).head(j).transpose();
-  for (int i = 3 * n; i < size; ++i) {
-    if (settings.decay_rate(i) == 0.0) continue;
-    const double kept = std::exp(-settings.decay_rate(i) * dt);
-    x(i) *= kept;
-    P.col(i) *= kept;
-    P.row(i) *= kept;  // the corner above is made from the one below
+  if (settings.decay_rate.tail(rest).any()) {
+    auto kept = scratch.tail(rest);
+    for (int i = 0; i < rest; ++i) {
+      const double rate = settings.decay_rate(3 * n + i);
+      kept(i) = rate == 0.0 ? 1.0 : std::exp(-rate * dt);
+    }
+    x.tail(rest).array() *= kept.array();
+    for (int c = 0; c < size; ++c)  // the corner above is made from the one below
+      P.col(c).tail(rest).array() *= kept.array() * (c < 3 * n ? 1.0 : kept(c - 3 * n));
   }
   P.topRightCorner(3 * n, rest) = P.bottomLeftCorner(rest, 3 * n).transpose();
   P.diagonal() += settings.process_variance;
