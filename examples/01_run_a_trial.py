@@ -18,7 +18,7 @@ else:
     subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
 
 model = dynakin.load_model("sagittal7", subject=subject, markers="opencap")
-result = dynakin.Estimator(model, noise=dynakin.presets.paper()).run(recording)
+result = dynakin.Estimator(model).run(recording, smooth=True)  # smooth: each frame from all frames
 
 for message in result.messages:  # what was found, left out, assumed
     print("-", message)
@@ -27,5 +27,8 @@ print(f"markers: {metrics['markers']['mean_rms_mm']:.2f} mm RMS on average (afte
 print("wrench:", {name: round(rms, 2) for name, rms in metrics["wrench"]["rms"].items()}, "N, N m RMS")
 print(metrics["consistency"]["verdict"])
 knee = result.data["moments"].sel(coordinate="knee")
-print(f"knee moment, both legs: {float(knee.min()):.0f} to {float(knee.max()):.0f} N m")
+sd = float(result.data["moments_sd"].sel(coordinate="knee").mean())
+print(
+    f"knee moment, both legs: {float(knee.min()):.0f} to {float(knee.max()):.0f} N m, standard deviation {sd:.1f} N m"
+)
 print("written to", result.save("out/example_01"))

@@ -49,6 +49,41 @@ def test_model_lists_and_describes(capsys: Said) -> None:
         assert word in told
 
 
+def test_model_says_what_it_lets_one_identify(capsys: Said) -> None:
+    assert main(["model", "squat7", "--identifiability", "--mass", "60"]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    for words in (
+        "22 of 28 inertial numbers",
+        "foot mass + mass of all that it carries",
+        "arm: a turn about the shoulder",
+    ):
+        assert words.lower() in told.lower()
+
+
+def test_model_says_what_a_trial_tells(data_dir: Path, capsys: Said) -> None:
+    folder = data_dir / "opencap_subject4"
+    trial = ["--trial", str(folder / "squats1.trc"), "--forces", str(folder / "squats1_grf.mot"), "--mass", "60.05"]
+    assert main(["model", "sagittal7", "--identifiability", *trial]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    for words in ("Of 6 lengths the recording tells 5 from the data", "What would tell more", "the foot's mass, first"):
+        assert words in told
+
+
+@pytest.mark.parametrize(
+    ("arguments", "expected"),
+    [
+        (["squat7", "--mass", "60"], "--mass is of use only with --identifiability"),
+        (["squat7", "--identifiability", "--forces", "x.mot"], "--forces is of use only with --trial"),
+        (["--identifiability"], "expected a model's name"),
+        (["squat7", "--identifiability", "--trial", "no.c3d"], "no.c3d"),
+    ],
+)
+def test_options_of_identifiability_that_do_not_fit(arguments: list[str], expected: str, capsys: Said) -> None:
+    assert main(["model", *arguments]) == 2
+    said = capsys.readouterr().err
+    assert expected in said and said.count("\n") == 1
+
+
 def test_demo_compares_with_the_truth_and_says_where_the_report_lies(tmp_path: Path, capsys: Said) -> None:
     out = tmp_path / "demo"
     assert main(["demo", "-o", str(out), "--duration", "6"]) == 0

@@ -14,7 +14,7 @@ from synthetic_estimate import make_estimate
 from dynakin.report import render_report
 from dynakin.report.insights import in_short, insights
 from dynakin.report.labels import listed, moment_note, number, short_marker_names
-from dynakin.report.plot import thin
+from dynakin.report.plot import new_axes, thin, to_svg
 from dynakin.results import Estimate, compute_metrics
 
 
@@ -201,3 +201,20 @@ def test_one_sentence_says_what_to_look_at(estimate: Estimate) -> None:
     found = insights(estimate, compute_metrics(estimate))
     assert in_short(found) == "1 finding to look at before using this run: bounds."
     assert in_short([]) == "Nothing in this run speaks against using it."
+
+
+def test_what_the_recording_tells_is_shown_where_the_prior_is_known(estimate: Estimate) -> None:
+    """Every constant once, with its standard deviation before and after; an estimate without priors has no section."""
+    assert 'id="identifiability"' not in render_report(estimate)
+    told = [replace(p, prior_sd=4.0 * p.sd) if p.estimated else p for p in estimate.parameters]
+    page = render_report(replace(estimate, parameters=told))
+    section = page.split('id="identifiability"')[-1].split("</section>")[0]
+    lengths = sum(p.kind == "length" and p.estimated for p in told)
+    assert f"Of {lengths} lengths the recording tells {lengths} from the data." in section
+    assert "Moments of inertia" in section and "What would tell more" not in section
+
+
+def test_numbers_in_the_words_of_a_figure_keep_their_digits() -> None:
+    figure, axes = new_axes()
+    axes.annotate("0.00174 kg m²", (0.123456, 0.5))
+    assert "0.00174 kg m²" in to_svg(figure, "digits", "a figure")

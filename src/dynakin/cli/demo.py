@@ -39,12 +39,14 @@ def demo(
     subject = Subject(mass_kg=who.mass_kg, height_m=who.height_m, sex=who.sex)
     model = load_model("sagittal7", subject, markers="opencap")
     with progress_bar("estimating") as progress:
-        estimator = Estimator(model, presets.paper())
+        estimator = Estimator(model)
         estimate = estimator.run(trial.recording, progress=progress)
+    with busy("and with the paper's settings, for comparison"):
+        paper = Estimator(model, presets.paper()).run(trial.recording)
     assert estimator.initial is not None
-    demo_config = {"trial": trial.recording.name, "preset": "paper", "seed": seed, "duration_s": duration}
+    demo_config = {"trial": trial.recording.name, "preset": "default", "seed": seed, "duration_s": duration}
     estimate = replace(estimate, config=demo_config | estimate.config)
-    comparison = trial_of({"paper": estimate}, estimator.initial, model)
+    comparison = trial_of({"default": estimate, "paper": paper}, estimator.initial, model)
     methods = {method.name: method.data for method in comparison.methods}
     with busy("writing results and report"):
         folder = estimate.save(output, comparison=comparison, identifiability=identifiability(estimator, estimate))
@@ -87,7 +89,7 @@ def compared_with_truth(estimate: Estimate, truth: Truth) -> Table:
         "speed, deg/s",
         "moment, N m",
         numbers=(1, 2, 3, 4),
-        title="EKF (paper) by coordinate: RMS error against the truth",
+        title="EKF (default) by coordinate: RMS error against the truth",
     )
     kinds = ("coordinates", "speeds", "moments")
     found = block_coverage(estimate.data, truth.data, window)[0]
@@ -109,7 +111,7 @@ def own_uncertainty(estimate: Estimate, truth: Truth) -> Table:
         "error²/sd²",
         "verdict",
         numbers=(1, 2, 3),
-        title="EKF (paper): are its standard deviations right? Truth within their 95 % interval",
+        title="EKF (default): are its standard deviations right? Truth within their 95 % interval",
     )
     found = block_coverage(estimate.data, truth.data, evaluation_window(estimate.time))
     for block in found + parameter_coverage(estimate.parameters, truth.parameters):

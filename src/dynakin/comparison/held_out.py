@@ -12,6 +12,7 @@ from dynakin.comparison.setup import Setup
 from dynakin.comparison.statistics import spread
 from dynakin.comparison.table2 import Row, unit_of
 from dynakin.errors import ModelError, RecordingError
+from dynakin.filter.smoothing import can_smooth
 from dynakin.model import InitialModel, initialise
 from dynakin.recordings import GroundFrame, Recording, check_plates
 from dynakin.reference import identify, predicted_wrench, reference_methods
@@ -112,6 +113,10 @@ def predict_blind(identified: Identified, recording: Recording) -> Blind:
             estimator.start_from(freeze(measured, values, coordinates))
             arrays = estimator.run_arrays(recording.time, markers, blank)
             found[f"EKF ({preset}), {label}"] = arrays["wrench_estimated"]
+            if label == "identified" and can_smooth(setup.noise[preset]):
+                estimator.start_from(freeze(measured, values, coordinates))
+                arrays = estimator.run_smoothed_arrays(recording.time, markers, blank)
+                found[f"EKF ({preset}), smoothed"] = arrays["wrench_estimated"]
     notes: list[str] = []
     try:
         found |= _referred(identified, recording, start)

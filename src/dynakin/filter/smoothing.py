@@ -33,12 +33,17 @@ def smoothed(arrays: dict[str, Array]) -> dict[str, Array]:
     return kept | {name: arrays[source] for name, source in _PLACES.items()}
 
 
+def can_smooth(noise: Noise) -> bool:
+    """Whether bounds are kept in a way that has a smoother."""
+    return noise.constraint in ("projection", "none")
+
+
 def check_can_smooth(noise: Noise) -> None:
     """
     Raises:
         ConfigError: these settings keep bounds in a way that has no smoother.
     """
-    if noise.constraint not in ("projection", "none"):
+    if not can_smooth(noise):
         raise ConfigError(
             f"smooth: bounds are kept by constraint {noise.constraint!r}, which changes the covariance; expected "
             "'projection' or 'none' (preset default)"

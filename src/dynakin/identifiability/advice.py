@@ -17,17 +17,21 @@ Array = npt.NDArray[np.float64]
 
 GAIN = 1.25
 """Least factor on a standard deviation that is worth saying: a third of the variance."""
+REPEATED = 0.15
+"""Part by which the trial's own motion, measured exactly, may miss the standard deviation that the trial ended with."""
 STILL_DEG = 5.0
 """A segment that turns by less over the trial does not move: soft tissue alone makes it seem to turn that far."""
 
 
 def gains_of(
-    names: Sequence[str], now: Array, tried: Sequence[Excitation], shares: Mapping[str, float]
+    names: Sequence[str], ended: Array, now: Array, tried: Sequence[Excitation], shares: Mapping[str, float]
 ) -> dict[str, dict[str, float]]:
     """Factors by which the standard deviation of what is not known yet would shrink, by motion.
 
     Args:
-        now: (n,) standard deviations after the trial's own motion. shares: posterior over prior of each constant.
+        ended: (n,) standard deviations that the trial ended with. now: (n,) those of its own motion, measured exactly;
+            what the two disagree on hangs on the path that the estimate took, and nothing is promised of it.
+        shares: posterior over prior of each constant.
 
     Returns:
         Motion -> name -> factor, where it is at least `GAIN`; each name under its best motion only, best first.
@@ -35,6 +39,8 @@ def gains_of(
     found: dict[str, dict[str, float]] = {}
     for k, name in enumerate(names):
         if not name.startswith(("inertia/", "length/")) or shares.get(name, 0.0) <= KNOWN or not tried:
+            continue
+        if abs(now[k] / ended[k] - 1.0) > REPEATED:
             continue
         best = max(tried, key=lambda e: now[k] / e.sd[k])
         factor = float(now[k] / best.sd[k])

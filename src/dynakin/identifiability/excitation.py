@@ -3,7 +3,8 @@
 Nothing is drawn at random and nothing is fitted: exact measurements of a motion are put through the same filter from
 the same prior, and the covariance at its end is read. So a gain counts all that the filter does not know either
 (coordinates, soft tissue, slow errors of the plates), which the information matrix of the regressor alone leaves out:
-that one takes the motion for known and promises several times too much.
+that one takes the motion for known and can promise twice too much (the arm's first moment of `squat7`, shoulder
+swinging: 8.5 times instead of 4.4).
 """
 
 from __future__ import annotations

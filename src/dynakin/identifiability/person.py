@@ -20,7 +20,8 @@ def estimator_of(definition: ModelDefinition) -> Estimator:
         ModelError: none of the simulated recordings has the markers that the model needs.
     """
     who, why = definition.subject, ""
-    for body in BODIES:
+    started: list[Estimator] = []
+    for body in sorted(BODIES, key=lambda name: name != definition.name):
         trial = simulate(
             body,
             duration_s=5.0,
@@ -35,11 +36,15 @@ def estimator_of(definition: ModelDefinition) -> Estimator:
             estimator.start(trial.recording)
         except DynakinError as error:
             why = why or error.message
-            if body != definition.name:
-                continue
-            why = error.message
         else:
-            return estimator
-    raise ModelError(
-        f"model {definition.name}: cannot be measured on a simulated person ({why}); expected --trial FILE"
-    )
+            started.append(estimator)
+    if not started:
+        raise ModelError(
+            f"model {definition.name}: cannot be measured on a simulated person ({why}); expected --trial FILE"
+        )
+    return max(started, key=_free)  # a joint without markers beyond it is locked; of equals the first
+
+
+def _free(estimator: Estimator) -> int:
+    assert estimator.initial is not None
+    return sum(not coordinate.locked for coordinate in estimator.initial.spec.coordinates)

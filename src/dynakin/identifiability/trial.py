@@ -119,7 +119,8 @@ def identifiability(
     structure, bench = structure_of(estimator), Bench(estimator, estimate)
     shares = {p.name: share for p in estimate.parameters if (share := share_of(p)) is not None}
     now, tried = bench.try_all(progress)
-    gains = gains_of(bench.measured.names, now, tried, shares)
+    ended = estimate.data["state_sd"].isel(time=-1).values
+    gains = gains_of(bench.measured.names, ended, now, tried, shares)
     states = bench.states(bench.trial)
     return Identifiability(
         structure=structure,

@@ -1,0 +1,92 @@
+"""What a trial told, and advice that keeps its word."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+
+from dynakin.identifiability.excitation import Bench
+from dynakin.results.learned import judged, learned
+from identifiability.conftest import Told, estimated_squat
+
+
+def test_an_exact_replay_of_the_trial_ends_as_sure_as_the_trial(squat: Told) -> None:
+    """So what other motions give on the same bench can be held against it."""
+    bench = Bench(squat.estimator, squat.estimate)
+    now = np.sqrt(np.diag(bench.covariance(bench.trial)))
+    at = bench.measured.block("inertia")
+    np.testing.assert_allclose(now[at], squat.estimate.data["state_sd"].values[-1, at], rtol=0.03)
+
+
+def test_the_advised_motion_shrinks_the_deviations_as_it_was_said(squat: Told) -> None:
+    """Simulated anew with the motion on top, by the simulator's own mechanics, soft tissue and sensors."""
+    gains = squat.found.gains["shoulder"]
+    words = {e.name: e.words for e in squat.found.tried}["shoulder"]
+    assert words == "moving the shoulder by ± 30 deg once a second"
+    assert max(gains.values()) > 2.0
+    _, moved = estimated_squat("shoulder", 30.0)
+    before, after = (e.data["state_sd"].isel(time=-1) for e in (squat.estimate, moved))
+    for name, factor in gains.items():
+        assert float(before.sel(element=name) / after.sel(element=name)) == pytest.approx(factor, rel=0.15), name
+
+
+def test_what_no_motion_tells_is_not_told_by_one(squat: Told) -> None:
+    _, moved = estimated_squat("shoulder", 30.0)
+    said = next(text for text in squat.found.advice if "foot's" in text)
+    assert "it does not move" in said
+    before, after = (e.data["state_sd"].isel(time=-1) for e in (squat.estimate, moved))
+    for number in ("mass", "mx", "my", "izz"):
+        ratio = before.sel(element=f"inertia/foot/{number}") / after.sel(element=f"inertia/foot/{number}")
+        assert float(ratio) == pytest.approx(1.0, abs=0.05)
+
+
+def test_tried_motions_keep_the_feet_loaded_and_the_person_in_balance(squat: Told) -> None:
+    bench = Bench(squat.estimator, squat.estimate)
+    ankle, shoulder = (bench.coordinates.index(name) for name in ("ankle", "shoulder"))
+    assert bench.possible(bench.trial)
+    assert bench.possible(bench.with_added(shoulder, np.radians(30.0), 1.0))
+    assert not bench.possible(bench.with_added(ankle, np.radians(5.0), 1.0))
+    assert not any(excitation.name == "toe" for excitation in squat.found.tried)
+
+
+def test_base_parameters_carry_the_filters_covariance(squat: Told) -> None:
+    data, base = squat.estimate.data, squat.found.structure.base
+    over = list(base.over)
+    P = data["final_covariance"].sel(element=over, element_=over).values
+    entry = squat.found.base[5]
+    assert entry.sd == pytest.approx(np.sqrt(base.K[5] @ P @ base.K[5]))
+    assert entry.sd < entry.prior_sd
+    assert sum(entry.share < 0.9 for entry in squat.found.base) > 10
+
+
+def test_covariances_are_kept_and_written(squat: Told, tmp_path: Path) -> None:
+    estimate = squat.estimate
+    sd = np.sqrt(np.diag(estimate.data["final_covariance"].values))
+    np.testing.assert_allclose(sd, estimate.data["state_sd"].values[-1], rtol=1e-9)
+    for p in estimate.parameters:
+        if p.estimated:
+            variance = estimate.data["initial_covariance"].sel(element=p.name, element_=p.name)
+            assert p.prior_sd == pytest.approx(float(np.sqrt(variance)))
+    folder = estimate.save(tmp_path / "out", identifiability=squat.found)
+    with xr.open_dataset(folder / "estimate.nc") as read:
+        assert read["final_covariance"].dims == ("element", "element_")
+        np.testing.assert_array_equal(read["final_covariance"], estimate.data["final_covariance"])
+    page = (folder / "report.html").read_text()
+    assert 'id="identifiability"' in page and "What would tell more" in page and "What no measurement sees" in page
+
+
+def test_the_block_of_the_metrics_agrees_with_the_estimate(squat: Told) -> None:
+    block = squat.found.as_dict()
+    assert block["base_parameters"]["rank"] == 22 and block["base_parameters"]["of"] == 28
+    assert block["gauges"]["count"] == len(block["gauges"]["directions"])
+    for p in squat.estimate.parameters:
+        if p.estimated and p.kind != "plates":
+            entry = block["parameters"][p.name]
+            assert entry["share"] == pytest.approx(p.sd / p.prior_sd)
+            assert entry["judgement"] == judged(entry["share"])
+    assert learned(squat.estimate)["verdict"] == block["verdict"]
+    counts = block["groups"]["lengths"]
+    assert sum(counts.values()) == sum(p.kind == "length" and p.estimated for p in squat.estimate.parameters)
