@@ -22,5 +22,5 @@ for k in range(101, recording.n_frames):  # from here on as samples would come f
         print(
             f"{estimate.time_s:5.2f} s  knee {estimate.coordinates[knee] * 57.29578:6.1f} deg  "
             f"moment {estimate.moments[knee]:7.1f} +- {estimator.deviations()['moments'][knee]:.1f} N m  "
-            f"speed {estimate.speeds[knee]:6.2f} rad/s, smoothed at {delayed.time_s:.2f} s {delayed.speeds[knee]:6.2f} rad/s"
+            f"speed {estimate.speeds[knee]:5.2f} rad/s, smoothed at {delayed.time_s:.2f} s {delayed.speeds[knee]:5.2f}"
         )

@@ -37,9 +37,10 @@ class Priors(Strict):
     """The same for translations."""
     length_fraction: Positive = 0.05
     """Lengths, of their value: joint centres are known to 1 or 2 cm, 3 to 5 % of a leg segment."""
-    marker_m: Positive = 0.01
-    """Local marker positions: landmarks are found again to within 6 to 21 mm (Della Croce et al. 2005), and the frame
-    that they are measured in hangs on a few of them. What skin and flesh do later is not part of it."""
+    marker_m: Positive = 0.005
+    """Local marker positions, measured while standing: the segment's frame hangs on the same landmarks, so one that is
+    put elsewhere moves frame and places alike; what is left is the skin's shape at rest. Tried on simulated landmarks
+    7 mm off: 4 to 10 mm do, the smaller the better. What skin and flesh do later is not part of it."""
     mass_fraction: Positive = 0.10
     """Segment masses, of the table's value: half of the +-20 % of (9), so that the bound lies at two
     sigma."""
