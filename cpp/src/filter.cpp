@@ -81,6 +81,7 @@ StepReport Filter::update(const Eigen::Ref<const MarkerMatrix>& markers, const V
     throw std::invalid_argument("markers or wrench: infinite, expected a number, or NaN where nothing is measured");
   if (last_.diverged()) return last_;
   StepReport report;
+  if (tape_) tape_->clear();
   measurement_.admit_all();
   measurement_.linearise(x_, markers, wrench);
   predicted_ = measurement_.predicted();
@@ -104,6 +105,7 @@ StepReport Filter::update(const Eigen::Ref<const MarkerMatrix>& markers, const V
     P_ = P0_;
     unbelieved_s_ = k_infinity;
     report.tracking = Tracking::restarted;
+    if (tape_) tape_->cut = true;
   }
   last_ = report;
   return report;
@@ -165,7 +167,7 @@ void Filter::constrain(double nis, StepReport& report) {
   retract(x_, dx_);
   if (settings_.constraint == ConstraintKind::gain) report.constrained = gain_.apply(settings_, nis, x_, P_);
   if (settings_.constraint == ConstraintKind::projection) {
-    const ProjectionReport projected = projection_.apply(x_, P_);
+    const ProjectionReport projected = projection_.apply(x_, P_, tape_);
     report.constrained = projected.active;
     report.constraints_met = projected.solved;
   }
@@ -177,6 +179,27 @@ StepStatus Filter::check() const {
   const bool may_be_sure = settings_.equality.rows() > 0;  // of an element that an equality alone decides
   if (least < 0.0 || (least == 0.0 && !may_be_sure)) return StepStatus::variance_not_positive;
   return StepStatus::ok;
+}
+
+void Filter::record_to(FrameTape* tape) {
+  tape_ = tape;
+  update_.record_to(tape);
+}
+
+void Filter::save(Checkpoint& out) const {
+  out.x = x_;
+  out.P = P_;
+  projection_.save(out.projection);
+  out.unbelieved_s = unbelieved_s_;
+  out.last = last_;
+}
+
+void Filter::restore(const Checkpoint& checkpoint) {
+  x_ = checkpoint.x;
+  P_ = checkpoint.P;
+  projection_.restore(checkpoint.projection);
+  unbelieved_s_ = checkpoint.unbelieved_s;
+  last_ = checkpoint.last;
 }
 
 const Measurement& Filter::evaluate() {

@@ -19,7 +19,8 @@ const char* describe(Verdict verdict) {
 
 Gate::Gate(const Model& model)
     : n_markers_(static_cast<int>(model.markers().size())), verdicts_(n_markers_ + 1, Verdict::missing) {
-  HP_.setZero(6, model.state_size());
+  HP_.setZero(model.state_size(), 6);
+  gathered_.setZero(model.state_size());
 }
 
 void Gate::judge(const FilterSettings& settings, const std::vector<RowBlock>& blocks, const Eigen::MatrixXd& P) {
@@ -49,17 +50,20 @@ Verdict Gate::judge(const RowBlock& block, const GateLimits& limits, const Eigen
   if (std::isinf(limits[rows - 1])) return Verdict::accepted;
   const std::vector<int>& columns = *block.columns;
   const int n = static_cast<int>(columns.size());
-  auto HP = HP_.topLeftCorner(rows, n);
+  // H P H' over the block's own columns of P, gathered one at a time.
+  auto HP = HP_.topLeftCorner(n, rows);
+  auto gathered = gathered_.head(n);
   HP.setZero();
   for (int c = 0; c < n; ++c) {
     const double* column = P.col(columns[c]).data();
-    for (int d = 0; d < n; ++d) HP.col(d) += block.H.col(c).head(rows) * column[columns[d]];
+    for (int d = 0; d < n; ++d) gathered(d) = column[columns[d]];
+    for (int r = 0; r < rows; ++r) HP.col(r) += block.H(r, c) * gathered;
   }
   Matrix6 S = Matrix6::Identity();
   S.topLeftCorner(rows, rows) = block.R.topLeftCorner(rows, rows);
-  for (int r = 0; r < rows; ++r)
-    for (int s = 0; s <= r; ++s)
-      for (int c = 0; c < n; ++c) S(r, s) += HP(r, c) * block.H(s, c);
+  for (int c = 0; c < n; ++c)
+    for (int r = 0; r < rows; ++r)
+      for (int s = 0; s <= r; ++s) S(r, s) += HP(c, r) * block.H(s, c);
   const Eigen::LLT<Matrix6> llt(S);
   if (llt.info() != Eigen::Success) return Verdict::accepted;  // the update will say that S is not definite
   Vector6 v = Vector6::Zero();

@@ -35,9 +35,33 @@ void Projection::forget() {
   last_ = start_;
 }
 
-ProjectionReport Projection::apply(Eigen::VectorXd& x, Eigen::MatrixXd& P) {
+ProjectionReport Projection::apply(Eigen::VectorXd& x, Eigen::MatrixXd& P, FrameTape* tape) {
+  const bool equal = keep_equalities(x, P, tape);
+  ProjectionReport report = bound(x, P);
+  report.solved = report.solved && equal;
+  if (tape && k_ > 0) {  // else nothing moved the mean, or no P N' u
+    tape->pulled = true;
+    tape->pull.setZero();
+    for (int k = 0; k < k_; ++k)
+      for (int i = 0; i < active_[k].row.size; ++i)
+        tape->pull(active_[k].row.index[i]) += active_[k].multiplier * active_[k].row.value[i];
+  }
+  return report;
+}
+
+void Projection::save(Memory& out) const {
+  out.active.assign(active_.begin(), active_.begin() + k_);
+  out.last = last_;
+}
+
+void Projection::restore(const Memory& memory) {
+  k_ = static_cast<int>(memory.active.size());
+  std::copy(memory.active.begin(), memory.active.end(), active_.begin());
+  last_ = memory.last;
+}
+
+ProjectionReport Projection::bound(Eigen::VectorXd& x, const Eigen::MatrixXd& P) {
   ProjectionReport report;
-  const bool equal = keep_equalities(x, P);
   wanted_ = x;
   warm_start(P, x);
   Active worst;
@@ -48,7 +72,6 @@ ProjectionReport Projection::apply(Eigen::VectorXd& x, Eigen::MatrixXd& P) {
     k_ = 0;
     fall_back(x);
   }
-  report.solved = report.solved && equal;
   for (int k = 0; k < k_; ++k)  // to the last bit
     if (const int i = active_[k].kind; i != k_cut) x(i) = active_[k].row.value[0] * active_[k].row.bound;
   x = x.cwiseMax(settings_.lower).cwiseMin(settings_.upper);  // what is left is rounding
@@ -59,7 +82,7 @@ ProjectionReport Projection::apply(Eigen::VectorXd& x, Eigen::MatrixXd& P) {
 
 // x + P a (b - a x) / a' P a, and P without what it had along a. A row of which P leaves nothing open is left alone;
 // false where it does not hold.
-bool Projection::keep_equalities(Eigen::VectorXd& x, Eigen::MatrixXd& P) {
+bool Projection::keep_equalities(Eigen::VectorXd& x, Eigen::MatrixXd& P, FrameTape* tape) {
   bool all_hold = true;
   for (Eigen::Index r = 0; r < settings_.equality.rows(); ++r) {
     const auto a = settings_.equality.row(r);
@@ -72,6 +95,7 @@ bool Projection::keep_equalities(Eigen::VectorXd& x, Eigen::MatrixXd& P) {
       all_hold = all_hold && std::abs(missing) <= rounding * size;
       continue;
     }
+    if (tape) tape->add_equality(a.transpose(), Pa_, aPa, missing);
     x += Pa_ * (missing / aPa);
     for (Eigen::Index i = 0; i < x.size(); ++i) {
       // An element that the equality decides alone: nothing is left, rounding neither.

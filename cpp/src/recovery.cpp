@@ -55,6 +55,7 @@ void Filter::hold_motion() {
     P_.row(i).setZero();
     P_.col(i).setZero();
     P_(i, i) = variance;
+    if (tape_) tape_->forget(i);
   };
   for (int i = 0; i < n; ++i) {
     forget(i, r.coordinate_sd * r.coordinate_sd);

@@ -20,7 +20,7 @@ StepReport step(Filter& filter, double dt, const Eigen::Map<const MarkerMatrix>&
 
 }  // namespace
 
-RunRecord::RunRecord(const Model& model, std::size_t frames)
+RunRecord::RunRecord(const Model& model, std::size_t frames, bool output_sd)
     : state(frames * model.state_size()),
       state_sd(state.size()),
       markers_predicted(frames * 3 * model.markers().size()),
@@ -28,6 +28,9 @@ RunRecord::RunRecord(const Model& model, std::size_t frames)
       wrench_predicted(frames * 6),
       wrench_estimated(frames * 6),
       moments(frames * model.coordinates().size()),
+      markers_sd(output_sd ? markers_estimated.size() : 0),
+      wrench_sd(output_sd ? frames * 6 : 0),
+      moments_sd(output_sd ? moments.size() : 0),
       nis(frames),
       log_likelihood(frames),
       step_us(frames),
@@ -35,7 +38,9 @@ RunRecord::RunRecord(const Model& model, std::size_t frames)
       constrained(frames),
       verdicts(frames * (model.markers().size() + 1)),
       tracking(frames),
-      constraints_met(frames) {}
+      constraints_met(frames) {
+  if (output_sd) deviation.emplace(model);
+}
 
 void run_frames(Filter& filter, const double* time, const double* markers, const double* wrench, std::size_t first,
                 std::size_t end, RunRecord& record) {
@@ -71,6 +76,11 @@ void run_frames(Filter& filter, const double* time, const double* markers, const
     Eigen::Map<Vector6>(record.wrench_estimated.data() + 6 * k) = now.dynamics().wrench.vector();
     joint_moments(model, now.kinematics(), now.dynamics(), nullptr,
                   Eigen::Map<Eigen::VectorXd>(record.moments.data() + k * nc, nc));
+    if (!record.deviation) continue;
+    const Eigen::MatrixXd& P = filter.covariance();
+    record.deviation->markers(now.kinematics(), P, record.markers_sd.data() + k * m);
+    record.deviation->wrench(now.kinematics(), now.dynamics(), P, record.wrench_sd.data() + 6 * k);
+    record.deviation->moments(filter.state(), now.kinematics(), now.dynamics(), P, record.moments_sd.data() + k * nc);
   }
 }
 

@@ -1,25 +1,10 @@
 #include "dynakin/update.hpp"
 
-#include <algorithm>
 #include <cmath>
 
+#include "mirror.hpp"
+
 namespace dynakin {
-namespace {
-
-void mirror_lower(Eigen::MatrixXd& P) {
-  const Eigen::Index n = P.rows();
-  constexpr Eigen::Index tile = 8;  // a tile and its mirror image stay in the cache
-  for (Eigen::Index j = 0; j < n; j += tile) {
-    const Eigen::Index w = std::min(tile, n - j);
-    for (Eigen::Index c = 1; c < w; ++c) P.col(j + c).segment(j, c) = P.row(j + c).segment(j, c).transpose();
-    for (Eigen::Index i = j + w; i < n; i += tile) {
-      const Eigen::Index h = std::min(tile, n - i);
-      P.block(j, i, w, h) = P.block(i, j, h, w).transpose();
-    }
-  }
-}
-
-}  // namespace
 
 ChunkedUpdate::ChunkedUpdate(int state_size, int chunk_rows, int max_rows) : chunk_rows_(chunk_rows) {
   const int capacity = std::min(std::max(chunk_rows, 6), std::max(max_rows, 1));  // a block is never split
@@ -31,6 +16,7 @@ ChunkedUpdate::ChunkedUpdate(int state_size, int chunk_rows, int max_rows) : chu
 
 UpdateSums ChunkedUpdate::apply(const std::vector<RowBlock>& blocks, Eigen::MatrixXd& P, Eigen::VectorXd& dx) {
   dx.setZero();
+  if (tape_) tape_->clear_chunks();
   UpdateSums sums;
   const int n_blocks = static_cast<int>(blocks.size());
   int first = 0;
@@ -86,6 +72,7 @@ void ChunkedUpdate::apply_chunk(int first_block, int end_block, int rows, const 
   L.solveInPlace(Z);
   auto v = v_.head(rows);
   L.solveInPlace(v);
+  if (tape_) tape_->add_chunk(blocks, first_block, end_block, S, Z, v);
   P.selfadjointView<Eigen::Lower>().rankUpdate(Z.transpose(), -1.0);
   mirror_lower(P);
   dx.noalias() += Z.transpose() * v;

@@ -5,7 +5,9 @@
 
 #include "check.hpp"
 #include "dynakin/filter.hpp"
+#include "dynakin/fixed_lag.hpp"
 #include "dynakin/moment_derivatives.hpp"
+#include "dynakin/output_sd.hpp"
 #include "dynakin/projection.hpp"
 #include "models.hpp"
 
@@ -140,6 +142,39 @@ void check_moments_allocate_nothing(const dynakin::ModelSpec& spec) {
   CHECK(jacobian.allFinite() && jacobian.norm() > 0.0);
 }
 
+// Bounds that bind, an equality, a gap; with and without deviations, and what is reported of the state with both.
+void check_fixed_lag_allocates_nothing(const dynakin::ModelSpec& spec, bool deviations) {
+  using namespace dynakin;
+  const Model model(spec);
+  FilterSettings settings = settings_for(model);
+  const Eigen::VectorXd x = model.initial_state();
+  settings.constraint = ConstraintKind::projection;
+  settings.upper = x.array() + 1e-3;
+  settings.equality = Eigen::MatrixXd::Zero(1, x.size());
+  settings.equality(0, 0) = settings.equality(0, 1) = 1.0;
+  settings.equality_value = settings.equality * x;
+  auto markers = markers_at(model, x);
+  const Vector6 wrench = Vector6::Constant(10.0);
+  Filter filter(model, settings, x, prior_for(model));
+  FixedLag lag(filter, 5, deviations);
+  OutputDeviation deviation(model);
+  std::vector<double> markers_sd(3 * model.markers().size()), moments_sd(model.coordinates().size()), wrench_sd(6);
+  bool bound = false;
+  for (int k = 0; k < 20; ++k) {
+    if (k == 10) markers.col(1).setConstant(std::nan(""));
+    const long before = allocations;
+    const StepReport report = lag.step(0.01, markers, wrench);
+    const Measurement& now = filter.evaluate();
+    deviation.markers(now.kinematics(), filter.covariance(), markers_sd.data());
+    deviation.wrench(now.kinematics(), now.dynamics(), filter.covariance(), wrench_sd.data());
+    deviation.moments(filter.state(), now.kinematics(), now.dynamics(), filter.covariance(), moments_sd.data());
+    CHECK(allocations == before);
+    CHECK(!report.diverged() && lag.state().allFinite());
+    bound = bound || report.constrained > 0;
+  }
+  CHECK(lag.ready() && bound && moments_sd[0] > 0.0);
+}
+
 }  // namespace
 
 TEST(the_counter_sees_allocations) {
@@ -163,5 +198,11 @@ TEST(keeping_bodies_possible_allocates_nothing) {
 TEST(the_moments_derivatives_allocate_nothing) {
   check_moments_allocate_nothing(planar_chain());
   check_moments_allocate_nothing(spatial_tree());
+}
+TEST(a_fixed_lag_allocates_nothing) {
+  for (bool deviations : {false, true}) {
+    check_fixed_lag_allocates_nothing(planar_chain(), deviations);
+    check_fixed_lag_allocates_nothing(spatial_tree(), deviations);
+  }
 }
 #endif

@@ -465,7 +465,51 @@ class Filter:
     def step(self, dt: float, markers: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], wrench: Annotated[NDArray[numpy.float64], dict(shape=(6), order='C')]) -> StepReport:
         """predict(dt), then update(markers, wrench)."""
 
-    def run(self, time: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], markers: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], wrench: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], progress: object | None = None) -> dict:
+    def run(self, time: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], markers: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], wrench: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], progress: object | None = None, output_sd: bool = False) -> dict:
         """
-        Runs over time (T,), markers (T, M, 3) and wrench (T, 6); the first frame is an update only. Returns arrays by name. Raises DivergenceError naming the frame. progress(done, total) is called now and then.
+        Runs over time (T,), markers (T, M, 3) and wrench (T, 6); the first frame is an update only. Returns arrays by name; with output_sd also markers_sd, wrench_sd (of the body's own wrench) and moments_sd. Raises DivergenceError naming the frame. progress(done, total) is called now and then.
         """
+
+    def run_smoothed(self, time: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], markers: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], wrench: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], progress: object | None = None, output_sd: bool = False, stretch: int = 0) -> dict:
+        """
+        run, then backwards over the same frames: the arrays of run, and smoothed_state, _markers, _wrench and _moments, each also with _sd, and backward_us. The filter then stands where run would have left it; after an interruption it stands anywhere. progress counts both ways: total is twice the frames. Memory beside the arrays: T / stretch checkpoints and stretch frames; 0: sqrt(T). Raises ValueError where bounds are kept by constraint 'gain' or 'sigmoid'.
+        """
+
+class FixedLag:
+    """
+    Steps a Filter and smooths the frame that lies `lag` frames back, from all frames until now.
+    """
+
+    def __init__(self, filter: Filter, lag: int, deviations: bool = False) -> None:
+        """
+        The filter stands before the first frame and is stepped by this object alone. Each step costs in proportion to the lag; with deviations much more.
+        """
+
+    def step(self, dt: float, markers: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], wrench: Annotated[NDArray[numpy.float64], dict(shape=(6), order='C')]) -> StepReport:
+        """
+        dt s since the frame before (the first frame is an update only), markers (M, 3), wrench (6,).
+        """
+
+    @property
+    def lag(self) -> int:
+        """frames"""
+
+    @property
+    def ready(self) -> bool:
+        """whether there is a smoothed frame yet"""
+
+    @property
+    def delay_s(self) -> float:
+        """how far the smoothed frame lies back"""
+
+    @property
+    def state(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]:
+        """smoothed x (n,) of the frame delay_s ago"""
+
+    @property
+    def state_sd(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]:
+        """its standard deviations (n,)"""
+
+    @property
+    def covariance(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='F')]:
+        """its covariance (n, n)"""

@@ -44,8 +44,10 @@ class RunConfig(Strict):
     sex: Sex | None = Field(default=None, examples=["female"])
     """male or female, for the table. Not given: the mean of both."""
 
-    preset: str = "paper"
+    preset: str = "default"
     """Noise settings to start from; [noise] changes single ones."""
+    smooth: bool = False
+    """Estimate each frame from all frames, those after it too. Not given: as it would be live."""
     side: Literal["auto", "right", "left", "both"] = "auto"
     """Which side's markers a model uses that has one leg for both: auto (fewest gaps), right, left, both."""
     vertical: str = "auto"

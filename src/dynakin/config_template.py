@@ -23,7 +23,7 @@ _TABLES: dict[str, type[BaseModel]] = {"noise": Noise, "priors": Priors, "bounds
 _WIDTH = 110
 
 
-def config_template(preset: str = "paper") -> str:
+def config_template(preset: str = "default") -> str:
     """A configuration file with every key, its meaning and its default.
 
     Raises:
@@ -44,7 +44,8 @@ def config_template(preset: str = "paper") -> str:
         table_docs = attribute_docs(schema)
         lines = [f"\n\n{_comment(docs[table])}[{table}]\n"]
         for key, value in defaults[table].model_dump(mode="json").items():
-            lines.append("\n" + _comment(table_docs.get(key, "")) + "#" + _line(key, value))
+            meaning = "\n" + _comment(table_docs.get(key, ""))
+            lines.append(meaning + (f"# {key}: not given\n" if value is None else "#" + _line(key, value)))
         parts.append("".join(lines))
     return "".join(parts)
 

@@ -123,7 +123,7 @@ def test_a_frame_without_any_marker(trial: Path, squat: Recording, refused: Refu
     markers = squat.markers.copy()
     markers[200] = np.nan
     write_trc(trial, squat.time, list(squat.marker_names), markers, unit="m")
-    assert "frame 201" in refused("run", trial, *_options(tmp_path))
+    assert "frame 201" in refused("run", trial, *_options(tmp_path), "--preset", "paper")
 
 
 def test_mass_of_zero(trial: Path, refused: Refused, tmp_path: Path) -> None:

@@ -55,6 +55,8 @@ def test_demo_compares_with_the_truth_and_says_where_the_report_lies(tmp_path: P
     told = capsys.readouterr().out
     assert "RMS error against the truth" in told and str(out / "report.html") in told.replace("\n", "")
     assert {entry.name for entry in out.iterdir()} == set(OUTPUT_FILES)
+    page = (out / "report.html").read_text()
+    assert 'id="methods"' in page and "classical (6 Hz)" in page and "of AT’s RMS" in page
 
 
 def test_check_tells_what_is_there_and_what_run_would_do(data_dir: Path, capsys: Said) -> None:
@@ -99,7 +101,12 @@ def test_run_replaces_its_own_output_and_draws_figures(data_dir: Path, tmp_path:
     trial = str(data_dir / "plugin_gait" / "S1_FlywheelSquat.c3d")
     options = ["--model", "squat7", "--mass", "78.6", "-o", str(tmp_path / "out")]
     assert main(["run", trial, *options]) == 0
-    assert main(["run", trial, *options, "--figures", str(tmp_path / "figures")]) == 0
+    gains = tmp_path / "gains.csv"
+    gains.write_text("log10_coordinate,log10_speed,log10_acceleration,criterion\n3,2,3,5\n4,2,3,\n")
+    figures = ["--figures", str(tmp_path / "figures"), "--sensitivity", str(gains)]
+    assert main(["run", trial, *options, *figures]) == 0
     drawn = {entry.suffix for entry in (tmp_path / "figures").iterdir()}
+    assert (tmp_path / "figures" / "figure3_sensitivity.svg").exists()
+    assert (tmp_path / "figures" / "repetitions.pdf").exists()
     assert drawn == {".svg", ".pdf", ".png"} and str(tmp_path / "figures") in capsys.readouterr().out.replace("\n", "")
     assert {entry.name for entry in (tmp_path / "out").iterdir()} == set(OUTPUT_FILES)

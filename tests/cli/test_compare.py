@@ -34,7 +34,7 @@ def test_one_trial_gives_table_ii_on_screen_and_as_files(trial: list[str], tmp_p
     out = tmp_path / "comparison"
     assert main(["compare", *trial, *SUBJECT, "-o", str(out)]) == 0
     told = capsys.readouterr().out
-    for word in ("EKF (paper)", "AT (6 Hz)", "classical (6 Hz)", "FY", "N m", "knee", "squats after the adaptation"):
+    for word in ("EKF (default)", "AT (6 Hz)", "classical (6 Hz)", "FY", "N m", "knee", "squats after the adaptation"):
         assert word in told
     rows = rows_of(out / "table2.csv")
     assert {row["quantity"] for row in rows} >= {"markers", "fx", "fy", "mz", "r_knee"}
@@ -44,6 +44,10 @@ def test_one_trial_gives_table_ii_on_screen_and_as_files(trial: list[str], tmp_p
     curves = rows_of(out / "repetitions.csv")
     assert len(curves) % 101 == 0 and {row["quantity"] for row in curves} >= {"knee", "knee/moment", "fy"}
     assert not (out / "held_out.csv").exists()
+    page = (out / "report.html").read_text()
+    for words in ("dynakin comparison", "Joint moments against AT", "squats after the adaptation", "cutoff_hz = 6.0"):
+        assert words in page
+    assert "Held out" not in page and "http://" not in page.replace("http://www.w3.org", "")
 
 
 def test_many_trials_give_mean_and_deviation(trial: list[str], tmp_path: Path, capsys: Said) -> None:
@@ -62,7 +66,9 @@ def test_halves_and_unseen_stand_beside_persistence(trial: list[str], tmp_path: 
     assert main(["compare", *trial, *SUBJECT, "--halves", "--unseen", "--horizon-ms", "50", "-o", str(out)]) == 0
     told = capsys.readouterr().out
     assert "markers, second half" in " ".join(told.split()) and "50 ms ahead" in told
-    assert {row["method"] for row in rows_of(out / "held_out.csv")} >= {"EKF (paper), table", "persistence: mean"}
+    assert {row["method"] for row in rows_of(out / "held_out.csv")} >= {"EKF (default), table", "persistence: mean"}
+    page = (out / "report.html").read_text()
+    assert "EKF (default), identified" in page and "50 ms ahead" in page
     yardsticks = {row["yardstick"] for row in rows_of(out / "unseen.csv")}
     assert yardsticks == {"plates withheld", "marker left out", "50 ms ahead"}
 
@@ -76,6 +82,7 @@ def test_identified_on_one_trial_and_judged_on_another(trial: list[str], tmp_pat
     assert "judged from markers alone" in capsys.readouterr().out
     rows = rows_of(tmp_path / "out" / "held_out.csv")
     assert {row["quantity"] for row in rows} == {"fx", "fy", "mz"}
+    assert "markers → markers" in (tmp_path / "out" / "report.html").read_text()
 
 
 def test_a_configuration_may_stand_for_a_trial(trial: list[str], tmp_path: Path) -> None:

@@ -14,7 +14,7 @@ from dynakin.cli.run import configure
 from dynakin.config import RunConfig, make_config, read_config
 from dynakin.config_template import attribute_docs, config_template
 from dynakin.errors import ConfigError
-from dynakin.filter import Noise
+from dynakin.filter import Noise, presets
 from dynakin.model import Bounds, Priors
 
 REQUIRED = {"trial": "squat.c3d", "model": "squat7", "output": "out"}
@@ -30,7 +30,7 @@ def test_printed_configuration_is_valid_as_it_stands(tmp_path: Path, capsys: pyt
     path.write_text(capsys.readouterr().out)
     config = make_config(read_config(path), str(path))
     assert config.trial == tmp_path / "squat.c3d"
-    assert config.noise_settings() == Noise()
+    assert config.noise_settings() == presets.default()
 
 
 def test_every_key_is_printed_with_its_default_and_a_comment() -> None:
@@ -39,7 +39,7 @@ def test_every_key_is_printed_with_its_default_and_a_comment() -> None:
     content = tomllib.loads(everything)
     assert set(content) == set(RunConfig.model_fields) - {"ground", "versions"}
     config = make_config(content, "template")
-    assert config.noise == Noise().model_dump(mode="json")
+    assert config.noise == presets.default().model_dump(mode="json")
     assert config.priors == Priors() and config.bounds == Bounds()
     for key in ("markers", "table", "side", "vertical", "forward", "preset"):
         assert content[key] == RunConfig.model_fields[key].default
@@ -74,7 +74,12 @@ def test_wrong_keys_and_values_are_named_with_the_file(keys: dict[str, Any], wor
 def test_noise_changes_single_values_of_the_preset() -> None:
     noise = _config(noise={"force": 25.0, "marker": {"RKNE": 1e-4}}).noise_settings()
     assert noise.force == 25.0 and noise.marker == {"RKNE": 1e-4}
-    assert noise.moment == Noise().moment
+    assert noise.moment == presets.default().moment
+
+
+def test_the_papers_settings_are_printed_too() -> None:
+    content = tomllib.loads(re.sub(r"^#(?=\w)", "", config_template("paper"), flags=re.MULTILINE))
+    assert make_config(content, "template").noise_settings() == presets.paper()
 
 
 def test_command_line_wins_over_the_file(tmp_path: Path) -> None:

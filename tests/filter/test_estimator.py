@@ -41,24 +41,36 @@ def samples(recording: dynakin.Recording) -> list[dynakin.Sample]:
     ]
 
 
-def test_live_steps_equal_the_run(trial: SimulatedTrial) -> None:
-    offline = estimator().run(trial.recording)
-    live = estimator()
+@pytest.mark.parametrize(("preset", "rows"), [("paper", 38), ("default", 37)])  # the paper's total mass is a row
+def test_live_steps_equal_the_run(trial: SimulatedTrial, preset: str, rows: int) -> None:
+    noise = dynakin.presets.preset(preset)
+    offline = estimator(noise=noise).run(trial.recording)
+    live = estimator(noise=noise)
     live.start(trial.recording)
     for k, sample in enumerate(samples(trial.recording)[:200]):
         step = live.step(sample)
         np.testing.assert_allclose(step.coordinates, offline.data["coordinates"].values[k], rtol=0, atol=1e-12)
         np.testing.assert_allclose(step.moments, offline.data["moments"].values[k], rtol=0, atol=1e-8)
-    assert step.report.n_rows == 38
+    assert step.report.n_rows == rows
 
 
 def test_a_sample_without_plates_or_markers_is_ridden_through(trial: SimulatedTrial) -> None:
-    live = estimator()
+    live = estimator(noise=dynakin.presets.paper())
     live.start(trial.recording)
     first, second, third, *_ = samples(trial.recording)
     live.step(first)
     assert live.step(dataclasses.replace(second, plates={})).report.n_rows == 35
     assert live.step(dataclasses.replace(third, markers={})).report.n_rows == 4
+
+
+def test_by_default_plates_alone_do_not_move_the_estimate(trial: SimulatedTrial) -> None:
+    live = estimator()
+    live.start(trial.recording)
+    first, second, third, *_ = samples(trial.recording)
+    live.step(first)
+    assert live.step(dataclasses.replace(second, plates={})).report.n_rows == 34
+    blind = live.step(dataclasses.replace(third, markers={})).report
+    assert (blind.n_rows, blind.status, blind.tracking) == (0, "nothing measured", "following")
 
 
 def test_without_sensor_noise_the_posture_comes_out(trial: SimulatedTrial) -> None:
@@ -117,7 +129,18 @@ def test_a_frame_without_any_marker_is_named(trial: SimulatedTrial) -> None:
         markers[250] = np.nan
 
     with pytest.raises(RecordingError, match=r"frame 251 \(2\.500 s\) has none of the model's 17 markers"):
-        estimator().run(with_markers(trial.recording, blind))
+        estimator(noise=dynakin.presets.paper()).run(with_markers(trial.recording, blind))
+
+
+def test_by_default_a_frame_without_any_marker_is_ridden_through(trial: SimulatedTrial) -> None:
+    def blind(markers: np.ndarray) -> None:
+        markers[250:255] = np.nan
+
+    through = estimator().run(with_markers(trial.recording, blind))
+    whole = estimator().run(trial.recording)
+    difference = through.data["coordinates"].values - whole.data["coordinates"].values
+    assert (np.abs(difference[400:]) < whole.data["coordinates_sd"].values[400:]).all()
+    assert (through.data["coordinates_sd"].values[254] > whole.data["coordinates_sd"].values[254]).all()
 
 
 def test_a_marker_far_beyond_all_numbers_is_divergence_at_its_frame(trial: SimulatedTrial) -> None:
@@ -127,7 +150,9 @@ def test_a_marker_far_beyond_all_numbers_is_divergence_at_its_frame(trial: Simul
         markers[250, knee] = 1e200
 
     with pytest.raises(DivergenceError, match=r"diverged at frame 250 \(2\.500000 s\)"):
-        estimator().run(with_markers(trial.recording, broken))
+        estimator(noise=dynakin.presets.paper()).run(with_markers(trial.recording, broken))
+    gated = estimator().run(with_markers(trial.recording, broken))
+    assert [(e.kind, e.frame) for e in gated.events if e.subject == "r_knee"] == [("gated", 250)]
 
 
 def test_plates_upside_down_are_refused_with_the_number(trial: SimulatedTrial) -> None:
@@ -142,7 +167,7 @@ def test_noise_for_a_marker_that_is_not_used_is_refused(trial: SimulatedTrial) -
 
 
 def test_an_unknown_preset_lists_the_known_ones() -> None:
-    with pytest.raises(ConfigError, match="preset 'papr' is unknown; expected paper"):
+    with pytest.raises(ConfigError, match="preset 'papr' is unknown; expected default, paper"):
         dynakin.presets.preset("papr")
 
 

@@ -13,7 +13,8 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "results"))
 
 from synthetic_estimate import SEGMENTS, make_estimate
 
-from dynakin.results import Estimate
+from dynakin.comparison import Method, Trial
+from dynakin.results import Estimate, evaluation_window, repetitions_of
 
 JOINTS = ("toe", "ankle", "knee", "hip", "lumbar", "shoulder", "elbow")
 
@@ -40,3 +41,38 @@ def with_joints(estimate: Estimate) -> Estimate:
         joint_segment=("joint", list(SEGMENTS)),
     )
     return replace(estimate, data=data)
+
+
+@pytest.fixture(scope="session")
+def comparison(jointed: Estimate) -> Trial:
+    """The jointed estimate beside made references: five degrees, 10 N m of moment and 20 of each wrench component
+    off."""
+    return made_comparison(jointed)
+
+
+def made_comparison(estimate: Estimate) -> Trial:
+    data = estimate.data
+    measured = data["markers_measured"].values
+    arrays = (data["coordinates"].values, data["moments"].values, data["markers_estimated"].values)
+    wrench = np.where(np.isfinite(data["wrench_estimated"].values), data["wrench_measured"].values + 20.0, np.nan)
+    shifted = (arrays[0] + np.radians(5.0), arrays[1] + 10.0, measured + 0.01, wrench)
+    return Trial(
+        name=estimate.recording.name,
+        time=estimate.time,
+        window=evaluation_window(estimate.time),
+        marker_names=tuple(estimate.marker_names),
+        coordinate_names=tuple(estimate.coordinate_names),
+        measured_markers=measured,
+        measured_wrench=data["wrench_measured"].values,
+        axes=estimate.modelled_axes(),
+        rotation=estimate.is_rotation(),
+        repetitions=repetitions_of(estimate),
+        mass_kg=60.05,
+        methods=(
+            Method("EKF (paper)", "EKF", *arrays, data["wrench_estimated"].values, data),
+            Method("AT (6 Hz)", "AT", *shifted, data),
+            Method("classical (6 Hz)", "classical", *shifted, data),
+        ),
+        notes=("AT: a sentence on AT.",),
+        estimates={"paper": estimate},
+    )

@@ -8,12 +8,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import xarray as xr
 
+from dynakin.comparison import Trial
 from dynakin.errors import ConfigError, OutputError
-from dynakin.report.cycle import middle_cycle
 from dynakin.report.direct_labels import spread
 from dynakin.report.figures import FIGURES, save_figures
+from dynakin.report.movement_figures import middle_cycle
 from dynakin.results import Estimate
 
 
@@ -22,21 +22,9 @@ def words_in(path: Path) -> str:
 
 
 @pytest.fixture(scope="module")
-def reference(jointed: Estimate) -> xr.Dataset:
-    """A made reference: five degrees, 10 N m of moment and 20 of each wrench component off."""
-    data = jointed.data
-    made = {
-        "coordinates": data["coordinates"] + np.radians(5.0),
-        "moments": data["moments"] + 10.0,
-        "wrench_estimated": data["wrench_measured"] + 20.0,
-    }
-    return xr.Dataset(made)
-
-
-@pytest.fixture(scope="module")
-def saved(jointed: Estimate, reference: xr.Dataset, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def saved(jointed: Estimate, comparison: Trial, tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("figures")
-    written = save_figures(jointed, folder, ("svg",), reference=reference)
+    written = save_figures(jointed, folder, ("svg",), comparison=comparison)
     assert [path.stem for path in written] == list(FIGURES)
     return folder
 
@@ -44,7 +32,10 @@ def saved(jointed: Estimate, reference: xr.Dataset, tmp_path_factory: pytest.Tem
 def test_differences_to_the_reference_are_said_with_their_unit(saved: Path) -> None:
     assert words_in(saved / "figure5_angles.svg").count("RMS difference 5.00 deg") == 7
     assert "AT 20.0 N m" in words_in(saved / "figure6_wrench.svg")
-    assert "RMS difference 10.0 N m" in words_in(saved / "figure7_knee_moment.svg")
+    assert re.search(r"RMS difference 10.0 N m, \d+ % of AT’s RMS", words_in(saved / "figure7_knee_moment.svg"))
+    repeated = words_in(saved / "repetitions.svg")
+    assert "% of the squat, n = 2" in repeated and repeated.count("N m/kg") == 8 and repeated.count("N/kg") == 3
+    assert all(name in repeated for name in ("EKF (paper)", "AT (6 Hz)", "measured", "± 1 standard deviation"))
 
 
 def test_lines_of_segments_are_named_where_they_end(saved: Path) -> None:
@@ -68,34 +59,35 @@ def test_formats_and_what_is_left_out(jointed: Estimate, tmp_path: Path) -> None
         "figure4_markers.png",
         "figure5_angles.pdf",
         "figure5_angles.png",
+        "repetitions.pdf",
+        "repetitions.png",
     ]
     assert written[0].read_bytes()[:4] == b"%PDF"
 
 
-def test_wrong_requests_are_refused(jointed: Estimate, reference: xr.Dataset, tmp_path: Path) -> None:
+def test_wrong_requests_are_refused(jointed: Estimate, comparison: Trial, tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match="'jpg' is not known, expected some of svg, pdf, png"):
         save_figures(jointed, tmp_path, ("jpg",))
-    with pytest.raises(ConfigError, match="reference has 100 frames, expected the estimate's 1201"):
-        save_figures(jointed, tmp_path, ("svg",), reference=reference.isel(time=slice(100)))
+    with pytest.raises(ConfigError, match="comparison has 100 frames, expected the estimate's 1201"):
+        save_figures(jointed, tmp_path, ("svg",), comparison=replace(comparison, time=comparison.time[:100]))
     (tmp_path / "file").touch()
     with pytest.raises(OutputError, match="cannot write figures there"):
         save_figures(jointed, tmp_path / "file", ("svg",))
 
 
-def test_same_estimate_same_files(jointed: Estimate, saved: Path, tmp_path: Path, reference: xr.Dataset) -> None:
-    save_figures(jointed, tmp_path, ("svg",), reference=reference)
+def test_same_estimate_same_files(jointed: Estimate, saved: Path, tmp_path: Path, comparison: Trial) -> None:
+    save_figures(jointed, tmp_path, ("svg",), comparison=comparison)
     for name in ("figure4_markers.svg", "figure8_lengths_and_masses.svg"):
         assert (tmp_path / name).read_bytes() == (saved / name).read_bytes()
 
 
-def test_cycle_goes_from_rest_to_rest(jointed: Estimate) -> None:
-    cycle = middle_cycle(jointed)  # squats of 3 s from 1.5 s on; the middle one of three and a half
+def test_cycle_is_the_middle_repetition_or_everything(jointed: Estimate) -> None:
+    cycle = middle_cycle(jointed)  # squats of 3 s from 1.5 s on, two of them whole and after the adaptation
     knee = jointed.data["coordinates"].sel(coordinate="knee").values[cycle]
-    assert jointed.time[cycle][0] == pytest.approx(4.5, abs=0.3)
-    assert len(knee) == pytest.approx(300, abs=60)
-    assert np.argmax(knee) == pytest.approx(len(knee) / 2, abs=5)
-    still = jointed.data.assign(coordinates=jointed.data["coordinates"] * 0.0)
-    assert middle_cycle(replace(jointed, data=still)) == slice(0, 1201)
+    assert jointed.time[cycle][0] >= 7.5 and jointed.time[cycle][-1] <= 10.5
+    assert np.argmax(knee) == pytest.approx(len(knee) / 2, abs=15)
+    still = replace(jointed.recording, markers=jointed.recording.markers[:1].repeat(1201, axis=0))
+    assert middle_cycle(replace(jointed, recording=still)) == slice(0, 1201)
 
 
 def test_labels_keep_apart_and_in_order() -> None:

@@ -22,6 +22,7 @@ def test_a_constant_error_is_normalised_by_rms_and_by_range() -> None:
 def test_the_wrenchs_figures_are_the_same_ones() -> None:
     fit, wrench = signal_fit(SINE, 0.5 * SINE), wrench_fit(SINE, 0.5 * SINE)
     assert (wrench.rms, wrench.nrms_percent, wrench.correlation) == (fit.rms, fit.nrms_rms_percent, fit.correlation)
+    assert wrench.nrms_range_percent == fit.nrms_range_percent == pytest.approx(25.0 * np.sqrt(0.5), rel=1e-3)
 
 
 def test_frames_that_either_lacks_do_not_count() -> None:

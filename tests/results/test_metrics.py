@@ -30,12 +30,13 @@ def test_wrench_fit_is_relative_to_the_rms_of_the_measured_signal() -> None:
     fit = wrench_fit(measured, measured + 0.3)
     assert fit.rms == pytest.approx(0.3)
     assert fit.nrms_percent == pytest.approx(10.0)
+    assert fit.nrms_range_percent == pytest.approx(5.0)
     assert fit.correlation == pytest.approx(1.0)
 
 
 def test_wrench_fit_of_a_constant_has_no_correlation() -> None:
     assert wrench_fit(np.ones(5), np.arange(5.0)).correlation is None
-    assert wrench_fit(np.full(5, np.nan), np.arange(5.0)) == (None, None, None)
+    assert wrench_fit(np.full(5, np.nan), np.arange(5.0)) == (None, None, None, None)
 
 
 def test_window_starts_after_two_seconds_of_a_long_trial_only() -> None:
@@ -66,6 +67,31 @@ def test_true_covariances_give_a_mean_within_the_95_percent_interval() -> None:
     assert 180 <= inside <= 199
 
 
+def test_strict_bounds_judge_the_filters_own_data_only() -> None:
+    rng = np.random.default_rng(6)
+    arrays = (1.3 * rng.chisquare(10, 2000), np.full(2000, 10), rng.normal(size=(2000, 6)), rng.normal(size=(2000, 4)))
+    practical, strict = consistency(*arrays), consistency(*arrays, own_model=True)
+    assert practical.interval_95 is not None and practical.mean_nis_per_dof is not None
+    assert practical.mean_nis_per_dof > practical.interval_95[1]
+    assert practical.judgement == "consistent" and practical.judged_by == "practical band, 0.5 to 2"
+    assert strict.judgement == "overconfident" and strict.judged_by == "95 % chi-square interval"
+    assert "overconfident" in strict.verdict and "consistent" in practical.verdict
+
+
+def test_a_recording_is_judged_by_the_practical_band(estimate: Estimate) -> None:
+    found = compute_metrics(estimate)["consistency"]
+    assert (found["judgement"], found["judged_by"]) == ("consistent", "practical band, 0.5 to 2")
+
+
+def test_metrics_are_computed_once_and_given_as_copies(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls = []
+    monkeypatch.setattr("dynakin.results.metrics.adaptation", lambda _: calls.append(1) or {})
+    made = make_estimate(2.0)
+    first = made.metrics()
+    first["window"]["start_s"] = -1.0
+    assert made.metrics()["window"]["start_s"] == 0.0 and len(calls) == 1
+
+
 def test_slow_innovations_are_called_not_white() -> None:
     slow = np.sin(np.linspace(0, 20, 500))[:, None]
     rng = np.random.default_rng(3)
@@ -94,12 +120,15 @@ def test_metrics_hold_the_keys_of_the_design(estimate: Estimate) -> None:
         "wrench",
         "prediction",
         "consistency",
+        "adaptation",
+        "bounds",
+        "soft_tissue",
         "events",
         "timing",
     }
     assert metrics["window"] == {"start_s": 2.0, "end_s": 12.0}
     assert set(metrics["markers"]) == {"rms_mm", "mean_rms_mm"}
-    assert set(metrics["wrench"]) == {"rms", "nrms_percent", "correlation"}
+    assert set(metrics["wrench"]) == {"rms", "nrms_percent", "nrms_range_percent", "correlation"}
     assert set(metrics["wrench"]["rms"]) == {"fx", "fy", "mz"}  # fz, mx, my are measured but not modelled
     assert metrics["timing"]["frames"] == 1201
 

@@ -59,7 +59,23 @@ class Filter {
   }
   void reset(const Eigen::VectorXd& x, const Eigen::MatrixXd& P);
 
+  // From now on each update also writes what it did, to a tape of tape_rows(); nullptr: no longer. One listener at a
+  // time.
+  void record_to(FrameTape* tape);
+  int tape_rows() const { return measurement_.max_rows() + static_cast<int>(settings_.equality.rows()); }
+  // All that later steps depend on: restored, they give the same numbers to the last bit.
+  struct Checkpoint {
+    Eigen::VectorXd x;
+    Eigen::MatrixXd P;
+    Projection::Memory projection;
+    double unbelieved_s = 0.0;
+    StepReport last;
+  };
+  void save(Checkpoint& out) const;
+  void restore(const Checkpoint& checkpoint);
+
   const Model& model() const { return model_; }
+  const FilterSettings& settings() const { return settings_; }
   const Eigen::VectorXd& state() const { return x_; }
   const Eigen::MatrixXd& covariance() const { return P_; }
   // z predicted before the last update, all channels.
@@ -95,6 +111,7 @@ class Filter {
   UpdateSums sums_;
   double unbelieved_s_ = 0.0;  // since a frame whose markers were believed
   StepReport last_;
+  FrameTape* tape_ = nullptr;
 };
 
 }  // namespace dynakin

@@ -33,7 +33,8 @@ class Gate {
   int n_markers_;
   int measured_ = 0, refused_ = 0;
   std::vector<Verdict> verdicts_;
-  Eigen::Matrix<double, 6, Eigen::Dynamic> HP_;
+  Eigen::Matrix<double, Eigen::Dynamic, 6> HP_;
+  Eigen::VectorXd gathered_;
 };
 
 }  // namespace dynakin

@@ -13,7 +13,8 @@ namespace dynakin {
 // makes two half steps equal one (docs/derivations.md).
 void predict(const Model& model, const FilterSettings& settings, double dt, Eigen::VectorXd& x, Eigen::MatrixXd& P);
 
-// x <- F' x: the backward pass of a smoother.
+// x <- F' x, and M <- F' M F of a symmetric M: the backward pass of a smoother.
 void transpose_transition(const Model& model, const FilterSettings& settings, double dt, Eigen::Ref<Eigen::VectorXd> x);
+void transpose_transition(const Model& model, const FilterSettings& settings, double dt, Eigen::MatrixXd& M);
 
 }  // namespace dynakin

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "dynakin/consistency.hpp"
+#include "dynakin/frame_tape.hpp"
 #include "dynakin/half_space.hpp"
 #include "dynakin/settings.hpp"
 
@@ -22,20 +23,30 @@ struct ProjectionReport {
 // were active the last time. Inequalities move the mean only (docs/derivations.md); equalities condition P too.
 class Projection {
  public:
-  Projection(const Model& model, const FilterSettings& settings);
-
-  // What the last frames left: the constraints to start from, and a state that kept them.
-  void forget();
-  ProjectionReport apply(Eigen::VectorXd& x, Eigen::MatrixXd& P);
-  const Consistency& consistency() const { return consistency_; }
-
- private:
   struct Active {
     HalfSpace row;
     int kind;  // state column with its bound, or k_equality, k_cut
     double multiplier;
   };
-  bool keep_equalities(Eigen::VectorXd& x, Eigen::MatrixXd& P);
+  Projection(const Model& model, const FilterSettings& settings);
+
+  // What the last frames left: the constraints to start from, and a state that kept them.
+  void forget();
+  // Equalities, then inequalities; what they do is written to the tape, if there is one.
+  ProjectionReport apply(Eigen::VectorXd& x, Eigen::MatrixXd& P, FrameTape* tape = nullptr);
+  // Inequalities alone.
+  ProjectionReport bound(Eigen::VectorXd& x, const Eigen::MatrixXd& P);
+  // What the next apply() depends on, besides its arguments.
+  struct Memory {
+    std::vector<Active> active;
+    Eigen::VectorXd last;
+  };
+  void save(Memory& out) const;
+  void restore(const Memory& memory);
+  const Consistency& consistency() const { return consistency_; }
+
+ private:
+  bool keep_equalities(Eigen::VectorXd& x, Eigen::MatrixXd& P, FrameTape* tape);
   void warm_start(const Eigen::MatrixXd& P, Eigen::VectorXd& x);
   bool worst_violation(const Eigen::VectorXd& x, const Eigen::MatrixXd& P, Active& out) const;
   bool add(Active incoming, const Eigen::MatrixXd& P, Eigen::VectorXd& x);

@@ -7,16 +7,12 @@
 #include <nanobind/stl/vector.h>
 
 #include "arrays.hpp"
-#include "dynakin/run.hpp"
+#include "dynakin/filter.hpp"
 #include "module.hpp"
 
 using namespace dynakin;
 
 namespace {
-
-using Array1 = nb::ndarray<const double, nb::ndim<1>, nb::c_contig, nb::device::cpu>;
-using Array2 = nb::ndarray<const double, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
-using Array3 = nb::ndarray<const double, nb::ndim<3>, nb::c_contig, nb::device::cpu>;
 
 ConstraintKind constraint_kind(const std::string& name) {
   if (name == "gain") return ConstraintKind::gain;
@@ -25,53 +21,6 @@ ConstraintKind constraint_kind(const std::string& name) {
   if (name == "none") return ConstraintKind::none;
   throw nb::value_error(
       ("constraint: expected 'projection', 'gain', 'sigmoid' or 'none', found '" + name + "'").c_str());
-}
-
-// A (M, 3) row-major array is a (3, M) column-major matrix.
-Eigen::Map<const MarkerMatrix> marker_map(const Array2& markers, const Model& model) {
-  const std::size_t n = model.markers().size();
-  if (markers.shape(0) != n || markers.shape(1) != 3)
-    throw std::invalid_argument("markers: expected (" + std::to_string(n) + ", 3), found (" +
-                                std::to_string(markers.shape(0)) + ", " + std::to_string(markers.shape(1)) + ")");
-  return {markers.data(), 3, static_cast<Eigen::Index>(n)};
-}
-
-nb::dict run(Filter& filter, const Array1& time, const Array3& markers, const Array2& wrench, nb::object progress) {
-  const std::size_t frames = time.shape(0), n_markers = filter.model().markers().size();
-  if (markers.shape(0) != frames || markers.shape(1) != n_markers || markers.shape(2) != 3)
-    throw std::invalid_argument("markers: expected (" + std::to_string(frames) + ", " + std::to_string(n_markers) +
-                                ", 3)");
-  if (wrench.shape(0) != frames || wrench.shape(1) != 6)
-    throw std::invalid_argument("wrench: expected (" + std::to_string(frames) + ", 6)");
-  RunRecord record(filter.model(), frames);
-  constexpr std::size_t stretch = 256;  // frames between two looks at the interpreter: progress, Ctrl-C
-  for (std::size_t first = 0; first < frames; first += stretch) {
-    const std::size_t end = std::min(frames, first + stretch);
-    {
-      nb::gil_scoped_release release;
-      run_frames(filter, time.data(), markers.data(), wrench.data(), first, end, record);
-    }
-    if (!progress.is_none()) progress(end, frames);
-    if (PyErr_CheckSignals() != 0) throw nb::python_error();
-  }
-  const std::size_t n = filter.model().state_size(), nc = filter.model().coordinates().size();
-  nb::dict out;
-  out["state"] = owned(std::move(record.state), {frames, n});
-  out["state_sd"] = owned(std::move(record.state_sd), {frames, n});
-  out["markers_predicted"] = owned(std::move(record.markers_predicted), {frames, n_markers, 3});
-  out["markers_estimated"] = owned(std::move(record.markers_estimated), {frames, n_markers, 3});
-  out["wrench_predicted"] = owned(std::move(record.wrench_predicted), {frames, 6});
-  out["wrench_estimated"] = owned(std::move(record.wrench_estimated), {frames, 6});
-  out["moments"] = owned(std::move(record.moments), {frames, nc});
-  out["nis"] = owned(std::move(record.nis), {frames});
-  out["log_likelihood"] = owned(std::move(record.log_likelihood), {frames});
-  out["step_us"] = owned(std::move(record.step_us), {frames});
-  out["n_rows"] = owned(std::move(record.rows), {frames});
-  out["constrained"] = owned(std::move(record.constrained), {frames});
-  out["verdicts"] = owned(std::move(record.verdicts), {frames, n_markers + 1});
-  out["tracking"] = owned(std::move(record.tracking), {frames});
-  out["constraints_met"] = owned(std::move(record.constraints_met), {frames});
-  return out;
 }
 
 }  // namespace
@@ -152,7 +101,8 @@ void bind_filter(nb::module_& m) {
       .def_ro("nis", &StepReport::nis, "normalised innovation squared, summed over the rows")
       .def_ro("log_likelihood", &StepReport::log_likelihood);
 
-  nb::class_<Filter>(m, "Filter", "The constrained extended Kalman filter; one thread at a time.")
+  nb::class_<Filter> filter(m, "Filter", "The constrained extended Kalman filter; one thread at a time.");
+  filter
       .def(nb::init<const Model&, const FilterSettings&, const Eigen::VectorXd&, const Eigen::MatrixXd&>(),
            nb::arg("model"), nb::arg("settings"), nb::arg("x0"), nb::arg("P0"))
       .def_prop_ro("state", &Filter::state, nb::rv_policy::copy, "x (n,)")
@@ -179,9 +129,6 @@ void bind_filter(nb::module_& m) {
           [](Filter& f, double dt, const Array2& markers, const Vector6& wrench) {
             return f.step(dt, marker_map(markers, f.model()), wrench);
           },
-          nb::arg("dt"), nb::arg("markers"), nb::arg("wrench"), "predict(dt), then update(markers, wrench).")
-      .def("run", &run, nb::arg("time"), nb::arg("markers"), nb::arg("wrench"), nb::arg("progress") = nb::none(),
-           "Runs over time (T,), markers (T, M, 3) and wrench (T, 6); the first frame is an update only. Returns "
-           "arrays by "
-           "name. Raises DivergenceError naming the frame. progress(done, total) is called now and then.");
+          nb::arg("dt"), nb::arg("markers"), nb::arg("wrench"), "predict(dt), then update(markers, wrench).");
+  bind_run(filter);
 }

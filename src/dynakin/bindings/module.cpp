@@ -6,4 +6,5 @@ NB_MODULE(_core, m) {
   bind_model(m);
   bind_mechanics(m);
   bind_filter(m);
+  bind_fixed_lag(m);
 }

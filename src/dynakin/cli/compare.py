@@ -12,8 +12,7 @@ from rich.console import Console
 from rich.padding import Padding
 
 from dynakin.cli.compare_inputs import Case, cases_of, chosen_trials, halves_of
-from dynakin.cli.compare_tables import angle_table, moment_table, table2_table, unseen_table
-from dynakin.cli.console import busy, out, progress_bar
+from dynakin.cli.console import as_table, busy, out, progress_bar
 from dynakin.cli.options import (
     ForceThreshold,
     Forward,
@@ -31,11 +30,9 @@ from dynakin.cli.run import forward_direction
 from dynakin.comparison import (
     HORIZON_S,
     Trial,
-    after_adaptation,
     angle_differences,
     check_comparison_folder,
     compare_trial,
-    curves,
     identify_on,
     judge,
     merged,
@@ -47,6 +44,9 @@ from dynakin.comparison import (
     unseen_figures,
 )
 from dynakin.reference import CUTOFF_HZ
+from dynakin.report import render_comparison
+from dynakin.report.text_tables import angle_text, moment_text, table2_text, unseen_text
+from dynakin.results.mean_curves import curve_points
 
 HORIZON_MS = 1000.0 * HORIZON_S
 
@@ -62,7 +62,7 @@ def compare(
     mass: Mass = None,
     height: Height = None,
     sex: Sex = None,
-    preset: Annotated[list[str] | None, typer.Option(help="Noise settings: paper. May be repeated.")] = None,
+    preset: Annotated[list[str] | None, typer.Option(help="Noise settings: default, paper. May be repeated.")] = None,
     cutoff: Annotated[float, typer.Option("--cutoff-hz", help="Low-pass of AT and classical, Hz.")] = CUTOFF_HZ,
     side: Side = None,
     vertical: Vertical = None,
@@ -103,20 +103,26 @@ def compare(
     console = out()
     tables: dict[str, Sequence[Any]] = {}
     more: dict[str, Any] = {"settings": settings_of(cases)}
+    compared: list[Trial] = []
+    notes: list[str] = []  # of what was held out; each trial keeps its own
     if identify_trial is not None:
-        tables |= print_held_out(console, [(cases[0], cases[1], False)])
+        tables |= print_held_out(console, [(cases[0], cases[1], False)], notes)
     else:
         compared = compare_cases(cases)
         tables |= print_comparison(console, compared)
         if halved:
-            tables |= print_held_out(console, [(*halves_of(case), True) for case in cases])
+            tables |= print_held_out(console, [(*halves_of(case), True) for case in cases], notes)
         if not_seen:
             tables |= print_unseen(console, cases, horizon)
         tables |= print_repetitions(console, compared)
         more["trials"] = [told(trial) for trial in compared]
     if output is not None:
-        save_comparison(output, tables, more)
+        with busy("writing tables and report"):
+            names = [case.recording.name for case in cases]
+            page = render_comparison(compared, tables, more["settings"], names, notes)
+            save_comparison(output, tables, more, page)
         console.print(f"Tables  {output}", soft_wrap=True)
+        console.print(f"Report  {output / 'report.html'}", soft_wrap=True)
 
 
 def compare_cases(cases: Sequence[Case]) -> list[Trial]:
@@ -137,11 +143,11 @@ def print_comparison(console: Console, compared: Sequence[Trial]) -> dict[str, S
         title = f"{first.name}: {seconds[0]:g} to {seconds[-1]:g} s"
     else:
         title = f"{len(compared)} trials, mean ± standard deviation, each after its adaptation"
-    console.print(table2_table(rows, title))
+    console.print(as_table(table2_text(rows, title)))
     if angles:
-        console.print(angle_table(angles))
+        console.print(as_table(angle_text(angles)))
     if moments:
-        console.print(moment_table(moments))
+        console.print(as_table(moment_text(moments)))
     for trial in compared:
         for note in trial.notes:
             text = note if len(compared) == 1 else f"{trial.name}: {note}"
@@ -149,19 +155,22 @@ def print_comparison(console: Console, compared: Sequence[Trial]) -> dict[str, S
     return {"table2": rows, "angles": angles, "moments": moments}
 
 
-def print_held_out(console: Console, pairs: Sequence[tuple[Case, Case, bool]]) -> dict[str, Sequence[Any]]:
-    """Identified on one, judged on the other; (identifying, judging, of one recording) each."""
+def print_held_out(
+    console: Console, pairs: Sequence[tuple[Case, Case, bool]], notes: list[str]
+) -> dict[str, Sequence[Any]]:
+    """Identified on one, judged on the other; (identifying, judging, of one recording) each. Adds to ``notes``."""
     tables = []
     for learning, judging, same in pairs:
         with busy(f"{judging.recording.name}: judging what was identified"):
             identified = identify_on(learning.recording, learning.setup, static=learning.static, same_recording=same)
             blind = predict_blind(identified, judging.recording)
             tables.append(judge(blind, judging.recording))
+            notes += [f"{judging.recording.name}: {note}" for note in blind.notes]
     names = f"{pairs[0][0].recording.name} -> {pairs[0][1].recording.name}"
     title = f"Identified -> judged from markers alone: {names if len(pairs) == 1 else f'{len(pairs)} trials'}"
     rows = merged(tables)
-    console.print(table2_table(rows, title))
-    for note in blind.notes:
+    console.print(as_table(table2_text(rows, title)))
+    for note in notes:
         console.print(Padding(note, (0, 0, 0, 2)), style="dim")
     return {"held_out": rows}
 
@@ -181,18 +190,16 @@ def print_unseen(console: Console, cases: Sequence[Case], horizon_ms: float) -> 
                 )
             )
     rows = unseen(figures)
-    console.print(unseen_table(rows))
+    console.print(as_table(unseen_text(rows)))
     return {"unseen": rows}
 
 
 def print_repetitions(console: Console, compared: Sequence[Trial]) -> dict[str, Sequence[Any]]:
-    """How many squats were found; their mean curves are for the file."""
+    """Which squats or gait cycles were found; their mean curves are for the file."""
     rows = []
     for trial in compared:
-        found = after_adaptation(trial)
-        rows += curves(trial, found)
-        times = ", ".join(f"{r.start_s:.1f} to {r.end_s:.1f} s" for r in found)
-        console.print(f"{trial.name}: {len(found)} squats after the adaptation" + (f" ({times})" if found else ""))
+        rows += curve_points(trial.name, trial.curves())
+        console.print(f"{trial.name}: {trial.repetitions.note}")
     return {"repetitions": rows}
 
 
@@ -214,6 +221,6 @@ def told(trial: Trial) -> dict[str, Any]:
         "window": {"start_s": float(seconds[0]), "end_s": float(seconds[-1])},
         "mass_kg": trial.mass_kg,
         "methods": [method.name for method in trial.methods],
-        "repetitions": [asdict(repetition) for repetition in after_adaptation(trial)],
+        "repetitions": [asdict(repetition) for repetition in trial.repetitions.items],
         "notes": list(trial.notes),
     }

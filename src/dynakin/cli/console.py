@@ -11,6 +11,8 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
+from dynakin.report.text_tables import TextTable
+
 
 def out() -> Console:
     """Console of results. Names in them are not markup, and numbers are not coloured at random."""
@@ -27,6 +29,14 @@ def table(*headings: str, numbers: tuple[int, ...] = (), title: str | None = Non
     made = Table(box=box.SIMPLE_HEAD, title=title, title_justify="left", title_style="bold", pad_edge=False)
     for index, heading in enumerate(headings):
         made.add_column(heading, justify="right" if index in numbers else "left", overflow="fold")
+    return made
+
+
+def as_table(text: TextTable) -> Table:
+    """A table of the report on screen."""
+    made = table(*text.headings, numbers=text.numbers, title=text.title)
+    for row in text.rows:
+        made.add_row(*row)
     return made
 
 

@@ -13,13 +13,15 @@ from rich.table import Table
 
 from dynakin.cli.console import busy, out, progress_bar, table
 from dynakin.cli.summary import print_summary
-from dynakin.comparison.truth import FIGURES, LEG, truth_errors
+from dynakin.comparison import trial_of
+from dynakin.comparison.coverage import block_coverage, parameter_coverage
+from dynakin.comparison.truth import FIGURES, LEG, parameter_errors, truth_errors
 from dynakin.filter import Estimator, presets
+from dynakin.identifiability import identifiability
 from dynakin.model import Subject, load_model
 from dynakin.results import Estimate, check_output_writable, evaluation_window, truth_error
 
 if TYPE_CHECKING:
-    from dynakin.reference.methods import Lengths
     from dynakin.simulation import Truth
 
 
@@ -29,8 +31,7 @@ def demo(
     duration: Annotated[float, typer.Option(help="Length of the simulated trial, s.")] = 20.0,
 ) -> None:
     """Simulate a squat, estimate it, and compare the estimate and the reference methods with the truth."""
-    from dynakin.reference import reference_methods  # no other command needs these
-    from dynakin.simulation import simulate_squat
+    from dynakin.simulation import simulate_squat  # no other command needs it
 
     check_output_writable(output)
     trial = simulate_squat(seed=seed, duration_s=duration)
@@ -41,18 +42,18 @@ def demo(
         estimator = Estimator(model, presets.paper())
         estimate = estimator.run(trial.recording, progress=progress)
     assert estimator.initial is not None
-    methods = {"EKF (paper)": estimate.data}
-    options: tuple[tuple[Lengths, str], ...] = (("constant", "AT (6 Hz)"), ("frame", "classical (6 Hz)"))
-    for lengths, title in options:
-        reference = reference_methods(trial.recording, estimator.initial, model, lengths=lengths)
-        methods[title] = reference.data
     demo_config = {"trial": trial.recording.name, "preset": "paper", "seed": seed, "duration_s": duration}
     estimate = replace(estimate, config=demo_config | estimate.config)
+    comparison = trial_of({"paper": estimate}, estimator.initial, model)
+    methods = {method.name: method.data for method in comparison.methods}
     with busy("writing results and report"):
-        folder = estimate.save(output)
+        folder = estimate.save(output, comparison=comparison, identifiability=identifiability(estimator, estimate))
     console = out()
     console.print(methods_by_error(methods, estimate, trial.truth))
     console.print(compared_with_truth(estimate, trial.truth))
+    console.print(own_uncertainty(estimate, trial.truth))
+    console.print(constants_in_words(estimate, trial.truth))
+    console.print()
     console.print(
         "AT: classical angles, low-passed and differentiated, with the table's inertia and constant lengths; "
         "classical: the same with joints that follow their landmarks. Moments: ankle, knee and hip. "
@@ -76,19 +77,55 @@ def methods_by_error(methods: dict[str, xr.Dataset], estimate: Estimate, truth: 
 
 
 def compared_with_truth(estimate: Estimate, truth: Truth) -> Table:
-    """RMS errors of angles, speeds and moments of each coordinate against the simulation's."""
+    """RMS errors of angles, speeds and moments of each coordinate against the simulation's, and how often the truth
+    lies in the angle's own 95 % interval."""
     window = evaluation_window(estimate.time)
     rows = table(
         "coordinate",
         "angle, deg",
+        "in 95 %",
         "speed, deg/s",
         "moment, N m",
-        numbers=(1, 2, 3),
+        numbers=(1, 2, 3, 4),
         title="EKF (paper) by coordinate: RMS error against the truth",
     )
     kinds = ("coordinates", "speeds", "moments")
+    found = block_coverage(estimate.data, truth.data, window)[0]
+    inside = {name: f"{100.0 * share:.0f} %" for name, share in zip(found.names, found.inside, strict=True)}
     for name in estimate.coordinate_names:
         pairs = ((truth.data[kind].sel(coordinate=name), estimate.data[kind].sel(coordinate=name)) for kind in kinds)
         errors = np.array([truth_error(true.values[window], given.values[window]).rms for true, given in pairs], float)
-        rows.add_row(name, f"{np.degrees(errors[0]):.1f}", f"{np.degrees(errors[1]):.0f}", f"{errors[2]:.1f}")
+        angle, speed = np.degrees(errors[:2])
+        rows.add_row(name, f"{angle:.1f}", inside.get(name, ""), f"{speed:.0f}", f"{errors[2]:.1f}")
     return rows
+
+
+def own_uncertainty(estimate: Estimate, truth: Truth) -> Table:
+    """Each block's errors beside the standard deviations that the filter gives with it."""
+    rows = table(
+        "",
+        "in 95 %",
+        "no offset",
+        "error²/sd²",
+        "verdict",
+        numbers=(1, 2, 3),
+        title="EKF (paper): are its standard deviations right? Truth within their 95 % interval",
+    )
+    found = block_coverage(estimate.data, truth.data, evaluation_window(estimate.time))
+    for block in found + parameter_coverage(estimate.parameters, truth.parameters):
+        about_mean = block.pooled_about_mean
+        rows.add_row(
+            block.block,
+            f"{100.0 * block.pooled:.0f} %",
+            "" if about_mean is None else f"{100.0 * about_mean:.0f} %",
+            f"{block.mean_square:.2g}",
+            block.judgement if block.judgement == "consistent" else f"{block.judgement}, {block.factor:.2g} times",
+        )
+    return rows
+
+
+def constants_in_words(estimate: Estimate, truth: Truth) -> str:
+    """How far lengths and inertia were from the truth at the start, and are at the end."""
+    errors = parameter_errors(estimate.parameters, truth.parameters).items()
+    parts = [f"{title} {e.start_percent:.1f} % at the start, {e.end_percent:.1f} % at the end" for title, e in errors]
+    return f"Constants, RMS error against the truth: {'; '.join(parts)}."

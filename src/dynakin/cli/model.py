@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated
 
 import numpy as np
@@ -10,8 +11,9 @@ from rich.table import Table
 from rich.tree import Tree
 
 from dynakin.cli.console import out, table
-from dynakin.cli.options import Markers
-from dynakin.model import ModelDefinition, available_marker_sets, available_models, load_marker_set, load_model
+from dynakin.cli.identifiability import print_identifiability
+from dynakin.cli.options import Force, Height, Markers, Mass, Sex
+from dynakin.model import ModelDefinition, Subject, available_marker_sets, available_models, load_marker_set, load_model
 from dynakin.model.marker_schema import MarkerSetFile
 from dynakin.model.schema import ModelFile
 from dynakin.model.schema import Segment as ModelSegment
@@ -20,13 +22,34 @@ from dynakin.model.schema import Segment as ModelSegment
 def model(
     name: Annotated[str | None, typer.Argument(help="squat7, sagittal7 or a .toml file; none: list them.")] = None,
     markers: Markers = None,
+    identifiable: Annotated[
+        bool, typer.Option("--identifiability", help="What its measurements can tell: base parameters and gauges.")
+    ] = False,
+    trial: Annotated[
+        Path | None, typer.Option(help="With --identifiability: what this recording tells, and what would tell more.")
+    ] = None,
+    forces: Force = None,
+    mass: Mass = None,
+    height: Height = None,
+    sex: Sex = None,
 ) -> None:
-    """Print a model: its tree, coordinates, states, markers and bounds."""
+    """Print a model: its tree, coordinates, states, markers and bounds; or what it lets one identify."""
     console = out()
+    of_a_person = {"--trial": trial, "--forces": forces, "--mass": mass, "--height": height, "--sex": sex}
+    needless = [option for option, value in of_a_person.items() if value is not None]
+    if needless and not identifiable:
+        raise typer.BadParameter(f"{needless[0]} is of use only with --identifiability")
+    if forces is not None and trial is None:
+        raise typer.BadParameter("--forces is of use only with --trial FILE")
     if name is None:
+        if identifiable:
+            raise typer.BadParameter("--identifiability: expected a model's name before it")
         console.print(_list())
         return
-    definition = load_model(name, markers=markers or "auto")
+    definition = load_model(name, Subject(mass_kg=mass, height_m=height, sex=sex), markers=markers or "auto")
+    if identifiable:
+        print_identifiability(definition, trial, forces)
+        return
     console.print(f"{definition.name}: {definition.model.description}")
     console.print()
     console.print(_tree(definition.model))

@@ -10,4 +10,4 @@ from dynakin.config_template import config_template
 
 def print_config(preset: Preset = None) -> None:
     """Print a commented configuration file for `run`."""
-    typer.echo(config_template(preset or "paper"), nl=False)
+    typer.echo(config_template(preset or "default"), nl=False)

@@ -26,11 +26,13 @@ from dynakin.cli.options import (
     Vertical,
 )
 from dynakin.cli.summary import print_summary
+from dynakin.comparison import Trial, trial_of
 from dynakin.config import RunConfig, make_config, read_config
 from dynakin.filter import Estimator
+from dynakin.identifiability import Identifiability, identifiability
 from dynakin.model import load_model
 from dynakin.recordings import read
-from dynakin.report import save_figures
+from dynakin.report import read_sensitivity, save_figures
 from dynakin.results import Estimate, check_output_writable
 
 
@@ -44,6 +46,7 @@ def run(
     height: Height = None,
     sex: Sex = None,
     preset: Preset = None,
+    smooth: Annotated[bool | None, typer.Option("--smooth", help="Estimate each frame from all frames.")] = None,
     side: Side = None,
     vertical: Vertical = None,
     forward: Forward = None,
@@ -53,6 +56,9 @@ def run(
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder for the results.")] = None,
     figures: Annotated[
         Path | None, typer.Option(help="Also write figures for papers (SVG, PDF, PNG) into this folder.")
+    ] = None,
+    sensitivity: Annotated[
+        Path | None, typer.Option(help="Criterion over the gains (.csv, .nc): draw it too, the paper's Figure 3.")
     ] = None,
 ) -> None:
     """Estimate coordinates, moments, lengths and masses from a recording, and write a report."""
@@ -65,6 +71,7 @@ def run(
         "height_m": height,
         "sex": sex,
         "preset": preset,
+        "smooth": smooth,
         "side": side,
         "vertical": vertical,
         "forward": forward_direction(forward),
@@ -75,14 +82,17 @@ def run(
     }
     config = configure(trial, given)
     check_output_writable(config.output)
+    if sensitivity is not None and figures is None:
+        raise typer.BadParameter("--sensitivity is a figure for papers, expected --figures FOLDER with it")
+    grid = None if sensitivity is None else read_sensitivity(sensitivity)
     with progress_bar("estimating") as progress:
-        estimate = estimate_from(config, progress)
+        estimate, comparison, told = estimate_from(config, progress)
     with busy("writing results and report"):
-        folder = estimate.save(config.output)
+        folder = estimate.save(config.output, comparison=comparison, identifiability=told)
     print_summary(estimate, folder)
     if figures is not None:
         with busy("drawing figures"):
-            written = save_figures(estimate, figures)
+            written = save_figures(estimate, figures, comparison=comparison, sensitivity=grid)
         out().print(f"Figures  {figures} ({len(written)} files)", soft_wrap=True)
 
 
@@ -94,8 +104,11 @@ def configure(trial: Path, given: dict[str, Any]) -> RunConfig:
     return make_config({"trial": trial} | options, "run")
 
 
-def estimate_from(config: RunConfig, progress: Callable[[int, int], None] | None = None) -> Estimate:
-    """Read, load, estimate: what a configuration asks for, with it kept in the result.
+def estimate_from(
+    config: RunConfig, progress: Callable[[int, int], None] | None = None
+) -> tuple[Estimate, Trial, Identifiability]:
+    """Read, load, estimate: what a configuration asks for, with it kept in the result; the same recording by the
+    reference methods; and what it tells of the constants.
 
     Raises:
         DynakinError: anything that is wrong with the input, in one line.
@@ -117,8 +130,11 @@ def estimate_from(config: RunConfig, progress: Callable[[int, int], None] | None
         vertical=config.vertical,
         forward=config.forward,
     )
-    estimate = estimator.run(recording, static=static, progress=progress)
-    return replace(estimate, config=config.as_used() | estimate.config)
+    estimate = estimator.run(recording, static=static, smooth=config.smooth, progress=progress)
+    estimate = replace(estimate, config=config.as_used() | estimate.config)
+    assert estimator.initial is not None
+    comparison = trial_of({config.preset: estimate}, estimator.initial, model, whatever=True)
+    return estimate, comparison, identifiability(estimator, estimate)
 
 
 def forward_direction(text: str | None) -> str | tuple[float, ...] | None:

@@ -3,25 +3,28 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from rich.table import Table
 
 from dynakin.cli.console import out, table
 from dynakin.results import Estimate
+from dynakin.results.bounds import counts_in_words
 
 
 def print_summary(estimate: Estimate, folder: Path) -> None:
     """Fit, what to look at, speed, and where the files lie."""
     console = out()
-    console.print(_figures(estimate))
-    console.print(f"Verdict: {estimate.metrics()['consistency']['verdict']}", style="dim")
+    metrics = estimate.metrics()
+    console.print(_figures(estimate, metrics))
+    verdicts = [metrics[block]["verdict"] for block in ("consistency", "adaptation", "soft_tissue")]
+    console.print(f"Verdict: {' '.join(filter(None, verdicts))}", style="dim")
     console.print()
     console.print(f"Results  {folder}", soft_wrap=True)
     console.print(f"Report   {folder / 'report.html'}", soft_wrap=True)
 
 
-def _figures(estimate: Estimate) -> Table:
-    metrics = estimate.metrics()
+def _figures(estimate: Estimate, metrics: dict[str, Any]) -> Table:
     window = metrics["window"]
     rows = table(
         "figure",
@@ -41,11 +44,18 @@ def _figures(estimate: Estimate) -> Table:
         rows.add_row(
             f"wrench {name}, RMS", f"{value:.2f} {unit}", "" if share is None else f"{share:.1f} % of measured"
         )
+    after = metrics["adaptation"]["after_s"]
+    rows.add_row("settled after", "-" if after is None else f"{after:.1f} s", "")
     stuck = metrics["events"]["parameters_at_bound"]
     free = sum(p.estimated for p in estimate.parameters)
-    rows.add_row(
-        "parameters on a bound", f"{len(stuck)} of {free}", ", ".join(stuck[:3]) + (" ..." if stuck[3:] else "")
-    )
+    by_kind = counts_in_words(metrics["bounds"]["by_kind"], "at_end")
+    rows.add_row("parameters on a bound", f"{len(stuck)} of {free}", by_kind if stuck else "")
+    moved = {name: m for name, m in metrics["soft_tissue"]["markers"].items() if m["max_mm"] is not None}
+    if moved:
+        most = max(moved, key=lambda name: moved[name]["max_mm"])
+        declared = moved[most]["declared_mm"]
+        size = "" if declared is None else f" (declared {declared:.0f} mm)"
+        rows.add_row("largest move on a segment", f"{moved[most]['max_mm']:.0f} mm", f"{most}{size}")
     gaps = metrics["events"]["missing_frames"]
     rows.add_row("markers with gaps", str(len(gaps)), ", ".join(gaps))
     timing = estimate.timing

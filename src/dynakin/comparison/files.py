@@ -14,7 +14,16 @@ from dynakin.results.output_folder import FolderKind, check_output_writable, rep
 from dynakin.results.versions import versions
 
 SCHEMA_VERSION = 1
-FILES = ("table2.csv", "angles.csv", "moments.csv", "held_out.csv", "unseen.csv", "repetitions.csv", "comparison.json")
+FILES = (
+    "table2.csv",
+    "angles.csv",
+    "moments.csv",
+    "held_out.csv",
+    "unseen.csv",
+    "repetitions.csv",
+    "comparison.json",
+    "report.html",
+)
 _SUMMARY = "comparison.json"
 COMPARISON = FolderKind(FILES, _SUMMARY, "comparison of dynakin")
 
@@ -41,15 +50,19 @@ def check_comparison_folder(folder: str | Path) -> None:
 
 
 def save_comparison(
-    folder: str | Path, tables: Mapping[str, Sequence[Any]], more: Mapping[str, Any] | None = None
+    folder: str | Path,
+    tables: Mapping[str, Sequence[Any]],
+    more: Mapping[str, Any] | None = None,
+    page: str | None = None,
 ) -> Path:
-    """Write each table as ``NAME.csv``, and all of them with ``more`` into ``comparison.json``.
+    """Write each table as ``NAME.csv``, all of them with ``more`` into ``comparison.json``, and ``report.html``.
 
     An earlier comparison is replaced as a whole; a CSV without rows is not written.
 
     Args:
         tables: rows, dataclasses, by the name of their file: table2, angles, moments, held_out, unseen, repetitions.
         more: further plain data: settings, notes.
+        page: the report as HTML (`dynakin.report.render_comparison`); none is written without it.
 
     Raises:
         OutputError: as `check_comparison_folder`.
@@ -62,6 +75,8 @@ def save_comparison(
         for name, rows in plain.items():
             _write_csv(made / f"{name}.csv", rows)
         write_metrics(summary, made / _SUMMARY)
+        if page is not None:
+            (made / "report.html").write_text(page, encoding="utf-8", newline="\n")
     return folder
 
 

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+import xarray as xr
 
 from dynakin.comparison.setup import Setup
-from dynakin.errors import ModelError
-from dynakin.model import InitialModel
+from dynakin.errors import DynakinError, ModelError
+from dynakin.model import InitialModel, ModelDefinition
 from dynakin.recordings import Recording
-from dynakin.reference import Reference, reference_methods
+from dynakin.reference import CUTOFF_HZ, Reference, reference_methods
+from dynakin.reference.methods import Lengths
 from dynakin.results import COMPONENTS, Estimate, evaluation_window
+from dynakin.results.mean_curves import MEASURED, MeanCurve, mean_curves, signals
+from dynakin.results.repetitions import Found, repetitions_of
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -31,6 +35,7 @@ class Method:
         name: "EKF (paper)", "AT (6 Hz)", ...; kind: "EKF", "AT" or "classical".
         coordinates: (T, C) rad or m. moments: (T, C) N m or N.
         markers: (T, M, 3) m. wrench: (T, 6) N and N m, ground on person, about the ground origin.
+        data: what it was taken from, named as `Estimate.data`, with speeds and accelerations too.
     """
 
     name: str
@@ -39,6 +44,7 @@ class Method:
     moments: Array
     markers: Array
     wrench: Array
+    data: xr.Dataset
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +55,7 @@ class Trial:
         window: (T,) bool, the frames that figures are taken over: after the adaptation.
         measured_markers: (T, M, 3) m; measured_wrench: (T, 6).
         axes: (3,) bool, ground axes that the model explains. rotation: (C,) bool.
-        height: (T,) m, of the pelvis over the ground origin; NaN without a pelvis.
+        repetitions: squats or gait cycles after the adaptation.
         notes: what was left out and why.
         estimates: of each preset, for whoever wants more.
     """
@@ -63,7 +69,7 @@ class Trial:
     measured_wrench: Array
     axes: Mask
     rotation: Mask
-    height: Array
+    repetitions: Found
     mass_kg: float
     methods: tuple[Method, ...]
     notes: tuple[str, ...]
@@ -72,6 +78,13 @@ class Trial:
     def of_kind(self, kind: str) -> list[Method]:
         """The methods of one kind, in order."""
         return [method for method in self.methods if method.kind == kind]
+
+    def curves(self) -> list[MeanCurve]:
+        """Mean curves of each method's coordinates, moments and wrench over the repetitions, and of the plates'."""
+        names, rotation = self.coordinate_names, self.rotation
+        methods = {m.name: signals(names, rotation, m.coordinates, m.moments, m.wrench) for m in self.methods}
+        methods[MEASURED] = signals(names, rotation, wrench=self.measured_wrench)
+        return mean_curves(self.time, self.repetitions.items, methods, self.mass_kg)
 
 
 def compare_trial(
@@ -86,53 +99,63 @@ def compare_trial(
     Raises:
         DynakinError: as `Estimator.run`.
     """
-    methods, estimates = [], {}
+    estimates = {}
     for preset in setup.noise:
         estimator = setup.estimator(preset)
-        estimates[preset] = estimate = estimator.run(recording, static=static, progress=progress)
-        methods.append(_filtered(preset, estimate))
-    initial = estimator.initial
-    assert initial is not None
+        estimates[preset] = estimator.run(recording, static=static, progress=progress)
+    assert estimator.initial is not None
+    return trial_of(estimates, estimator.initial, setup.definition, setup.cutoff_hz)
+
+
+def trial_of(
+    estimates: Mapping[str, Estimate],
+    initial: InitialModel,
+    definition: ModelDefinition,
+    cutoff_hz: float = CUTOFF_HZ,
+    *,
+    whatever: bool = False,
+) -> Trial:
+    """Estimates of one recording beside the reference methods on it; nothing is filtered again.
+
+    Args:
+        estimates: by the name of their preset, at least one. initial, definition: what they started from
+            (`Estimator.initial`, `Estimator.model`).
+        whatever: let no reference method that fails stop anything: the notes say why it is left out. Else only a model
+            that is no hinge chain in the plane is a note.
+
+    Raises:
+        RecordingError: uneven time steps, or a cut-off that is not below half the rate; not with ``whatever``.
+    """
+    methods = [_filtered(preset, estimate) for preset, estimate in estimates.items()]
+    first = next(iter(estimates.values()))
     notes: list[str] = []
+    options: tuple[tuple[str, Lengths], ...] = ((AT, "constant"), (CLASSICAL, "frame"))
     try:
-        for kind, lengths in ((AT, "constant"), (CLASSICAL, "frame")):
-            reference = reference_methods(
-                recording,
-                initial,
-                setup.definition,
-                setup.cutoff_hz,
-                lengths=lengths,  # type: ignore[arg-type]
-            )
+        for kind, lengths in options:
+            reference = reference_methods(first.recording, initial, definition, cutoff_hz, lengths=lengths)
             methods.append(_referred(kind, reference, initial))
             notes += [f"{kind}: {note}" for note in reference.notes]
-    except ModelError as error:  # the filter took the model, so it is no hinge chain in the plane
+    except DynakinError as error:
+        if not (whatever or isinstance(error, ModelError)):
+            raise
         notes.append(f"AT and the classical method are left out: {error.message}")
-    data = estimate.data
+    data = first.data
     return Trial(
-        name=recording.name,
-        time=estimate.time,
-        window=evaluation_window(estimate.time),
-        marker_names=tuple(estimate.marker_names),
-        coordinate_names=tuple(estimate.coordinate_names),
+        name=first.recording.name,
+        time=first.time,
+        window=evaluation_window(first.time),
+        marker_names=tuple(first.marker_names),
+        coordinate_names=tuple(first.coordinate_names),
         measured_markers=data["markers_measured"].transpose("time", "marker", "axis").values,
         measured_wrench=data["wrench_measured"].transpose("time", "component").values,
-        axes=estimate.modelled_axes(),
-        rotation=estimate.is_rotation(),
-        height=pelvis_height(recording, initial),
+        axes=first.modelled_axes(),
+        rotation=first.is_rotation(),
+        repetitions=repetitions_of(first),
         mass_kg=initial.mass_kg,
         methods=tuple(methods),
         notes=tuple(notes),
-        estimates=estimates,
+        estimates=dict(estimates),
     )
-
-
-def pelvis_height(recording: Recording, initial: InitialModel) -> Array:
-    """Mean height (T,) m of the pelvis markers over the ground origin, NaN where one is missing or there are none."""
-    names = [site.recorded for site in initial.plan.sites if site.segment == "pelvis"]
-    if not names:
-        return np.full(recording.n_frames, np.nan)
-    points = initial.ground.points_to_ground(np.stack([recording.marker(name) for name in names], axis=1))
-    return np.asarray(points[:, :, 1].mean(axis=1))
 
 
 def _filtered(preset: str, estimate: Estimate) -> Method:
@@ -144,6 +167,7 @@ def _filtered(preset: str, estimate: Estimate) -> Method:
         data["moments"].transpose("time", "coordinate").values,
         data["markers_estimated"].transpose("time", "marker", "axis").values,
         data["wrench_estimated"].transpose("time", "component").values,
+        data,
     )
 
 
@@ -159,4 +183,5 @@ def _referred(kind: str, reference: Reference, initial: InitialModel) -> Method:
         data["moments"].transpose("time", "coordinate").values,
         markers,
         data["wrench_estimated"].transpose("time", "component").sel(component=list(COMPONENTS)).values,
+        data,
     )

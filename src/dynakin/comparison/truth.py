@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
+
+from dynakin.results import Parameter
+from dynakin.results.adaptation import constant_groups
 
 Array = npt.NDArray[np.float64]
 
@@ -67,6 +71,32 @@ def truth_errors(
             *(_mean_rms(wrench[:, [k]]) for k in (0, 1, 5)),
         ),
     )
+
+
+class ParameterError(NamedTuple):
+    """RMS error of one kind of constant, per cent of the true values: where the filter started, and where it ended."""
+
+    constants: int
+    start_percent: float
+    end_percent: float
+
+
+def parameter_errors(parameters: Sequence[Parameter], truth: Mapping[str, float]) -> dict[str, ParameterError]:
+    """Errors of the estimated lengths, masses and moments of inertia.
+
+    Args:
+        truth: by the names of the filter's state, as `dynakin.simulation.Truth.parameters`; constants that it does not
+            hold do not count.
+    """
+    found = {}
+    for title, group in constant_groups(parameters).items():
+        known = [p for p in group if truth.get(p.name)]
+        if known:
+            true = np.array([truth[p.name] for p in known])
+            errors = [np.array([getattr(p, key) for p in known]) / true - 1.0 for key in ("initial", "value")]
+            start, end = (100.0 * float(np.sqrt(np.mean(error**2))) for error in errors)
+            found[title] = ParameterError(len(known), start, end)
+    return found
 
 
 def _mean_rms(errors: Array) -> float:

@@ -1,7 +1,8 @@
 """The filter as users meet it: noise settings, the estimator, live samples."""
 
 from dynakin.filter import presets
-from dynakin.filter.estimator import Estimator, StepEstimate
+from dynakin.filter.estimator import Estimator
+from dynakin.filter.live import StepEstimate
 from dynakin.filter.noise import Noise
 from dynakin.filter.samples import Sample
 

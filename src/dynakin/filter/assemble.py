@@ -27,6 +27,7 @@ def assemble(
     measured: tuple[Array, Array],
     config: dict[str, Any],
     notes: Sequence[str],
+    covariances: tuple[Array, Array],
 ) -> Estimate:
     """Label what `Filter.run` returned and keep what is needed to judge it.
 
@@ -35,9 +36,13 @@ def assemble(
         measured: markers (T, M, 3) and wrench (T, 6), as the filter took them.
         config: what was asked for, as plain data.
         notes: sentences of the plates' check.
+        covariances: P (n, n) before the first frame and after the last.
     """
     data = _dataset(arrays, model, initial, recording, measured)
-    parameters = parameters_of(initial, arrays["state"][-1], arrays["state_sd"][-1])
+    for name, covariance in zip(("initial_covariance", "final_covariance"), covariances, strict=True):
+        data[name] = (("element", "element_"), covariance)
+    prior_sd = np.sqrt(np.diag(covariances[0]))
+    parameters = parameters_of(initial, arrays["state"][-1], arrays["state_sd"][-1], prior_sd)
     config = config | {
         "mass_kg": initial.mass_kg,
         "height_m": initial.height_m,
@@ -75,6 +80,7 @@ def _dataset(
     for block, values in _coordinate_blocks(arrays, model).items():
         data[block] = (("time", "coordinate"), values)
     data["moments"] = (("time", "coordinate"), arrays["moments"])
+    data["moments_sd"] = (("time", "coordinate"), arrays["moments_sd"])
     missing = np.count_nonzero(np.isnan(measured[0]), axis=2, keepdims=True) > 0
     for name, values in (
         ("measured", np.where(missing, np.nan, measured[0])),
@@ -88,10 +94,15 @@ def _dataset(
         ("predicted", arrays["wrench_predicted"]),
     ):
         data[f"wrench_{name}"] = (("time", "component"), np.where(modelled, values, np.nan))
+    data["markers_sd"] = (("time", "marker", "axis"), np.where(axes, arrays["markers_sd"], np.nan))
+    data["wrench_sd"] = (("time", "component"), np.where(modelled, arrays["wrench_sd"], np.nan))
     data["state"] = (("time", "element"), arrays["state"])
     data["state_sd"] = (("time", "element"), arrays["state_sd"])
-    for name in ("nis", "n_rows", "log_likelihood", "constrained", "step_us"):
+    for name in ("nis", "n_rows", "log_likelihood", "constrained", "constraints_met", "tracking", "step_us"):
         data[name] = ("time", arrays[name])
+    data["verdict"] = (("time", "sensor"), arrays["verdicts"])
+    if any(any(marker.soft_tissue) for marker in spec.markers):
+        data["soft_tissue_amplitude"] = ("marker", initial.soft_tissue_m, {"units": "m"})
     data["joint_centres"] = (("time", "joint", "axis"), _joint_centres(arrays["state"], model), {"units": "m"})
     names, parents, segments = _joints(spec)
     coords = {
@@ -100,9 +111,11 @@ def _dataset(
         "coordinate_type": ("coordinate", _types(spec)),
         "marker": list(initial.recorded_markers),
         "axis": list(AXES),
+        "sensor": [*initial.recorded_markers, "plates"],
         "marker_axes_modelled": ("axis", axes),
         "component": list(COMPONENTS),
         "element": list(model.layout.names),
+        "element_": list(model.layout.names),
         "joint": names,
         "joint_parent": ("joint", parents),
         "joint_segment": ("joint", segments),

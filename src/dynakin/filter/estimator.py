@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
@@ -11,10 +10,13 @@ import numpy.typing as npt
 from dynakin import _core
 from dynakin.errors import ConfigError, DivergenceError, RecordingError
 from dynakin.filter import presets
+from dynakin.filter.alignment import PASSES, delay_of, in_step, in_words, is_late
 from dynakin.filter.assemble import assemble
 from dynakin.filter.extend import continuous_noise, extended, initial_covariance
+from dynakin.filter.live import StepEstimate, deviations_of, step_estimate
 from dynakin.filter.noise import Noise, gate_limits
-from dynakin.filter.samples import Sample, recording_arrays, sample_arrays
+from dynakin.filter.samples import Sample, foreign_load, recording_arrays, sample_arrays
+from dynakin.filter.smoothing import check_can_smooth, smoothed
 from dynakin.model import Bounds, InitialModel, ModelDefinition, Priors, initialise
 from dynakin.recordings import Recording, check_plates
 from dynakin.results import Estimate
@@ -23,29 +25,16 @@ Array = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]
 
 
-@dataclass(frozen=True)
-class StepEstimate:
-    """What one live step gives: all coordinates of the model in order, and how well the sample was expected."""
-
-    time_s: float
-    coordinates: Array  # (C,) rad or m
-    speeds: Array  # (C,)
-    accelerations: Array  # (C,)
-    moments: Array  # (C,) N m or N
-    wrench: Array  # (6,) N, N m, about the model's ground origin
-    markers: Array  # (M, 3) m, ground frame
-    report: _core.StepReport
-
-
 class Estimator:
-    """Estimates movement and what drives it with the paper's constrained extended Kalman filter.
+    """Estimates movement and what drives it with one constrained extended Kalman filter.
 
     Args:
         model: what `load_model` returns.
-        noise: variances; the paper's Table I where not given.
+        noise: `presets.default()` where not given.
         priors, bounds: prior standard deviations and half widths of (9); see `dynakin.model.priors`.
         side: limb markers of a lumped model ("auto", "right", "left", "both").
         vertical, forward: laboratory directions, found in the recording where "auto".
+        lag: frames by which `delayed` lies behind `step`, for smoothing while it is measured; 0: none.
     """
 
     def __init__(
@@ -58,46 +47,88 @@ class Estimator:
         side: str = "auto",
         vertical: str = "auto",
         forward: str | tuple[float, float, float] = "auto",
+        lag: int = 0,
     ) -> None:
+        if lag < 0:
+            raise ConfigError(f"lag is {lag}, expected 0 frames or more")
         self.model = model
-        self.noise = noise or presets.paper()
+        self.noise = noise or presets.default()
         self.priors = priors or Priors()
         self.bounds = bounds or Bounds()
         self.side = side
         self.vertical = vertical
         self.forward = forward
+        self.lag = lag
         self.initial: InitialModel | None = None
         self._filter: _core.Filter | None = None
+        self._lag: _core.FixedLag | None = None
         self._core_model: _core.Model | None = None
         self._time: float | None = None
 
     def run(
-        self, recording: Recording, *, static: Recording | None = None, progress: Progress | None = None
+        self,
+        recording: Recording,
+        *,
+        static: Recording | None = None,
+        smooth: bool = False,
+        progress: Progress | None = None,
     ) -> Estimate:
         """Estimate a whole recording.
 
         Args:
             recording: markers and plates, as `read` gives them.
             static: the same person and markers, standing: lengths and marker places are taken from it.
+            smooth: whether each frame is estimated from all frames, those after it too (`filter.smoothing`).
             progress: called with (frames done, frames in all) now and then.
 
         Raises:
             ModelError, RecordingError: model, markers, plates and recording do not fit.
             DivergenceError: the filter lost its estimate; the message names the frame.
         """
+        if smooth:
+            check_can_smooth(self.noise)
         initial = self.start(recording, static=static)
         assert self._core_model is not None
-        markers, wrench = recording_arrays(recording, initial)
+        markers, wrench = recording_arrays(recording, initial, gaps=self.noise.recover)
         check = check_plates(recording, initial.ground, initial.mass_kg)
         if check.refusal:
             raise RecordingError(f"{recording.path or recording.name}: {check.refusal}")
+        notes = list(check.messages)
+        foreign = foreign_load(check, initial.mass_kg, self.noise.plate_load_tolerance)
+        if foreign:
+            wrench[:] = np.nan
+            notes.append(foreign)
         try:
-            arrays = self.run_arrays(recording.time, markers, wrench, progress)
+            arrays, wrench, clock = self._in_step(initial, recording.time, markers, wrench, progress)
+            if smooth:
+                self.start_from(initial)
+                arrays = self.run_smoothed_arrays(recording.time, markers, wrench, progress)
         except ValueError as error:  # a frame that the core refuses, named by it
             raise RecordingError(f"{recording.path or recording.name}: {error}") from None
-        return assemble(
-            arrays, self._core_model, initial, recording, (markers, wrench), self.settings(), check.messages
-        )
+        config = self.settings() | {"smooth": smooth}
+        notes += [] if foreign else clock
+        assert self._filter is not None
+        covariances = (initial_covariance(initial, self.noise), self._filter.covariance)
+        return assemble(arrays, self._core_model, initial, recording, (markers, wrench), config, notes, covariances)
+
+    def _in_step(
+        self, initial: InitialModel, time: Array, markers: Array, wrench: Array, progress: Progress | None
+    ) -> tuple[dict[str, Array], Array, list[str]]:
+        """`run_arrays`, again with the plates brought into step where they turn out to lag.
+
+        Returns:
+            The arrays, the wrench (T, 6) as the last run took it, and what there is to say of the plates' clock.
+        """
+        arrays, shift, taken = self.run_arrays(time, markers, wrench, progress), 0.0, wrench
+        for _ in range(PASSES):
+            delay = self._delay(arrays)
+            if delay is None or not is_late(delay):
+                break
+            shift += delay[0]
+            taken = in_step(time, wrench, shift)
+            self.start_from(initial)
+            arrays = self.run_arrays(time, markers, taken, progress)
+        return arrays, taken, in_words(shift, self._delay(arrays))
 
     def start(self, recording: Recording, *, static: Recording | None = None) -> InitialModel:
         """Measure the model on a recording (or the first seconds of a live one) and make the filter ready to step.
@@ -124,6 +155,9 @@ class Estimator:
         self._filter = _core.Filter(
             self._core_model, self.filter_settings(initial), initial.x0, initial_covariance(initial, self.noise)
         )
+        if self.lag:
+            check_can_smooth(self.noise)
+        self._lag = _core.FixedLag(self._filter, self.lag) if self.lag else None
         self.initial, self._time = initial, None
         return initial
 
@@ -145,9 +179,25 @@ class Estimator:
         if self._filter is None:
             raise ConfigError("run_arrays: the estimator has not been started; call start or start_from first")
         time, markers, wrench = (np.ascontiguousarray(values) for values in (time, markers, wrench))
-        arrays = self._filter.run(time, markers, wrench, progress)
+        arrays = self._filter.run(time, markers, wrench, progress, output_sd=True)
         self._time = float(time[-1])
         return arrays
+
+    def run_smoothed_arrays(
+        self, time: Array, markers: Array, wrench: Array, progress: Progress | None = None
+    ) -> dict[str, Array]:
+        """`run_arrays`, then backwards over the same frames: the smoothed arrays take the places of the filtered.
+
+        Raises:
+            ConfigError: the bounds are kept in a way that has no smoother. DivergenceError: as `run_arrays`.
+        """
+        if self._filter is None:
+            raise ConfigError("run_smoothed_arrays: the estimator has not been started; call start or start_from first")
+        check_can_smooth(self.noise)
+        time, markers, wrench = (np.ascontiguousarray(values) for values in (time, markers, wrench))
+        arrays = self._filter.run_smoothed(time, markers, wrench, progress)
+        self._time = float(time[-1])
+        return smoothed(arrays)
 
     def step(self, sample: Sample) -> StepEstimate:
         """Take one sample, after `start`; samples come in the order of their times.
@@ -162,24 +212,44 @@ class Estimator:
         if dt < 0.0:
             raise RecordingError(f"sample at {sample.time_s} s: older than the one before, at {self._time} s")
         markers, wrench = sample_arrays(sample, self.initial)
-        if self._time is not None:
-            self._filter.predict(dt)
-        report = self._filter.update(markers, wrench)
+        if self._lag is not None:
+            report = self._lag.step(dt, markers, wrench)
+        else:
+            if self._time is not None:
+                self._filter.predict(dt)
+            report = self._filter.update(markers, wrench)
         if report.diverged:
             raise DivergenceError(f"the filter diverged at {sample.time_s} s: {report.status}")
         self._time = sample.time_s
-        model, x = self._core_model, self._filter.state
-        q, qd, qdd = _core.coordinates(model, x)
-        return StepEstimate(
-            sample.time_s,
-            q,
-            qd,
-            qdd,
-            _core.joint_moments(model, x),
-            _core.wrench(model, x),
-            _core.marker_positions(model, x),
-            report,
-        )
+        return step_estimate(self._core_model, sample.time_s, self._filter.state, report)
+
+    def delayed(self) -> StepEstimate | None:
+        """The frame that lies ``lag`` frames back, smoothed by all samples until now; None before there is one.
+
+        Its ``time_s`` is its own: the delay is the last sample's time less that.
+
+        Raises:
+            ConfigError: the estimator was made without a lag.
+        """
+        if self._lag is None or self._core_model is None or self._time is None:
+            raise ConfigError("delayed: expected Estimator(..., lag=frames), started and stepped")
+        if not self._lag.ready:
+            return None
+        return step_estimate(self._core_model, self._time - self._lag.delay_s, self._lag.state, None)
+
+    def deviations(self) -> dict[str, Array]:
+        """Standard deviations of the present estimate, as it was last stepped: propagated now, not in every step.
+
+        Returns:
+            coordinates, speeds, accelerations, moments (C,), of all coordinates of the model; wrench (6,).
+        """
+        if self._filter is None or self._core_model is None:
+            raise ConfigError("deviations: the estimator has not been started; call start(recording) first")
+        return deviations_of(self._core_model, self._filter.state, self._filter.covariance)
+
+    def _delay(self, arrays: dict[str, Array]) -> tuple[float, float] | None:
+        assert self.initial is not None
+        return delay_of(self.initial, arrays["state"][-1], arrays["state_sd"][-1])
 
     def settings(self) -> dict[str, object]:
         """What was asked for, as plain data: written into the outputs."""
@@ -203,19 +273,17 @@ class Estimator:
                 f"{', '.join(initial.recorded_markers)}"
             )
         noise, layout = self.noise, self._core_model.layout
-        variance = noise.marker_scale * initial.marker_variance
-        if noise.marker_sd_m is not None:
-            variance[:] = noise.marker_sd_m**2
-        for k, name in enumerate(initial.recorded_markers):
-            variance[k] = self.noise.marker.get(name, variance[k])
+        point = noise.reference_point_m
         density, decay = continuous_noise(initial, noise, layout)
         return _core.FilterSettings(
             process_variance=noise.process_variance(layout),
             process_density=density,
             decay_rate=decay,
-            marker_variance=variance,
+            marker_variance=noise.marker_variance(
+                initial.recorded_markers, initial.marker_variance, initial.soft_tissue_m
+            ),
             wrench_covariance=noise.wrench_covariance(),
-            reference_point=np.array(self._reference_point(), dtype=float),
+            reference_point=initial.plate_centre if point == "auto" else np.array(point, dtype=float),
             total_mass=initial.mass_kg if noise.total_mass_use == "frame" else None,
             total_mass_variance=noise.total_mass,
             lower=initial.lower,
@@ -227,7 +295,3 @@ class Estimator:
             iterate_beyond=np.inf if noise.iterate_beyond is None else noise.iterate_beyond,
             recovery=_core.RecoverySettings(blind_s=noise.blind_s) if noise.recover else None,
         )
-
-    def _reference_point(self) -> tuple[float, float, float]:
-        point = self.noise.reference_point_m
-        return (0.0, 0.0, 0.0) if point == "auto" else point

@@ -1,4 +1,4 @@
-"""What happened during a run that a reader should know: gaps of markers, coordinates and parameters at their bounds."""
+"""What happened during a run that a reader should know: gaps and refusals, a lost motion, bounds reached."""
 
 from __future__ import annotations
 
@@ -10,11 +10,16 @@ from dynakin.model import InitialModel
 from dynakin.results import Event, Parameter
 from dynakin.results.records import EventKind
 
+REFUSED = 2
+"""Value of a verdict: 0 missing, 1 accepted, 2 refused (as the core has it)."""
+TRACKING = ("following", "doubtful", "lost", "found", "restarted")
+"""Words of the core's tracking states, by their number."""
+
 
 def events_of(data: xr.Dataset, parameters: list[Parameter], initial: InitialModel) -> list[Event]:
     """Events in the order of their times; one a stretch, not one a frame."""
     time = data["time"].values
-    events = [*_missing(data), *_coordinates_at_bounds(data, initial)]
+    events = [*_missing(data), *_refused(data), *_tracking(data), *_coordinates_at_bounds(data, initial)]
     last = len(time) - 1
     for p in parameters:
         if p.at_bound:
@@ -32,6 +37,37 @@ def _missing(data: xr.Dataset) -> list[Event]:
         for k, name in enumerate(names)
         for event in _stretches(data["time"].values, lost[:, k], "missing", name, "not measured")
     ]
+
+
+def _refused(data: xr.Dataset) -> list[Event]:
+    """Markers and plates that the gate did not believe."""
+    verdicts = data["verdict"].values
+    names = [str(name) for name in data["sensor"].values]
+    return [
+        event
+        for k, name in enumerate(names)
+        for event in _stretches(
+            data["time"].values, verdicts[:, k] == REFUSED, "gated", name, "contradicts all else, not used"
+        )
+    ]
+
+
+def _tracking(data: xr.Dataset) -> list[Event]:
+    """Stretches in which the filter did not believe its markers, and what it did about them."""
+    time, tracking = data["time"].values, data["tracking"].values
+    told: tuple[tuple[str, EventKind, str], ...] = (
+        ("doubtful", "gated", "most markers contradict the motion: nothing measured was used"),
+        ("lost", "reset", "motion lost and held where it was"),
+        ("found", "reset", "motion sought anew from the markers, and found"),
+        ("restarted", "reset", "the numbers had broken down: everything started again"),
+    )
+    events = [
+        event
+        for word, kind, text in told
+        for event in _stretches(time, tracking == TRACKING.index(word), kind, "motion", text)
+    ]
+    unmet = data["constraints_met"].values == 0
+    return events + _stretches(time, unmet, "note", "bounds", "not all kept at once, each kept by itself")
 
 
 def _coordinates_at_bounds(data: xr.Dataset, initial: InitialModel) -> list[Event]:

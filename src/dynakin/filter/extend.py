@@ -1,4 +1,4 @@
-"""From the model that was measured to the one that is filtered: soft tissue, plate errors and what is known at first."""
+"""From the model that was measured to the one that is filtered: soft tissue, plate errors, what is known at first."""
 
 from __future__ import annotations
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Annotated, Literal
 
 import numpy as np
@@ -46,7 +47,8 @@ class Noise(BaseModel):
     """Standard deviation of the displacement of skin and flesh under each marker, as a fraction of the size that its
     marker set declares; 0: none is estimated."""
     soft_tissue_least_m: Deviation = 0.0
-    """The least such standard deviation, m: what stands in for a foot or a joint that is not as the model has it."""
+    """Where the standard deviation is below this, this much is taken for noise of the marker instead, without a state
+    of its own: a foot is not as rigid, nor its toe as fixed in the ground, as a model has it."""
     soft_tissue_time_s: Seconds = 1.0
     """Time constant of that displacement (first-order Gauss-Markov process)."""
 
@@ -69,6 +71,9 @@ class Noise(BaseModel):
     """The same of each moment about the ground origin, N m."""
     plate_time_s: Seconds = 1.0
     """Time constant of that slow error."""
+    plate_load_tolerance: Annotated[float, Field(gt=0.0)] | None = None
+    """Plates whose load is further from the person's weight than this part of it are not used: something that the model
+    does not have bears on them. Not given: they always are."""
     plate_delay_s: Deviation = 0.0
     """Prior standard deviation of the plates' delay behind the markers, s; 0: none is estimated."""
     total_mass: PositiveVariance = 1e-4
@@ -115,9 +120,20 @@ class Noise(BaseModel):
 
     def soft_tissue_sd(self, declared_m: Array) -> Array:
         """Standard deviation (M,) m of each marker's displacement; 0 where none is estimated."""
-        if self.soft_tissue == 0.0 and self.soft_tissue_least_m == 0.0:
-            return np.zeros(len(declared_m))
-        return np.maximum(self.soft_tissue * declared_m, self.soft_tissue_least_m)
+        sd = self.soft_tissue * declared_m
+        return np.where(sd < self.soft_tissue_least_m, 0.0, sd)
+
+    def marker_variance(self, names: Sequence[str], of_set: Array, declared_m: Array) -> Array:
+        """R (M,) m^2 of markers with these names in the recording.
+
+        Args:
+            of_set: (M,) m^2, as the marker set has it. declared_m: (M,) m, size of the soft tissue's displacement.
+        """
+        variance = self.marker_scale * of_set
+        if self.marker_sd_m is not None:
+            unmodelled = np.where(self.soft_tissue_sd(declared_m) == 0.0, self.soft_tissue_least_m, 0.0)
+            variance = self.marker_sd_m**2 + unmodelled**2
+        return np.array([self.marker.get(name, value) for name, value in zip(names, variance, strict=True)])
 
 
 def gate_limits(probability: float) -> list[float] | None:

@@ -11,15 +11,16 @@ from dynakin.results.records import ParameterKind
 
 Array = npt.NDArray[np.float64]
 
-_KINDS: dict[str, ParameterKind] = {"length": "length", "marker": "marker", "inertia": "inertia"}
+_KINDS: dict[str, ParameterKind] = {"length": "length", "marker": "marker", "inertia": "inertia", "plates": "plates"}
 _INERTIA_UNITS = {"mass": "kg", "mx": "kg m", "my": "kg m", "mz": "kg m"}
+_PLATE_UNITS = {"delay": "s", "fx": "N", "fy": "N", "fz": "N"}
 
 
-def parameters_of(initial: InitialModel, state: Array, sd: Array) -> list[Parameter]:
+def parameters_of(initial: InitialModel, state: Array, sd: Array, prior_sd: Array) -> list[Parameter]:
     """Every length, marker place and inertial parameter in the state, and the lengths that were held fixed.
 
     Args:
-        state, sd: (n,) the last frame's.
+        state, sd: (n,) the last frame's. prior_sd: (n,) before the first.
     """
     segments = {marker.name: marker.segment for marker in initial.spec.markers}
     found = []
@@ -32,8 +33,8 @@ def parameters_of(initial: InitialModel, state: Array, sd: Array) -> list[Parame
             Parameter(
                 name=name,
                 kind=kind,
-                segment=segments[rest[0]] if kind == "marker" else rest[0],
-                unit=_INERTIA_UNITS.get(rest[-1], "kg m2") if kind == "inertia" else "m",
+                segment=segments[rest[0]] if kind == "marker" else "plates" if kind == "plates" else rest[0],
+                unit=_unit(kind, rest[-1]),
                 value=float(state[k]),
                 sd=float(sd[k]),
                 initial=float(initial.x0[k]),
@@ -42,6 +43,7 @@ def parameters_of(initial: InitialModel, state: Array, sd: Array) -> list[Parame
                 upper=_finite(initial.upper[k]),
                 at_bound=bool(state[k] <= initial.lower[k] or state[k] >= initial.upper[k]),
                 estimated=True,
+                prior_sd=float(prior_sd[k]),
             )
         )
     for length in initial.spec.parameters:
@@ -50,6 +52,12 @@ def parameters_of(initial: InitialModel, state: Array, sd: Array) -> list[Parame
             name = f"length/{length.name}"
             found.append(Parameter(name, "length", length.name, "m", value, 0.0, value, None, None, None, False, False))
     return found
+
+
+def _unit(kind: ParameterKind, last: str) -> str:
+    if kind == "inertia":
+        return _INERTIA_UNITS.get(last, "kg m2")
+    return _PLATE_UNITS.get(last, "N m") if kind == "plates" else "m"
 
 
 def _finite(value: float) -> float | None:

@@ -6,12 +6,46 @@ from dynakin.errors import ConfigError
 from dynakin.filter.noise import Noise
 
 
+def default() -> Noise:
+    """Settings for anyone: white jerk, soft tissue as a process of its own, bounds by projection, gates, recovery.
+
+    How each number was found is told in docs/validation.md.
+    """
+    return Noise(
+        coordinate=0.0,
+        speed=0.0,
+        acceleration=0.0,
+        marker_place=0.0,
+        jerk=100.0,
+        jerk_translation=10.0,
+        soft_tissue=0.5,
+        soft_tissue_least_m=0.002,
+        soft_tissue_time_s=5.0,
+        marker_sd_m=0.0007,
+        force=100.0,
+        moment=25.0,
+        reference_point_m="auto",
+        plate_force=5.0,
+        plate_moment=3.0,
+        plate_time_s=30.0,
+        plate_load_tolerance=0.15,
+        plate_delay_s=0.02,
+        total_mass=0.25,
+        total_mass_use="prior",
+        marker_gate=1e-9,
+        wrench_gate=1e-9,
+        recover=True,
+        iterate_beyond=0.2,
+        constraint="projection",
+    )
+
+
 def paper() -> Noise:
     """Bonnet et al., Table I, as it stands: its R as variances, its Q added at each step."""
     return Noise()
 
 
-PRESETS = {"paper": paper}
+PRESETS = {"default": default, "paper": paper}
 
 
 def preset(name: str) -> Noise:

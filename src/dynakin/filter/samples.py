@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from dynakin.errors import RecordingError
 from dynakin.model import InitialModel
-from dynakin.recordings import Recording
+from dynakin.recordings import PlateCheck, Recording
 
 Array = npt.NDArray[np.float64]
 
@@ -30,12 +30,15 @@ class Sample:
     plates: Mapping[str, npt.ArrayLike] = field(default_factory=dict)
 
 
-def recording_arrays(recording: Recording, initial: InitialModel) -> tuple[Array, Array]:
+def recording_arrays(recording: Recording, initial: InitialModel, *, gaps: bool = False) -> tuple[Array, Array]:
     """Markers (T, M, 3) m and total wrench (T, 6) about the model's ground origin, ground frame, NaN missing.
 
+    Args:
+        gaps: whether frames without any marker, and plates that drop out (NaN), are ridden through.
+
     Raises:
-        RecordingError: no plates, a marker of the model that is not in the recording, a frame without any of its
-            markers, or a wrench that is not finite.
+        RecordingError: no plates, a marker of the model that is not in the recording; without ``gaps`` a frame without
+            any of its markers, or a wrench that is not finite.
     """
     where = recording.path or recording.name
     if not recording.plates:
@@ -48,7 +51,7 @@ def recording_arrays(recording: Recording, initial: InitialModel) -> tuple[Array
     )
     seen = np.isfinite(markers).all(axis=2)
     blind = np.flatnonzero(np.count_nonzero(seen, axis=1) == 0)
-    if len(blind):
+    if len(blind) and (not gaps or not seen.any()):
         k = int(blind[0])
         raise RecordingError(
             f"{where}: frame {k + 1} ({recording.time[k]:.3f} s) has none of the model's {seen.shape[1]} markers, "
@@ -56,7 +59,9 @@ def recording_arrays(recording: Recording, initial: InitialModel) -> tuple[Array
         )
     wrench = initial.ground.wrench_to_ground(recording.total_wrench())
     bad = np.flatnonzero(~np.isfinite(wrench).all(axis=1))
-    if len(bad):
+    if len(bad) and gaps and len(bad) < len(wrench):
+        wrench[bad] = np.nan
+    elif len(bad):
         k = int(bad[0])
         raise RecordingError(
             f"{where}: the plates' wrench at frame {k + 1} ({recording.time[k]:.3f} s) is {wrench[k]}, "
@@ -74,3 +79,19 @@ def sample_arrays(sample: Sample, initial: InitialModel) -> tuple[Array, Array]:
         return np.ascontiguousarray(markers), np.full(6, np.nan)
     total = np.sum([np.asarray(plate, float) for plate in sample.plates.values()], axis=0)
     return np.ascontiguousarray(markers), initial.ground.wrench_to_ground(total)
+
+
+def foreign_load(check: PlateCheck, mass_kg: float, tolerance: float | None) -> str | None:
+    """A sentence where the plates' mean load is not the person's weight; None where it is, or nobody asks.
+
+    Args:
+        tolerance: part of the weight by which they may differ.
+    """
+    load = check.mass_kg_from_plates if check.mass_kg_from_plates is not None else check.mean_mass_kg
+    if tolerance is None or load is None or abs(load - mass_kg) <= tolerance * mass_kg:
+        return None
+    return (
+        f"Warning: the plates carry {load:.1f} kg where the person weighs {mass_kg:.1f} kg (more than "
+        f"{100.0 * tolerance:.0f} % apart): the mass is wrong, or something that the model does not have bears on them "
+        "(a weight, a cable, a rail, a foot beside a plate). The plates are not used."
+    )

@@ -18,7 +18,8 @@ def refuse_moving_origin(model: ModelFile, trial: Trial, finder: LandmarkFinder)
     """Refuse a trial in which the landmark that the model holds fixed in the ground moves, on either foot.
 
     Raises:
-        ModelError: with the distance, the norm of the 2.5 to 97.5 percentile ranges of its three coordinates.
+        ModelError: with the distance, the norm of the 10 to 90 percentile ranges (a marker that is
+            swapped or flies off for a moment has not moved) of its three coordinates.
     """
     limit, name = model.ground.fixed_within_m, model.ground.origin
     if limit is None or name is None:
@@ -27,7 +28,7 @@ def refuse_moving_origin(model: ModelFile, trial: Trial, finder: LandmarkFinder)
         each = LandmarkFinder(trial.match, side, finder.sex, finder.planar)
         for key in sorted(each.markers_of(name)):
             path = trial.paths[key][np.isfinite(trial.paths[key]).all(axis=1)]
-            low, high = np.percentile(path, [2.5, 97.5], axis=0)
+            low, high = np.percentile(path, [10.0, 90.0], axis=0)
             moved = float(np.linalg.norm(high - low))
             if moved > limit:
                 raise ModelError(

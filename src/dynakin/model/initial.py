@@ -33,6 +33,8 @@ class InitialModel:
         marker_variance: (M,) m^2, R of each marker as its set gives it.
         soft_tissue_m: (M,) declared size of the displacement of skin and flesh under each marker.
         ground: ground frame whose origin is the model's ground landmark (the toe).
+        plate_centre: (3,) m, ground frame: mean centre of pressure of the first second, the ground's origin where
+            nothing was measured.
         recorded_markers: names in the recording, in the order of spec.markers.
         side: "right", "left" or "both".
         mass_kg, height_m: as used; height None where nothing needed it.
@@ -51,6 +53,7 @@ class InitialModel:
     marker_variance: Array
     soft_tissue_m: Array
     ground: GroundFrame
+    plate_centre: Array
     recorded_markers: tuple[str, ...]
     side: str
     mass_kg: float

@@ -4,12 +4,17 @@ frames, inertia from the table, coordinates from the landmarks."""
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from dynakin.model.definition import ModelDefinition
 from dynakin.model.initial import InitialModel
 from dynakin.model.measure import measure
 from dynakin.model.priors import Bounds, Priors
 from dynakin.recordings import GroundFrame, Recording
+
+Array = npt.NDArray[np.float64]
+
+_LOADED_N = 20.0  # a lesser load has no centre of pressure worth the name
 
 
 def initialise(
@@ -67,6 +72,7 @@ def initialise(
         marker_variance=np.array([site.variance for site in plan.sites]),
         soft_tissue_m=np.array([site.soft_tissue_m for site in plan.sites]),
         ground=rest.ground,
+        plate_centre=first_centre_of_pressure(recording, rest.ground),
         recorded_markers=tuple(site.recorded for site in plan.sites),
         side=rest.side,
         mass_kg=rest.mass_kg,
@@ -75,3 +81,16 @@ def initialise(
         messages=tuple(messages),
         plan=plan,
     )
+
+
+def first_centre_of_pressure(recording: Recording, ground: GroundFrame) -> Array:
+    """Mean centre of pressure (3,) m of the first second, on the ground (y = 0), ground frame; 0 without plates."""
+    if not recording.plates:
+        return np.zeros(3)
+    wrench = ground.wrench_to_ground(recording.total_wrench())
+    wrench = wrench[recording.time < recording.time[0] + 1.0]
+    loaded = wrench[np.isfinite(wrench).all(axis=1) & (wrench[:, 1] > _LOADED_N)]
+    if not len(loaded):
+        return np.zeros(3)
+    force, moment = loaded[:, 1].mean(), loaded[:, 3:].mean(axis=0)
+    return np.array([moment[2] / force, 0.0, -moment[0] / force])

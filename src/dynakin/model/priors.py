@@ -37,9 +37,9 @@ class Priors(Strict):
     """The same for translations."""
     length_fraction: Positive = 0.05
     """Lengths, of their value: joint centres are known to 1 or 2 cm, 3 to 5 % of a leg segment."""
-    marker_m: Positive = 0.02
-    """Local marker positions: soft tissue under load and the frame's own error, 1 to 3 cm on thigh and
-    trunk."""
+    marker_m: Positive = 0.01
+    """Local marker positions: landmarks are found again to within 6 to 21 mm (Della Croce et al. 2005), and the frame
+    that they are measured in hangs on a few of them. What skin and flesh do later is not part of it."""
     mass_fraction: Positive = 0.10
     """Segment masses, of the table's value: half of the +-20 % of (9), so that the bound lies at two
     sigma."""

@@ -12,6 +12,7 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.errors import ModelError
 from dynakin.model.plan import ModelPlan
 from dynakin.model.schema import Frame
 from dynakin.model.schema import Segment as SegmentEntry
@@ -25,6 +26,9 @@ def classical_angles(chain: PlanarChain, plan: ModelPlan, landmarks: Mapping[str
 
     Args:
         landmarks: (T, 3) m each, ground frame, as `landmark_paths` gives them.
+
+    Raises:
+        ModelError: the recording does not give a landmark that a direction needs.
 
     Source: Bonnet et al., section II.A, after Cappozzo et al. 1995 [1].
     """
@@ -74,13 +78,23 @@ def _direction(plan: ModelPlan, segment: SegmentEntry, landmarks: Mapping[str, A
     if isinstance(segment.frame, Frame):
         main = segment.frame.main or ("x" if segment.frame.x else "y")
         start, end = segment.frame.x or ("", "") if main == "x" else segment.frame.y or ("", "")
-        return _angle(landmarks[end] - landmarks[start]) - (0.0 if main == "x" else 0.5 * np.pi)
+        return _angle(_line(landmarks, segment.name, start, end)) - (0.0 if main == "x" else 0.5 * np.pi)
     # Axes of the ground while standing: since then turned with the line to the next joint.
     for child in plan.model.segments:
         start, end = segment.origin or "", child.origin or ""
         if child.parent == segment.name and start in landmarks and end in landmarks:
             return _angle(landmarks[end] - landmarks[start]) - _angle(plan.geometry.placement(child))
     return np.zeros(len(next(iter(landmarks.values()))))
+
+
+def _line(landmarks: Mapping[str, Array], segment: str, start: str, end: str) -> Array:
+    missing = [name for name in (start, end) if name not in landmarks]
+    if missing:  # lengths may come from another recording, standing, that has the markers
+        raise ModelError(
+            f"the classical direction of {segment} needs the landmarks {start} and {end}, and the recording's markers "
+            f"do not give {' and '.join(missing)}"
+        )
+    return landmarks[end] - landmarks[start]
 
 
 def _angle(line: Array) -> Array:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -85,10 +86,41 @@ def condense(
     Raises:
         RecordingError: too few such frames.
     """
-    names, table, scale = parameter_names(chain), table_parameters(chain), parameter_scales(chain)
     flags = [dict(zip(INERTIA_NAMES, plan.estimated_inertia(link.name), strict=True)) for link in chain.links]
-    estimated = np.array([entry[name] for entry in flags for name in PLANAR_NAMES])
-    Y, y = wrench_regressor(chain, kinematics), wrench[:, IN_PLANE]
+    return stacked(
+        parameter_names(chain),
+        table_parameters(chain),
+        parameter_scales(chain),
+        np.array([entry[name] for entry in flags for name in PLANAR_NAMES]),
+        wrench_regressor(chain, kinematics),
+        wrench[:, IN_PLANE],
+        mass_kg=mass_kg,
+        sigma=sigma,
+    )
+
+
+def stacked(
+    names: tuple[str, ...],
+    table: Array,
+    scale: Array,
+    estimated: Mask,
+    Y: Array,
+    y: Array,
+    *,
+    mass_kg: float | None = None,
+    sigma: Sequence[float],
+) -> Condensed:
+    """The same of any regressor of the wrench, in the plane or in space.
+
+    Args:
+        names, table, scale, estimated: (p,) as in `Condensed`.
+        Y, y: (T, r, p) and (T, r), measured components; frames with NaN are left out.
+        mass_kg: total mass held by the soft constraint; None: not held.
+        sigma: (r,) declared standard deviations, N and N m.
+
+    Raises:
+        RecordingError: fewer frames than parameters.
+    """
     known = np.isfinite(Y).all(axis=(1, 2)) & np.isfinite(y).all(axis=1)
     frames, unknowns = int(known.sum()), int(estimated.sum())
     if frames < unknowns:

@@ -12,10 +12,10 @@ import xarray as xr
 from dynakin.errors import ConfigError
 from dynakin.model import InitialModel, ModelDefinition
 from dynakin.recordings import Recording
+from dynakin.recordings.smoothing import CUTOFF_HZ, MAX_GAP_S, smooth
 from dynakin.reference.chain import Kinematics, PlanarChain
 from dynakin.reference.classical import classical_angles, hinge_paths
 from dynakin.reference.landmark_paths import landmark_paths
-from dynakin.reference.smoothing import CUTOFF_HZ, MAX_GAP_S, smooth
 from dynakin.reference.table_dynamics import IN_PLANE, table_dynamics
 from dynakin.results import COMPONENTS
 

@@ -1,9 +1,20 @@
-"""The report of a run: one HTML file with words first, then figures; it needs no network and no other file.
+"""The report of a run or of a comparison: one HTML file with words first, then figures; it needs no network and no
+other file.
 
 `save_figures` writes the paper's figures of a run as files of their own.
 """
 
-from dynakin.report.figures import save_figures
+from dynakin.report.comparison_page import render_comparison
+from dynakin.report.figures import save_figures, save_sensitivity_figure
 from dynakin.report.page import render_report, write_report
+from dynakin.report.sensitivity import Sensitivity, read_sensitivity
 
-__all__ = ["render_report", "save_figures", "write_report"]
+__all__ = [
+    "Sensitivity",
+    "read_sensitivity",
+    "render_comparison",
+    "render_report",
+    "save_figures",
+    "save_sensitivity_figure",
+    "write_report",
+]

@@ -8,10 +8,11 @@ from typing import Literal
 import numpy as np
 
 from dynakin.results import Estimate, Parameter
+from dynakin.results.adaptation import BAND, constant_groups
 
-# A constant that still moves by this share of its size in the last quarter of the recording has not settled: over a
-# recording as long again it would move by several per cent.
-MOVING = 0.01
+# A constant that still moves by more than that in the last quarter has not settled: over a recording as long again it
+# would move by several per cent.
+MOVING = BAND
 # A standard deviation that shrinks by less than this says that the recording told nothing about the constant.
 TAUGHT = 0.05
 
@@ -36,14 +37,7 @@ class Convergence:
 
 def convergence(estimate: Estimate) -> list[Convergence]:
     """Lengths, masses, and moments of inertia; a kind that was not estimated is left out."""
-    free = [p for p in estimate.parameters if p.estimated and p.initial != 0.0]
-    inertial = [p for p in free if p.kind == "inertia"]
-    groups = {
-        "lengths": [p for p in free if p.kind == "length"],
-        "masses": [p for p in inertial if p.name.endswith("/mass")],
-        "moments of inertia": [p for p in inertial if p.name.rpartition("/")[2] in ("ixx", "iyy", "izz")],
-    }
-    return [_judge(estimate, title, group) for title, group in groups.items() if group]
+    return [_judge(estimate, title, group) for title, group in constant_groups(estimate.parameters).items()]
 
 
 def _judge(estimate: Estimate, title: str, group: list[Parameter]) -> Convergence:

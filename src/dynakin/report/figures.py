@@ -1,4 +1,4 @@
-"""Figures 4 to 9 of the paper for any run, as files for papers: `save_figures`."""
+"""The paper's figures for any run, and mean curves of its repetitions, as files for papers: `save_figures`."""
 
 from __future__ import annotations
 
@@ -6,19 +6,21 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import matplotlib as mpl
-import xarray as xr
 from matplotlib.figure import Figure
 
+from dynakin.comparison import Trial
 from dynakin.errors import ConfigError, OutputError
 from dynakin.report.movement_figures import angles_figure, knee_moment_figure, markers_figure, wrench_figure
 from dynakin.report.parameter_figures import inertias_figure, lengths_and_masses_figure
 from dynakin.report.plot import FILE_STYLE
+from dynakin.report.repetition_figure import repetitions_figure
+from dynakin.report.sensitivity import Sensitivity, read_sensitivity, sensitivity_figure
 from dynakin.results import Estimate
 
 FORMATS = ("svg", "pdf", "png")
 _DATES: dict[str, dict[str, None]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {}}
 
-Draw = Callable[[Estimate, xr.Dataset | None], Figure | None]
+Draw = Callable[[Estimate, Trial | None], Figure | None]
 FIGURES: dict[str, Draw] = {
     "figure4_markers": markers_figure,
     "figure5_angles": angles_figure,
@@ -26,8 +28,10 @@ FIGURES: dict[str, Draw] = {
     "figure7_knee_moment": knee_moment_figure,
     "figure8_lengths_and_masses": lengths_and_masses_figure,
     "figure9_inertias": inertias_figure,
+    "repetitions": repetitions_figure,
 }
 """File name -> what draws it; it gives None where the estimate has nothing to show."""
+SENSITIVITY_FIGURE = "figure3_sensitivity"
 
 
 def save_figures(
@@ -35,37 +39,60 @@ def save_figures(
     folder: str | Path,
     formats: Sequence[str] = FORMATS,
     *,
-    reference: xr.Dataset | None = None,
+    comparison: Trial | None = None,
+    sensitivity: Sensitivity | None = None,
 ) -> list[Path]:
-    """Write Figures 4 to 9 of the paper for this run, 300 dots an inch where dots are needed.
+    """Write Figures 4 to 9 of the paper for this run and its repetitions' mean curves, 300 dots an inch where dots
+    are needed.
 
     Args:
         folder: made where it is not there; files of the same names are replaced.
         formats: some of svg, pdf, png.
-        reference: `dynakin.reference.Reference.data`: classical angles (Figure 5), the table's wrench (6) and moments
-            (7), drawn beside the estimate. Its times are the estimate's.
+        comparison: this estimate beside the reference methods (`dynakin.comparison.trial_of`): classical angles (Figure
+            5), the table's wrench (6) and moments (7) and their mean curves are drawn too.
+        sensitivity: a criterion over the gains (`read_sensitivity`): Figure 3 is drawn too.
 
     Returns:
         The files written, in the order of the paper; a figure without anything to show is left out.
 
     Raises:
-        ConfigError: an unknown format, or a reference of another recording.
+        ConfigError: an unknown format, or a comparison of another recording.
         OutputError: the folder cannot be written.
     """
+    if comparison is not None and len(comparison.time) != len(estimate.time):
+        raise ConfigError(
+            f"comparison has {len(comparison.time)} frames, expected the estimate's {len(estimate.time)}: "
+            "make it from the same recording"
+        )
+    draws: dict[str, Callable[[], Figure | None]] = {
+        name: lambda draw=draw: draw(estimate, comparison)  # type: ignore[misc]
+        for name, draw in FIGURES.items()
+    }
+    if sensitivity is not None:
+        draws = {SENSITIVITY_FIGURE: lambda: sensitivity_figure(sensitivity), **draws}
+    return _write(draws, Path(folder), formats)
+
+
+def save_sensitivity_figure(path: str | Path, folder: str | Path, formats: Sequence[str] = FORMATS) -> list[Path]:
+    """Write Figure 3 of the paper from a file of a criterion over the gains (see `read_sensitivity`).
+
+    Raises:
+        ConfigError: an unknown format, or no such file. OutputError: the folder cannot be written.
+    """
+    grid = read_sensitivity(path)
+    return _write({SENSITIVITY_FIGURE: lambda: sensitivity_figure(grid)}, Path(folder), formats)
+
+
+def _write(draws: dict[str, Callable[[], Figure | None]], folder: Path, formats: Sequence[str]) -> list[Path]:
     unknown = [name for name in formats if name not in FORMATS]
     if unknown:
         raise ConfigError(f"formats: {unknown[0]!r} is not known, expected some of {', '.join(FORMATS)}")
-    if reference is not None and reference.sizes["time"] != len(estimate.time):
-        raise ConfigError(
-            f"reference has {reference.sizes['time']} frames, expected the estimate's {len(estimate.time)}: "
-            "make it from the same recording"
-        )
-    folder, written = Path(folder), []
+    written = []
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for name, draw in FIGURES.items():
+        for name, draw in draws.items():
             with mpl.rc_context({**FILE_STYLE, "svg.hashsalt": name}):
-                figure = draw(estimate, reference)
+                figure = draw()
                 for form in formats if figure is not None else ():
                     assert figure is not None
                     figure.savefig(folder / f"{name}.{form}", dpi=300, metadata=_DATES[form])

@@ -17,13 +17,39 @@ from dynakin.report.labels import (
     words,
 )
 from dynakin.results import Estimate
+from dynakin.results.bounds import counts_in_words
 from dynakin.results.consistency import CONSISTENT
-from dynakin.results.metrics import evaluation_window, speed_consistency, window_consistency
+from dynakin.results.metrics import ADAPTATION_S, evaluation_window, speed_consistency, window_consistency
+from dynakin.results.soft_tissue import excess_in_words
 
 # Expected one frame ahead against seen: further apart than this, the estimate follows the measurements.
 FOLLOWING = 4.0
 
 Level = Literal["good", "note", "warning"]
+
+
+# How the sentences begin that a run says of its plates as a whole.
+PLATE_WORDS = ("The plates are ", "Warning: the plates carry ")
+
+# What to try: with the paper's process noise, with white jerk.
+ADVICE = {
+    "follows": (
+        "Smaller process noise (noise.coordinate, noise.speed, noise.acceleration) lets the model carry more.",
+        "A smaller noise.jerk lets the model carry more.",
+    ),
+    "cautious": (
+        "Smaller noise.coordinate, noise.speed and noise.acceleration; then a smaller noise.marker_scale.",
+        "A smaller noise.marker_sd_m and noise.jerk; then a smaller noise.soft_tissue.",
+    ),
+    "overconfident": (
+        "A larger noise.marker_scale, noise.force and noise.moment; look for markers that fit badly first.",
+        "A larger noise.soft_tissue, noise.force and noise.moment; look for markers that fit badly first.",
+    ),
+    "speeds": (
+        "Smaller noise.coordinate and noise.speed tie each speed to its coordinate.",
+        "A live estimate steps where a measurement corrects it; smoothing (--smooth) does not.",
+    ),
+}
 
 
 @dataclass(frozen=True)
@@ -61,12 +87,14 @@ def insights(estimate: Estimate, metrics: dict[str, Any]) -> list[Insight]:
     """All findings, in the order of the report."""
     found = [
         _markers(estimate, metrics),
-        _wrench(metrics),
-        _prediction(metrics),
+        _wrench(estimate, metrics),
+        _prediction(estimate, metrics),
         _consistency(estimate, metrics),
         _speeds(estimate),
+        _adaptation(metrics),
         *_constants(estimate),
-        _bounds(estimate),
+        _bounds(estimate, metrics),
+        _soft_tissue(estimate, metrics),
         _joint_limits(estimate),
         _missing(estimate, metrics),
         _gated(estimate),
@@ -102,10 +130,12 @@ def _markers(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     )
 
 
-def _wrench(metrics: dict[str, Any]) -> Insight | None:
+def _wrench(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     rms = metrics["wrench"]["rms"]
+    told = [text for text in estimate.messages if text.startswith(PLATE_WORDS)]
     if not rms:
-        return Insight("note", "Force plates", "No wrench was compared: none was measured, or none is modelled.")
+        why = " ".join(told) or "No wrench was compared: none was measured, or none is modelled."
+        return Insight("warning" if told else "note", "Force plates", why.removeprefix("Warning: "))
     text = [
         f"{COMPONENT_LABELS[name][0].lower()} {number(value, COMPONENT_LABELS[name][1])}"
         + (f" ({number(share, digits=2)} %)" if (share := metrics["wrench"]["nrms_percent"][name]) is not None else "")
@@ -114,11 +144,12 @@ def _wrench(metrics: dict[str, Any]) -> Insight | None:
     return Insight(
         "note",
         "Force plates",
-        f"RMS difference between the model’s wrench and the plates’: {listed(text)}; percent of the measured RMS.",
+        f"RMS difference between the model’s wrench and the plates’: {listed(text)}; percent of the measured RMS."
+        + "".join(f" {sentence}" for sentence in told),
     )
 
 
-def _prediction(metrics: dict[str, Any]) -> Insight | None:
+def _prediction(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     """How much of the fit is the model, and how much is following the measurement of the same frame."""
     ahead, fitted = metrics["prediction"]["wrench"]["rms"], metrics["wrench"]["rms"]
     ratio = {name: ahead[name] / fitted[name] for name in fitted if fitted[name] and ahead.get(name) is not None}
@@ -137,7 +168,7 @@ def _prediction(metrics: dict[str, Any]) -> Insight | None:
         "One frame ahead",
         f"{text} That is {ratio[worst]:.0f} times as far as after it is seen ({COMPONENT_LABELS[worst][0].lower()}): "
         "the good fit above comes from following each measurement, less from a model that explains the movement.",
-        "Smaller process noise (noise.coordinate, noise.speed, noise.acceleration) lets the model carry more.",
+        _advice(estimate, "follows"),
     )
 
 
@@ -148,16 +179,21 @@ def _consistency(estimate: Estimate, metrics: dict[str, Any]) -> Insight:
     figure = "" if ratio is None else f" (Mean normalised innovation squared {number(ratio)}, 1 is right.)"
     advice = ""
     if ratio is not None and ratio < CONSISTENT[0]:
-        advice = "Smaller noise.coordinate, noise.speed and noise.acceleration; then a smaller noise.marker_scale."
+        advice = _advice(estimate, "cautious")
     elif ratio is not None and ratio > CONSISTENT[1]:
-        advice = "A larger noise.marker_scale, noise.force and noise.moment; look for markers that fit badly first."
+        advice = _advice(estimate, "overconfident")
     return Insight("good" if good else "warning", "Uncertainty", found.verdict + figure, advice)
 
 
 def _speeds(estimate: Estimate) -> Insight | None:
     _, verdict = speed_consistency(estimate, evaluation_window(estimate.time))
-    advice = "Smaller noise.coordinate and noise.speed tie each speed to its coordinate."
-    return Insight("warning", "Speeds", verdict, advice) if verdict else None
+    return Insight("warning", "Speeds", verdict, _advice(estimate, "speeds")) if verdict else None
+
+
+def _advice(estimate: Estimate, finding: str) -> str:
+    """What to try, for the process model of this run: the paper's, or white jerk."""
+    white_jerk = float(estimate.config.get("noise", {}).get("jerk", 0.0)) > 0.0
+    return ADVICE[finding][int(white_jerk)]
 
 
 def _constants(estimate: Estimate) -> list[Insight]:
@@ -179,7 +215,7 @@ def _constants(estimate: Estimate) -> list[Insight]:
                 f"These are the values {source}, not identified ones: none of {group.count} changed by more than "
                 f"{change} %, and {shrunk}."
             )
-            advice = "" if group.title == "lengths" else "Smaller process noise, and a livelier movement with the arms."
+            advice = "" if group.title == "lengths" else "A livelier movement, with the arms too; then smaller noise."
             found.append(Insight("note", title, text, advice))
         else:
             text = f"Settled: {group.count}, changed from the start by up to {change} %; {shrunk}."
@@ -187,18 +223,71 @@ def _constants(estimate: Estimate) -> list[Insight]:
     return found
 
 
-def _bounds(estimate: Estimate) -> Insight:
+def _bounds(estimate: Estimate, metrics: dict[str, Any]) -> Insight:
     free = [p for p in estimate.parameters if p.estimated]
     names = short_marker_names(estimate.marker_names)
     stuck = [parameter_label(p, names) for p in free if p.at_bound]
+    passing = {n: entry for n, entry in metrics["bounds"]["parameters"].items() if not entry["at_end"]}
+    for_a_time = ""
+    if passing:
+        most = max(passing, key=lambda name: passing[name]["share_of_time"])
+        label = next(parameter_label(p, names) for p in free if p.name == most)
+        share = number(100.0 * passing[most]["share_of_time"], "%", digits=2)
+        for_a_time = (
+            f" {plural(len(passing), 'other')} touched a bound and left it (longest: {label}, {share} of the time)."
+        )
     if not stuck:
-        return Insight("good", "Bounds", f"None of the {len(free)} estimated parameters ends on its bound.")
+        return Insight("good", "Bounds", f"None of the {len(free)} estimated parameters ends on its bound.{for_a_time}")
+    counts = counts_in_words(metrics["bounds"]["by_kind"], "at_end")
     return Insight(
         "warning",
         "Bounds",
-        f"{len(stuck)} of {len(free)} estimated parameters end on a bound: {listed(stuck)}. The data ask for a value "
-        "that the person cannot have, so the model or the noise settings do not fit there.",
+        f"{len(stuck)} of {len(free)} estimated parameters end on a bound ({counts}): {listed(stuck)}. The data ask "
+        f"for a value that the person cannot have, so the model or the noise settings do not fit there.{for_a_time}",
         "Check the mass, the height and the markers of those segments; then the film for a marker off its place.",
+    )
+
+
+def _adaptation(metrics: dict[str, Any]) -> Insight:
+    """When the estimate settled, beside the time from which the figures are taken."""
+    found = metrics["adaptation"]
+    if found["after_s"] is None:
+        lost = any(misfit["after_s"] is None for misfit in found["misfits"].values())
+        return Insight("warning" if lost else "note", "Adaptation", found["verdict"])
+    if found["after_s"] <= ADAPTATION_S:
+        return Insight("good", "Adaptation", found["verdict"])
+    return Insight(
+        "note",
+        "Adaptation",
+        f"{found['verdict']} The figures of this page are taken from {metrics['window']['start_s']:.4g} s on and hold "
+        "part of that.",
+    )
+
+
+def _soft_tissue(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
+    """Markers that move on their segments further than skin does."""
+    names = short_marker_names(estimate.marker_names)
+    markers = {names[name]: found for name, found in metrics["soft_tissue"]["markers"].items()}
+    moved = {name: found["max_mm"] for name, found in markers.items() if found["max_mm"] is not None}
+    if not moved:
+        return None
+    text = excess_in_words(markers)
+    if text:
+        return Insight(
+            "warning",
+            "Soft tissue",
+            text,
+            "Look whether each sits on the segment that the marker set says. If so, the segment is not as rigid as the "
+            "model’s (a trunk that bends), or its angle is estimated wrongly and the marker’s place makes up for it.",
+        )
+    most = max(moved, key=lambda name: moved[name])
+    declared = markers[most]["declared_mm"]
+    beside = "" if declared is None else f" (declared {number(declared, 'mm', digits=2)})"
+    return Insight(
+        "good",
+        "Soft tissue",
+        f"No marker moves further on its segment than skin does; furthest is {most} with "
+        f"{number(moved[most], 'mm', digits=2)}{beside}.",
     )
 
 

@@ -3,25 +3,25 @@
 from __future__ import annotations
 
 import numpy as np
-import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
+from dynakin.comparison import Trial, angle_differences, moment_differences
+from dynakin.comparison.methods import AT, CLASSICAL, Method
 from dynakin.report.body import chain_of, colours_of, floor_height, marker_segments
-from dynakin.report.cycle import middle_cycle
 from dynakin.report.labels import COMPONENT_LABELS, moment_note, number, sentence, words
+from dynakin.report.method_styles import LineStyle, method_styles
 from dynakin.report.panels import band_is_too_wide
-from dynakin.report.plot import ESTIMATED, INK, MEASURED, QUIET, REFERENCE
-from dynakin.results import COMPONENTS, Estimate, evaluation_window
+from dynakin.report.plot import ESTIMATED, INK, MEASURED, QUIET
+from dynakin.results import COMPONENTS, Estimate, evaluation_window, repetitions_of
 from dynakin.results.fit import signal_fit
 
 _PICTURES = 6
-_DASHED = (0, (4, 1.6))
 
 
-def markers_figure(estimate: Estimate, reference: xr.Dataset | None = None) -> Figure | None:
+def markers_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
     """Figure 4: the stick figure and the markers, measured (hollow) and estimated (filled), over one cycle."""
     cycle = middle_cycle(estimate)
     frames = np.linspace(cycle.start, cycle.stop - 1, _PICTURES).astype(int)
@@ -62,29 +62,27 @@ def markers_figure(estimate: Estimate, reference: xr.Dataset | None = None) -> F
     return figure
 
 
-def angles_figure(estimate: Estimate, reference: xr.Dataset | None = None) -> Figure | None:
+def angles_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
     """Figure 5: every free coordinate with its band, beside the classical method's."""
     free = [
         k for k in range(len(estimate.coordinate_names)) if np.any(_by_coordinate(estimate, "coordinates_sd")[:, k])
     ]
     if not free:
         return None
-    classical = None if reference is None else reference.get("coordinates_unfiltered", reference.get("coordinates"))
+    classical = _reference(comparison, CLASSICAL)
+    differences = {row.coordinate: row for row in angle_differences([] if comparison is None else [comparison])}
     columns = min(4, len(free))
     rows = -(-len(free) // columns)
     figure = Figure(figsize=(7.2, 0.5 + 1.75 * rows), layout="constrained")
     every = figure.subplots(rows, columns, squeeze=False).ravel()
-    window = evaluation_window(estimate.time)
     values, sd = _by_coordinate(estimate, "coordinates"), _by_coordinate(estimate, "coordinates_sd")
     for axes, k in zip(every, free, strict=False):
         name = estimate.coordinate_names[k]
         factor, unit = (180.0 / np.pi, "deg") if estimate.is_rotation()[k] else (1000.0, "mm")
         title, notes = sentence(words(name)), []
-        if classical is not None and name in classical["coordinate"].values:
-            other = factor * classical.sel(coordinate=name).values
-            axes.plot(estimate.time, other, color=REFERENCE, linewidth=1.0, linestyle=_DASHED, zorder=3)
-            rms = signal_fit(factor * values[window, k], other[window]).rms
-            notes.append(f"RMS difference {number(rms, unit)}")
+        if classical is not None:
+            _draw(axes, estimate.time, factor * classical.coordinates[:, k], classical, zorder=3)
+            notes.append(f"RMS difference {number(differences[name].rms.mean, unit)}")
         axes.plot(estimate.time, factor * values[:, k], color=ESTIMATED, linewidth=1.2)
         axes.margins(y=0.12)
         half = 2.0 * factor * sd[:, k]
@@ -100,18 +98,18 @@ def angles_figure(estimate: Estimate, reference: xr.Dataset | None = None) -> Fi
     for axes in every[len(free) :]:
         axes.set_visible(False)
     figure.supxlabel("time, s", fontsize=8, color=QUIET)
-    _key(figure, every[0], band=True, other="" if classical is None else "classical method")
+    _key(figure, every[0], band=True, other=classical)
     return figure
 
 
-def wrench_figure(estimate: Estimate, reference: xr.Dataset | None = None) -> Figure | None:
+def wrench_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
     """Figure 6: the wrench as measured, estimated, and from the table and classical angles ("AT")."""
     measured = estimate.data["wrench_measured"].transpose("time", "component").values
     estimated = estimate.data["wrench_estimated"].transpose("time", "component").values
     shown = [k for k in range(len(COMPONENTS)) if np.isfinite(estimated[:, k]).any()]
     if not shown:
         return None
-    at = None if reference is None else reference["wrench_estimated"].transpose("time", "component").values
+    at = _reference(comparison, AT)
     figure = Figure(figsize=(7.2, 0.5 + 1.35 * len(shown)), layout="constrained")
     every = figure.subplots(len(shown), 1, sharex=True, squeeze=False).ravel()
     window = evaluation_window(estimate.time)
@@ -119,45 +117,48 @@ def wrench_figure(estimate: Estimate, reference: xr.Dataset | None = None) -> Fi
         title, unit = COMPONENT_LABELS[COMPONENTS[k]]
         axes.plot(estimate.time, measured[:, k], color=MEASURED, linewidth=2.8, solid_capstyle="round")
         if at is not None:
-            axes.plot(estimate.time, at[:, k], color=REFERENCE, linewidth=0.9, linestyle=_DASHED)
+            _draw(axes, estimate.time, at.wrench[:, k], at)
         axes.plot(estimate.time, estimated[:, k], color=ESTIMATED, linewidth=1.0)
         rms = [f"EKF {number(signal_fit(measured[window, k], estimated[window, k]).rms, unit)}"]
         if at is not None:
-            rms.append(f"AT {number(signal_fit(measured[window, k], at[window, k]).rms, unit)}")
+            rms.append(f"AT {number(signal_fit(measured[window, k], at.wrench[window, k]).rms, unit)}")
         axes.set_title(f"{title} {COMPONENTS[k]}, {unit}")
         if np.isfinite(measured[:, k]).any():
             axes.set_title(f"RMS difference: {', '.join(rms)}", loc="right", color=QUIET, weight="normal", fontsize=8)
         axes.set_xlim(float(estimate.time[0]), float(estimate.time[-1]))
     every[-1].set_xlabel("time, s")
-    _key(figure, every[0], measured=True, other="" if at is None else "AT: table and classical angles")
+    _key(figure, every[0], measured=True, other=at)
     return figure
 
 
-def knee_moment_figure(estimate: Estimate, reference: xr.Dataset | None = None) -> Figure | None:
+def knee_moment_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
     """Figure 7: the moment about each knee, estimated, and from the table and classical angles ("AT")."""
     names = [name for name in estimate.coordinate_names if "knee" in name]
     if not names:
         return None
     figure = Figure(figsize=(4.6, 0.5 + 2.3 * len(names)), layout="constrained")
     every = figure.subplots(len(names), 1, sharex=True, squeeze=False).ravel()
-    window = evaluation_window(estimate.time)
+    at = _reference(comparison, AT)
+    differences = {row.coordinate: row for row in moment_differences([] if comparison is None else [comparison])}
     for axes, name in zip(every, names, strict=True):
         moment = estimate.data["moments"].sel(coordinate=name).values
         axes.plot(estimate.time, moment, color=ESTIMATED, linewidth=1.2)
+        if "moments_sd" in estimate.data:
+            sd = estimate.data["moments_sd"].sel(coordinate=name).values
+            axes.fill_between(estimate.time, moment - 2.0 * sd, moment + 2.0 * sd, color=ESTIMATED, alpha=0.2, lw=0)
         note = moment_note(estimate, name)
         axes.set_title(f"{sentence(words(name))} moment, N m{f' ({note})' if note else ''}")
-        if reference is not None and name in reference["coordinate"].values:
-            other = reference["moments"].sel(coordinate=name).values
-            axes.plot(estimate.time, other, color=REFERENCE, linewidth=1.0, linestyle=_DASHED)
-            fit = signal_fit(moment[window], other[window])
+        if at is not None:
+            _draw(axes, estimate.time, at.moments[:, estimate.coordinate_names.index(name)], at)
+            row = differences[name]
             axes.set_xlabel(
-                f"time, s\nRMS difference {number(fit.rms, 'N m')}, "
-                f"{number(fit.nrms_rms_percent, digits=2)} % of the EKF’s RMS"
+                f"time, s\nRMS difference {number(row.rms.mean, 'N m')}, "
+                f"{number(row.nrms_rms_percent.mean, digits=2)} % of AT’s RMS"
             )
         else:
             axes.set_xlabel("time, s")
         axes.set_xlim(float(estimate.time[0]), float(estimate.time[-1]))
-    _key(figure, every[0], other="" if reference is None else "AT: table and classical angles")
+    _key(figure, every[0], other=at)
     return figure
 
 
@@ -165,7 +166,32 @@ def _by_coordinate(estimate: Estimate, name: str) -> np.ndarray:
     return np.asarray(estimate.data[name].transpose("time", "coordinate").values)
 
 
-def _key(figure: Figure, axes: Axes, *, measured: bool = False, band: bool = False, other: str = "") -> None:
+def middle_cycle(estimate: Estimate) -> slice:
+    """Frames of the middle repetition; the whole recording where nothing repeats."""
+    found = repetitions_of(estimate).items
+    if not found:
+        return slice(0, len(estimate.time))
+    middle = found[len(found) // 2]
+    return slice(middle.first, middle.last + 1)
+
+
+def _reference(comparison: Trial | None, kind: str) -> Method | None:
+    methods = [] if comparison is None else comparison.of_kind(kind)
+    return methods[0] if methods else None
+
+
+def _draw(axes: Axes, time: np.ndarray, values: np.ndarray, method: Method, zorder: float = 2.0) -> None:
+    style = _style(method)
+    axes.plot(time, values, color=style.colour, linewidth=style.width, linestyle=style.pattern, zorder=zorder)
+
+
+def _style(method: Method) -> LineStyle:
+    return method_styles([method.name])[method.name]
+
+
+def _key(
+    figure: Figure, axes: Axes, *, measured: bool = False, band: bool = False, other: Method | None = None
+) -> None:
     """One line of words above the panels, each with the line that it names."""
     handles: list[Artist] = []
     if measured:
@@ -173,6 +199,9 @@ def _key(figure: Figure, axes: Axes, *, measured: bool = False, band: bool = Fal
     handles += axes.plot([], [], color=ESTIMATED, linewidth=1.4, label="EKF")
     if band:
         handles.append(axes.fill_between([], [], [], color=ESTIMATED, alpha=0.18, label="± 2 standard deviations"))
-    if other:
-        handles += axes.plot([], [], color=REFERENCE, linewidth=1.2, linestyle=_DASHED, label=other)
+    if other is not None:
+        style = _style(other)
+        handles += axes.plot(
+            [], [], color=style.colour, linewidth=style.width, linestyle=style.pattern, label=other.name
+        )
     figure.legend(handles=handles, loc="outside upper left", ncols=4, borderaxespad=0.2, columnspacing=1.8)

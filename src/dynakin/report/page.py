@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jinja2
 import tomli_w
@@ -16,6 +16,9 @@ from dynakin.results import Estimate, compute_metrics
 from dynakin.results.config_file import plain
 from dynakin.results.versions import versions
 
+if TYPE_CHECKING:
+    from dynakin.comparison import Trial
+
 KEY_LABELS = {
     "measured": "measured",
     "estimated": "estimated",
@@ -24,9 +27,8 @@ KEY_LABELS = {
 }
 
 
-def render_report(estimate: Estimate, *, metrics: dict[str, Any] | None = None) -> str:
-    """The report of a run as one HTML text that needs nothing else."""
-    metrics = metrics or compute_metrics(estimate)
+def render_page(template: str, **content: Any) -> str:
+    """One of the templates, with what all pages have: the names of lines, the versions."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("dynakin.report", "templates"),
         autoescape=True,
@@ -34,30 +36,47 @@ def render_report(estimate: Estimate, *, metrics: dict[str, Any] | None = None) 
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
+    return environment.get_template(template).render(key_labels=KEY_LABELS, versions=versions(), **content)
+
+
+def render_report(estimate: Estimate, *, metrics: dict[str, Any] | None = None, comparison: Trial | None = None) -> str:
+    """The report of a run as one HTML text that needs nothing else.
+
+    Args:
+        comparison: this estimate beside the reference methods (`dynakin.comparison.trial_of`).
+    """
+    metrics = metrics or compute_metrics(estimate)
     found = insights(estimate, metrics)
-    return environment.get_template("report.html.j2").render(
+    preset = estimate.config.get("preset")
+    return render_page(
+        "report.html.j2",
+        eyebrow="dynakin report",
         title=estimate.recording.name,
-        model=estimate.model_name,
-        preset=estimate.config.get("preset"),
+        chips=[
+            f"model {estimate.model_name}",
+            *([f"preset {preset}"] if preset else []),
+            f"dynakin {versions()['dynakin']}",
+        ],
         what_was_run=what_was_run(estimate),
         figures=_headline(estimate, metrics),
         insights=found,
         in_short=in_short(found),
         warnings=sum(insight.level == "warning" for insight in found),
         player=playback(estimate),
-        sections=sections(estimate, metrics),
-        key_labels=KEY_LABELS,
+        sections=sections(estimate, metrics, comparison),
         messages=estimate.messages,
         events=[event for event in estimate.events if event.kind != "missing"],
         parameters=_parameter_rows(estimate),
         configuration=tomli_w.dumps(plain(estimate.config)),
-        versions=versions(),
     )
 
 
-def write_report(estimate: Estimate, path: Path, *, metrics: dict[str, Any] | None = None) -> None:
+def write_report(
+    estimate: Estimate, path: Path, *, metrics: dict[str, Any] | None = None, comparison: Trial | None = None
+) -> None:
     """Write `render_report` to ``path``."""
-    path.write_text(render_report(estimate, metrics=metrics), encoding="utf-8", newline="\n")
+    html = render_report(estimate, metrics=metrics, comparison=comparison)
+    path.write_text(html, encoding="utf-8", newline="\n")
 
 
 def _headline(estimate: Estimate, metrics: dict[str, Any]) -> list[dict[str, str]]:

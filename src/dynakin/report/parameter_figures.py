@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from dynakin.comparison import Trial
 from dynakin.report.body import colours_of
 from dynakin.report.direct_labels import label_ends
 from dynakin.report.labels import number, signed_percent, words
@@ -17,7 +17,7 @@ _PANEL_IN = 2.35
 _INERTIAS = {f"i{a}{b}": f"{a}{b}" for a, b in ("xx", "yy", "zz", "xy", "xz", "yz")}
 
 
-def lengths_and_masses_figure(estimate: Estimate, reference: xr.Dataset | None = None) -> Figure | None:
+def lengths_and_masses_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
     """Figure 8: change of each segment's length and mass from its start, in per cent, with its band and bounds."""
     groups = {
         "Segment lengths": [p for p in estimate.parameters if p.kind == "length" and p.estimated],
@@ -26,7 +26,7 @@ def lengths_and_masses_figure(estimate: Estimate, reference: xr.Dataset | None =
     return _figure(estimate, groups)
 
 
-def inertias_figure(estimate: Estimate, reference: xr.Dataset | None = None) -> Figure | None:
+def inertias_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
     """Figure 9: change of each estimated moment of inertia, about the segment's origin, in per cent."""
     groups = {
         f"Moments of inertia {label}": [p for p in _inertial(estimate) if p.name.endswith(f"/{key}")]

@@ -59,6 +59,7 @@ FILE_STYLE: dict[Any, Any] = {
 """Of the figures that are written as files of their own."""
 _MOST_POINTS = 700
 _GROUP_ID = re.compile(r' id="(?:figure|axes|patch|matplotlib\.axis|xtick|ytick|line2d|text|[A-Za-z]+Collection)_\d+"')
+_TAG = re.compile(r"<[^>]*>")
 _LONG_NUMBER = re.compile(r"-?\d+\.\d{3,}")
 
 
@@ -109,7 +110,7 @@ def to_svg(figure: Figure, key: str, description: str) -> str:
     text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
     text = re.sub(r"<!--.*?-->", "", text, flags=re.DOTALL)
     text = _GROUP_ID.sub("", text)
-    text = _LONG_NUMBER.sub(lambda match: f"{float(match.group()):.2f}".rstrip("0").rstrip("."), text)
+    text = _TAG.sub(lambda tag: _LONG_NUMBER.sub(_rounded, tag.group()), text)  # numbers in words stay as they are
     text = re.sub(r"font: ([\d.]+)px [^;\"]*", r"font-size: \1px", text)
     text = re.sub(r"font-family:[^;\"]*;?", "", text)
     text = re.sub(r"\n\s*", "\n", text)
@@ -117,3 +118,7 @@ def to_svg(figure: Figure, key: str, description: str) -> str:
     head, _, rest = text.partition(">")
     head = re.sub(r' (?:width|height)="[^"]*"', "", head)
     return f'{head} role="img" aria-label="{label}">{rest}'
+
+
+def _rounded(number: re.Match[str]) -> str:
+    return f"{float(number.group()):.2f}".rstrip("0").rstrip(".")

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dynakin.report import panels as charts
+from dynakin.report.identifiability_section import identifiability_section
 from dynakin.report.labels import (
     COMPONENT_LABELS,
     is_planar,
@@ -18,35 +18,36 @@ from dynakin.report.labels import (
     signed_percent,
     words,
 )
+from dynakin.report.method_sections import methods_section
 from dynakin.report.panels import Panel
-from dynakin.results import AXES, COMPONENTS, Estimate, Parameter
+from dynakin.report.repetition_sections import repetition_section
+from dynakin.report.section import Section
+from dynakin.results import AXES, COMPONENTS, Estimate, Parameter, estimate_curves, repetitions_of
+
+if TYPE_CHECKING:
+    from dynakin.comparison import Trial
 
 
-@dataclass(frozen=True)
-class Section:
-    """A heading, a paragraph, and panels; ``folded`` ones open on a click; ``key`` names the lines."""
+def sections(estimate: Estimate, metrics: dict[str, Any], comparison: Trial | None = None) -> list[Section]:
+    """All sections in order; one without anything to show is left out.
 
-    anchor: str
-    title: str
-    text: str
-    panels: list[Panel] = field(default_factory=list)
-    wide: list[Panel] = field(default_factory=list)
-    folded: list[Panel] = field(default_factory=list)
-    folded_title: str = ""
-    key: tuple[str, ...] = ()
-
-
-def sections(estimate: Estimate, metrics: dict[str, Any]) -> list[Section]:
-    """All sections in order; one without anything to show is left out."""
+    Args:
+        comparison: this estimate beside the reference methods, for a section on them.
+    """
+    found = repetitions_of(estimate) if comparison is None else comparison.repetitions
+    curves = estimate_curves(estimate) if comparison is None else comparison.curves()
     every = [
         marker_section(estimate, metrics),
         wrench_section(estimate, metrics),
         angle_section(estimate),
         moment_section(estimate),
+        repetition_section(estimate, found, curves),
+        *([] if comparison is None else [methods_section(comparison)]),
         length_section(estimate),
         mass_section(estimate),
+        identifiability_section(estimate, metrics),
     ]
-    return [section for section in every if section.panels or section.wide]
+    return [section for section in every if not section.empty]
 
 
 def marker_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
@@ -136,6 +137,7 @@ def angle_section(estimate: Estimate) -> Section:
 def moment_section(estimate: Estimate) -> Section:
     """Moments, each with what it stands for."""
     panels = []
+    deviations = estimate.data["moments_sd"].values if "moments_sd" in estimate.data else None
     for index, name in enumerate(estimate.coordinate_names):
         unit = "N m" if estimate.is_rotation()[index] else "N"
         values = estimate.data["moments"].values[:, index]
@@ -148,6 +150,7 @@ def moment_section(estimate: Estimate) -> Section:
                 None,
                 values,
                 note=moment_note(estimate, name),
+                sd=deviations[:, index] if deviations is not None else None,
             )
         )
     text = "What the muscles and ligaments do about each joint, in the direction in which its coordinate grows."
@@ -156,7 +159,8 @@ def moment_section(estimate: Estimate) -> Section:
             " The model has one leg and one arm for both sides, so theirs are the sums of both. At the toe there is no "
             "joint: its “moment” is the ground’s about the toe."
         )
-    return Section("moments", "Joint moments", text, panels, key=("estimated",))
+    key = ("estimated",) if deviations is None else ("estimated", "band")
+    return Section("moments", "Joint moments", text, panels, key=key)
 
 
 def length_section(estimate: Estimate) -> Section:

@@ -4,9 +4,11 @@ from dynakin.results.consistency import Consistency, consistency
 from dynakin.results.estimate import AXES, COMPONENTS, Estimate
 from dynakin.results.fit import SignalFit, TruthError, marker_rms_mm, signal_fit, truth_error, wrench_fit
 from dynakin.results.marker_file import laboratory_markers, write_trc
+from dynakin.results.mean_curves import MeanCurve, estimate_curves
 from dynakin.results.metrics import SCHEMA_VERSION, compute_metrics, evaluation_window
 from dynakin.results.output_folder import OUTPUT_FILES, check_output_writable
 from dynakin.results.records import EVENT_KINDS, Event, Parameter, Timing
+from dynakin.results.repetitions import Found, Repetition, find_repetitions, repetitions_of
 from dynakin.results.storage_file import write_storage
 
 __all__ = [
@@ -18,16 +20,22 @@ __all__ = [
     "Consistency",
     "Estimate",
     "Event",
+    "Found",
+    "MeanCurve",
     "Parameter",
+    "Repetition",
     "SignalFit",
     "Timing",
     "TruthError",
     "check_output_writable",
     "compute_metrics",
     "consistency",
+    "estimate_curves",
     "evaluation_window",
+    "find_repetitions",
     "laboratory_markers",
     "marker_rms_mm",
+    "repetitions_of",
     "signal_fit",
     "truth_error",
     "wrench_fit",

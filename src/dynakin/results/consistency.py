@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from scipy import stats
+
+Judgement = Literal["overconfident", "consistent", "conservative"]
 
 # A ratio within these is called consistent: model error always moves it a little from one, while noise settings
 # wrong by a factor of two in standard deviation move it by four.
@@ -25,6 +28,8 @@ class Consistency:
         measured_dof: number of measured rows.
         whiteness_markers, whiteness_wrench: lag-1 autocorrelation of the innovations (see `lag_one`); None if there
             are too few frames.
+        judgement: of that number; None without a measured row.
+        judged_by: by what: the practical band, or the chi-square interval where the data are the filter's own.
         verdict: the same in words.
     """
 
@@ -33,11 +38,18 @@ class Consistency:
     measured_dof: int
     whiteness_markers: float | None
     whiteness_wrench: float | None
+    judgement: Judgement | None
+    judged_by: str
     verdict: str
 
 
 def consistency(
-    nis: np.ndarray, n_rows: np.ndarray, marker_innovations: np.ndarray, wrench_innovations: np.ndarray
+    nis: np.ndarray,
+    n_rows: np.ndarray,
+    marker_innovations: np.ndarray,
+    wrench_innovations: np.ndarray,
+    *,
+    own_model: bool = False,
 ) -> Consistency:
     """Judge a run.
 
@@ -46,15 +58,31 @@ def consistency(
         n_rows: (T,) measured rows of each frame.
         marker_innovations: (T, N) m, measured less predicted, one column a marker and axis; NaN where missing.
         wrench_innovations: (T, K) N or N m, likewise.
+        own_model: the data were drawn from the filter's own model and noise, so the chi-square interval is strict;
+            no recording of a person is, and there the practical band (0.5 to 2) and whiteness judge.
     """
     used = np.isfinite(nis) & (n_rows > 0)
     dof = int(np.sum(n_rows[used]))
     ratio = float(np.sum(nis[used]) / dof) if dof else None
-    interval = None
-    if dof:
-        interval = (float(stats.chi2.ppf(0.025, dof) / dof), float(stats.chi2.ppf(0.975, dof) / dof))
+    interval = mean_interval_95(dof) if dof else None
     white_markers, white_wrench = lag_one(marker_innovations), lag_one(wrench_innovations)
-    return Consistency(ratio, interval, dof, white_markers, white_wrench, _verdict(ratio, white_markers, white_wrench))
+    band = interval if own_model and interval else CONSISTENT
+    judgement = None if ratio is None else judge(ratio, band)
+    judged_by = "95 % chi-square interval" if own_model else f"practical band, {band[0]:g} to {band[1]:g}"
+    verdict = _verdict(ratio, judgement, white_markers, white_wrench)
+    return Consistency(ratio, interval, dof, white_markers, white_wrench, judgement, judged_by, verdict)
+
+
+def mean_interval_95(dof: float) -> tuple[float, float]:
+    """Where the mean of ``dof`` independent squared standard normal numbers lies in 95 % of cases."""
+    return float(stats.chi2.ppf(0.025, dof) / dof), float(stats.chi2.ppf(0.975, dof) / dof)
+
+
+def judge(ratio: float, band: tuple[float, float] = CONSISTENT) -> Judgement:
+    """A mean normalised square in words: above ``band`` the filter trusts itself too much, below too little."""
+    if ratio > band[1]:
+        return "overconfident"
+    return "conservative" if ratio < band[0] else "consistent"
 
 
 def lag_one(innovations: np.ndarray) -> float | None:
@@ -73,15 +101,15 @@ def lag_one(innovations: np.ndarray) -> float | None:
     return float(np.mean(np.sum(first * second, axis=0)[kept] / power[kept]))
 
 
-def _verdict(ratio: float | None, markers: float | None, wrench: float | None) -> str:
+def _verdict(ratio: float | None, judgement: Judgement | None, markers: float | None, wrench: float | None) -> str:
     if ratio is None:
         return "Nothing was measured in this window, so nothing can be said."
-    if ratio > CONSISTENT[1]:
+    if judgement == "overconfident":
         text = (
             f"The filter is overconfident: its innovations are {_times(ratio)} times as large as its covariances "
             "say. P, Q or R may be too small, or the model does not fit."
         )
-    elif ratio < CONSISTENT[0]:
+    elif judgement == "conservative":
         text = (
             f"The filter is too cautious: its innovations are {_times(1.0 / max(ratio, 1e-300))} times smaller "
             "than its covariances say. Q or R are larger than this recording needs, and the standard deviations it "

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from copy import deepcopy
 from dataclasses import dataclass, field
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,6 +14,8 @@ import xarray as xr
 from dynakin.results.records import Event, Parameter, Timing
 
 if TYPE_CHECKING:
+    from dynakin.comparison import Trial
+    from dynakin.identifiability import Identifiability
     from dynakin.recordings import GroundFrame, Recording
 
 AXES = ("x", "y", "z")
@@ -34,6 +38,7 @@ class Estimate:
     markers_measured, markers_estimated, markers_predicted        (time, marker, axis)        m
     wrench_measured, wrench_estimated, wrench_predicted           (time, component)           N or N m
     state, state_sd                                               (time, element)             as the element's own
+    initial_covariance, final_covariance                          (element, element_)         as the elements' own
     joint_centres                                                 (time, joint, axis)         m
     nis, n_rows, log_likelihood                                   (time,)                     1
     ============================================================  ==========================  =====================
@@ -80,21 +85,40 @@ class Estimate:
         return np.asarray(self.data["marker_axes_modelled"].values, dtype=bool)
 
     def metrics(self) -> dict[str, Any]:
-        """The content of ``metrics.json`` (see `dynakin.results.metrics`)."""
+        """The content of ``metrics.json`` (see `dynakin.results.metrics`); computed once, a copy is given."""
+        return deepcopy(self._metrics)
+
+    @cached_property
+    def _metrics(self) -> dict[str, Any]:
         from dynakin.results.metrics import compute_metrics
 
         return compute_metrics(self)
 
-    def save(self, folder: str | Path, *, overwrite: bool = True) -> Path:
+    def save(
+        self,
+        folder: str | Path,
+        *,
+        overwrite: bool = True,
+        comparison: Trial | None = None,
+        identifiability: Identifiability | None = None,
+    ) -> Path:
         """Write every output file into ``folder`` and return it.
 
         All files are first written into a temporary folder beside it, which then takes its place: a failure leaves
         what was there. A folder that exists is replaced only if ``overwrite`` is true and it is empty or holds
         nothing but an earlier output of dynakin.
 
+        Args:
+            comparison: this estimate beside the reference methods (`dynakin.comparison.trial_of`), for the report and
+                for ``repetitions.csv``.
+            identifiability: what this trial tells and what would tell more (`dynakin.identifiability`), for the report
+                and for ``metrics.json``.
+
         Raises:
             OutputError: the folder cannot be written or holds something else.
         """
         from dynakin.results.save import save_estimate
 
-        return save_estimate(self, Path(folder), overwrite=overwrite)
+        return save_estimate(
+            self, Path(folder), overwrite=overwrite, comparison=comparison, identifiability=identifiability
+        )

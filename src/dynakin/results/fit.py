@@ -13,6 +13,9 @@ class WrenchFit(NamedTuple):
 
     rms: float | None
     nrms_percent: float | None
+    """Of the measured component's RMS."""
+    nrms_range_percent: float | None
+    """Of its range (largest less smallest)."""
     correlation: float | None
 
 
@@ -34,6 +37,7 @@ class SignalFit(NamedTuple):
     """Agreement of two signals; None where a figure is not defined (a constant signal, no frame).
 
     The paper does not say by what it normalises: per cent of the measured signal's RMS fits its FY, not its FX and MZ.
+    The RMS of a force that carries weight is mostly the weight; its range is what the movement makes of it.
     """
 
     rms: float | None
@@ -89,10 +93,10 @@ def truth_error(truth: np.ndarray, estimated: np.ndarray) -> TruthError:
 
 
 def wrench_fit(measured: np.ndarray, estimated: np.ndarray) -> WrenchFit:
-    """RMS difference, the same in percent of the RMS of the measured signal (as the paper's Table II), correlation.
+    """RMS difference, the same in percent of the measured component's RMS and of its range, correlation.
 
     Args:
         measured, estimated: (T,) in N or N m.
     """
     fit = signal_fit(measured, estimated)
-    return WrenchFit(fit.rms, fit.nrms_rms_percent, fit.correlation)
+    return WrenchFit(*fit)

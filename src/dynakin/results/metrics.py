@@ -8,10 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from dynakin.results.adaptation import adaptation
+from dynakin.results.bounds import parameter_bounds
 from dynakin.results.consistency import Consistency, consistency
 from dynakin.results.estimate import COMPONENTS, Estimate
 from dynakin.results.fit import WrenchFit, marker_rms_mm, wrench_fit
 from dynakin.results.kinematic_consistency import mismatch_in_words, speed_mismatch
+from dynakin.results.learned import learned
+from dynakin.results.soft_tissue import soft_tissue
 
 SCHEMA_VERSION = 1
 """Version of ``metrics.json``, ``parameters.json`` and ``estimate.nc``; it grows when a key changes its meaning."""
@@ -44,6 +48,10 @@ def compute_metrics(estimate: Estimate) -> dict[str, Any]:
             "wrench": {"rms": _wrench(estimate, "predicted", window)["rms"]},
         },
         "consistency": _consistency(estimate, window),
+        "adaptation": adaptation(estimate),
+        "bounds": parameter_bounds(estimate, window),
+        "soft_tissue": soft_tissue(estimate, window),
+        "identifiability": learned(estimate),
         "events": _events(estimate),
         "timing": asdict(estimate.timing),
     }
@@ -98,6 +106,8 @@ def _consistency(estimate: Estimate, window: np.ndarray) -> dict[str, Any]:
         "mean_nis_per_dof": found.mean_nis_per_dof,
         "interval_95": list(found.interval_95) if found.interval_95 else None,
         "measured_dof": found.measured_dof,
+        "judgement": found.judgement,
+        "judged_by": found.judged_by,
         "whiteness": {
             "what": "lag-1 autocorrelation of the innovations, 0 if white",
             "markers": found.whiteness_markers,

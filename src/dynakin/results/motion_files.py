@@ -70,6 +70,37 @@ def write_moments(estimate: Estimate, path: Path) -> None:
     )
 
 
+def write_deviations(estimate: Estimate, path: Path) -> None:
+    """``uncertainty.sto``: one standard deviation of all that the other motion files hold.
+
+    Columns ``NAME``, ``NAME_speed``, ``NAME_acceleration`` in degrees or metres (a second, a second squared), moments
+    as in ``moments.sto``, ``fx`` ... ``mz`` in N and N m; what an estimate does not hold has no column.
+    """
+    names: list[str] = []
+    columns: list[np.ndarray] = []
+    for variable, suffix in (("coordinates", ""), ("speeds", "_speed"), ("accelerations", "_acceleration")):
+        if f"{variable}_sd" in estimate.data:
+            names += [f"{name}{suffix}" for name in estimate.coordinate_names]
+            columns.append(_in_degrees(estimate, f"{variable}_sd"))
+    if "moments_sd" in estimate.data:
+        names += moment_columns(estimate)
+        columns.append(estimate.data["moments_sd"].transpose("time", "coordinate").values)
+    if "wrench_sd" in estimate.data:
+        values = estimate.data["wrench_sd"].transpose("time", "component").values
+        known = np.isfinite(values).any(axis=0)
+        names += [name for name, seen in zip(COMPONENTS, known, strict=True) if seen]
+        columns.append(values[:, known])
+    write_storage(
+        path,
+        "Standard deviations",
+        estimate.time,
+        names,
+        np.hstack(columns) if columns else np.empty((len(estimate.time), 0)),
+        in_degrees=True,
+        notes=["One standard deviation, as the filter believes. Degrees, metres, seconds, N, N m."],
+    )
+
+
 def write_wrench(estimate: Estimate, path: Path) -> None:
     """``wrench.sto``: N and N m, ground frame, about the model's ground origin, what the ground does to the person.
 

@@ -18,6 +18,8 @@ OUTPUT_FILES = (
     "moments.sto",
     "markers.trc",
     "wrench.sto",
+    "uncertainty.sto",
+    "repetitions.csv",
     "parameters.json",
     "metrics.json",
     "estimate.nc",

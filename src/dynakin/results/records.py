@@ -6,18 +6,20 @@ import math
 from dataclasses import dataclass
 from typing import Literal
 
-ParameterKind = Literal["length", "marker", "inertia"]
+ParameterKind = Literal["length", "marker", "inertia", "plates"]
 EventKind = Literal["missing", "gated", "at_bound", "reset", "note"]
 EVENT_KINDS: tuple[EventKind, ...] = ("missing", "gated", "at_bound", "reset", "note")
 
 
 @dataclass(frozen=True)
 class Parameter:
-    """One constant of the model: a segment length, a marker's place on its segment or an inertial number.
+    """One constant: a segment length, a marker's place on its segment, an inertial number, or an error of the plates
+    (slow, as it ends, or their delay).
 
-    ``value`` and ``sd`` (one standard deviation) are those of the last frame; ``initial`` is where the filter
-    started; ``table`` is what the anthropometric table says, None where it says nothing; ``lower`` and ``upper``
-    are the bounds of equation (9), None where there is none. All in ``unit`` (m, kg, kg m, kg m2).
+    ``value`` and ``sd`` (one standard deviation) are those of the last frame; ``initial`` and ``prior_sd`` those
+    before the first, with the declared total mass in them where it is a prior (None: not estimated); ``table`` is what
+    the anthropometric table says, None where it says nothing; ``lower`` and ``upper`` are the bounds of equation (9),
+    None where there is none. All in ``unit`` (m, kg, kg m, kg m2, N, N m, s).
     """
 
     name: str
@@ -32,6 +34,7 @@ class Parameter:
     upper: float | None
     at_bound: bool
     estimated: bool
+    prior_sd: float | None = None
 
     def change_percent(self) -> float | None:
         """Change from the initial value in percent of its size; None where the initial value is zero."""

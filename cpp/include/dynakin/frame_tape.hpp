@@ -1,0 +1,44 @@
+// What one update did to mean and covariance, in the form that a backward pass undoes (docs/derivations.md, section
+// 11).
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "dynakin/measurement.hpp"
+
+namespace dynakin {
+
+// Sized once for a filter (Filter::tape_rows); writing allocates nothing.
+struct FrameTape {
+  FrameTape(int state_size, int max_rows);
+
+  void clear();         // a new frame
+  void clear_chunks();  // an update begins anew: only its last linearisation counts
+  // After S = L L': Z = L^-1 H P and w = L^-1 v of the blocks from first to end - 1. A = L^-1 H is formed here.
+  void add_chunk(const std::vector<RowBlock>& blocks, int first, int end, const Eigen::Ref<const Eigen::MatrixXd>& L,
+                 const Eigen::Ref<const Eigen::MatrixXd>& Z, const Eigen::Ref<const Eigen::VectorXd>& w);
+  // The row a x = b, known for sure, with Pa = P a and missing = b - a x.
+  void add_equality(const Eigen::Ref<const Eigen::VectorXd, 0, Eigen::InnerStride<>>& a,
+                    const Eigen::Ref<const Eigen::VectorXd>& Pa, double aPa, double missing);
+  void forget(int i) {
+    any_forgotten = true;
+    forgotten[i] = 1;
+  }
+
+  // A column a row of A and Z, so that a chunk is a block of whole columns.
+  Eigen::MatrixXd A, Z;
+  Eigen::VectorXd w;
+  std::vector<int> ends;  // of the chunks, in rows
+  bool any_forgotten = false;
+  std::vector<std::uint8_t> forgotten;  // (n,) elements that were drawn anew before the update: the motion was held
+  Eigen::VectorXd pull;  // (n,) N' u: binding inequalities and their multipliers, the mean moved by P N' u
+  bool pulled = false;
+  bool cut = false;  // everything started again after the update
+
+ private:
+  int rows() const { return ends.empty() ? 0 : ends.back(); }
+};
+
+}  // namespace dynakin

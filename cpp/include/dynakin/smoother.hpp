@@ -1,0 +1,64 @@
+// A whole trial forwards and backwards: each frame's estimate from all frames, in bounded memory.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "dynakin/backward_pass.hpp"
+#include "dynakin/run.hpp"
+
+namespace dynakin {
+
+// As RunRecord, of the smoothed state.
+struct SmoothRecord {
+  SmoothRecord(const Model& model, std::size_t frames);
+
+  std::vector<double> state, state_sd;
+  std::vector<double> markers, markers_sd;  // (frames, markers, 3)
+  std::vector<double> wrench, wrench_sd;    // (frames, 6) the body's own
+  std::vector<double> moments, moments_sd;  // (frames, coordinates)
+  std::vector<double> backward_us;          // without the second run forwards
+};
+
+// The forward run keeps a checkpoint every so many frames. The way back runs each stretch between two of them forwards
+// once more, now with tapes, so memory grows with the root of the number of frames. Afterwards the filter stands
+// where the run left it.
+class Smoother {
+ public:
+  // Of all frames: time, markers (frames, M, 3) and wrench (frames, 6), which must outlive it. stretch: frames between
+  // checkpoints, 0: sqrt(frames). Throws std::invalid_argument where constraints are kept in a way that has no
+  // smoother.
+  Smoother(Filter& filter, const double* time, const double* markers, const double* wrench, std::size_t frames,
+           std::size_t stretch = 0);
+  ~Smoother() { filter_.record_to(nullptr); }
+  Smoother(const Smoother&) = delete;
+  Smoother& operator=(const Smoother&) = delete;
+
+  // run_frames, from the first frame to the last, in as many calls as one likes.
+  void forward(std::size_t first, std::size_t end, RunRecord& record);
+  // The last stretch that is left; returns how many frames then are left.
+  std::size_t backward(const RunRecord& record, SmoothRecord& out);
+
+ private:
+  struct Frame {
+    Eigen::VectorXd x;
+    Eigen::MatrixXd P;
+    FrameTape tape;
+  };
+  void replay(std::size_t first, std::size_t end, const RunRecord& record);
+  void report(std::size_t k, const Frame& frame, SmoothRecord& out);
+
+  Filter& filter_;
+  const double *time_, *markers_, *wrench_;
+  std::size_t frames_, stretch_, left_;
+  std::vector<Filter::Checkpoint> checkpoints_;  // before each stretch and, last, after the run
+  std::vector<Frame> replayed_;
+  BackwardPass pass_;
+  OutputDeviation deviation_;
+  KinematicState kinematics_;
+  DynamicState dynamics_;
+  Eigen::VectorXd x_;
+  Eigen::MatrixXd P_;
+};
+
+}  // namespace dynakin

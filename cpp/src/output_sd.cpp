@@ -1,0 +1,66 @@
+#include "dynakin/output_sd.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace dynakin {
+namespace {
+
+// sqrt of row J P J', with the row's columns of P. Rounding may leave a variance of 0 below it.
+template <class Row>
+double deviation(const Row& row, const std::vector<int>& columns, const Eigen::MatrixXd& P,
+                 const std::vector<int>* slot) {
+  double variance = 0.0;
+  for (const int c : columns) {
+    const double a = row(slot ? (*slot)[c] : c);
+    if (a == 0.0) continue;
+    double sum = 0.0;
+    const double* column = P.col(c).data();
+    for (const int d : columns) sum += column[d] * row(slot ? (*slot)[d] : d);
+    variance += a * sum;
+  }
+  return std::sqrt(std::max(variance, 0.0));
+}
+
+}  // namespace
+
+OutputDeviation::OutputDeviation(const Model& model) : model_(model), work_(model) {
+  std::size_t widest = 0;
+  for (std::size_t m = 0; m < model.markers().size(); ++m) {
+    const auto& columns = model.marker_columns(static_cast<int>(m));
+    widest = std::max(widest, columns.size());
+    slot_.emplace_back(model.state_size(), k_none);
+    for (std::size_t k = 0; k < columns.size(); ++k) slot_.back()[columns[k]] = static_cast<int>(k);
+  }
+  marker_J_.setZero(3, static_cast<Eigen::Index>(widest));
+  wrench_J_.setZero(6, model.state_size());
+  moment_J_.setZero(static_cast<Eigen::Index>(model.coordinates().size()), model.state_size());
+  moment_JP_ = moment_J_;
+}
+
+void OutputDeviation::markers(const KinematicState& state, const Eigen::MatrixXd& P, double* out) {
+  for (std::size_t m = 0; m < model_.markers().size(); ++m) {
+    const auto& columns = model_.marker_columns(static_cast<int>(m));
+    auto J = marker_J_.leftCols(static_cast<Eigen::Index>(columns.size()));
+    marker_jacobian(model_, state, static_cast<int>(m), slot_[m], J);
+    for (int k = 0; k < 3; ++k) out[3 * m + k] = deviation(J.row(k), columns, P, &slot_[m]);
+  }
+}
+
+void OutputDeviation::wrench(const KinematicState& state, const DynamicState& dynamics, const Eigen::MatrixXd& P,
+                             double* out) {
+  wrench_jacobian(model_, state, dynamics, wrench_J_);
+  for (int k = 0; k < 6; ++k) out[k] = deviation(wrench_J_.row(k), model_.wrench_columns(), P, nullptr);
+}
+
+void OutputDeviation::moments(const StateRef& x, const KinematicState& state, const DynamicState& dynamics,
+                              const Eigen::MatrixXd& P, double* out) {
+  moment_jacobian(model_, x, state, dynamics, nullptr, work_, moment_J_);
+  moment_JP_.setZero();
+  for (Eigen::Index c = 0; c < P.cols(); ++c)  // most columns do not matter to moments
+    if (!moment_J_.col(c).isZero(0.0)) moment_JP_.noalias() += moment_J_.col(c) * P.col(c).transpose();
+  for (Eigen::Index k = 0; k < moment_J_.rows(); ++k)
+    out[k] = std::sqrt(std::max(moment_JP_.row(k).dot(moment_J_.row(k)), 0.0));
+}
+
+}  // namespace dynakin

@@ -1,0 +1,116 @@
+#include "dynakin/smoother.hpp"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <string>
+
+namespace dynakin {
+namespace {
+
+std::size_t stretch_of(std::size_t frames, std::size_t asked) {
+  const auto root = static_cast<std::size_t>(std::ceil(std::sqrt(static_cast<double>(frames))));
+  return std::clamp<std::size_t>(asked == 0 ? root : asked, 1, std::max<std::size_t>(frames, 1));
+}
+
+}  // namespace
+
+SmoothRecord::SmoothRecord(const Model& model, std::size_t frames)
+    : state(frames * model.state_size()),
+      state_sd(state.size()),
+      markers(frames * 3 * model.markers().size()),
+      markers_sd(markers.size()),
+      wrench(frames * 6),
+      wrench_sd(frames * 6),
+      moments(frames * model.coordinates().size()),
+      moments_sd(moments.size()),
+      backward_us(frames) {}
+
+Smoother::Smoother(Filter& filter, const double* time, const double* markers, const double* wrench, std::size_t frames,
+                   std::size_t stretch)
+    : filter_(filter),
+      time_(time),
+      markers_(markers),
+      wrench_(wrench),
+      frames_(frames),
+      stretch_(stretch_of(frames, stretch)),
+      left_(frames),
+      checkpoints_((frames + stretch_ - 1) / stretch_ + 1),
+      pass_(filter.model(), filter.settings(), filter.tape_rows(), true),
+      deviation_(filter.model()),
+      kinematics_(filter.model()),
+      dynamics_(filter.model()) {
+  pass_.start();
+}
+
+void Smoother::forward(std::size_t first, std::size_t end, RunRecord& record) {
+  while (first < end) {
+    if (first % stretch_ == 0) filter_.save(checkpoints_[first / stretch_]);
+    const std::size_t next = std::min(end, (first / stretch_ + 1) * stretch_);
+    run_frames(filter_, time_, markers_, wrench_, first, next, record);
+    first = next;
+  }
+  if (end == frames_) filter_.save(checkpoints_.back());
+}
+
+// The same steps once more from their checkpoint, taped.
+void Smoother::replay(std::size_t first, std::size_t end, const RunRecord& record) {
+  const Model& model = filter_.model();
+  const auto n = static_cast<std::size_t>(model.state_size());
+  const std::size_t m = model.markers().size();
+  while (replayed_.size() < end - first)
+    replayed_.push_back({{}, {}, FrameTape(model.state_size(), filter_.tape_rows())});
+  filter_.restore(checkpoints_[first / stretch_]);
+  for (std::size_t k = first; k < end; ++k) {
+    Frame& frame = replayed_[k - first];
+    filter_.record_to(&frame.tape);
+    if (k > 0) filter_.predict(time_[k] - time_[k - 1]);
+    filter_.update(Eigen::Map<const MarkerMatrix>(markers_ + 3 * m * k, 3, m),
+                   Eigen::Map<const Vector6>(wrench_ + 6 * k));
+    frame.x = filter_.state();
+    frame.P = filter_.covariance();
+    if (!std::equal(frame.x.begin(), frame.x.end(), record.state.begin() + static_cast<std::ptrdiff_t>(k * n)))
+      throw std::logic_error("smoothing: frame " + std::to_string(k) + " does not repeat itself from its checkpoint");
+  }
+  filter_.record_to(nullptr);
+}
+
+std::size_t Smoother::backward(const RunRecord& record, SmoothRecord& out) {
+  using clock = std::chrono::steady_clock;
+  if (left_ == 0) return 0;
+  const std::size_t first = (left_ - 1) / stretch_ * stretch_;
+  replay(first, left_, record);
+  for (std::size_t k = left_; k-- > first;) {
+    const Frame& frame = replayed_[k - first];
+    const auto start = clock::now();
+    report(k, frame, out);
+    pass_.undo(frame.tape, k > 0 ? time_[k] - time_[k - 1] : 0.0);
+    out.backward_us[k] = std::chrono::duration<double, std::micro>(clock::now() - start).count();
+  }
+  left_ = first;
+  if (left_ == 0) filter_.restore(checkpoints_.back());
+  return left_;
+}
+
+void Smoother::report(std::size_t k, const Frame& frame, SmoothRecord& out) {
+  const Model& model = filter_.model();
+  const auto n = static_cast<std::size_t>(model.state_size());
+  const std::size_t m = 3 * model.markers().size(), nc = model.coordinates().size();
+  pass_.smooth(frame.x, frame.P, x_);
+  pass_.smooth(frame.P, P_);
+  pass_.bound(x_, P_);
+  Eigen::Map<Eigen::VectorXd>(out.state.data() + k * n, n) = x_;
+  Eigen::Map<Eigen::VectorXd>(out.state_sd.data() + k * n, n) = P_.diagonal().cwiseMax(0.0).cwiseSqrt();
+  forward_kinematics(model, x_, kinematics_);
+  subtree_dynamics(model, x_, kinematics_, dynamics_);
+  for (std::size_t i = 0; i < m / 3; ++i)
+    Eigen::Map<Vector3>(out.markers.data() + k * m + 3 * i) = kinematics_.markers[i];
+  Eigen::Map<Vector6>(out.wrench.data() + 6 * k) = dynamics_.wrench.vector();
+  joint_moments(model, kinematics_, dynamics_, nullptr,
+                Eigen::Map<Eigen::VectorXd>(out.moments.data() + k * nc, static_cast<Eigen::Index>(nc)));
+  deviation_.markers(kinematics_, P_, out.markers_sd.data() + k * m);
+  deviation_.wrench(kinematics_, dynamics_, P_, out.wrench_sd.data() + 6 * k);
+  deviation_.moments(x_, kinematics_, dynamics_, P_, out.moments_sd.data() + k * nc);
+}
+
+}  // namespace dynakin

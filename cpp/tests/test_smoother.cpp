@@ -1,0 +1,94 @@
+#include "check.hpp"
+#include "dynakin/fixed_lag.hpp"
+#include "dynakin/smoother.hpp"
+#include "models.hpp"
+
+using namespace dynakin;
+
+namespace {
+
+// A trial in which the markers wave about and one is lost for a while, with some lengths held by their bounds.
+struct Trial {
+  explicit Trial(const ModelSpec& spec, int frames = 23) : model(spec), settings(settings_for(model)) {
+    settings.constraint = ConstraintKind::projection;
+    const Block& lengths = model.layout().block("lengths");
+    settings.upper.segment(lengths.offset, lengths.size) =
+        model.initial_state().segment(lengths.offset, lengths.size).array() + 1e-3;
+    const auto still = markers_at(model, model.initial_state());
+    for (int k = 0; k < frames; ++k) {
+      auto shown = still;
+      shown.array() += 0.02 * std::sin(0.3 * k);
+      if (k > 5 && k < 10) shown.col(1).setConstant(std::nan(""));
+      time.push_back(0.01 * k + 0.001 * (k % 3));
+      markers.insert(markers.end(), shown.data(), shown.data() + shown.size());
+      for (int c = 0; c < 6; ++c) wrench.push_back(c == 1 ? 400.0 : 5.0);
+    }
+  }
+  SmoothRecord smoothed(std::size_t stretch) const {
+    Filter f(model, settings, model.initial_state(), prior_for(model));
+    Smoother smoother(f, time.data(), markers.data(), wrench.data(), time.size(), stretch);
+    RunRecord record(model, time.size());
+    smoother.forward(0, 7, record);
+    smoother.forward(7, time.size(), record);
+    SmoothRecord out(model, time.size());
+    while (smoother.backward(record, out) > 0) {
+    }
+    CHECK(smoother.backward(record, out) == 0);
+    const std::size_t n = model.state_size();
+    for (std::size_t i = 0; i < n; ++i) {
+      CHECK(f.state()(static_cast<Eigen::Index>(i)) == record.state[record.state.size() - n + i]);
+      CHECK(out.state[out.state.size() - n + i] == record.state[record.state.size() - n + i]);
+    }
+    for (std::size_t i = 0; i < out.state_sd.size(); ++i) CHECK(out.state_sd[i] <= record.state_sd[i] * (1.0 + 1e-12));
+    return out;
+  }
+
+  Model model;
+  FilterSettings settings;
+  std::vector<double> time, markers, wrench;
+};
+
+}  // namespace
+
+TEST(smoothing_gives_the_same_bits_with_any_checkpoints) {
+  for (const ModelSpec& spec : {planar_chain(), spatial_tree()}) {
+    const Trial trial(spec);
+    const SmoothRecord whole = trial.smoothed(1000);
+    for (std::size_t stretch : {0, 1, 4, 22}) {
+      const SmoothRecord out = trial.smoothed(stretch);
+      CHECK(out.state == whole.state && out.state_sd == whole.state_sd);
+      CHECK(out.moments == whole.moments && out.moments_sd == whole.moments_sd && out.wrench_sd == whole.wrench_sd);
+    }
+  }
+}
+
+TEST(a_fixed_lag_ends_where_the_smoother_does) {
+  const Trial trial(spatial_tree());
+  const SmoothRecord out = trial.smoothed(0);
+  Filter f(trial.model, trial.settings, trial.model.initial_state(), prior_for(trial.model));
+  FixedLag lag(f, 6, true);
+  const std::size_t m = trial.model.markers().size(), n = trial.model.state_size(), frames = trial.time.size();
+  for (std::size_t k = 0; k < frames; ++k) {
+    CHECK(lag.ready() == (k > 6));
+    lag.step(k > 0 ? trial.time[k] - trial.time[k - 1] : 0.0,
+             Eigen::Map<const MarkerMatrix>(trial.markers.data() + 3 * m * k, 3, m),
+             Eigen::Map<const Vector6>(trial.wrench.data() + 6 * k));
+  }
+  CHECK_NEAR(lag.delay(), trial.time[frames - 1] - trial.time[frames - 7], 1e-12);
+  for (std::size_t i = 0; i < n; ++i) {
+    const double sd = out.state_sd[(frames - 7) * n + i];
+    CHECK_NEAR(lag.state()(static_cast<Eigen::Index>(i)), out.state[(frames - 7) * n + i], 1e-7 * sd);
+    CHECK_NEAR(std::sqrt(lag.covariance()(i, i)), sd, 1e-10 * sd);
+  }
+}
+
+TEST(smoothing_refuses_bounds_that_have_no_smoother) {
+  const Model model(planar_chain());
+  FilterSettings settings = settings_for(model);
+  settings.upper(0) = 1.0;
+  for (const auto& [kind, name] : {std::pair{ConstraintKind::gain, "'gain'"}, {ConstraintKind::sigmoid, "'sigmoid'"}}) {
+    settings.constraint = kind;
+    Filter filter(model, settings, model.initial_state(), prior_for(model));
+    check_refused([&] { FixedLag(filter, 3); }, name);
+  }
+}

@@ -1,0 +1,63 @@
+#include <nanobind/eigen/dense.h>
+#include <nanobind/ndarray.h>
+
+#include "arrays.hpp"
+#include "dynakin/fixed_lag.hpp"
+#include "module.hpp"
+
+using namespace dynakin;
+
+namespace {
+
+void check_ready(const FixedLag& lag) {
+  if (!lag.ready())
+    throw std::invalid_argument("fixed lag: no smoothed frame before frame " + std::to_string(lag.lag()) +
+                                " (see ready)");
+}
+
+void check_deviations(const FixedLag& lag) {
+  check_ready(lag);
+  if (!lag.deviations()) throw std::invalid_argument("fixed lag: made without deviations");
+}
+
+}  // namespace
+
+void bind_fixed_lag(nb::module_& m) {
+  nb::class_<FixedLag>(m, "FixedLag",
+                       "Steps a Filter and smooths the frame that lies `lag` frames back, from all frames until now.")
+      .def(nb::init<Filter&, int, bool>(), nb::arg("filter"), nb::arg("lag"), nb::arg("deviations") = false,
+           nb::keep_alive<1, 2>(),
+           "The filter stands before the first frame and is stepped by this object alone. Each step costs in "
+           "proportion to the lag; with deviations much more.")
+      .def(
+          "step",
+          [](FixedLag& lag, double dt, const Array2& markers, const Vector6& wrench) {
+            return lag.step(dt, marker_map(markers, lag.filter().model()), wrench);
+          },
+          nb::arg("dt"), nb::arg("markers"), nb::arg("wrench"),
+          "dt s since the frame before (the first frame is an update only), markers (M, 3), wrench (6,).")
+      .def_prop_ro("lag", &FixedLag::lag, "frames")
+      .def_prop_ro("ready", &FixedLag::ready, "whether there is a smoothed frame yet")
+      .def_prop_ro("delay_s", &FixedLag::delay, "how far the smoothed frame lies back")
+      .def_prop_ro(
+          "state",
+          [](const FixedLag& lag) -> Eigen::VectorXd {
+            check_ready(lag);
+            return lag.state();
+          },
+          "smoothed x (n,) of the frame delay_s ago")
+      .def_prop_ro(
+          "state_sd",
+          [](const FixedLag& lag) -> Eigen::VectorXd {
+            check_deviations(lag);
+            return lag.covariance().diagonal().cwiseMax(0.0).cwiseSqrt();
+          },
+          "its standard deviations (n,)")
+      .def_prop_ro(
+          "covariance",
+          [](const FixedLag& lag) -> Eigen::MatrixXd {
+            check_deviations(lag);
+            return lag.covariance();
+          },
+          "its covariance (n, n)");
+}

@@ -1,0 +1,131 @@
+#include <nanobind/ndarray.h>
+
+#include <utility>
+
+#include "arrays.hpp"
+#include "dynakin/smoother.hpp"
+#include "module.hpp"
+
+using namespace dynakin;
+
+namespace {
+
+struct Trial {
+  Trial(const Filter& filter, const Array1& time, const Array3& markers, const Array2& wrench)
+      : time(time.data()), markers(markers.data()), wrench(wrench.data()), frames(time.shape(0)) {
+    const std::size_t n_markers = filter.model().markers().size();
+    if (markers.shape(0) != frames || markers.shape(1) != n_markers || markers.shape(2) != 3)
+      throw std::invalid_argument("markers: expected (" + std::to_string(frames) + ", " + std::to_string(n_markers) +
+                                  ", 3)");
+    if (wrench.shape(0) != frames || wrench.shape(1) != 6)
+      throw std::invalid_argument("wrench: expected (" + std::to_string(frames) + ", 6)");
+  }
+  const double *time, *markers, *wrench;
+  std::size_t frames;
+};
+
+constexpr std::size_t k_stretch = 256;  // frames between two looks at the interpreter: progress, Ctrl-C
+
+void look_up(const nb::object& progress, std::size_t done, std::size_t total) {
+  if (!progress.is_none()) progress(done, total);
+  if (PyErr_CheckSignals() != 0) throw nb::python_error();
+}
+
+nb::dict arrays_of(RunRecord&& record, const Model& model, std::size_t frames) {
+  const std::size_t n = model.state_size(), nc = model.coordinates().size(), n_markers = model.markers().size();
+  nb::dict out;
+  out["state"] = owned(std::move(record.state), {frames, n});
+  out["state_sd"] = owned(std::move(record.state_sd), {frames, n});
+  out["markers_predicted"] = owned(std::move(record.markers_predicted), {frames, n_markers, 3});
+  out["markers_estimated"] = owned(std::move(record.markers_estimated), {frames, n_markers, 3});
+  out["wrench_predicted"] = owned(std::move(record.wrench_predicted), {frames, 6});
+  out["wrench_estimated"] = owned(std::move(record.wrench_estimated), {frames, 6});
+  out["moments"] = owned(std::move(record.moments), {frames, nc});
+  if (record.deviation) {
+    out["markers_sd"] = owned(std::move(record.markers_sd), {frames, n_markers, 3});
+    out["wrench_sd"] = owned(std::move(record.wrench_sd), {frames, 6});
+    out["moments_sd"] = owned(std::move(record.moments_sd), {frames, nc});
+  }
+  out["nis"] = owned(std::move(record.nis), {frames});
+  out["log_likelihood"] = owned(std::move(record.log_likelihood), {frames});
+  out["step_us"] = owned(std::move(record.step_us), {frames});
+  out["n_rows"] = owned(std::move(record.rows), {frames});
+  out["constrained"] = owned(std::move(record.constrained), {frames});
+  out["verdicts"] = owned(std::move(record.verdicts), {frames, n_markers + 1});
+  out["tracking"] = owned(std::move(record.tracking), {frames});
+  out["constraints_met"] = owned(std::move(record.constraints_met), {frames});
+  return out;
+}
+
+void add_arrays_of(SmoothRecord&& record, const Model& model, std::size_t frames, nb::dict& out) {
+  const std::size_t n = model.state_size(), nc = model.coordinates().size(), n_markers = model.markers().size();
+  out["smoothed_state"] = owned(std::move(record.state), {frames, n});
+  out["smoothed_state_sd"] = owned(std::move(record.state_sd), {frames, n});
+  out["smoothed_markers"] = owned(std::move(record.markers), {frames, n_markers, 3});
+  out["smoothed_markers_sd"] = owned(std::move(record.markers_sd), {frames, n_markers, 3});
+  out["smoothed_wrench"] = owned(std::move(record.wrench), {frames, 6});
+  out["smoothed_wrench_sd"] = owned(std::move(record.wrench_sd), {frames, 6});
+  out["smoothed_moments"] = owned(std::move(record.moments), {frames, nc});
+  out["smoothed_moments_sd"] = owned(std::move(record.moments_sd), {frames, nc});
+  out["backward_us"] = owned(std::move(record.backward_us), {frames});
+}
+
+nb::dict run(Filter& filter, const Array1& time, const Array3& markers, const Array2& wrench, nb::object progress,
+             bool output_sd) {
+  const Trial trial(filter, time, markers, wrench);
+  RunRecord record(filter.model(), trial.frames, output_sd);
+  for (std::size_t first = 0; first < trial.frames; first += k_stretch) {
+    const std::size_t end = std::min(trial.frames, first + k_stretch);
+    {
+      nb::gil_scoped_release release;
+      run_frames(filter, trial.time, trial.markers, trial.wrench, first, end, record);
+    }
+    look_up(progress, end, trial.frames);
+  }
+  return arrays_of(std::move(record), filter.model(), trial.frames);
+}
+
+nb::dict run_smoothed(Filter& filter, const Array1& time, const Array3& markers, const Array2& wrench,
+                      nb::object progress, bool output_sd, std::size_t stretch) {
+  const Trial trial(filter, time, markers, wrench);
+  const std::size_t frames = trial.frames;
+  Smoother smoother(filter, trial.time, trial.markers, trial.wrench, frames, stretch);
+  RunRecord record(filter.model(), frames, output_sd);
+  for (std::size_t first = 0; first < frames; first += k_stretch) {
+    const std::size_t end = std::min(frames, first + k_stretch);
+    {
+      nb::gil_scoped_release release;
+      smoother.forward(first, end, record);
+    }
+    look_up(progress, end, 2 * frames);
+  }
+  SmoothRecord smoothed(filter.model(), frames);
+  for (std::size_t left = frames; left > 0;) {
+    {
+      nb::gil_scoped_release release;
+      left = smoother.backward(record, smoothed);
+    }
+    look_up(progress, 2 * frames - left, 2 * frames);
+  }
+  nb::dict out = arrays_of(std::move(record), filter.model(), frames);
+  add_arrays_of(std::move(smoothed), filter.model(), frames, out);
+  return out;
+}
+
+}  // namespace
+
+void bind_run(nb::class_<Filter>& filter) {
+  filter
+      .def("run", &run, nb::arg("time"), nb::arg("markers"), nb::arg("wrench"), nb::arg("progress") = nb::none(),
+           nb::arg("output_sd") = false,
+           "Runs over time (T,), markers (T, M, 3) and wrench (T, 6); the first frame is an update only. Returns "
+           "arrays by name; with output_sd also markers_sd, wrench_sd (of the body's own wrench) and moments_sd. "
+           "Raises DivergenceError naming the frame. progress(done, total) is called now and then.")
+      .def("run_smoothed", &run_smoothed, nb::arg("time"), nb::arg("markers"), nb::arg("wrench"),
+           nb::arg("progress") = nb::none(), nb::arg("output_sd") = false, nb::arg("stretch") = 0,
+           "run, then backwards over the same frames: the arrays of run, and smoothed_state, _markers, _wrench and "
+           "_moments, each also with _sd, and backward_us. The filter then stands where run would have left it; after "
+           "an interruption it stands anywhere. progress counts both ways: total is twice the frames. Memory beside "
+           "the arrays: T / stretch checkpoints and stretch frames; 0: sqrt(T). Raises ValueError where bounds are "
+           "kept by constraint 'gain' or 'sigmoid'.");
+}

@@ -1,0 +1,47 @@
+"""Plates that lag behind the markers: brought into step between two passes over a recording."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.model import InitialModel
+
+Array = npt.NDArray[np.float64]
+
+LEAST_S = 0.003
+"""A lesser delay is left to the state: a third of a frame at 100 Hz moves no moment by much."""
+SIGMAS = 3.0
+PASSES = 3
+"""The state extrapolates motion back over the delay and tells a long one a sixth too long; further passes mend that."""
+
+
+def delay_of(initial: InitialModel, state: Array, sd: Array) -> tuple[float, float] | None:
+    """Delay and its standard deviation, s, after the last frame (state, sd: (n,)); None where none is estimated."""
+    if "plates/delay" not in initial.names:
+        return None
+    k = initial.names.index("plates/delay")
+    return float(state[k]), float(sd[k])
+
+
+def is_late(delay: tuple[float, float] | None) -> bool:
+    """Whether a delay is worth bringing the plates into step for."""
+    return delay is not None and abs(delay[0]) > max(LEAST_S, SIGMAS * delay[1])
+
+
+def in_step(time: Array, wrench: Array, delay_s: float) -> Array:
+    """The wrench (T, 6) that belongs to each time (T,) s: what plates that lag by ``delay_s`` say that much later.
+
+    Linear between samples, NaN where one of them is, the last (or first) one held where the recording ends.
+    """
+    return np.stack([np.interp(time + delay_s, time, column) for column in wrench.T], axis=1)
+
+
+def in_words(shift_s: float, delay: tuple[float, float] | None) -> list[str]:
+    """What was found about the plates' clock; empty where nothing was asked."""
+    if delay is None:
+        return []
+    total, sd = shift_s + delay[0], delay[1]
+    ahead = "behind" if total >= 0.0 else "ahead of"
+    text = f"The plates are {1000.0 * abs(total):.1f} ms {ahead} the markers (standard deviation {1000.0 * sd:.1f} ms)"
+    return [f"{text}; they were brought into step." if shift_s else f"{text}."]

@@ -1,0 +1,184 @@
+"""Figure 3 of the paper: a criterion over the filter's three gains, as slices through its optimum."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+from matplotlib.colors import LogNorm, Normalize
+from matplotlib.figure import Figure
+from matplotlib.ticker import MaxNLocator
+
+from dynakin.errors import ConfigError
+from dynakin.report.labels import number
+from dynakin.report.plot import INK, QUIET
+
+Array = npt.NDArray[np.float64]
+
+GAINS = ("log10_coordinate", "log10_speed", "log10_acceleration")
+CRITERION = "criterion"
+LABEL, UNIT = "sum of RMS differences", "mm + N + N m"
+"""The paper's criterion: markers and wrench together."""
+_NAMES = ("coordinates", "speeds", "accelerations")
+_UNITS = ("rad²", "(rad/s)²", "(rad/s²)²")
+# A criterion that spans more than this many times its least value is coloured on a logarithmic scale.
+_LOG_FROM = 20.0
+
+
+@dataclass(frozen=True, eq=False)
+class Sensitivity:
+    """A criterion on a grid of gains.
+
+    gains: three sorted arrays, log10 of the process variances of coordinates, speeds and accelerations (SI squared, a
+    step). criterion: (A, B, C), NaN where the filter diverged or nothing was computed; in ``unit``.
+    """
+
+    gains: tuple[Array, Array, Array]
+    criterion: Array
+    label: str = LABEL
+    unit: str = UNIT
+
+    @property
+    def optimum(self) -> tuple[int, int, int]:
+        """Place of the least value in the grid."""
+        a, b, c = np.unravel_index(int(np.nanargmin(self.criterion)), self.criterion.shape)
+        return int(a), int(b), int(c)
+
+
+def read_sensitivity(path: str | Path) -> Sensitivity:
+    """Read a grid of gains: CSV or netCDF.
+
+    CSV: columns ``log10_coordinate``, ``log10_speed``, ``log10_acceleration`` and ``criterion``, one row a combination,
+    in any order; a blank or ``nan`` criterion is a filter that diverged. netCDF: a variable ``criterion`` over
+    coordinates of these three names; its attributes ``long_name`` and ``units`` say what it is.
+
+    Raises:
+        ConfigError: not such a file, or no finite criterion.
+    """
+    path = Path(path)
+    try:
+        found = _read_csv(path) if path.suffix.casefold() == ".csv" else _read_netcdf(path)
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or 'no such format'})") from None
+    if not np.isfinite(found.criterion).any():
+        raise ConfigError(f"{path}: no finite {CRITERION}, expected at least one combination that did not diverge")
+    return found
+
+
+def sensitivity_figure(grid: Sensitivity) -> Figure:
+    """Three slices through the optimum, each over two of the gains."""
+    best = grid.optimum
+    values = grid.criterion[np.isfinite(grid.criterion)]
+    low, high = float(values.min()), float(values.max())
+    norm: Normalize = (
+        LogNorm(low, high) if 0.0 < low * _LOG_FROM < high else Normalize(low, high if high > low else low + 1.0)
+    )
+    figure = Figure(figsize=(7.2, 2.7), layout="constrained")
+    every = figure.subplots(1, 3)
+    mesh = None
+    for axes, (x, y) in zip(every, ((0, 1), (0, 2), (1, 2)), strict=True):
+        held = 3 - x - y
+        plane = np.take(grid.criterion, best[held], axis=held).T  # rows: y
+        axes.set_facecolor("white")
+        axes.patch.set(hatch="////", edgecolor="#c9d0d6", linewidth=0.0)
+        mesh = axes.pcolormesh(
+            _edges(grid.gains[x]), _edges(grid.gains[y]), np.ma.masked_invalid(plane), cmap="cividis", norm=norm
+        )
+        point = (grid.gains[x][best[x]], grid.gains[y][best[y]])
+        axes.plot(*point, "o", markersize=8, markerfacecolor="none", markeredgecolor="white", markeredgewidth=3.2)
+        axes.plot(*point, "o", markersize=8, markerfacecolor="none", markeredgecolor="#D55E00", markeredgewidth=1.6)
+        axes.set_xlabel(_axis_label(x))
+        axes.set_ylabel(_axis_label(y))
+        at = f"{grid.gains[held][best[held]]:g}"
+        axes.set_title(f"{_NAMES[held]} at $10^{{{at}}}$ {_UNITS[held]}", fontsize=8, weight="normal")
+        for axis in (axes.xaxis, axes.yaxis):
+            axis.set_major_locator(MaxNLocator(7, integer=True, steps=[1, 2, 3, 5, 10]))
+        axes.grid(False)
+        axes.set_box_aspect(1)
+    assert mesh is not None
+    bar = figure.colorbar(mesh, ax=list(every), location="right", shrink=0.82, pad=0.02)
+    bar.set_label(f"{grid.label}, {grid.unit}", color=QUIET)
+    bar.outline.set_visible(False)
+    figure.suptitle(
+        f"Slices through the optimum (○: {number(low)}, in {grid.unit}); hatched: the filter diverged",
+        x=0.01,
+        ha="left",
+        fontsize=8.5,
+        color=INK,
+    )
+    return figure
+
+
+def _axis_label(gain: int) -> str:
+    return f"gain of {_NAMES[gain]}\nlog₁₀ of Q in {_UNITS[gain]}"
+
+
+def _edges(centres: Array) -> Array:
+    """Sides of the cells (n + 1,) around sorted centres (n,); a lone one is a decade wide."""
+    if len(centres) == 1:
+        return np.array([centres[0] - 0.5, centres[0] + 0.5])
+    middle = 0.5 * (centres[1:] + centres[:-1])
+    return np.concatenate([[2 * centres[0] - middle[0]], middle, [2 * centres[-1] - middle[-1]]])
+
+
+def _read_csv(path: Path) -> Sensitivity:
+    with path.open(encoding="utf-8", newline="") as file:
+        lines = csv.DictReader(line for line in file if not line.startswith("#"))
+        missing = [name for name in (*GAINS, CRITERION) if name not in (lines.fieldnames or ())]
+        if missing:
+            expected = ", ".join((*GAINS, CRITERION))
+            raise ConfigError(f"{path}: no column {missing[0]}, expected {expected}")
+        rows = [_row(path, k + 1, line) for k, line in enumerate(lines)]
+    if not rows:
+        raise ConfigError(f"{path}: no rows, expected one for each combination of gains")
+    table = np.array(rows)
+    return _on_grid(path, table[:, :3], table[:, 3])
+
+
+def _row(path: Path, row: int, line: dict[str, str | None]) -> list[float]:
+    found = []
+    for name in (*GAINS, CRITERION):
+        text = (line[name] or "").strip()
+        try:
+            value = float(text or "nan")
+        except ValueError:
+            raise ConfigError(f"{path}: row {row}: {name} is {text!r}, expected a number") from None
+        if name != CRITERION and not np.isfinite(value):
+            raise ConfigError(f"{path}: row {row}: {name} is {text or 'blank'}, expected a finite number")
+        found.append(value if np.isfinite(value) else np.nan)
+    return found
+
+
+def _on_grid(path: Path, gains: Array, values: Array, label: str = LABEL, unit: str = UNIT) -> Sensitivity:
+    axes, places = zip(*(np.unique(gains[:, k], return_inverse=True) for k in range(3)), strict=True)
+    flat = np.ravel_multi_index(places, tuple(len(axis) for axis in axes))
+    if len(np.unique(flat)) < len(flat):
+        k = int(np.flatnonzero(np.bincount(flat)[flat] > 1)[1])
+        raise ConfigError(f"{path}: the gains {gains[k].tolist()} stand there twice, expected each combination once")
+    criterion = np.full(tuple(len(axis) for axis in axes), np.nan)
+    criterion.ravel()[flat] = values
+    return Sensitivity((axes[0], axes[1], axes[2]), criterion, label, unit)
+
+
+def _read_netcdf(path: Path) -> Sensitivity:
+    try:
+        with xr.open_dataset(path, engine="h5netcdf") as data:
+            data.load()
+    except FileNotFoundError as error:
+        raise OSError(2, "No such file or directory") from error
+    if CRITERION not in data or set(data[CRITERION].dims) != set(GAINS) or not set(GAINS) <= set(data.coords):
+        expected = ", ".join(GAINS)
+        raise ConfigError(f"{path}: no variable {CRITERION} over {expected} with their values, expected it")
+    values = data[CRITERION].transpose(*GAINS).astype(float)
+    gains: Sequence[Array] = [np.asarray(data[name].values, dtype=float) for name in GAINS]
+    if not all(np.isfinite(axis).all() for axis in gains):
+        raise ConfigError(f"{path}: a gain is not finite, expected numbers along {', '.join(GAINS)}")
+    grid = np.stack([axis.ravel() for axis in np.meshgrid(*gains, indexing="ij")], axis=1)
+    label, unit = str(values.attrs.get("long_name", LABEL)), str(values.attrs.get("units", UNIT))
+    finite = np.where(np.isfinite(values.values), values.values, np.nan)
+    return _on_grid(path, grid, finite.ravel(), label, unit)

@@ -1,0 +1,92 @@
+"""A comparison's tables as words, for the page and for the screen."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from dynakin.comparison import AngleDifference, MomentDifference, Row, Spread, UnseenRow
+from dynakin.comparison.table2 import MARKERS
+from dynakin.results import COMPONENTS
+
+
+@dataclass(frozen=True)
+class TextTable:
+    """A table whose cells are written; the columns ``numbers`` stand to the right. ``folded``: opens on a click."""
+
+    title: str
+    headings: tuple[str, ...]
+    rows: list[tuple[str, ...]]
+    numbers: tuple[int, ...]
+    folded: bool = False
+
+
+def shown(value: Spread, digits: int, unit: str = "") -> str:
+    """Mean and, over several trials, standard deviation."""
+    if value.mean is None:
+        return "–"
+    text = f"{value.mean:.{digits}f}" + (f" ± {value.sd:.{digits}f}" if value.sd is not None else "")
+    return f"{text} {unit}".rstrip().replace("-", "−")
+
+
+def table2_text(rows: Sequence[Row], title: str, *, single_markers: bool = False) -> TextTable:
+    """Rows of Table II or of a held-out trial: the markers' mean and the wrench, or each single marker."""
+    found = []
+    for row in rows:
+        if (row.quantity in (MARKERS, *COMPONENTS)) == single_markers:
+            continue
+        found.append((name_of(row.quantity), row.method, *_fit(row)))
+    headings = ("", "method", "RMS", "of range, %", "of RMS, %", "r")
+    return TextTable(title, headings, _once(found), (2, 3, 4, 5), folded=single_markers)
+
+
+def angle_text(rows: Sequence[AngleDifference]) -> TextTable:
+    """Differences to the classical angles."""
+    found = [
+        (row.coordinate, row.method, *(shown(value, 1, row.unit) for value in (row.rms, row.mean, row.rms_about_mean)))
+        for row in rows
+    ]
+    headings = ("coordinate", "method", "RMS", "mean", "RMS about mean")
+    return TextTable("Coordinates against the classical method", headings, _once(found), (2, 3, 4))
+
+
+def moment_text(rows: Sequence[MomentDifference]) -> TextTable:
+    """Differences to AT's joint moments."""
+    found = [(row.coordinate, row.method, *_fit(row)) for row in rows]
+    headings = ("coordinate", "method", "RMS", "of range, %", "of RMS, %", "r")
+    return TextTable("Joint moments against AT", headings, _once(found), (2, 3, 4, 5))
+
+
+def unseen_text(rows: Sequence[UnseenRow]) -> TextTable:
+    """Yardsticks: methods side by side, RMS."""
+    methods = list(dict.fromkeys(row.method for row in rows))
+    figures = {(row.yardstick, row.quantity, row.method): row for row in rows}
+    found = []
+    for yardstick, quantity in dict.fromkeys((row.yardstick, row.quantity) for row in rows):
+        if quantity not in (MARKERS, *COMPONENTS):
+            continue
+        cells = [figures.get((yardstick, quantity, method)) for method in methods]
+        texts = ("" if cell is None else shown(cell.rms, 1, cell.unit) for cell in cells)
+        found.append((yardstick, name_of(quantity), *texts))
+    numbers = tuple(range(2, 2 + len(methods)))
+    return TextTable("What was not seen, RMS error", ("", "", *methods), _once(found), numbers)
+
+
+def name_of(quantity: str) -> str:
+    """Components as the paper writes them."""
+    return quantity.upper() if quantity in COMPONENTS else quantity
+
+
+def _fit(row: Row | MomentDifference) -> tuple[str, str, str, str]:
+    return (
+        shown(row.rms, 1, row.unit),
+        shown(row.nrms_range_percent, 1),
+        shown(row.nrms_rms_percent, 1),
+        shown(row.correlation, 2),
+    )
+
+
+def _once(rows: Sequence[tuple[str, ...]]) -> list[tuple[str, ...]]:
+    """The first cell only where it changes."""
+    before = [""] + [row[0] for row in rows[:-1]]
+    return [("" if row[0] == last else row[0], *row[1:]) for row, last in zip(rows, before, strict=True)]

@@ -1,0 +1,56 @@
+"""Names and numbers as people read them: on the page, on screen and in the sentences of ``metrics.json``."""
+
+from __future__ import annotations
+
+import numpy as np
+
+INERTIA_WORDS = {
+    "mass": "mass",
+    "mx": "first moment, forward",
+    "my": "first moment, up",
+    "mz": "first moment, right",
+    "ixx": "inertia xx",
+    "iyy": "inertia yy",
+    "izz": "inertia zz",
+    "ixy": "inertia xy",
+    "ixz": "inertia xz",
+    "iyz": "inertia yz",
+}
+
+
+def words(name: str) -> str:
+    """`upper_arm` -> `upper arm`."""
+    return name.replace("_", " ")
+
+
+def sentence(text: str) -> str:
+    """With a capital at the start, the rest as it is."""
+    return text[:1].upper() + text[1:]
+
+
+def number(value: float | None, unit: str = "", digits: int = 3) -> str:
+    """A number of ``digits`` significant digits with its unit; a dash where there is none."""
+    if value is None or not np.isfinite(value):
+        return "–"
+    if value == 0.0:
+        text = "0"
+    elif not 1e-4 <= abs(value) < 1e5:
+        text = f"{value:.{digits - 1}e}"
+    else:
+        rounded = abs(float(f"{value:.{digits - 1}e}"))  # 9.996 has as many decimals as 10.0
+        decimals = max(0, digits - 1 - int(np.floor(np.log10(rounded))))
+        text = f"{value:.{decimals}f}"
+    text = text.replace("-", "−")
+    return f"{text} {unit}" if unit else text
+
+
+def listed(items: list[str], limit: int = 6) -> str:
+    """`a, b and c`; the rest of a long list only counted."""
+    if len(items) > limit:
+        return f"{', '.join(items[:limit])} and {len(items) - limit} more"
+    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
+
+
+def plural(count: int, noun: str) -> str:
+    """`1 frame`, `2 frames`."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"

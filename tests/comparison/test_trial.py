@@ -1,0 +1,83 @@
+"""A trial made from an estimate that is there already, and its repetitions by method."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dynakin
+from dynakin.comparison import Setup, Trial, trial_of
+from dynakin.errors import ModelError, RecordingError
+from dynakin.recordings import find_ground_frame
+from dynakin.reference import PlanarChain, classical_angles, landmark_paths
+from dynakin.results.mean_curves import MEASURED
+from dynakin.results.repetitions import body_paths, find_repetitions
+from dynakin.simulation import SimulatedTrial
+
+
+@pytest.fixture(scope="module")
+def estimator(simulated: SimulatedTrial, setup: Setup) -> dynakin.Estimator:
+    made = setup.estimator("paper")
+    made.start(simulated.recording)
+    return made
+
+
+def test_nothing_is_filtered_again(compared: Trial, estimator: dynakin.Estimator) -> None:
+    assert estimator.initial is not None
+    again = trial_of(compared.estimates, estimator.initial, estimator.model)
+    for one, other in zip(compared.methods, again.methods, strict=True):
+        assert one.name == other.name
+        np.testing.assert_array_equal(one.wrench, other.wrench)
+        np.testing.assert_array_equal(one.markers, other.markers)
+    assert again.methods[0].data is compared.estimates["paper"].data
+
+
+def test_repetitions_lie_after_the_adaptation_and_every_method_has_their_curves(compared: Trial) -> None:
+    assert compared.repetitions.movement == "squat" and compared.repetitions.items
+    assert all(compared.window[r.first : r.last + 1].all() for r in compared.repetitions.items)
+    curves = compared.curves()
+    names = [method.name for method in compared.methods]
+    assert {c.method for c in curves if c.quantity == "knee/moment"} == set(names)
+    assert {c.method for c in curves if c.quantity == "fy"} == {*names, MEASURED}
+    (measured,) = [c for c in curves if (c.method, c.quantity) == (MEASURED, "fy")]
+    assert measured.mean_per_kg is not None
+    assert measured.mean_per_kg.mean() == pytest.approx(
+        9.8, abs=0.7
+    )  # over a squat the person rises as far as it sinks
+
+
+def test_a_reference_that_cannot_be_had_is_a_note_where_the_run_asks_for_whatever_there_is(
+    compared: Trial, estimator: dynakin.Estimator
+) -> None:
+    assert estimator.initial is not None
+    with pytest.raises(RecordingError, match="80 Hz is not possible at 100 Hz"):
+        trial_of(compared.estimates, estimator.initial, estimator.model, 80.0)
+    alone = trial_of(compared.estimates, estimator.initial, estimator.model, 80.0, whatever=True)
+    assert [method.name for method in alone.methods] == ["EKF (paper)"]
+    (note,) = alone.notes
+    assert note.startswith("AT and the classical method are left out: ") and "\n" not in note
+
+
+def test_a_landmark_that_the_recording_does_not_give_is_named(
+    simulated: SimulatedTrial, estimator: dynakin.Estimator
+) -> None:
+    assert estimator.initial is not None
+    landmarks = landmark_paths(simulated.recording, estimator.initial, estimator.model)
+    del landmarks["hip"]
+    with pytest.raises(ModelError, match=r"of thigh needs the landmarks .* do not give hip"):
+        classical_angles(PlanarChain.of(estimator.initial.plan), estimator.initial.plan, landmarks)
+
+
+def test_a_walk_has_curves_of_each_foot(data_dir: Path, compared: Trial) -> None:
+    recording = dynakin.read(data_dir / "plugin_gait" / "GaitNormal_1.c3d")
+    found = find_repetitions(body_paths(recording, find_ground_frame(recording)))
+    short = {"time": recording.time, "repetitions": found}
+    methods = tuple(
+        replace(m, coordinates=m.coordinates[:215], moments=m.moments[:215], wrench=m.wrench[:215])
+        for m in compared.methods
+    )
+    walk = replace(compared, methods=methods, measured_wrench=compared.measured_wrench[:215], **short)
+    assert {(c.side, c.movement) for c in walk.curves()} == {("left", "gait"), ("right", "gait")}

@@ -1,0 +1,94 @@
+"""The fixed-lag smoother equals the full one on the frames until now."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from core.random_models import planar_model, spatial_model
+from core.smoother_cases import case
+from core.test_smoother_constraints import BOUNDED, lost_and_found
+from dynakin import _core
+
+CASES = {
+    "planar": lambda: case(planar_model(50, n_segments=5), 31, 40),
+    "spatial, all blocks": lambda: case(spatial_model(9), 31, 40, states="all"),
+    "bounds": BOUNDED["all blocks"],
+    "lost and found": lost_and_found,
+}
+
+
+def stepped(c, lag, frames, **options):
+    smoother = _core.FixedLag(c.filter(), lag, **options)
+    d = c.data
+    for k in range(frames):
+        dt = d.time[k] - d.time[k - 1] if k else 0.0
+        smoother.step(dt, d.markers[k], d.wrench[k])
+        yield k, smoother
+
+
+@pytest.mark.parametrize("lag", [1, 4, 12])
+@pytest.mark.parametrize("name", CASES)
+def test_equals_the_full_smoother_on_the_data_until_now(name, lag):
+    c = CASES[name]()
+    frames = len(c.data.time)
+    for k, smoother in stepped(c, lag, frames, deviations=True):
+        assert smoother.ready == (k >= lag)
+        if k < lag or k % 5:
+            continue
+        full = c.smoothed(frames=k + 1)
+        there = k - lag
+        assert smoother.delay_s == pytest.approx(c.data.time[k] - c.data.time[there])
+        sd = full["smoothed_state_sd"][there]
+        np.testing.assert_allclose(smoother.state_sd, sd, rtol=1e-10)
+        # where bounds bind, the projection's own tolerance is 1e-9 of a standard deviation
+        np.testing.assert_array_less(np.abs(smoother.state - full["smoothed_state"][there]) / sd, 1e-7)
+
+
+@pytest.mark.parametrize("name", ["planar", "spatial, all blocks"])
+def test_without_deviations_the_mean_is_the_same(name):
+    c = CASES[name]()
+    with_sd = [(s.state, s.delay_s) for _, s in stepped(c, 6, 40, deviations=True) if s.ready]
+    alone = [(s.state, s.delay_s) for _, s in stepped(c, 6, 40) if s.ready]
+    for (a, delay_a), (b, delay_b) in zip(with_sd, alone, strict=True):
+        np.testing.assert_array_equal(a, b)
+        assert delay_a == delay_b
+
+
+def test_without_deviations_bounds_are_kept_too():
+    c = CASES["bounds"]()
+    for _, smoother in stepped(c, 6, 60):
+        if smoother.ready:
+            assert (smoother.state >= c.options["lower"]).all()
+            assert (smoother.state <= c.options["upper"]).all()
+
+
+def test_a_refused_sample_counts_as_a_frame_in_which_nothing_was_measured():
+    refused, missing = case(planar_model(3), 31, 40, total_mass=None), case(planar_model(3), 31, 40, total_mass=None)
+    refused.data.markers[15, 0] = np.inf
+    missing.data.markers[15], missing.data.wrench[15] = np.nan, np.nan
+    d = refused.data
+    a, b = _core.FixedLag(refused.filter(), 4, True), _core.FixedLag(missing.filter(), 4, True)
+    for k in range(40):
+        dt = d.time[k] - d.time[k - 1] if k else 0.0
+        if k == 15:
+            with pytest.raises(ValueError, match="infinite"):
+                a.step(dt, d.markers[k], d.wrench[k])
+        else:
+            a.step(dt, d.markers[k], d.wrench[k])
+        b.step(dt, missing.data.markers[k], missing.data.wrench[k])
+        if a.ready and k != 15:
+            np.testing.assert_array_equal(a.state, b.state)
+            np.testing.assert_array_equal(a.covariance, b.covariance)
+
+
+def test_what_is_not_there_is_refused_by_name():
+    c = CASES["planar"]()
+    with pytest.raises(ValueError, match="lag: expected 1 frame or more, found 0"):
+        _core.FixedLag(c.filter(), 0)
+    smoother = _core.FixedLag(c.filter(), 3)
+    with pytest.raises(ValueError, match="no smoothed frame before frame 3"):
+        _ = smoother.state
+    *_, (_, smoother) = stepped(c, 3, 5)
+    with pytest.raises(ValueError, match="made without deviations"):
+        _ = smoother.state_sd

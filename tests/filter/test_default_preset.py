@@ -1,0 +1,169 @@
+"""The default preset on simulated squats: truth, faults, plates that lag or err, smoothing and live use."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from filter.test_estimator import estimator, samples, with_markers
+
+import dynakin
+from dynakin.errors import ConfigError
+from dynakin.filter.samples import recording_arrays
+from dynakin.results import Estimate
+from dynakin.simulation import SensorNoise, SimulatedTrial, simulate_squat
+
+START_S = 3.0
+
+
+@pytest.fixture(scope="module")
+def trial() -> SimulatedTrial:
+    return simulate_squat(seed=3, duration_s=10.0)
+
+
+@pytest.fixture(scope="module")
+def plain(trial: SimulatedTrial) -> Estimate:
+    return estimator().run(trial.recording)
+
+
+@pytest.fixture(scope="module")
+def smoothed(trial: SimulatedTrial) -> Estimate:
+    return estimator().run(trial.recording, smooth=True)
+
+
+def rms(estimate: Estimate, trial: SimulatedTrial, name: str) -> np.ndarray:
+    window = trial.recording.time >= START_S
+    error = (estimate.data[name] - trial.truth.data[name]).transpose("time", "coordinate").values[window]
+    return np.sqrt(np.mean((error - (error.mean(axis=0) if name == "coordinates" else 0.0)) ** 2, axis=0))
+
+
+def test_angles_speeds_and_moments_are_near_the_truth(plain: Estimate, trial: SimulatedTrial) -> None:
+    angle = dict(zip(plain.coordinate_names, np.degrees(rms(plain, trial, "coordinates")), strict=True))
+    assert angle["ankle"] < 1.5 and angle["knee"] < 1.5, angle
+    assert rms(plain, trial, "speeds").mean() < 0.12
+    leg = [plain.coordinate_names.index(name) for name in ("ankle", "knee", "hip")]
+    assert rms(plain, trial, "moments")[leg].mean() < 5.0
+
+
+def test_smoothing_comes_closer_to_the_truth_and_is_surer(
+    plain: Estimate, smoothed: Estimate, trial: SimulatedTrial
+) -> None:
+    assert rms(smoothed, trial, "speeds").mean() < 0.8 * rms(plain, trial, "speeds").mean()
+    assert rms(smoothed, trial, "accelerations").mean() < 0.6 * rms(plain, trial, "accelerations").mean()
+    for name in ("state_sd", "moments_sd"):
+        live, after = plain.data[name].values, smoothed.data[name].values
+        assert (after <= live * (1.0 + 1e-9)).all() or name == "moments_sd", name
+        assert after.mean() < live.mean()
+    np.testing.assert_array_equal(smoothed.data["nis"].values, plain.data["nis"].values)
+    assert smoothed.config["smooth"] is True
+
+
+def test_smoothing_needs_bounds_that_have_a_smoother(trial: SimulatedTrial) -> None:
+    with pytest.raises(ConfigError, match="smooth: bounds are kept by constraint 'gain'"):
+        estimator(noise=dynakin.presets.paper()).run(trial.recording, smooth=True)
+
+
+def test_the_delayed_frame_is_the_smoothers_of_what_was_seen(trial: SimulatedTrial) -> None:
+    live = estimator(lag=15)
+    live.start(trial.recording)
+    for sample in samples(trial.recording)[:120]:
+        now = live.step(sample)
+        delayed = live.delayed()
+        assert (delayed is None) == (sample.time_s < 0.15 - 1e-9)
+    assert delayed is not None and delayed.time_s == pytest.approx(now.time_s - 0.15)
+    offline = estimator()
+    initial = offline.start(trial.recording)
+    markers, wrench = recording_arrays(trial.recording, initial)
+    arrays = offline.run_smoothed_arrays(trial.recording.time[:120], markers[:120], wrench[:120])
+    np.testing.assert_allclose(delayed.speeds, arrays["state"][104, 7:14], atol=1e-8)
+    with pytest.raises(ConfigError, match=r"expected Estimator\(\.\.\., lag=frames\)"):
+        offline.delayed()
+
+
+def test_deviations_on_demand_are_those_of_the_run(trial: SimulatedTrial, plain: Estimate) -> None:
+    live = estimator()
+    live.start(trial.recording)
+    for sample in samples(trial.recording)[:50]:
+        live.step(sample)
+    found = live.deviations()
+    for name in ("coordinates", "speeds", "accelerations", "moments"):
+        np.testing.assert_allclose(found[name], plain.data[f"{name}_sd"].values[49], rtol=1e-8)
+    known = np.isfinite(plain.data["wrench_sd"].values[49])
+    np.testing.assert_allclose(found["wrench"][known], plain.data["wrench_sd"].values[49][known], rtol=1e-8)
+
+
+def test_plates_that_lag_are_brought_into_step() -> None:
+    late = simulate_squat(seed=3, duration_s=10.0, noise=SensorNoise(plate_lag_s=0.04))
+    result = estimator().run(late.recording)
+    told = [text for text in result.messages if text.startswith("The plates are ")]
+    assert len(told) == 1 and told[0].endswith("they were brought into step.")
+    lag_ms = float(told[0].split()[3])
+    assert lag_ms == pytest.approx(40.0, abs=4.0) and "behind" in told[0]
+    aside = estimator(noise=dynakin.presets.default().model_copy(update={"plate_delay_s": 0.0})).run(late.recording)
+    assert rms(result, late, "moments").mean() < 0.6 * rms(aside, late, "moments").mean()
+
+
+def test_an_offset_of_the_plates_is_found(trial: SimulatedTrial) -> None:
+    def pushed(recording: dynakin.Recording, newtons: float) -> dynakin.Recording:
+        first, *others = recording.plates
+        forward = estimator().start(recording).ground.forward
+        return recording.with_plates((dataclasses.replace(first, force=first.force + newtons * forward), *others))
+
+    result = estimator().run(pushed(trial.recording, 8.0))
+    offset = next(p for p in result.parameters if p.name == "plates/fx")
+    assert offset.unit == "N" and offset.value == pytest.approx(8.0, abs=3.0 * offset.sd)
+    assert abs(offset.value - 8.0) < 3.0
+
+
+def test_plates_that_carry_something_else_are_not_used(trial: SimulatedTrial) -> None:
+    heavier = [dataclasses.replace(p, force=1.4 * p.force, moment=1.4 * p.moment) for p in trial.recording.plates]
+    result = estimator().run(trial.recording.with_plates(tuple(heavier)))
+    warning = [text for text in result.messages if "The plates are not used" in text]
+    assert len(warning) == 1 and "where the person weighs 70.0 kg" in warning[0]
+    assert np.isnan(result.data["wrench_measured"].values).all()
+    assert (result.data["n_rows"].values <= 34).all()
+
+
+def test_swapped_and_flying_markers_are_refused_and_said(trial: SimulatedTrial, plain: Estimate) -> None:
+    """Given two markers swapped for 1 s and one that flies off, when it is over, then the constants have not moved."""
+    names = trial.recording.marker_names
+    knee, hip, wrist = (names.index(name) for name in ("r_knee", "r.ASIS", "C7"))
+
+    def faults(markers: np.ndarray) -> None:
+        markers[400:500, [knee, hip]] = markers[400:500, [hip, knee]]
+        markers[600:700, wrist] += [0.3, 0.4, 0.0]
+
+    result = estimator().run(with_markers(trial.recording, faults))
+    told = {event.subject: event for event in result.events if event.kind == "gated"}
+    assert {"r_knee", "r.ASIS", "C7"} <= set(told)
+    assert told["C7"].time_s == pytest.approx(6.0) and "100 frames" in told["C7"].message
+    for before, after in zip(plain.parameters, result.parameters, strict=True):
+        if before.kind in ("length", "inertia"):
+            assert abs(after.value - before.value) < before.sd, before.name
+
+
+def test_a_motion_that_nobody_saw_is_found_again(trial: SimulatedTrial) -> None:
+    """Given 1 s without any marker in the middle of a squat, when they come back, then the motion is found and said."""
+
+    def blind(markers: np.ndarray) -> None:
+        markers[450:550] = np.nan
+
+    result = estimator().run(with_markers(trial.recording, blind))
+    words = [event.message for event in result.events if event.subject == "motion"]
+    assert any("lost" in text for text in words) and any("found" in text for text in words)
+    assert np.isfinite(result.data["state"].values).all()
+    error = (result.data["coordinates"] - trial.truth.data["coordinates"]).transpose("time", "coordinate").values
+    assert np.degrees(np.abs(error[560:]).max()) < 25.0
+
+
+def test_every_output_has_a_deviation_in_the_files(smoothed: Estimate, tmp_path) -> None:
+    from dynakin.recordings import read_table
+
+    smoothed.save(tmp_path / "out")
+    table = read_table(tmp_path / "out" / "uncertainty.sto")
+    for name in ("knee", "knee_speed", "knee_acceleration", "knee_moment", "fx", "fy", "mz"):
+        values = table.column(name)
+        assert (values > 0.0).all(), name
+    knee = smoothed.coordinate_names.index("knee")
+    np.testing.assert_allclose(table.column("knee_moment"), smoothed.data["moments_sd"].values[:, knee], rtol=1e-5)

@@ -1,0 +1,56 @@
+"""Findings on adaptation, bounds and soft tissue: their words and how much they matter."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from dynakin.report.insights import Insight, insights
+from dynakin.results import Estimate, compute_metrics
+
+
+def found(estimate: Estimate) -> dict[str, Insight]:
+    return {insight.title: insight for insight in insights(estimate, compute_metrics(estimate))}
+
+
+def with_element(estimate: Estimate, name: str, path: np.ndarray) -> Estimate:
+    state = estimate.data["state"].copy(deep=True)
+    state.loc[{"element": name}] = path
+    return replace(estimate, data=estimate.data.assign(state=state))
+
+
+def with_error(estimate: Estimate, component: str, error: np.ndarray) -> Estimate:
+    wrench = estimate.data["wrench_estimated"].copy(deep=True)
+    wrench.loc[{"component": component}] += error
+    return replace(estimate, data=estimate.data.assign(wrench_estimated=wrench))
+
+
+def test_a_late_adaptation_is_noted_and_a_misfit_that_grows_is_a_warning(estimate: Estimate) -> None:
+    late = found(estimate)["Adaptation"]  # the thigh's length wanders by about 1 %
+    assert late.level == "note" and "until then the lengths move by more than 1 %" in late.text
+    assert "taken from 2 s on and hold part of that" in late.text
+    flat = estimate.data["state"].copy(deep=True)
+    flat[:] = flat[0]
+    still = replace(estimate, data=estimate.data.assign(state=flat))
+    assert found(still)["Adaptation"].level == "good"
+    early = found(with_error(still, "fy", np.where(estimate.time < 4.0, 100.0, 0.0)))["Adaptation"]
+    assert early.level == "note" and "settled after 4.0 s" in early.text and "misfit of fy" in early.text
+    grown = found(with_error(estimate, "fy", np.exp(estimate.time)))["Adaptation"]
+    assert grown.level == "warning" and "estimate is being lost" in grown.text
+
+
+def test_markers_that_move_too_far_are_named_without_their_prefix(estimate: Estimate) -> None:
+    assert found(estimate)["Soft tissue"].level == "good"
+    swing = 0.06 * np.sin(np.pi * estimate.time)
+    told = found(with_element(estimate, "marker/S1:RTHI/x", swing))["Soft tissue"]
+    assert told.level == "warning" and told.text.startswith("RTHI moves 60 mm on the thigh (declared 18 mm)")
+    assert told.advice
+
+
+def test_bounds_are_counted_by_kind_and_those_touched_for_a_time_are_told(estimate: Estimate) -> None:
+    (shank,) = (p for p in estimate.parameters if p.name == "length/shank")
+    path = np.where((estimate.time >= 4.0) & (estimate.time < 9.0), shank.upper, shank.initial)
+    told = found(with_element(estimate, "length/shank", path))["Bounds"].text
+    assert "(1 of 6 lengths, 0 of 20 marker places, 1 of 21 inertial numbers)" in told
+    assert "1 other touched a bound and left it (longest: shank length, 50 % of the time)" in told
