@@ -152,9 +152,18 @@ bool Projection::worst_violation(const Eigen::VectorXd& x, const Eigen::MatrixXd
     return true;
   }
   out.kind = k_cut;
-  for (int b = 0; b < consistency_.size(); ++b)
-    if (consistency_.cut(b, x, out.row)) return true;
-  return false;
+  bool any = false;
+  HalfSpace cut;
+  for (int b = 0; b < consistency_.size(); ++b) {
+    if (!consistency_.cut(b, x, cut)) continue;
+    const double variance = cut.variance(P), missing = cut.bound - cut.dot(x);
+    const double excess = variance > 0.0 ? missing / std::sqrt(variance) : k_infinity;
+    if (any && excess <= worst) continue;
+    any = true;
+    worst = excess;
+    out.row = cut;
+  }
+  return any;
 }
 
 bool Projection::add(Active incoming, const Eigen::MatrixXd& P, Eigen::VectorXd& x) {

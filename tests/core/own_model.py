@@ -1,8 +1,8 @@
 """Trials drawn from the filter's own model: what it assumes of noise is exactly so.
 
 A planar chain with white jerk, Gauss-Markov soft tissue, slow plate errors and a delay; lengths, places and inertia are
-drawn from the prior. Angles stay within about 20 deg (RMS 5) and constants within a few per cent, so that what is tested is the
-filter's statistics and not how well a tangent stands for a curve (the extended Kalman filter's own approximation).
+drawn from the prior. Angles stay within 23 deg (RMS 4) and constants within a few per cent, so that what is tested is
+the filter's statistics and not how well a tangent stands for a curve (the extended Kalman filter's own approximation).
 """
 
 from __future__ import annotations

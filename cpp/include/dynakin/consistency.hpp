@@ -1,5 +1,6 @@
 // Physical consistency: a segment's inertia belongs to some distribution of mass exactly if its pseudo-inertia is
-// positive definite (Wensing et al. 2018). In the plane that is m > 0 and m izz > mx^2 + my^2.
+// positive definite (Wensing et al. 2018; docs/derivations.md, section 13). In the plane that is m > 0 and
+// m izz > mx^2 + my^2.
 #pragma once
 
 #include <Eigen/Core>

@@ -23,6 +23,13 @@ struct HalfSpace {
     for (int k = 0; k < size; ++k) sum += value[k] * x(index[k]);
     return sum;
   }
+  // a' P a
+  double variance(const Eigen::MatrixXd& P) const {
+    double sum = 0.0;
+    for (int k = 0; k < size; ++k)
+      for (int l = 0; l < size; ++l) sum += value[k] * value[l] * P(index[k], index[l]);
+    return sum;
+  }
   // out = M a
   template <class Out>
   void times(const Eigen::MatrixXd& M, Out&& out) const {

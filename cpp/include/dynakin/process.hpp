@@ -10,7 +10,7 @@ namespace dynakin {
 
 // x <- f(x), P <- F P F' + Q over dt. F is never formed: it mixes the first three blocks of P and scales what decays.
 // Q is the sum of a diagonal added at each call, the paper's, and of continuous white noise integrated over dt, which
-// makes two half steps equal one (docs/derivations.md).
+// makes two half steps equal one (docs/derivations.md, section 10).
 // scratch: (n,).
 void predict(const Model& model, const FilterSettings& settings, double dt, Eigen::VectorXd& scratch,
              Eigen::VectorXd& x, Eigen::MatrixXd& P);

@@ -20,7 +20,8 @@ struct ProjectionReport {
 
 // Dual active-set method (Goldfarb and Idnani 1983) for min (y - x)' P^-1 (y - x); it needs columns of P only, adds the
 // worst violated constraint and drops those whose multiplier would turn negative. It starts from the constraints that
-// were active the last time. Inequalities move the mean only (docs/derivations.md); equalities condition P too.
+// were active the last time. Inequalities move the mean only; equalities condition P too
+// (docs/derivations.md, section 12).
 class Projection {
  public:
   struct Active {
