@@ -82,6 +82,8 @@ def continuous_noise(initial: InitialModel, noise: Noise, layout: _core.StateLay
     for k in range(offset, offset + size):
         coordinate = layout.names[k].removesuffix("/acceleration")
         density[k] = noise.jerk if kinds[coordinate] == "rotation" else noise.jerk_translation
+    offset, size = layout.blocks["lengths"]
+    density[offset : offset + size] = noise.length_drift
     for block, time in (("soft_tissue", noise.soft_tissue_time_s), ("plates", noise.plate_time_s)):
         offset, size = layout.blocks[block]
         for k in range(offset, offset + size):

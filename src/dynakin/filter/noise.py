@@ -43,6 +43,9 @@ class Noise(BaseModel):
     jerk_translation: Variance = 0.0
     """The same of each translation, m^2/s^5."""
 
+    length_drift: Variance = 0.0
+    """Spectral density of a random walk of each length, m^2/s: skin that follows an angle and joints that are no hinges
+    look like lengths, and do not average out; without it a length is thought to be known the better the longer."""
     soft_tissue: Deviation = 0.0
     """Standard deviation of the displacement of skin and flesh under each marker, as a fraction of the size that its
     marker set declares; 0: none is estimated."""

@@ -18,6 +18,7 @@ def default() -> Noise:
         marker_place=0.0,
         jerk=100.0,
         jerk_translation=10.0,
+        length_drift=3e-6,
         soft_tissue=0.5,
         soft_tissue_least_m=0.002,
         soft_tissue_time_s=5.0,
