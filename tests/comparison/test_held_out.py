@@ -41,7 +41,7 @@ def test_halves_share_no_frame_and_leave_none_out(
 
 
 def test_frozen_model_estimates_neither_lengths_nor_inertia_and_has_the_values(identified: Identified) -> None:
-    values = final_values(identified.estimates["paper"])
+    values = final_values(identified.estimates["default"])
     frozen = freeze(identified.initial, values, {"knee": 0.3})
     model = _core.Model(frozen.spec)
     assert not any(name.startswith(("length/", "inertia/")) for name in model.layout.names)
@@ -81,11 +81,11 @@ def test_every_method_is_judged_in_every_component(identified: Identified, parts
     rows = judge(blind, parts[1])
     assert [row.quantity for row in rows[:: len(blind.wrenches)]] == ["fx", "fy", "mz"]
     assert {row.method for row in rows} >= {
-        "EKF (paper), identified",
-        "EKF (paper), table",
+        "EKF (default), identified",
+        "EKF (default), table",
         "AT (6 Hz)",
         "classical (6 Hz), least squares in bounds",
-        "classical (6 Hz), inertia of EKF (paper)",
+        "classical (6 Hz), inertia of EKF (default)",
         "persistence: last",
     }
     last = next(row for row in rows if (row.quantity, row.method) == ("fy", "persistence: last"))
@@ -111,5 +111,5 @@ def test_a_marker_that_the_judging_trial_lacks_is_missing_not_zero(
         marker_names=tuple(parts[1].marker_names[k] for k in kept),
         markers=np.ascontiguousarray(parts[1].markers[:, kept]),
     )
-    wrench = predict_blind(identified, fewer).wrenches["EKF (paper), identified"]
+    wrench = predict_blind(identified, fewer).wrenches["EKF (default), identified"]
     assert np.isfinite(wrench[:, [0, 1, 5]]).all()

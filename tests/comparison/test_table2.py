@@ -55,20 +55,20 @@ def test_mean_and_sample_deviation_over_the_trials_that_have_a_figure() -> None:
 
 def test_rows_are_recomputable_from_the_estimate_after_the_adaptation(compared: Trial) -> None:
     rows = {(row.quantity, row.method): row for row in table2([compared])}
-    metrics = compared.estimates["paper"].metrics()
+    metrics = compared.estimates["default"].metrics()
     assert compared.time[compared.window][0] == pytest.approx(2.0)
-    assert rows["markers", "EKF (paper)"].rms.mean == pytest.approx(metrics["markers"]["mean_rms_mm"])
+    assert rows["markers", "EKF (default)"].rms.mean == pytest.approx(metrics["markers"]["mean_rms_mm"])
     for component in ("fx", "fy", "mz"):
-        row = rows[component, "EKF (paper)"]
+        row = rows[component, "EKF (default)"]
         assert row.rms.mean == pytest.approx(metrics["wrench"]["rms"][component])
         assert row.nrms_rms_percent.mean == pytest.approx(metrics["wrench"]["nrms_percent"][component])
-    assert ("fz", "EKF (paper)") not in rows  # a planar model says nothing of it
+    assert ("fz", "EKF (default)") not in rows  # a planar model says nothing of it
 
 
 def test_every_method_has_markers_and_wrench_and_the_filter_follows_them_closest(compared: Trial) -> None:
     rows = {(row.quantity, row.method): row.rms.mean for row in table2([compared])}
     for quantity in ("markers", "fx", "fy", "mz"):
-        ekf, *others = (rows[quantity, name] for name in ("EKF (paper)", "AT (6 Hz)", "classical (6 Hz)"))
+        ekf, *others = (rows[quantity, name] for name in ("EKF (default)", "AT (6 Hz)", "classical (6 Hz)"))
         assert ekf is not None
         assert all(other is not None and ekf < other for other in others), quantity
 
@@ -107,7 +107,7 @@ def test_files_hold_the_rows_and_replace_only_an_earlier_comparison(compared: Tr
         read = list(csv.DictReader(file))
     assert [line["quantity"] for line in read] == [row.quantity for row in rows]
     assert float(read[0]["rms"]) == rows[0].rms.mean and read[0]["rms_sd"] == ""
-    assert json.loads((folder / "comparison.json").read_text())["table2"][0]["method"] == "EKF (paper)"
+    assert json.loads((folder / "comparison.json").read_text())["table2"][0]["method"] == "EKF (default)"
     (folder / "mine.txt").write_text("kept")
     with pytest.raises(OutputError, match=r"mine\.txt"):
         save_comparison(folder, {"table2": rows})
@@ -128,5 +128,5 @@ def test_squats1_filter_follows_the_plates_far_below_the_table(data_dir: Path) -
     rows = {(row.quantity, row.method): row.rms.mean for row in table2([compare_trial(recording, Setup(model))])}
     limits = {"fx": (6.0, 15.0, 30.0), "fy": (10.0, 20.0, 45.0), "mz": (7.0, 15.0, 30.0)}
     for component, (ekf, least, most) in limits.items():
-        assert (rows[component, "EKF (paper)"] or np.inf) < ekf
+        assert (rows[component, "EKF (default)"] or np.inf) < ekf
         assert least < (rows[component, "AT (6 Hz)"] or 0.0) < most

@@ -20,7 +20,7 @@ from dynakin.simulation import SimulatedTrial
 
 @pytest.fixture(scope="module")
 def estimator(simulated: SimulatedTrial, setup: Setup) -> dynakin.Estimator:
-    made = setup.estimator("paper")
+    made = setup.estimator("default")
     made.start(simulated.recording)
     return made
 
@@ -32,7 +32,7 @@ def test_nothing_is_filtered_again(compared: Trial, estimator: dynakin.Estimator
         assert one.name == other.name
         np.testing.assert_array_equal(one.wrench, other.wrench)
         np.testing.assert_array_equal(one.markers, other.markers)
-    assert again.methods[0].data is compared.estimates["paper"].data
+    assert again.methods[0].data is compared.estimates["default"].data
 
 
 def test_repetitions_lie_after_the_adaptation_and_every_method_has_their_curves(compared: Trial) -> None:
@@ -56,7 +56,7 @@ def test_a_reference_that_cannot_be_had_is_a_note_where_the_run_asks_for_whateve
     with pytest.raises(RecordingError, match="80 Hz is not possible at 100 Hz"):
         trial_of(compared.estimates, estimator.initial, estimator.model, 80.0)
     alone = trial_of(compared.estimates, estimator.initial, estimator.model, 80.0, whatever=True)
-    assert [method.name for method in alone.methods] == ["EKF (paper)"]
+    assert [method.name for method in alone.methods] == ["EKF (default)"]
     (note,) = alone.notes
     assert note.startswith("AT and the classical method are left out: ") and "\n" not in note
 

@@ -10,7 +10,7 @@ import pytest
 from dynakin.comparison import Setup, unseen, unseen_figures
 from dynakin.comparison.extrapolation import extrapolated, held, line, persisted
 from dynakin.errors import ConfigError, RecordingError
-from dynakin.filter import Noise
+from dynakin.filter import presets
 from dynakin.simulation import SensorNoise, SimulatedTrial, simulate_squat
 
 
@@ -32,7 +32,7 @@ def test_what_is_held_is_the_last_value_that_was_seen() -> None:
 
 def test_rows_hold_every_yardstick_beside_what_raw_data_foretell(simulated: SimulatedTrial, setup: Setup) -> None:
     rows = unseen([unseen_figures(simulated.recording, setup)])
-    methods = {"EKF (paper)", "persistence", "linear extrapolation"}
+    methods = {"EKF (default)", "persistence", "linear extrapolation"}
     for yardstick in ("plates withheld", "marker left out", "100 ms ahead"):
         assert {row.method for row in rows if row.yardstick == yardstick} == methods
     assert all(row.rms.mean is not None and row.rms.mean > 0.0 for row in rows)
@@ -49,24 +49,22 @@ def test_a_marker_left_out_is_predicted_by_the_others_alone(simulated: Simulated
     moved = recording.markers.copy()
     moved[recording.time > 3.0, column] += 0.5  # m; nobody can foretell it, so it must all be error
     both = [unseen_figures(r, setup) for r in (recording, replace(recording, markers=moved))]
-    honest, shifted = (figures["marker left out", name, "EKF (paper)"] for figures in both)
+    honest, shifted = (figures["marker left out", name, "EKF (default)"] for figures in both)
     assert honest is not None and honest < 60.0
     assert shifted is not None and shifted > 400.0
 
 
 def test_a_filter_whose_noise_fits_foretells_what_the_paper_s_gains_do_not(setup: Setup) -> None:
     trial = simulate_squat(seed=2, duration_s=8.0, mass_kg=70.0, noise=SensorNoise.none())
-    # The same noise of the accelerations as the paper's, but coordinates and speeds that follow from them.
-    smooth = Noise(coordinate=1e-10, speed=1e-8, acceleration=1e3, marker_place=1e-8, force=100.0, moment=100.0)
-    figures = unseen_figures(trial.recording, replace(setup, noise={**setup.noise, "smooth": smooth}))
+    figures = unseen_figures(trial.recording, replace(setup, noise={**setup.noise, "paper": presets.paper()}))
     for yardstick, quantity in (
         ("100 ms ahead", "markers"),
         ("marker left out", "markers"),
         ("plates withheld", "fy"),
     ):
-        of = {m: figures[yardstick, quantity, m] for m in ("EKF (smooth)", "EKF (paper)", "persistence")}
-        assert of["EKF (smooth)"] < 0.3 * of["persistence"], yardstick  # type: ignore[operator]
-        assert of["EKF (smooth)"] < 0.7 * of["EKF (paper)"], yardstick  # type: ignore[operator]
+        of = {m: figures[yardstick, quantity, m] for m in ("EKF (default)", "EKF (paper)", "persistence")}
+        assert of["EKF (default)"] < 0.3 * of["persistence"], yardstick  # type: ignore[operator]
+        assert of["EKF (default)"] < 0.7 * of["EKF (paper)"], yardstick  # type: ignore[operator]
     assert figures["100 ms ahead", "markers", "EKF (paper)"] > figures["100 ms ahead", "markers", "persistence"]  # type: ignore[operator]
 
 

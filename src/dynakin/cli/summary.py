@@ -18,6 +18,9 @@ def print_summary(estimate: Estimate, folder: Path) -> None:
     metrics = estimate.metrics()
     console.print(_figures(estimate, metrics))
     verdicts = [metrics[block]["verdict"] for block in ("consistency", "adaptation", "soft_tissue")]
+    for message in estimate.messages:
+        if message.startswith("Warning:"):
+            console.print(message, style="yellow")
     console.print(f"Verdict: {' '.join(filter(None, verdicts))}", style="dim")
     console.print()
     console.print(f"Results  {folder}", soft_wrap=True)
@@ -47,7 +50,7 @@ def _figures(estimate: Estimate, metrics: dict[str, Any]) -> Table:
     after = metrics["adaptation"]["after_s"]
     rows.add_row("settled after", "-" if after is None else f"{after:.1f} s", "")
     stuck = metrics["events"]["parameters_at_bound"]
-    free = sum(p.estimated for p in estimate.parameters)
+    free = sum(p.estimated and p.lower is not None for p in estimate.parameters)
     by_kind = counts_in_words(metrics["bounds"]["by_kind"], "at_end")
     rows.add_row("parameters on a bound", f"{len(stuck)} of {free}", by_kind if stuck else "")
     moved = {name: m for name, m in metrics["soft_tissue"]["markers"].items() if m["max_mm"] is not None}
@@ -58,6 +61,12 @@ def _figures(estimate: Estimate, metrics: dict[str, Any]) -> Table:
         rows.add_row("largest move on a segment", f"{moved[most]['max_mm']:.0f} mm", f"{most}{size}")
     gaps = metrics["events"]["missing_frames"]
     rows.add_row("markers with gaps", str(len(gaps)), ", ".join(gaps))
+    refused = sorted({event.subject for event in estimate.events if event.kind == "gated"})
+    if refused:
+        rows.add_row("refused for a time", str(len(refused)), ", ".join(refused))
+    resets = [event for event in estimate.events if event.kind == "reset"]
+    if resets:
+        rows.add_row("motion lost or sought anew", str(len(resets)), f"first at {resets[0].time_s:.2f} s")
     timing = estimate.timing
     rows.add_row(
         "time of a step, median", f"{timing.median_us:.0f} µs", f"{timing.realtime_factor:.0f} times real time"

@@ -23,7 +23,7 @@ class Setup:
     """
 
     definition: ModelDefinition
-    noise: Mapping[str, Noise] = field(default_factory=lambda: {"paper": presets.paper()})
+    noise: Mapping[str, Noise] = field(default_factory=lambda: {"default": presets.default()})
     cutoff_hz: float = CUTOFF_HZ
     priors: Priors | None = None
     bounds: Bounds | None = None

@@ -23,8 +23,8 @@ Verdict = Literal["settled", "moving", "untaught"]
 class Convergence:
     """What became of one kind of constant.
 
-    ``largest_change_percent`` is the largest change from the start, ``sd_left`` the median of last over first standard
-    deviation, ``moving`` those that had not settled.
+    ``largest_change_percent`` is the largest change from the start, ``sd_left`` the median of the standard deviation at
+    the end over that before the first frame, ``moving`` those that had not settled.
     """
 
     title: str
@@ -48,7 +48,8 @@ def _judge(estimate: Estimate, title: str, group: list[Parameter]) -> Convergenc
         late = path[3 * len(path) // 4 :]
         if np.ptp(late) > MOVING * abs(p.initial) and not p.at_bound:
             moving.append(p)
-        left.append(float(sd[-1] / sd[0]) if sd[0] > 0.0 else 1.0)
+        first = p.prior_sd or float(sd[0])  # a smoothed estimate knows at its first frame what it learnt later
+        left.append(float(sd[-1]) / first if first > 0.0 else 1.0)
         largest = max(largest, abs(p.change_percent() or 0.0))
     sd_left = float(np.median(left))
     still = largest < 100.0 * MOVING

@@ -224,7 +224,7 @@ def _constants(estimate: Estimate) -> list[Insight]:
 
 
 def _bounds(estimate: Estimate, metrics: dict[str, Any]) -> Insight:
-    free = [p for p in estimate.parameters if p.estimated]
+    free = [p for p in estimate.parameters if p.estimated and p.lower is not None]
     names = short_marker_names(estimate.marker_names)
     stuck = [parameter_label(p, names) for p in free if p.at_bound]
     passing = {n: entry for n, entry in metrics["bounds"]["parameters"].items() if not entry["at_end"]}

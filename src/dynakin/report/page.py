@@ -84,7 +84,7 @@ def _headline(estimate: Estimate, metrics: dict[str, Any]) -> list[dict[str, str
     forces = [value for name, value in rms.items() if name.startswith("f")]
     moments = [value for name, value in rms.items() if name.startswith("m")]
     stuck = [p for p in estimate.parameters if p.at_bound]
-    free = [p for p in estimate.parameters if p.estimated]
+    free = [p for p in estimate.parameters if p.estimated and p.lower is not None]
     tiles = [{"value": number(metrics["markers"]["mean_rms_mm"], digits=2), "unit": "mm", "label": "markers, mean RMS"}]
     if forces:
         names = listed([name for name in rms if name.startswith("f")])
