@@ -15,6 +15,7 @@ import numpy as np
 
 import dynakin
 from dynakin import _core
+from dynakin.filter.extend import initial_covariance
 from dynakin.filter.samples import recording_arrays
 from dynakin.simulation import simulate_squat
 
@@ -42,21 +43,28 @@ def describe(values: list[float]) -> str:
 def main() -> None:
     print(f"{platform.processor() or platform.machine()}, {os.cpu_count()} cores, Python {platform.python_version()}")
     for title, name, recording, subject in trials():
-        estimator = dynakin.Estimator(dynakin.load_model(name, subject=subject, markers="opencap"))
-        initial = estimator.start(recording)
-        model = _core.Model(initial.spec)
-        markers, wrench = recording_arrays(recording, initial)
-        rows = int(sum(sum(m.measured) for m in initial.spec.markers) + sum(initial.spec.wrench_measured) + 1)
-        settings, x0, P0 = estimator.filter_settings(initial), initial.x0, np.diag(initial.sd0**2)
-        step, dense = [], []
-        while len(step) < STEPS:
-            result = dynakin_bench.interleaved(model, settings, x0, P0, recording.time, markers, wrench, rows)
-            step += result[0]
-            dense += result[1]
-        ratio = np.median(step) / np.median(dense)
-        print(f"{title}: {model.layout.size} states, {rows} rows, {len(step)} steps")
-        print(f"  step         {describe(step)}")
-        print(f"  dense update {describe(dense)}   step / dense = {ratio:.2f}")
+        medians = {}
+        for preset in ("paper", "default"):
+            noise = dynakin.presets.preset(preset)
+            estimator = dynakin.Estimator(dynakin.load_model(name, subject=subject, markers="opencap"), noise)
+            initial = estimator.start(recording)
+            model = _core.Model(initial.spec)
+            markers, wrench = recording_arrays(recording, initial)
+            rows = int(sum(sum(m.measured) for m in initial.spec.markers) + sum(initial.spec.wrench_measured))
+            rows += noise.total_mass_use == "frame"
+            settings, P0 = estimator.filter_settings(initial), initial_covariance(initial, noise)
+            step, dense = [], []
+            while len(step) < STEPS:
+                result = dynakin_bench.interleaved(
+                    model, settings, initial.x0, P0, recording.time, markers, wrench, rows
+                )
+                step += result[0]
+                dense += result[1]
+            medians[preset] = np.median(step)
+            print(f"{title}, {preset}: {model.layout.size} states, {rows} rows, {len(step)} steps")
+            print(f"  step         {describe(step)}")
+            print(f"  dense update {describe(dense)}   step / dense = {medians[preset] / np.median(dense):.2f}")
+        print(f"  default / paper = {medians['default'] / medians['paper']:.2f}")
 
 
 if __name__ == "__main__":
