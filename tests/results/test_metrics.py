@@ -123,6 +123,7 @@ def test_metrics_hold_the_keys_of_the_design(estimate: Estimate) -> None:
         "adaptation",
         "bounds",
         "soft_tissue",
+        "identifiability",
         "events",
         "timing",
     }
