@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dynakin import _core, load_model
-from dynakin.errors import ConfigError, DynakinError
+from dynakin.errors import ConfigError, DynakinError, ModelError
 from dynakin.filter import Estimator
 from dynakin.identifiability import estimator_of, structure_of
 from dynakin.identifiability.base import base_of, in_no_base_parameter, told_alone
@@ -101,3 +101,9 @@ def test_a_model_that_fits_no_simulated_person_asks_for_a_recording(tmp_path: Pa
     lost.model.segments[1].__dict__["origin"] = "nowhere"
     with pytest.raises(DynakinError, match=r"expected --trial FILE"):
         estimator_of(lost)
+
+
+def test_a_model_that_estimates_no_inertia_is_refused(tmp_path: Path) -> None:
+    path = changed_model(tmp_path, ('\nparts = ["', '\ninertia_estimated = false\nparts = ["'))
+    with pytest.raises(ModelError, match="estimates no inertial number"):
+        structure_of(estimator_of(load_model(path)))

@@ -28,6 +28,7 @@ from dynakin.cli.options import (
 from dynakin.cli.summary import print_summary
 from dynakin.comparison import Trial, trial_of
 from dynakin.config import RunConfig, make_config, read_config
+from dynakin.errors import DynakinError
 from dynakin.filter import Estimator
 from dynakin.identifiability import Identifiability, identifiability
 from dynakin.model import load_model
@@ -106,9 +107,9 @@ def configure(trial: Path, given: dict[str, Any]) -> RunConfig:
 
 def estimate_from(
     config: RunConfig, progress: Callable[[int, int], None] | None = None
-) -> tuple[Estimate, Trial, Identifiability]:
+) -> tuple[Estimate, Trial, Identifiability | None]:
     """Read, load, estimate: what a configuration asks for, with it kept in the result; the same recording by the
-    reference methods; and what it tells of the constants.
+    reference methods; and what it tells of the constants, None with a note in the estimate where that cannot be said.
 
     Raises:
         DynakinError: anything that is wrong with the input, in one line.
@@ -134,7 +135,11 @@ def estimate_from(
     estimate = replace(estimate, config=config.as_used() | estimate.config)
     assert estimator.initial is not None
     comparison = trial_of({config.preset: estimate}, estimator.initial, model, whatever=True)
-    return estimate, comparison, identifiability(estimator, estimate)
+    try:
+        return estimate, comparison, identifiability(estimator, estimate)
+    except DynakinError as error:  # a trial of a few frames, say: no reason to lose the estimate
+        note = f"What the recording tells of the constants is left out: {error.message}"
+        return replace(estimate, messages=[*estimate.messages, note]), comparison, None
 
 
 def forward_direction(text: str | None) -> str | tuple[float, ...] | None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.errors import ModelError
 from dynakin.identifiability.measured import MeasuredModel
 from dynakin.reference import BaseParameters
 from dynakin.reference.base_parameters import base_parameters
@@ -28,9 +29,12 @@ def base_of(measured: MeasuredModel, states: Array | None = None) -> BaseParamet
 
     Raises:
         RecordingError: fewer states than inertial numbers.
+        ModelError: the model estimates none.
     """
     states = measured.random_states(_POSTURES) if states is None else states
     at = measured.block("inertia")
+    if at.start == at.stop:
+        raise ModelError(f"model {measured.initial.spec.name}: it estimates no inertial number, expected at least one")
     table = states[-1, at]
     Y = np.stack([measured.wrench_rows(x)[:, at] for x in states])
     names, scale = measured.names[at], np.sqrt(np.diag(measured.prior)[at])
