@@ -82,6 +82,7 @@ StepReport Filter::update(const Eigen::Ref<const MarkerMatrix>& markers, const V
   if (last_.diverged()) return last_;
   StepReport report;
   if (tape_) tape_->clear();
+  if (settings_.recovery.enabled) hold_unseen();
   measurement_.admit_all();
   measurement_.linearise(x_, markers, wrench);
   predicted_ = measurement_.predicted();

@@ -46,22 +46,35 @@ Tracking Filter::believe(const MarkerRef& markers) {
   return measured > 0 ? Tracking::doubtful : Tracking::following;
 }
 
-// Coordinates stay, at rest; motion and soft tissue no longer know anything of each other or of the constants.
-void Filter::hold_motion() {
+void Filter::forget(int element, double variance) {
+  P_.row(element).setZero();
+  P_.col(element).setZero();
+  P_(element, element) = variance;
+  if (tape_) tape_->forget(element);
+}
+
+// The coordinate stays, at rest, and knows nothing of anything else.
+void Filter::hold_coordinate(int i) {
   const int n = model_.n_free();
   const RecoverySettings& r = settings_.recovery;
-  x_.segment(n, 2 * n).setZero();
-  const auto forget = [&](int i, double variance) {
-    P_.row(i).setZero();
-    P_.col(i).setZero();
-    P_(i, i) = variance;
-    if (tape_) tape_->forget(i);
-  };
-  for (int i = 0; i < n; ++i) {
-    forget(i, r.coordinate_sd * r.coordinate_sd);
-    forget(n + i, r.speed_sd * r.speed_sd);
-    forget(2 * n + i, r.acceleration_sd * r.acceleration_sd);
-  }
+  x_(n + i) = x_(2 * n + i) = 0.0;
+  forget(i, r.coordinate_sd * r.coordinate_sd);
+  forget(n + i, r.speed_sd * r.speed_sd);
+  forget(2 * n + i, r.acceleration_sd * r.acceleration_sd);
+}
+
+// A joint whose markers have not been seen for long would be carried on with the speed it last had, to the end of its
+// range; it is held instead.
+void Filter::hold_unseen() {
+  const double most = settings_.recovery.unseen_sd * settings_.recovery.unseen_sd;
+  for (int i = 0; i < model_.n_free(); ++i)
+    if (P_(i, i) > most) hold_coordinate(i);
+}
+
+// All coordinates; and the soft tissue goes back to where it is on average.
+void Filter::hold_motion() {
+  const int n = model_.n_free();
+  for (int i = 0; i < n; ++i) hold_coordinate(i);
   for (int i = 3 * n; i < model_.state_size(); ++i) {
     if (settings_.decay_rate(i) == 0.0) continue;
     x_(i) = 0.0;

@@ -82,6 +82,8 @@ void FilterSettings::check(const Model& model) const {
   for (double value : {recovery.blind_s, recovery.coordinate_sd, recovery.speed_sd, recovery.acceleration_sd})
     if (!(value > 0.0) || std::isinf(value))
       fail("recovery", "holds " + std::to_string(value) + ", expected more than 0");
+  if (!(recovery.unseen_sd > 0.0))
+    fail("recovery", "unseen_sd is " + std::to_string(recovery.unseen_sd) + ", expected more than 0");
   if (chunk_rows < 1) fail("chunk_rows", "is " + std::to_string(chunk_rows) + ", expected 1 or more");
 }
 

@@ -380,7 +380,7 @@ def plates_jacobian(model: Model, x: Annotated[NDArray[numpy.float64], dict(shap
 class RecoverySettings:
     """When the motion counts as lost, and how it is sought anew."""
 
-    def __init__(self, blind_s: float = 0.2, coordinate_sd: float = 0.5, speed_sd: float = 2.0, acceleration_sd: float = 20.0) -> None: ...
+    def __init__(self, blind_s: float = 0.2, coordinate_sd: float = 0.5, speed_sd: float = 2.0, acceleration_sd: float = 20.0, unseen_sd: float = float('inf')) -> None: ...
 
 class FilterSettings:
     """Noise, bounds and constraints of a Filter, SI units."""

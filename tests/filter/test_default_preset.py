@@ -157,6 +157,28 @@ def test_a_motion_that_nobody_saw_is_found_again(trial: SimulatedTrial) -> None:
     assert np.degrees(np.abs(error[560:]).max()) < 25.0
 
 
+def test_a_joint_that_nobody_sees_is_held_and_comes_back(trial: SimulatedTrial) -> None:
+    """Given 3 s without the forearm's only marker, then the elbow is held, is unsure, and returns."""
+    wrist = trial.recording.marker_names.index("R_wrist_radius")
+
+    def hidden(markers: np.ndarray) -> None:
+        markers[400:700, wrist] = np.nan
+
+    without = with_markers(trial.recording, hidden)
+    result = estimator(side="right").run(without)
+    elbow = result.data["coordinates"].sel(coordinate="elbow").values
+    sd = result.data["coordinates_sd"].sel(coordinate="elbow").values
+    assert (sd[480:700] > 0.4).all() and sd[720] < 0.1
+    assert any(event.subject == "elbow" and "held" in event.message for event in result.events)
+    whole = estimator(side="right").run(trial.recording).data["coordinates"].sel(coordinate="elbow").values
+    assert np.degrees(np.abs(elbow - whole)[400:700]).max() < 60.0  # carried on, it would be at its joint limit
+    later = np.abs(elbow - whole)[750:]
+    assert (later < 3.0 * sd[750:]).all()
+    smoothed = estimator(side="right").run(without, smooth=True).data
+    assert np.isfinite(smoothed["state"].values).all()
+    assert (smoothed["coordinates_sd"].sel(coordinate="elbow").values[400:700] <= sd[400:700] + 1e-12).all()
+
+
 def test_every_output_has_a_deviation_in_the_files(smoothed: Estimate, tmp_path) -> None:
     from dynakin.recordings import read_table
 

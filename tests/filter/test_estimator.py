@@ -86,7 +86,8 @@ def test_without_sensor_noise_the_posture_comes_out(trial: SimulatedTrial) -> No
 
 
 def test_deviations_of_parameters_never_grow_and_coordinates_stay_finite(trial: SimulatedTrial) -> None:
-    result = estimator().run(trial.recording)
+    noise = dynakin.presets.default().model_copy(update={"length_drift": 0.0})
+    result = estimator(noise=noise).run(trial.recording)
     sd = result.data["state_sd"].values
     constants = [k for k, name in enumerate(result.data["element"].values) if str(name).startswith("length/")]
     held = result.data["constrained"].values > 0  # a restricted gain may widen what it holds
@@ -110,7 +111,9 @@ def test_bounds_are_kept_at_every_frame(trial: SimulatedTrial, preset: str) -> N
     state = result.data["state"].values
     assert (state >= initial.lower).all() and (state <= initial.upper).all()
     assert result.data["constrained"].values.sum() > 0
-    assert any(p.at_bound for p in result.parameters)
+    elements = [k for k, name in enumerate(initial.names) if name.startswith(("length/", "marker/"))]
+    held = (state[:, elements] <= initial.lower[elements]) | (state[:, elements] >= initial.upper[elements])
+    assert held.any()
 
 
 def test_a_model_survives_pickling(trial: SimulatedTrial) -> None:

@@ -92,6 +92,9 @@ class Filter {
   UpdateSums correct(const MarkerRef& markers, const Vector6& wrench);
   UpdateSums iterate(const MarkerRef& markers, const Vector6& wrench, int most);
   void constrain(double nis, StepReport& report);
+  void forget(int element, double variance);
+  void hold_coordinate(int i);
+  void hold_unseen();
   void hold_motion();
   bool seek_motion(const MarkerRef& markers);
   bool seek_motion_from_start(const MarkerRef& markers);

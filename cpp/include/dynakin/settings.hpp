@@ -24,6 +24,7 @@ struct RecoverySettings {
   double coordinate_sd = 0.5;  // rad or m: the motion's standard deviations when it is sought anew
   double speed_sd = 2.0;       // rad/s or m/s
   double acceleration_sd = 20.0;
+  double unseen_sd = k_infinity;  // rad or m: a coordinate less sure than this is held instead of carried on
 };
 
 struct FilterSettings {

@@ -37,12 +37,14 @@ void bind_filter(nb::module_& m) {
   nb::class_<RecoverySettings>(m, "RecoverySettings", "When the motion counts as lost, and how it is sought anew.")
       .def(
           "__init__",
-          [](RecoverySettings* self, double blind_s, double coordinate_sd, double speed_sd, double acceleration_sd) {
-            new (self) RecoverySettings{true, blind_s, coordinate_sd, speed_sd, acceleration_sd};
+          [](RecoverySettings* self, double blind_s, double coordinate_sd, double speed_sd, double acceleration_sd,
+             double unseen_sd) {
+            new (self) RecoverySettings{true, blind_s, coordinate_sd, speed_sd, acceleration_sd, unseen_sd};
           },
           nb::arg("blind_s") = RecoverySettings{}.blind_s, nb::arg("coordinate_sd") = RecoverySettings{}.coordinate_sd,
           nb::arg("speed_sd") = RecoverySettings{}.speed_sd,
-          nb::arg("acceleration_sd") = RecoverySettings{}.acceleration_sd);
+          nb::arg("acceleration_sd") = RecoverySettings{}.acceleration_sd,
+          nb::arg("unseen_sd") = RecoverySettings{}.unseen_sd);
 
   nb::class_<FilterSettings>(m, "FilterSettings", "Noise, bounds and constraints of a Filter, SI units.")
       .def(

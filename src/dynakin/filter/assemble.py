@@ -56,7 +56,7 @@ def assemble(
     return Estimate(
         data=data,
         parameters=parameters,
-        events=events_of(data, parameters, initial),
+        events=events_of(data, parameters, initial, config.get("noise", {}).get("unseen_sd")),
         timing=_timing(arrays["step_us"], recording),
         recording=recording,
         ground=initial.ground,

@@ -274,6 +274,8 @@ class Estimator:
             )
         noise, layout = self.noise, self._core_model.layout
         point = noise.reference_point_m
+        unseen = np.inf if noise.unseen_sd is None else noise.unseen_sd
+        recovery = _core.RecoverySettings(blind_s=noise.blind_s, unseen_sd=unseen) if noise.recover else None
         density, decay = continuous_noise(initial, noise, layout)
         return _core.FilterSettings(
             process_variance=noise.process_variance(layout),
@@ -293,5 +295,5 @@ class Estimator:
             wrench_gate=gate_limits(noise.wrench_gate),
             wrench_needs_markers=noise.recover,
             iterate_beyond=np.inf if noise.iterate_beyond is None else noise.iterate_beyond,
-            recovery=_core.RecoverySettings(blind_s=noise.blind_s) if noise.recover else None,
+            recovery=recovery,
         )

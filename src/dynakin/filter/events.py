@@ -16,10 +16,18 @@ TRACKING = ("following", "doubtful", "lost", "found", "restarted")
 """Words of the core's tracking states, by their number."""
 
 
-def events_of(data: xr.Dataset, parameters: list[Parameter], initial: InitialModel) -> list[Event]:
+def events_of(
+    data: xr.Dataset, parameters: list[Parameter], initial: InitialModel, unseen_sd: float | None = None
+) -> list[Event]:
     """Events in the order of their times; one a stretch, not one a frame."""
     time = data["time"].values
-    events = [*_missing(data), *_refused(data), *_tracking(data), *_coordinates_at_bounds(data, initial)]
+    events = [
+        *_missing(data),
+        *_refused(data),
+        *_tracking(data),
+        *_held(data, unseen_sd),
+        *_coordinates_at_bounds(data, initial),
+    ]
     last = len(time) - 1
     for p in parameters:
         if p.at_bound:
@@ -68,6 +76,21 @@ def _tracking(data: xr.Dataset) -> list[Event]:
     ]
     unmet = data["constraints_met"].values == 0
     return events + _stretches(time, unmet, "note", "bounds", "not all kept at once, each kept by itself")
+
+
+def _held(data: xr.Dataset, unseen_sd: float | None) -> list[Event]:
+    """Coordinates that no marker told anything of for so long that the filter stopped carrying them on."""
+    if unseen_sd is None:
+        return []
+    following = data["tracking"].values == TRACKING.index("following")
+    unsure = data["coordinates_sd"].values > 0.8 * unseen_sd  # the plates tell a little even of what is held
+    return [
+        event
+        for k, name in enumerate(str(name) for name in data["coordinate"].values)
+        for event in _stretches(
+            data["time"].values, following & unsure[:, k], "note", name, "not seen for so long that it was held"
+        )
+    ]
 
 
 def _coordinates_at_bounds(data: xr.Dataset, initial: InitialModel) -> list[Event]:

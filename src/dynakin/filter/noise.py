@@ -92,6 +92,9 @@ class Noise(BaseModel):
     """Whether a motion that most markers contradict, or that was not seen for blind_s, is sought anew."""
     blind_s: Seconds = 0.2
     """How long the motion is believed without markers that fit, s."""
+    unseen_sd: Annotated[float, Field(gt=0.0)] | None = None
+    """Standard deviation of a coordinate (rad or m) from which on it is held where it is, because no marker tells of it
+    any more; not given: it is carried on with the speed it last had. Needs ``recover``."""
     iterate_beyond: Annotated[float, Field(gt=0.0)] | None = None
     """Standard deviation of a coordinate (rad or m) beyond which an update is linearised anew; not given: never."""
 

@@ -36,6 +36,7 @@ def default() -> Noise:
         marker_gate=1e-9,
         wrench_gate=1e-9,
         recover=True,
+        unseen_sd=0.5,
         iterate_beyond=0.2,
         constraint="projection",
     )
