@@ -83,7 +83,7 @@ def _held(data: xr.Dataset, unseen_sd: float | None) -> list[Event]:
     if unseen_sd is None:
         return []
     following = data["tracking"].values == TRACKING.index("following")
-    unsure = data["coordinates_sd"].values > 0.8 * unseen_sd  # the plates tell a little even of what is held
+    unsure = data["coordinates_sd"].values > 0.4 * unseen_sd  # the plates tell a little even of what is held
     return [
         event
         for k, name in enumerate(str(name) for name in data["coordinate"].values)
