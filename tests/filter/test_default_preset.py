@@ -46,6 +46,19 @@ def test_angles_speeds_and_moments_are_near_the_truth(plain: Estimate, trial: Si
     assert rms(plain, trial, "moments")[leg].mean() < 5.0
 
 
+def test_lengths_are_as_sure_as_skin_allows(plain: Estimate, trial: SimulatedTrial) -> None:
+    """Skin that follows an angle looks like a length: what is told of a length covers the truth, the filter's own part
+    alone would not."""
+    lengths = [p for p in plain.parameters if p.kind == "length"]
+    error = np.array([p.value - trial.truth.parameters[p.name] for p in lengths])
+    told, own = (np.array([getattr(p, name) for p in lengths]) for name in ("sd", "learnt_sd"))
+    thigh = next(p for p in lengths if p.name == "length/thigh")
+    assert thigh.skin_sd == pytest.approx(0.6 * 0.018)  # 0.6 of the 18 mm that the marker set declares of the thigh
+    assert thigh.sd == pytest.approx(np.hypot(thigh.skin_sd, thigh.learnt_sd))
+    assert np.mean((error / told) ** 2) < 1.5 and np.mean((error / own) ** 2) > 2.0
+    assert all(p.skin_sd == 0.0 for p in plain.parameters if p.kind != "length")
+
+
 def test_smoothing_comes_closer_to_the_truth_and_is_surer(
     plain: Estimate, smoothed: Estimate, trial: SimulatedTrial
 ) -> None:

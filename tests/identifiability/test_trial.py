@@ -85,7 +85,7 @@ def test_the_block_of_the_metrics_agrees_with_the_estimate(squat: Told) -> None:
     for p in squat.estimate.parameters:
         if p.estimated and p.kind != "plates":
             entry = block["parameters"][p.name]
-            assert entry["share"] == pytest.approx(p.sd / p.prior_sd)
+            assert entry["share"] == pytest.approx(p.learnt_sd / p.prior_sd)
             assert entry["judgement"] == judged(entry["share"])
     assert learned(squat.estimate)["verdict"] == block["verdict"]
     counts = block["groups"]["lengths"]

@@ -42,7 +42,10 @@ def assemble(
     for name, covariance in zip(("initial_covariance", "final_covariance"), covariances, strict=True):
         data[name] = (("element", "element_"), covariance)
     prior_sd = np.sqrt(np.diag(covariances[0]))
-    parameters = parameters_of(initial, arrays["state"][-1], arrays["state_sd"][-1], prior_sd)
+    noise = config.get("noise", {})
+    parameters = parameters_of(
+        initial, arrays["state"][-1], arrays["state_sd"][-1], prior_sd, noise.get("length_skin", 0.0)
+    )
     config = config | {
         "mass_kg": initial.mass_kg,
         "height_m": initial.height_m,
@@ -56,7 +59,7 @@ def assemble(
     return Estimate(
         data=data,
         parameters=parameters,
-        events=events_of(data, parameters, initial, config.get("noise", {}).get("unseen_sd")),
+        events=events_of(data, parameters, initial, noise.get("unseen_sd")),
         timing=_timing(arrays["step_us"], recording),
         recording=recording,
         ground=initial.ground,

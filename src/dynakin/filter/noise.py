@@ -46,6 +46,9 @@ class Noise(BaseModel):
     length_drift: Variance = 0.0
     """Spectral density of a random walk of each length, m^2/s: skin that follows an angle and joints that are no hinges
     look like lengths, and do not average out; without it a length is thought to be known the better the longer."""
+    length_skin: Deviation = 0.0
+    """Part of the skin's declared displacement that is added to the standard deviation of the lengths about it when
+    they are told, not in the filter: skin that follows an angle never averages out."""
     soft_tissue: Deviation = 0.0
     """Standard deviation of the displacement of skin and flesh under each marker, as a fraction of the size that its
     marker set declares; 0: none is estimated."""

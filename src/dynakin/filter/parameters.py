@@ -16,19 +16,24 @@ _INERTIA_UNITS = {"mass": "kg", "mx": "kg m", "my": "kg m", "mz": "kg m"}
 _PLATE_UNITS = {"delay": "s", "fx": "N", "fy": "N", "fz": "N"}
 
 
-def parameters_of(initial: InitialModel, state: Array, sd: Array, prior_sd: Array) -> list[Parameter]:
+def parameters_of(
+    initial: InitialModel, state: Array, sd: Array, prior_sd: Array, length_skin: float = 0.0
+) -> list[Parameter]:
     """Every length, marker place and inertial parameter in the state, and the lengths that were held fixed.
 
     Args:
         state, sd: (n,) the last frame's. prior_sd: (n,) before the first.
+        length_skin: part of the skin's declared displacement that may look like a length (`Noise.length_skin`).
     """
     segments = {marker.name: marker.segment for marker in initial.spec.markers}
+    skin = length_skin_sd(initial, length_skin)
     found = []
     for k, name in enumerate(initial.names):
         first, *rest = name.split("/")
         if first not in _KINDS or not rest:
             continue  # a coordinate, speed or acceleration
         kind = _KINDS[first]
+        unseen = skin.get(rest[0], 0.0) if kind == "length" else 0.0
         found.append(
             Parameter(
                 name=name,
@@ -36,7 +41,7 @@ def parameters_of(initial: InitialModel, state: Array, sd: Array, prior_sd: Arra
                 segment=segments[rest[0]] if kind == "marker" else "plates" if kind == "plates" else rest[0],
                 unit=_unit(kind, rest[-1]),
                 value=float(state[k]),
-                sd=float(sd[k]),
+                sd=float(np.hypot(sd[k], unseen)),
                 initial=float(initial.x0[k]),
                 table=_finite(initial.table[k]),
                 lower=_finite(initial.lower[k]),
@@ -44,6 +49,7 @@ def parameters_of(initial: InitialModel, state: Array, sd: Array, prior_sd: Arra
                 at_bound=bool(state[k] <= initial.lower[k] or state[k] >= initial.upper[k]),
                 estimated=True,
                 prior_sd=float(prior_sd[k]),
+                skin_sd=unseen,
             )
         )
     for length in initial.spec.parameters:
@@ -51,6 +57,24 @@ def parameters_of(initial: InitialModel, state: Array, sd: Array, prior_sd: Arra
             value = float(length.value)
             name = f"length/{length.name}"
             found.append(Parameter(name, "length", length.name, "m", value, 0.0, value, None, None, None, False, False))
+    return found
+
+
+def length_skin_sd(initial: InitialModel, share: float) -> dict[str, float]:
+    """Standard deviation (m) of each estimated length that comes from skin that follows joint angles.
+
+    Such a displacement repeats with the movement, so no length of trial averages it out, and to the filter it is a
+    joint elsewhere. Of a length between two joints the largest displacement declared of a marker on the two segments
+    counts.
+    """
+    largest: dict[str, float] = {}
+    for marker, declared in zip(initial.spec.markers, initial.soft_tissue_m, strict=True):
+        largest[marker.segment] = max(largest.get(marker.segment, 0.0), float(declared))
+    found: dict[str, float] = {}
+    for segment in initial.spec.segments:
+        for term in segment.lengths:
+            here = share * max(largest.get(segment.name, 0.0), largest.get(segment.parent, 0.0))
+            found[term.parameter] = max(found.get(term.parameter, 0.0), here)
     return found
 
 

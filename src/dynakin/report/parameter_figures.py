@@ -61,7 +61,7 @@ def _changes(axes: Axes, estimate: Estimate, parameters: list[Parameter]) -> Non
     for p in parameters:
         scale = 100.0 / abs(p.initial)
         path = estimate.data["state"].sel(element=p.name).values
-        sd = estimate.data["state_sd"].sel(element=p.name).values
+        sd = np.hypot(estimate.data["state_sd"].sel(element=p.name).values, p.skin_sd)
         time, change = thin(estimate.time, scale * (path - p.initial))
         half = 2.0 * scale * np.interp(time, estimate.time, sd)
         changes.append((p, time, change, half))

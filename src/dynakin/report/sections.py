@@ -199,7 +199,7 @@ def mass_section(estimate: Estimate) -> Section:
 
 def _parameter_panel(estimate: Estimate, p: Parameter, title: str, factor: float, unit: str) -> Panel:
     element = estimate.data["state"].sel(element=p.name).values
-    sd = estimate.data["state_sd"].sel(element=p.name).values
+    sd = np.hypot(estimate.data["state_sd"].sel(element=p.name).values, p.skin_sd)
     change = p.change_percent()
     note = f"{number(factor * p.initial)} to {number(factor * p.value, unit)}"
     if change is not None:

@@ -34,7 +34,7 @@ def share_of(parameter: Parameter) -> float | None:
     """Standard deviation at the end over that before the first frame; None where it is not estimated."""
     if not parameter.estimated or not parameter.prior_sd:
         return None
-    return parameter.sd / parameter.prior_sd
+    return parameter.learnt_sd / parameter.prior_sd
 
 
 def group_of(parameter: Parameter) -> str | None:

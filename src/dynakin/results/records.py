@@ -17,7 +17,8 @@ class Parameter:
     (slow, as it ends, or their delay).
 
     ``value`` and ``sd`` (one standard deviation) are those of the last frame; ``initial`` and ``prior_sd`` those
-    before the first, with the declared total mass in them where it is a prior (None: not estimated); ``table`` is what
+    before the first, with the declared total mass in them where it is a prior (None: not estimated); ``skin_sd`` is
+    the part of ``sd`` that the filter cannot see: skin that follows an angle looks like a length; ``table`` is what
     the anthropometric table says, None where it says nothing; ``lower`` and ``upper`` are the bounds of equation (9),
     None where there is none. All in ``unit`` (m, kg, kg m, kg m2, N, N m, s).
     """
@@ -35,6 +36,12 @@ class Parameter:
     at_bound: bool
     estimated: bool
     prior_sd: float | None = None
+    skin_sd: float = 0.0
+
+    @property
+    def learnt_sd(self) -> float:
+        """``sd`` without ``skin_sd``: how sure the filter is of what it sees."""
+        return math.sqrt(max(self.sd**2 - self.skin_sd**2, 0.0))
 
     def change_percent(self) -> float | None:
         """Change from the initial value in percent of its size; None where the initial value is zero."""
