@@ -12,15 +12,27 @@ from rich.tree import Tree
 
 from dynakin.cli.console import out, table
 from dynakin.cli.identifiability import print_identifiability
+from dynakin.cli.opensim_model import print_opensim
 from dynakin.cli.options import Force, Height, Markers, Mass, Sex
-from dynakin.model import ModelDefinition, Subject, available_marker_sets, available_models, load_marker_set, load_model
+from dynakin.model import (
+    ModelDefinition,
+    OpenSimDefinition,
+    Subject,
+    available_marker_sets,
+    available_models,
+    load_marker_set,
+    load_model,
+)
+from dynakin.model.definition import load_built_in_or_toml
 from dynakin.model.marker_schema import MarkerSetFile
 from dynakin.model.schema import ModelFile
 from dynakin.model.schema import Segment as ModelSegment
 
 
 def model(
-    name: Annotated[str | None, typer.Argument(help="squat7, sagittal7 or a .toml file; none: list them.")] = None,
+    name: Annotated[
+        str | None, typer.Argument(help="squat7, sagittal7, a .toml or .osim file; none: list them.")
+    ] = None,
     markers: Markers = None,
     identifiable: Annotated[
         bool, typer.Option("--identifiability", help="What its measurements can tell: base parameters and gauges.")
@@ -47,6 +59,11 @@ def model(
         console.print(_list())
         return
     definition = load_model(name, Subject(mass_kg=mass, height_m=height, sex=sex), markers=markers or "auto")
+    if isinstance(definition, OpenSimDefinition):
+        if identifiable:
+            raise typer.BadParameter("--identifiability: expected a built-in model or a .toml file")
+        print_opensim(console, definition)
+        return
     if identifiable:
         print_identifiability(definition, trial, forces)
         return
@@ -63,7 +80,7 @@ def model(
 def _list() -> Table:
     rows = table("name", "what it is", title="Models and marker sets")
     for name in available_models():
-        rows.add_row(name, load_model(name).model.description)
+        rows.add_row(name, load_built_in_or_toml(name).model.description)
     for name in available_marker_sets():
         rows.add_row(name, load_marker_set(name).description)
     return rows
