@@ -12,7 +12,7 @@ from rich.tree import Tree
 
 from dynakin.cli.console import out, table
 from dynakin.cli.identifiability import print_identifiability
-from dynakin.cli.opensim_model import print_opensim
+from dynakin.cli.opensim_model import export_model, print_opensim
 from dynakin.cli.options import Force, Height, Markers, Mass, Sex
 from dynakin.model import (
     ModelDefinition,
@@ -44,21 +44,38 @@ def model(
     mass: Mass = None,
     height: Height = None,
     sex: Sex = None,
+    export: Annotated[
+        Path | None,
+        typer.Option(
+            help="Write the model as an OpenSim file (.osim); a built-in one needs --trial to be measured on."
+        ),
+    ] = None,
+    parameters: Annotated[
+        Path | None, typer.Option(help="With --export: a run's parameters.json, whose values are written.")
+    ] = None,
 ) -> None:
-    """Print a model: its tree, coordinates, states, markers and bounds; or what it lets one identify."""
+    """Print a model: its tree, coordinates, states, markers and bounds; or what it lets one identify; or export it."""
     console = out()
     of_a_person = {"--trial": trial, "--forces": forces, "--mass": mass, "--height": height, "--sex": sex}
     needless = [option for option, value in of_a_person.items() if value is not None]
-    if needless and not identifiable:
-        raise typer.BadParameter(f"{needless[0]} is of use only with --identifiability")
+    if needless and not identifiable and export is None:
+        raise typer.BadParameter(f"{needless[0]} is of use only with --identifiability or --export")
+    if parameters is not None and export is None:
+        raise typer.BadParameter("--parameters is of use only with --export FILE")
     if forces is not None and trial is None:
         raise typer.BadParameter("--forces is of use only with --trial FILE")
     if name is None:
         if identifiable:
             raise typer.BadParameter("--identifiability: expected a model's name before it")
+        if export is not None:
+            raise typer.BadParameter("--export: expected a model's name before it")
         console.print(_list())
         return
     definition = load_model(name, Subject(mass_kg=mass, height_m=height, sex=sex), markers=markers or "auto")
+    if export is not None:
+        export_model(definition, export, parameters, mass, trial, forces)
+        console.print(f"Written {export}", soft_wrap=True)
+        return
     if isinstance(definition, OpenSimDefinition):
         if identifiable:
             raise typer.BadParameter("--identifiability: expected a built-in model or a .toml file")

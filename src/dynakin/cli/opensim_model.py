@@ -1,15 +1,21 @@
-"""`dynakin model FILE.osim`: what an OpenSim model holds and what of it would be estimated."""
+"""`dynakin model FILE.osim`: what an OpenSim model holds; `--export`: any model as an .osim file."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
+import typer
 from rich.console import Console
 from rich.table import Table
 from rich.tree import Tree
 
 from dynakin.cli.console import table
-from dynakin.model import OpenSimDefinition
+from dynakin.model import Definition, OpenSimDefinition, initialise
+from dynakin.model.opensim.export import mass_of_run, of_definition, of_initial, read_values
 from dynakin.model.opensim.spec import free_coordinates, placements, used_scales
+from dynakin.model.opensim.write import write_osim
+from dynakin.recordings import read
 
 
 def print_opensim(console: Console, definition: OpenSimDefinition) -> None:
@@ -27,6 +33,31 @@ def print_opensim(console: Console, definition: OpenSimDefinition) -> None:
     console.print(_markers(definition))
     scales = used_scales(placements(source, definition.scales))
     console.print(f"Scales (1 as the file has it): {', '.join(scales) or 'none'}", soft_wrap=True)
+
+
+def export_model(
+    definition: Definition,
+    path: Path,
+    parameters: Path | None,
+    mass_kg: float | None,
+    trial: Path | None,
+    forces: Path | None,
+) -> None:
+    """Write a model with a run's values, where given.
+
+    Raises:
+        DynakinError: files that cannot be read or written, or do not fit; in one line.
+    """
+    if path.suffix.casefold() != ".osim":
+        raise typer.BadParameter(f"--export is {path}, expected a file that ends in .osim")
+    values = {} if parameters is None else read_values(parameters)
+    if isinstance(definition, OpenSimDefinition):
+        mass = mass_of_run(parameters) if mass_kg is None and parameters is not None else mass_kg
+        write_osim(of_definition(definition, values, mass), path)
+        return
+    if trial is None:
+        raise typer.BadParameter("--export of a model that is no .osim file: expected --trial to measure it on")
+    write_osim(of_initial(initialise(definition, read(trial, forces)), values), path)
 
 
 def _tree(definition: OpenSimDefinition) -> Tree:

@@ -60,7 +60,7 @@ def place(joint: Joint, couplers: Mapping[str, Coupler], scales: Mapping[str, st
     R_before = np.eye(3)  # of rotations that no coordinate changes, as long as nothing turns before them
     host = next((resolved(c.name, couplers)[0] for c in joint.coordinates), None)
     for axis in joint.axes:
-        scale = _scale_of(axis, scales.get(joint.parent, ""))
+        scale = scales.get(joint.parent, "") if grows(axis) else ""
         if is_constant(axis.functions):
             value = constant(axis.functions)
             if axis.kind == "translation":
@@ -93,10 +93,9 @@ def _unit(vector: Array) -> Array:
     return vector / np.linalg.norm(vector)
 
 
-def _scale_of(axis: JointAxis, scale: str) -> str:
-    """Translations by a function grow with the parent; a plain coordinate is a length of its own."""
-    grows = axis.kind == "translation" and (is_constant(axis.functions) or not is_linear(axis.functions))
-    return scale if grows else ""
+def grows(axis: JointAxis) -> bool:
+    """Whether a motion grows with the parent: translations by a function do; a plain coordinate is its own length."""
+    return axis.kind == "translation" and (is_constant(axis.functions) or not is_linear(axis.functions))
 
 
 class _Terms:
