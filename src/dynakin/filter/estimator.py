@@ -282,7 +282,7 @@ class Estimator:
             process_density=density,
             decay_rate=decay,
             marker_variance=noise.marker_variance(
-                initial.recorded_markers, initial.marker_variance, initial.soft_tissue_m
+                initial.recorded_markers, initial.marker_variance, initial.soft_tissue_m, initial.unmodelled_m
             ),
             wrench_covariance=noise.wrench_covariance(),
             reference_point=initial.plate_centre if point == "auto" else np.array(point, dtype=float),

@@ -43,6 +43,8 @@ class InitialModel:
         messages: sentences on what was found, left out, locked or assumed.
         plan: the same as plain data; None for an OpenSim model.
         feet: "right", "left" -> segment on which the ground acts; empty for a model fixed in the ground.
+        unmodelled_m: (M,) standard deviation of what neither a state nor the cameras explain of each marker; it is
+            added to the noise of the cameras.
         dimensionless: geometry parameters that are factors, not lengths.
     """
 
@@ -65,6 +67,7 @@ class InitialModel:
     messages: tuple[str, ...]
     plan: ModelPlan | None
     feet: dict[str, str] = field(default_factory=dict)
+    unmodelled_m: Array | float = 0.0
     dimensionless: frozenset[str] = frozenset()
 
     def measured_plan(self) -> ModelPlan:
