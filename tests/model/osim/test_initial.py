@@ -54,7 +54,9 @@ def test_everything_from_the_file_but_mass_and_posture(folder: Path, squats: Rec
 def test_what_is_estimated_is_a_choice(folder: Path, squats: Recording) -> None:
     path = folder / FILE
     nothing = initialise(load_opensim(path, estimate=()), squats)
-    assert len(nothing.names) == 3 * 33
+    assert len(nothing.names) == 3 * 31  # toes have no markers
+    assert [c.name for c in nothing.spec.coordinates if c.locked] == ["mtp_angle_r", "mtp_angle_l"]
+    assert len(initialise(load_opensim(path, estimate=(), lock_unseen=False), squats).names) == 3 * 33
     assert (nothing.unmodelled_m > 0.0).all()
     few = initialise(load_opensim(path, scale=("femur_r", "femur_l"), share_sides=False, estimate=("lengths",)), squats)
     assert [name for name in few.names if name.startswith("length")] == ["length/scale_femur_r", "length/scale_femur_l"]

@@ -31,6 +31,8 @@ class OpenSimOptions(Strict):
     """Which constants are estimated, and whether skin and flesh move under the markers."""
     lightest_share: float = Field(default=0.01, ge=0.0, lt=1.0)
     """Bodies of less than this part of the whole mass keep the file's mass and inertia: no recording tells of them."""
+    lock_unseen: bool = True
+    """Whether coordinates that move no measured marker (toes, often) are locked at the file's default value."""
     leave_out: tuple[str, ...] = ()
     """Markers of the file that are not measurements (regressed joint centres, say)."""
 

@@ -16,7 +16,7 @@ from dynakin.model.opensim.definition import OpenSimDefinition
 from dynakin.model.opensim.description import OpenSimModel
 from dynakin.model.opensim.sites import sites, with_mass
 from dynakin.model.opensim.skin import skin_of
-from dynakin.model.opensim.spec import free_coordinates, to_spec
+from dynakin.model.opensim.spec import free_coordinates, to_spec, unseen
 from dynakin.model.pose_start import start_posture
 from dynakin.model.priors import Bounds, Interval, Priors
 from dynakin.model.spec import in_layout
@@ -58,6 +58,9 @@ def lay_on(
     messages += said
     if static is not None:
         messages.append("The standing trial gives the mass only: marker places are those of the OpenSim file.")
+    lock = unseen(source, {marker.body for marker, _ in chosen}) if options.lock_unseen else []
+    if lock:
+        messages.append(f"Coordinates that move no measured marker, locked at the file's value: {', '.join(lock)}.")
     carried = _estimated_bodies(source, definition, messages)
 
     def spec_at(values: dict[str, float]) -> _core.ModelSpec:
@@ -69,6 +72,7 @@ def lay_on(
             estimate_places="markers" in options.estimate,
             estimate_inertia=carried,
             values=values,
+            lock=lock,
         )
 
     limits = limits_of(source)

@@ -26,6 +26,19 @@ def placements(model: OpenSimModel, scales: Mapping[str, str]) -> dict[str, Plac
     return {joint.child: place(joint, couplers, scales) for joint in model.joints}
 
 
+def unseen(model: OpenSimModel, bodies: Collection[str]) -> list[str]:
+    """Free coordinates that move none of these bodies and are not locked by the file."""
+    placed = placements(model, {})
+    parents = {joint.child: joint.parent for joint in model.joints}
+    seen: set[str] = set()
+    for body in bodies:
+        at = body
+        while at != GROUND:
+            seen |= {axis.coordinate for axis in placed[at].axes}
+            at = parents[at]
+    return [c.name for c in free_coordinates(model) if c.name not in seen and not c.locked]
+
+
 def used_scales(placed: Mapping[str, Placed]) -> list[str]:
     """Scale parameters that place something, in the order of the tree."""
     names: dict[str, None] = {}
@@ -44,6 +57,7 @@ def to_spec(
     estimate_places: bool = True,
     estimate_inertia: Collection[str] = (),
     values: Mapping[str, float] | None = None,
+    lock: Collection[str] = (),
 ) -> _core.ModelSpec:
     """The core's specification.
 
@@ -52,6 +66,7 @@ def to_spec(
         markers: those that are measured; all of the model's that sit on bodies where not given.
         estimate_inertia: bodies whose ten numbers are estimated.
         values: coordinates at the start, by name; the file's defaults where not given.
+        lock: coordinates that are locked beside those of the file.
     """
     placed = placements(model, scales)
     parents = {joint.child: joint.parent for joint in model.joints}
@@ -61,7 +76,7 @@ def to_spec(
     return _core.ModelSpec(
         name=model.name,
         coordinates=[
-            _core.CoordinateSpec(c.name, start.get(c.name, c.value), c.locked)
+            _core.CoordinateSpec(c.name, start.get(c.name, c.value), c.locked or c.name in lock)
             for c in free_coordinates(model)
             if c.name in moving
         ],
