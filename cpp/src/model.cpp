@@ -3,6 +3,7 @@
 #include <cmath>
 #include <set>
 #include <stdexcept>
+#include <utility>
 
 namespace dynakin {
 namespace {
@@ -169,7 +170,10 @@ void Model::compile_segments() {
       for (double c : a.coefficients)
         if (!std::isfinite(c)) fail(axis + ": a coefficient is not a finite number");
       const int scale = a.scale.empty() ? k_none : find(spec_.parameters, a.scale, axis, "geometry parameter");
-      axes_.push_back({a.kind, unit(a.direction, axis), coordinate, AxisFunction(a.coefficients, scale)});
+      std::vector<ScalarFunction> inner;
+      for (const FunctionSpec& f : a.functions) inner.emplace_back(f, axis);
+      axes_.push_back(
+          {a.kind, unit(a.direction, axis), coordinate, AxisFunction(a.coefficients, scale, std::move(inner))});
     }
     segment.end_axis = static_cast<int>(axes_.size());
     segment.inertia = s.inertia;

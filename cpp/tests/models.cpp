@@ -83,7 +83,14 @@ ModelSpec spatial_tree() {
   add("trunk", "ground", base);
   add("thigh", "trunk",
       {{"knee", AxisKind::rotation, Vector3::UnitZ(), {0.1, -1.0, 0.2}, ""},
-       {"knee", AxisKind::translation, Vector3::UnitX(), {0.0, 0.1, 0.05}, "b"}});
+       {"knee", AxisKind::translation, Vector3::UnitX(), {0.0, 0.1, 0.05}, "b"},
+       {"knee",
+        AxisKind::translation,
+        Vector3::UnitY(),
+        {0.0, 0.9},
+        "a",
+        {{FunctionKind::polynomial, {0.1, 0.9}},
+         {FunctionKind::spline, {}, {-0.5, 0.1, 0.6, 1.0, 1.7}, {0.0, 0.02, 0.05, 0.03, 0.01}}}}});
   add("shank", "thigh",
       {{"slide", AxisKind::translation, Vector3::UnitY(), {0.0, 1.0}, ""},
        {"fixed", AxisKind::rotation, Vector3::UnitX(), {0.0, 1.0}, ""}});

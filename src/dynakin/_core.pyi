@@ -9,12 +9,47 @@ import numpy
 from numpy.typing import NDArray
 
 
-class AxisSpec:
+class FunctionSpec:
     """
-    One degree of freedom, s = scale * sum_k coefficients[k] q**k (rad or m).
+    sum_k coefficients[k] x**k ('polynomial'), or a function through the points (x, y), straight on beyond them: 'spline' (twice continuously differentiable cubics, as OpenSim's SimmSpline) or 'piecewise_linear'.
     """
 
-    def __init__(self, coordinate: str, kind: str = 'rotation', direction: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C')] = ..., coefficients: Sequence[float] = [0.0, 1.0], scale: str = '') -> None: ...
+    def __init__(self, kind: str = 'polynomial', coefficients: Sequence[float] = [], x: Sequence[float] = [], y: Sequence[float] = []) -> None: ...
+
+    @property
+    def kind(self) -> str: ...
+
+    @kind.setter
+    def kind(self, arg: str, /) -> None: ...
+
+    @property
+    def coefficients(self) -> list[float]: ...
+
+    @coefficients.setter
+    def coefficients(self, arg: Sequence[float], /) -> None: ...
+
+    @property
+    def x(self) -> list[float]: ...
+
+    @x.setter
+    def x(self, arg: Sequence[float], /) -> None: ...
+
+    @property
+    def y(self) -> list[float]: ...
+
+    @y.setter
+    def y(self, arg: Sequence[float], /) -> None: ...
+
+    def __getstate__(self) -> tuple: ...
+
+    def __setstate__(self, arg: tuple, /) -> None: ...
+
+class AxisSpec:
+    """
+    One degree of freedom, s = scale * sum_k coefficients[k] u**k (rad or m); u is the coordinate, or what the functions make of it one after the other.
+    """
+
+    def __init__(self, coordinate: str, kind: str = 'rotation', direction: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C')] = ..., coefficients: Sequence[float] = [0.0, 1.0], scale: str = '', functions: Sequence[FunctionSpec] = []) -> None: ...
 
     @property
     def coordinate(self) -> str: ...
@@ -45,6 +80,12 @@ class AxisSpec:
 
     @scale.setter
     def scale(self, arg: str, /) -> None: ...
+
+    @property
+    def functions(self) -> list[FunctionSpec]: ...
+
+    @functions.setter
+    def functions(self, arg: Sequence[FunctionSpec], /) -> None: ...
 
     def __getstate__(self) -> tuple: ...
 

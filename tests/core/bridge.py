@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from oracle.spec import Spec
+from oracle.spec import Axis, Spec
 
 from dynakin import _core
 
@@ -16,7 +16,9 @@ def to_core(spec: Spec) -> _core.ModelSpec:
     segments = []
     for s in spec.segments:
         lengths = [_core.LengthTerm(t.parameter, t.direction) for t in s.lengths]
-        axes = [_core.AxisSpec(a.coordinate, a.kind, a.direction, a.coefficients, a.scale) for a in s.axes]
+        axes = [
+            _core.AxisSpec(a.coordinate, a.kind, a.direction, a.coefficients, a.scale, functions_of(a)) for a in s.axes
+        ]
         segments.append(
             _core.SegmentSpec(
                 name=s.name,
@@ -43,6 +45,10 @@ def to_core(spec: Spec) -> _core.ModelSpec:
         wrench_offset=spec.wrench_offset,
         wrench_delay=spec.wrench_delay,
     )
+
+
+def functions_of(axis: Axis) -> list[_core.FunctionSpec]:
+    return [_core.FunctionSpec(f.kind, f.coefficients, f.x, f.y) for f in axis.functions]
 
 
 def model_of(spec: Spec) -> _core.Model:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 from oracle import measurement
-from oracle.spec import Axis, Coordinate, Length, Marker, Parameter, Segment, Spec
+from oracle.spec import Axis, Coordinate, Function, Length, Marker, Parameter, Segment, Spec
 from oracle.state import Layout
 
 PLANE = [True, True, False]
@@ -150,6 +150,27 @@ def with_slow_errors(spec: Spec, seed: int, delay: bool = True) -> Spec:
     spec.markers[0].soft_tissue = list(spec.markers[0].measured)
     spec.wrench_offset = [bool(seen and rng.random() < 0.8) for seen in spec.wrench_measured]
     spec.wrench_delay = delay
+    return spec
+
+
+def random_function(rng: Generator) -> Function:
+    """A polynomial, or a gentle function through some points."""
+    kind = str(rng.choice(["polynomial", "spline", "spline", "piecewise_linear"]))
+    if kind == "polynomial":
+        return Function(kind, [*rng.uniform(-0.3, 0.3, int(rng.integers(1, 4))), float(rng.uniform(0.3, 0.8))])
+    n = int(rng.integers(2, 8))
+    x = np.cumsum(rng.uniform(0.2, 0.5, n)) - 0.15 * n
+    return Function(kind, [], list(x), list(0.5 * np.sin(2.0 * x) + rng.uniform(-0.1, 0.1, n)))
+
+
+def with_functions(spec: Spec, seed: int) -> Spec:
+    """The same model with functions, one or two in a chain, in front of the polynomials of some of its axes."""
+    spec, rng = deepcopy(spec), np.random.default_rng(seed)
+    axes = [axis for segment in spec.segments for axis in segment.axes]
+    for k, axis in enumerate(axes):
+        if k == 0 or rng.random() < 0.6:
+            axis.functions = [random_function(rng) for _ in range(int(rng.integers(1, 3)))]
+    spec.name += " with functions"
     return spec
 
 

@@ -6,7 +6,7 @@ import copy
 
 import numpy as np
 import pytest
-from oracle.spec import Coordinate
+from oracle.spec import Coordinate, Function
 
 from core.bridge import filter_of, model_of
 from core.random_models import planar_model, settings, trial
@@ -219,6 +219,13 @@ BAD_MODELS = [
     ("segments.1.axes.0.coefficients", [], "s1.*coefficient"),
     ("segments.1.axes.0.coefficients", [0.0, NAN], "s1.*coefficient"),
     ("segments.1.axes.0.scale", "zz", "s1.*zz"),
+    ("segments.1.axes.0.functions", [Function("zz")], "kind.*zz"),
+    ("segments.1.axes.0.functions", [Function()], "s1.*without coefficients"),
+    ("segments.1.axes.0.functions", [Function("polynomial", [NAN])], "s1.*coefficient"),
+    ("segments.1.axes.0.functions", [Function("spline", x=[0.0], y=[0.0])], "s1.*1 points"),
+    ("segments.1.axes.0.functions", [Function("spline", x=[0.0, 1.0], y=[0.0])], "s1.*2 x and 1 y"),
+    ("segments.1.axes.0.functions", [Function("spline", x=[0.0, 1.0, 1.0], y=[0.0] * 3)], "s1.*increase"),
+    ("segments.1.axes.0.functions", [Function("piecewise_linear", x=[0.0, 1.0], y=[0.0, INF])], "s1.* y .*finite"),
     ("markers.1.name", "m0", "m0"),
     ("markers.0.segment", "zz", "m0.*zz"),
     ("markers.0.position", np.full(3, NAN), "m0"),

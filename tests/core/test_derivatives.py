@@ -8,10 +8,11 @@ from oracle import measurement
 from oracle.state import Layout
 
 from core.bridge import model_of
-from core.random_models import planar_model, random_state, spatial_model, with_slow_errors
+from core.random_models import planar_model, random_state, spatial_model, with_functions, with_slow_errors
 from dynakin import _core
 
 MODELS = [planar_model(s) for s in range(5)] + [spatial_model(s) for s in range(16)]
+MODELS += [with_functions(spatial_model(s), s) for s in range(16, 26)]
 SLOW = [with_slow_errors(spec, k) for k, spec in enumerate(MODELS)]
 OFFSETS_ONLY = with_slow_errors(planar_model(3), 7, delay=False)
 BLOCKS = ("coordinates", "speeds", "accelerations", "lengths", "markers", "soft_tissue", "inertia", "plates")

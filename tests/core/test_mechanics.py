@@ -8,14 +8,15 @@ from oracle import measurement
 from oracle.state import Layout, unpack
 
 from core.bridge import close, model_of
-from core.random_models import planar_model, random_state, spatial_model, with_slow_errors
+from core.random_models import planar_model, random_state, spatial_model, with_functions, with_slow_errors
 from dynakin import _core
 
 PLANAR = [planar_model(s) for s in range(6)] + [planar_model(50, n_segments=7)]
 SPATIAL = [spatial_model(s) for s in range(20)]
 IDENTITY = [spatial_model(s, nonlinear=False) for s in range(100, 108)]
 SLOW = [with_slow_errors(spec, k) for k, spec in enumerate(PLANAR[::3] + SPATIAL[::3])]
-MODELS = PLANAR + SPATIAL + IDENTITY + SLOW
+CURVED = [with_functions(spatial_model(s), s) for s in range(20, 28)]
+MODELS = PLANAR + SPATIAL + IDENTITY + SLOW + CURVED
 
 
 def test_the_random_models_hold_what_they_should():

@@ -9,10 +9,19 @@ import pytest
 from oracle.state import Layout
 
 from core.bridge import filter_of, model_of, to_core
-from core.random_models import planar_model, random_state, settings, spatial_model, trial, with_slow_errors
+from core.random_models import (
+    planar_model,
+    random_state,
+    settings,
+    spatial_model,
+    trial,
+    with_functions,
+    with_slow_errors,
+)
 from dynakin import _core
 
 SPECS = [planar_model(1), *(spatial_model(s) for s in (2, 5, 6, 9)), with_slow_errors(planar_model(2), 2)]
+SPECS += [with_functions(spatial_model(5), 5)]
 each_spec = pytest.mark.parametrize("spec", SPECS, ids=lambda s: s.name)
 
 
@@ -30,7 +39,10 @@ def as_data(thing):
     }
     parts["lengths"] = [[(t.parameter, _plain(t.direction)) for t in segment.lengths] for segment in thing.segments]
     parts["axes"] = [
-        [(a.coordinate, a.kind, _plain(a.direction), _plain(a.coefficients), a.scale) for a in segment.axes]
+        [
+            (a.coordinate, a.kind, _plain(a.direction), _plain(a.coefficients), a.scale, _functions(a))
+            for a in segment.axes
+        ]
         for segment in thing.segments
     ]
     return parts | {
@@ -40,6 +52,10 @@ def as_data(thing):
         "wrench_offset": _plain(thing.wrench_offset),
         "wrench_delay": thing.wrench_delay,
     }
+
+
+def _functions(axis):
+    return [(f.kind, _plain(f.coefficients), _plain(f.x), _plain(f.y)) for f in axis.functions]
 
 
 def _plain(value):
@@ -70,11 +86,13 @@ def test_specification_and_model_survive_pickling(spec):
 def test_each_part_of_a_specification_survives_pickling():
     spec = to_core(SPECS[2])
     segment = next(s for s in spec.segments if s.axes)
+    function = _core.FunctionSpec("spline", x=[0.0, 1.0, 2.0], y=[0.0, 1.0, 0.5])
     for part, keys in (
         (spec.coordinates[0], ("name", "value", "locked")),
         (spec.parameters[0], ("name", "value", "estimated")),
         (spec.markers[0], ("name", "segment", "position", "measured", "estimated", "soft_tissue")),
         (segment.axes[0], ("coordinate", "kind", "direction", "coefficients", "scale")),
+        (function, ("kind", "coefficients", "x", "y")),
         (segment, ("name", "parent", "rotation", "translation", "inertia", "inertia_estimated")),
     ):
         again = pickle.loads(pickle.dumps(part))

@@ -8,11 +8,12 @@ from oracle import measurement, mechanics
 from oracle.state import Layout, unpack
 
 from core.bridge import close, model_of
-from core.random_models import planar_model, random_state, spatial_model, with_slow_errors
+from core.random_models import planar_model, random_state, spatial_model, with_functions, with_slow_errors
 from core.test_derivatives import BLOCKS, central_differences, compare
 from dynakin import _core
 
 MODELS = [planar_model(s) for s in range(6)] + [planar_model(50, n_segments=7)] + [spatial_model(s) for s in range(30)]
+MODELS += [with_functions(spatial_model(s), s) for s in range(30, 40)]
 MODELS += [with_slow_errors(spec, k) for k, spec in enumerate(MODELS[::8])]
 
 
@@ -37,6 +38,9 @@ def test_the_random_models_hold_what_they_should():
     assert any(a.scale and (spec.name, a.scale) in fixed for spec, a in axes)
     assert any(a.scale and (spec.name, a.scale) not in fixed for spec, a in axes)
     assert any((spec.name, a.coordinate) in locked for spec, a in axes)
+    kinds = {f.kind for _, a in axes for f in a.functions}
+    assert kinds == {"polynomial", "spline", "piecewise_linear"}
+    assert any(len(a.functions) > 1 and a.scale for _, a in axes)
     across = [[{a.coordinate for a in s.axes} for s in spec.segments] for spec in MODELS]
     assert any(a & b for chains in across for k, a in enumerate(chains) for b in chains[k + 1 :])
 

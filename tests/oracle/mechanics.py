@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from oracle.functions import axis_function
+
 
 def cross(a: NDArray, b: NDArray) -> NDArray:
     """Vector product over the last axis (never conjugates)."""
@@ -36,15 +38,6 @@ def axis_angle(direction: NDArray, angle: NDArray) -> NDArray:
     k = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     s, c = np.sin(angle)[..., None, None], np.cos(angle)[..., None, None]
     return np.eye(3) + s * k + (1 - c) * (k @ k)
-
-
-def axis_function(axis: Any, q: NDArray, scale: Any) -> tuple[NDArray, NDArray, NDArray]:
-    """s = scale * sum_k c_k q^k and its first and second derivative with respect to q."""
-    c = list(axis.coefficients)
-    value = sum((ck * q**k for k, ck in enumerate(c)), 0 * q)
-    first = sum((k * ck * q ** (k - 1) for k, ck in enumerate(c) if k >= 1), 0 * q)
-    second = sum((k * (k - 1) * ck * q ** (k - 2) for k, ck in enumerate(c) if k >= 2), 0 * q)
-    return scale * value, scale * first, scale * second
 
 
 @dataclass

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from oracle.mechanics import axis_function
+from oracle.functions import axis_function
 from oracle.state import Values
 
 try:

@@ -15,12 +15,21 @@ INERTIA_NAMES = ("mass", "mx", "my", "mz", "ixx", "iyy", "izz", "ixy", "ixz", "i
 
 
 @dataclass
+class Function:
+    kind: str = "polynomial"  # or "spline", "piecewise_linear"
+    coefficients: list[float] = field(default_factory=list)
+    x: list[float] = field(default_factory=list)
+    y: list[float] = field(default_factory=list)
+
+
+@dataclass
 class Axis:
     coordinate: str
     kind: str  # "rotation" or "translation"
     direction: NDArray
     coefficients: list[float] = field(default_factory=lambda: [0.0, 1.0])
     scale: str = ""
+    functions: list[Function] = field(default_factory=list)
 
 
 @dataclass

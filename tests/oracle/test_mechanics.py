@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from core.random_models import planar_model, random_state, spatial_model
+from core.random_models import planar_model, random_state, spatial_model, with_functions
 
 from oracle import measurement, mechanics
 from oracle.spec import Axis, Coordinate, Marker, Segment, Spec
 from oracle.state import Layout, unpack
 
 MODELS = [planar_model(s) for s in range(4)] + [spatial_model(s) for s in range(12)]
+MODELS += [with_functions(spatial_model(s), s) for s in range(12, 18)]
 IDENTITY = [spatial_model(s, nonlinear=False) for s in range(100, 106)]
 
 

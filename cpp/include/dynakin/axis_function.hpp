@@ -1,7 +1,10 @@
-// Motion along one axis as a function of its coordinate: s = L f(q), f a polynomial, L a geometry parameter or 1.
+// Motion along one axis as a function of its coordinate: s = L p(f_n(... f_1(q))), p a polynomial, L a geometry
+// parameter or 1.
 #pragma once
 
 #include <vector>
+
+#include "dynakin/scalar_function.hpp"
 
 namespace dynakin {
 
@@ -16,7 +19,7 @@ struct AxisMotion {
 class AxisFunction {
  public:
   AxisFunction() = default;
-  AxisFunction(std::vector<double> coefficients, int scale_parameter);
+  AxisFunction(std::vector<double> coefficients, int scale_parameter, std::vector<ScalarFunction> inner = {});
 
   int scale_parameter() const { return scale_parameter_; }
   AxisMotion evaluate(double q, double qd, double qdd, double scale) const;
@@ -24,6 +27,7 @@ class AxisFunction {
  private:
   std::vector<double> coefficients_ = {0.0, 1.0};
   int scale_parameter_ = -1;  // index of a geometry parameter, -1: none
+  std::vector<ScalarFunction> inner_;
   bool identity_ = true;
 };
 

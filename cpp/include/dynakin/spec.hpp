@@ -13,14 +13,25 @@ namespace dynakin {
 
 enum class AxisKind { rotation, translation };
 
-// One degree of freedom: s = scale * sum_k coefficients[k] q^k, a rotation (rad) about or translation (m) along
-// direction.
+enum class FunctionKind { polynomial, spline, piecewise_linear };
+
+// sum_k coefficients[k] x^k, or a function through the points (x[k], y[k]), x increasing, that goes straight on beyond
+// the outermost.
+struct FunctionSpec {
+  FunctionKind kind = FunctionKind::polynomial;
+  std::vector<double> coefficients;
+  std::vector<double> x, y;
+};
+
+// One degree of freedom: s = scale * sum_k coefficients[k] u^k, a rotation (rad) about or translation (m) along
+// direction; u is the coordinate, or what the functions make of it one after the other.
 struct AxisSpec {
   std::string coordinate;
   AxisKind kind = AxisKind::rotation;
   Vector3 direction = Vector3::UnitZ();
   std::vector<double> coefficients = {0.0, 1.0};
   std::string scale;  // a geometry parameter, or empty for 1
+  std::vector<FunctionSpec> functions = {};
 };
 
 // Adds direction * (parameter) to the placement of a joint in its parent segment.

@@ -32,36 +32,85 @@ AxisKind axis_kind(const std::string& name) {
 
 std::string axis_kind_name(AxisKind kind) { return kind == AxisKind::rotation ? "rotation" : "translation"; }
 
+constexpr std::pair<FunctionKind, const char*> function_kinds[] = {
+    {FunctionKind::polynomial, "polynomial"},
+    {FunctionKind::spline, "spline"},
+    {FunctionKind::piecewise_linear, "piecewise_linear"}};
+
+FunctionKind function_kind(const std::string& name) {
+  for (const auto& [kind, known] : function_kinds)
+    if (name == known) return kind;
+  throw nb::value_error(
+      ("function kind: expected 'polynomial', 'spline' or 'piecewise_linear', found '" + name + "'").c_str());
+}
+
+std::string function_kind_name(FunctionKind kind) { return function_kinds[static_cast<int>(kind)].second; }
+
+void bind_function(nb::module_& m) {
+  using Numbers = std::vector<double>;
+  nb::class_<FunctionSpec> function(
+      m, "FunctionSpec",
+      "sum_k coefficients[k] x**k ('polynomial'), or a function through the points (x, y), straight on beyond them: "
+      "'spline' (twice continuously differentiable cubics, as OpenSim's SimmSpline) or 'piecewise_linear'.");
+  function
+      .def(
+          "__init__",
+          [](FunctionSpec* self, const std::string& kind, Numbers coefficients, Numbers x, Numbers y) {
+            new (self) FunctionSpec{function_kind(kind), std::move(coefficients), std::move(x), std::move(y)};
+          },
+          nb::arg("kind") = "polynomial", nb::arg("coefficients") = Numbers{}, nb::arg("x") = Numbers{},
+          nb::arg("y") = Numbers{})
+      .def_prop_rw(
+          "kind", [](const FunctionSpec& f) { return function_kind_name(f.kind); },
+          [](FunctionSpec& f, const std::string& name) { f.kind = function_kind(name); })
+      .def_rw("coefficients", &FunctionSpec::coefficients)
+      .def_rw("x", &FunctionSpec::x)
+      .def_rw("y", &FunctionSpec::y);
+  function.def("__getstate__", [](const FunctionSpec& f) {
+    return nb::make_tuple(function_kind_name(f.kind), f.coefficients, f.x, f.y);
+  });
+  function.def("__setstate__", [](FunctionSpec& self, const nb::tuple& s) {
+    new (&self) FunctionSpec{function_kind(nb::cast<std::string>(s[0])), nb::cast<Numbers>(s[1]),
+                             nb::cast<Numbers>(s[2]), nb::cast<Numbers>(s[3])};
+  });
+}
+
 void bind_axis(nb::module_& m) {
-  nb::class_<AxisSpec> axis(m, "AxisSpec", "One degree of freedom, s = scale * sum_k coefficients[k] q**k (rad or m).");
+  nb::class_<AxisSpec> axis(m, "AxisSpec",
+                            "One degree of freedom, s = scale * sum_k coefficients[k] u**k (rad or m); u is the "
+                            "coordinate, or what the functions make of it one after the other.");
   axis.def(
           "__init__",
           [](AxisSpec* self, std::string coordinate, const std::string& kind, const Vector3& direction,
-             std::vector<double> coefficients, std::string scale) {
-            new (self)
-                AxisSpec{std::move(coordinate), axis_kind(kind), direction, std::move(coefficients), std::move(scale)};
+             std::vector<double> coefficients, std::string scale, std::vector<FunctionSpec> functions) {
+            new (self) AxisSpec{std::move(coordinate),   axis_kind(kind),  direction,
+                                std::move(coefficients), std::move(scale), std::move(functions)};
           },
           nb::arg("coordinate"), nb::arg("kind") = "rotation", nb::arg("direction") = Vector3(Vector3::UnitZ()),
-          nb::arg("coefficients") = std::vector<double>{0.0, 1.0}, nb::arg("scale") = "")
+          nb::arg("coefficients") = std::vector<double>{0.0, 1.0}, nb::arg("scale") = "",
+          nb::arg("functions") = std::vector<FunctionSpec>{})
       .def_rw("coordinate", &AxisSpec::coordinate)
       .def_prop_rw(
           "kind", [](const AxisSpec& a) { return axis_kind_name(a.kind); },
           [](AxisSpec& a, const std::string& name) { a.kind = axis_kind(name); })
       .def_rw("direction", &AxisSpec::direction, nb::rv_policy::copy)
       .def_rw("coefficients", &AxisSpec::coefficients)
-      .def_rw("scale", &AxisSpec::scale);
+      .def_rw("scale", &AxisSpec::scale)
+      .def_rw("functions", &AxisSpec::functions);
   axis.def("__getstate__", [](const AxisSpec& a) {
-    return nb::make_tuple(a.coordinate, axis_kind_name(a.kind), a.direction, a.coefficients, a.scale);
+    return nb::make_tuple(a.coordinate, axis_kind_name(a.kind), a.direction, a.coefficients, a.scale, a.functions);
   });
   axis.def("__setstate__", [](AxisSpec& self, const nb::tuple& s) {
-    new (&self) AxisSpec{nb::cast<std::string>(s[0]), axis_kind(nb::cast<std::string>(s[1])), nb::cast<Vector3>(s[2]),
-                         nb::cast<std::vector<double>>(s[3]), nb::cast<std::string>(s[4])};
+    new (&self) AxisSpec{nb::cast<std::string>(s[0]), axis_kind(nb::cast<std::string>(s[1])),
+                         nb::cast<Vector3>(s[2]),     nb::cast<std::vector<double>>(s[3]),
+                         nb::cast<std::string>(s[4]), nb::cast<std::vector<FunctionSpec>>(s[5])};
   });
 }
 
 }  // namespace
 
 void bind_spec(nb::module_& m) {
+  bind_function(m);
   bind_axis(m);
 
   nb::class_<LengthTerm> length(m, "LengthTerm", "Adds direction * parameter to a joint's placement in its parent.");

@@ -16,8 +16,20 @@ from dynakin.cli.console import out, table
 from dynakin.cli.options import Force, Forward, Height, Markers, Mass, Sex, Side, Static, Vertical
 from dynakin.cli.run import forward_direction
 from dynakin.errors import DynakinError
-from dynakin.model import Subject, available_marker_sets, available_models, load_marker_set, load_model, measure
+from dynakin.model import (
+    Definition,
+    InitialModel,
+    OpenSimDefinition,
+    Subject,
+    available_marker_sets,
+    available_models,
+    initialise,
+    load_marker_set,
+    load_model,
+    measure,
+)
 from dynakin.model.marker_schema import MarkerSetFile
+from dynakin.model.measure import Measured
 from dynakin.recordings import (
     GroundFrame,
     Recording,
@@ -61,14 +73,7 @@ def check(
         try:
             if not recording.plates:
                 raise DynakinError("no force plates, expected at least one (give --forces)")
-            _, found = measure(
-                definition,
-                recording,
-                static=still,
-                side=side or "auto",
-                vertical=vertical or "auto",
-                forward=direction,  # type: ignore[arg-type]
-            )
+            found = _laid_on(definition, recording, still, side or "auto", vertical or "auto", direction)
             plates = check_plates(recording, found.ground, found.mass_kg)
             if plates.refusal:
                 raise DynakinError(plates.refusal)
@@ -78,6 +83,34 @@ def check(
             # how the ground frame was found is said above
             _sentences(console, [text for text in found.messages if text not in found.ground.how])
         console.print()
+
+
+def _laid_on(
+    definition: Definition,
+    recording: Recording,
+    static: Recording | None,
+    side: str,
+    vertical: str,
+    forward: str | tuple[float, ...],
+) -> Measured | InitialModel:
+    """What the model is when measured on the recording, as far as the messages go."""
+    if isinstance(definition, OpenSimDefinition):
+        return initialise(
+            definition,
+            recording,
+            static=static,
+            vertical=vertical,
+            forward=forward,  # type: ignore[arg-type]
+        )
+    _, found = measure(
+        definition,
+        recording,
+        static=static,
+        side=side,
+        vertical=vertical,
+        forward=forward,  # type: ignore[arg-type]
+    )
+    return found
 
 
 def _print_recording(console: Console, recording: Recording) -> None:

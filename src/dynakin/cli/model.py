@@ -12,15 +12,27 @@ from rich.tree import Tree
 
 from dynakin.cli.console import out, table
 from dynakin.cli.identifiability import print_identifiability
+from dynakin.cli.opensim_model import export_model, print_opensim
 from dynakin.cli.options import Force, Height, Markers, Mass, Sex
-from dynakin.model import ModelDefinition, Subject, available_marker_sets, available_models, load_marker_set, load_model
+from dynakin.model import (
+    ModelDefinition,
+    OpenSimDefinition,
+    Subject,
+    available_marker_sets,
+    available_models,
+    load_marker_set,
+    load_model,
+)
+from dynakin.model.definition import load_built_in_or_toml
 from dynakin.model.marker_schema import MarkerSetFile
 from dynakin.model.schema import ModelFile
 from dynakin.model.schema import Segment as ModelSegment
 
 
 def model(
-    name: Annotated[str | None, typer.Argument(help="squat7, sagittal7 or a .toml file; none: list them.")] = None,
+    name: Annotated[
+        str | None, typer.Argument(help="squat7, sagittal7, a .toml or .osim file; none: list them.")
+    ] = None,
     markers: Markers = None,
     identifiable: Annotated[
         bool, typer.Option("--identifiability", help="What its measurements can tell: base parameters and gauges.")
@@ -32,21 +44,43 @@ def model(
     mass: Mass = None,
     height: Height = None,
     sex: Sex = None,
+    export: Annotated[
+        Path | None,
+        typer.Option(
+            help="Write the model as an OpenSim file (.osim); a built-in one needs --trial to be measured on."
+        ),
+    ] = None,
+    parameters: Annotated[
+        Path | None, typer.Option(help="With --export: a run's parameters.json, whose values are written.")
+    ] = None,
 ) -> None:
-    """Print a model: its tree, coordinates, states, markers and bounds; or what it lets one identify."""
+    """Print a model: its tree, coordinates, states, markers and bounds; or what it lets one identify; or export it."""
     console = out()
     of_a_person = {"--trial": trial, "--forces": forces, "--mass": mass, "--height": height, "--sex": sex}
     needless = [option for option, value in of_a_person.items() if value is not None]
-    if needless and not identifiable:
-        raise typer.BadParameter(f"{needless[0]} is of use only with --identifiability")
+    if needless and not identifiable and export is None:
+        raise typer.BadParameter(f"{needless[0]} is of use only with --identifiability or --export")
+    if parameters is not None and export is None:
+        raise typer.BadParameter("--parameters is of use only with --export FILE")
     if forces is not None and trial is None:
         raise typer.BadParameter("--forces is of use only with --trial FILE")
     if name is None:
         if identifiable:
             raise typer.BadParameter("--identifiability: expected a model's name before it")
+        if export is not None:
+            raise typer.BadParameter("--export: expected a model's name before it")
         console.print(_list())
         return
     definition = load_model(name, Subject(mass_kg=mass, height_m=height, sex=sex), markers=markers or "auto")
+    if export is not None:
+        export_model(definition, export, parameters, mass, trial, forces)
+        console.print(f"Written {export}", soft_wrap=True)
+        return
+    if isinstance(definition, OpenSimDefinition):
+        if identifiable:
+            raise typer.BadParameter("--identifiability: expected a built-in model or a .toml file")
+        print_opensim(console, definition)
+        return
     if identifiable:
         print_identifiability(definition, trial, forces)
         return
@@ -63,7 +97,7 @@ def model(
 def _list() -> Table:
     rows = table("name", "what it is", title="Models and marker sets")
     for name in available_models():
-        rows.add_row(name, load_model(name).model.description)
+        rows.add_row(name, load_built_in_or_toml(name).model.description)
     for name in available_marker_sets():
         rows.add_row(name, load_marker_set(name).description)
     return rows

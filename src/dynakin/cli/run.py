@@ -40,7 +40,7 @@ from dynakin.results import Estimate, check_output_writable
 def run(
     trial: Annotated[Path, typer.Argument(help="Recording (.c3d, .trc, .csv), or a configuration (.toml).")],
     forces: Force = None,
-    model: Annotated[str | None, typer.Option(help="Model: squat7, sagittal7 or a .toml file.")] = None,
+    model: Annotated[str | None, typer.Option(help="Model: squat7, sagittal7, a .toml or .osim file.")] = None,
     markers: Markers = None,
     static: Static = None,
     mass: Mass = None,

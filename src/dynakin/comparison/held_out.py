@@ -192,7 +192,7 @@ def _referred(identified: Identified, recording: Recording, start: InitialModel)
     learnt = reference_methods(identified.recording, measured, setup.definition, setup.cutoff_hz, lengths="frame")
     fit = identify(
         learnt.chain,
-        measured.plan,
+        measured.measured_plan(),
         learnt.kinematics,
         identified.wrench,
         mass_kg=measured.mass_kg,

@@ -11,7 +11,7 @@ import xarray as xr
 
 from dynakin.comparison.setup import Setup
 from dynakin.errors import DynakinError, ModelError
-from dynakin.model import InitialModel, ModelDefinition
+from dynakin.model import Definition, InitialModel
 from dynakin.recordings import Recording
 from dynakin.reference import CUTOFF_HZ, Reference, reference_methods
 from dynakin.reference.methods import Lengths
@@ -110,7 +110,7 @@ def compare_trial(
 def trial_of(
     estimates: Mapping[str, Estimate],
     initial: InitialModel,
-    definition: ModelDefinition,
+    definition: Definition,
     cutoff_hz: float = CUTOFF_HZ,
     *,
     whatever: bool = False,
@@ -175,7 +175,7 @@ def _referred(kind: str, reference: Reference, initial: InitialModel) -> Method:
     data = reference.data
     cutoff = "" if reference.cutoff_hz is None else f" ({reference.cutoff_hz:g} Hz)"
     segments = reference.chain.moving(reference.kinematics).segments
-    markers = np.stack([segments[site.segment].point(site.position) for site in initial.plan.sites], axis=1)
+    markers = np.stack([segments[site.segment].point(site.position) for site in initial.measured_plan().sites], axis=1)
     return Method(
         kind + cutoff,
         kind,

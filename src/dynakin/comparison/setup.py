@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 from dynakin.errors import ConfigError
 from dynakin.filter import Estimator, Noise, presets
-from dynakin.model import Bounds, ModelDefinition, Priors
+from dynakin.model import Bounds, Definition, Priors
 from dynakin.reference import CUTOFF_HZ
 
 
@@ -22,7 +22,7 @@ class Setup:
         priors, bounds, side, vertical, forward: as `Estimator` takes them.
     """
 
-    definition: ModelDefinition
+    definition: Definition
     noise: Mapping[str, Noise] = field(default_factory=lambda: {"default": presets.default()})
     cutoff_hz: float = CUTOFF_HZ
     priors: Priors | None = None

@@ -17,7 +17,7 @@ from dynakin.filter.live import StepEstimate, deviations_of, step_estimate
 from dynakin.filter.noise import Noise, gate_limits
 from dynakin.filter.samples import Sample, foreign_load, recording_arrays, sample_arrays
 from dynakin.filter.smoothing import check_can_smooth, smoothed
-from dynakin.model import Bounds, InitialModel, ModelDefinition, Priors, initialise
+from dynakin.model import Bounds, Definition, InitialModel, Priors, initialise
 from dynakin.recordings import Recording, check_plates
 from dynakin.results import Estimate
 
@@ -39,7 +39,7 @@ class Estimator:
 
     def __init__(
         self,
-        model: ModelDefinition,
+        model: Definition,
         noise: Noise | None = None,
         *,
         priors: Priors | None = None,
@@ -282,7 +282,7 @@ class Estimator:
             process_density=density,
             decay_rate=decay,
             marker_variance=noise.marker_variance(
-                initial.recorded_markers, initial.marker_variance, initial.soft_tissue_m
+                initial.recorded_markers, initial.marker_variance, initial.soft_tissue_m, initial.unmodelled_m
             ),
             wrench_covariance=noise.wrench_covariance(),
             reference_point=initial.plate_centre if point == "auto" else np.array(point, dtype=float),

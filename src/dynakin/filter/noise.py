@@ -132,16 +132,19 @@ class Noise(BaseModel):
         sd = self.soft_tissue * declared_m
         return np.where(sd < self.soft_tissue_least_m, 0.0, sd)
 
-    def marker_variance(self, names: Sequence[str], of_set: Array, declared_m: Array) -> Array:
+    def marker_variance(
+        self, names: Sequence[str], of_set: Array, declared_m: Array, unmodelled_m: Array | float = 0.0
+    ) -> Array:
         """R (M,) m^2 of markers with these names in the recording.
 
         Args:
             of_set: (M,) m^2, as the marker set has it. declared_m: (M,) m, size of the soft tissue's displacement.
+            unmodelled_m: (M,) m, of ``InitialModel``; the marker set's R holds it already.
         """
         variance = self.marker_scale * of_set
         if self.marker_sd_m is not None:
             unmodelled = np.where(self.soft_tissue_sd(declared_m) == 0.0, self.soft_tissue_least_m, 0.0)
-            variance = self.marker_sd_m**2 + unmodelled**2
+            variance = self.marker_sd_m**2 + unmodelled**2 + unmodelled_m**2
         return np.array([self.marker.get(name, value) for name, value in zip(names, variance, strict=True)])
 
 

@@ -39,7 +39,7 @@ def parameters_of(
                 name=name,
                 kind=kind,
                 segment=segments[rest[0]] if kind == "marker" else "plates" if kind == "plates" else rest[0],
-                unit=_unit(kind, rest[-1]),
+                unit="1" if rest[0] in initial.dimensionless else _unit(kind, rest[-1]),
                 value=float(state[k]),
                 sd=float(np.hypot(sd[k], unseen)),
                 initial=float(initial.x0[k]),
@@ -56,7 +56,10 @@ def parameters_of(
         if not length.estimated:
             value = float(length.value)
             name = f"length/{length.name}"
-            found.append(Parameter(name, "length", length.name, "m", value, 0.0, value, None, None, None, False, False))
+            unit = "1" if length.name in initial.dimensionless else "m"
+            found.append(
+                Parameter(name, "length", length.name, unit, value, 0.0, value, None, None, None, False, False)
+            )
     return found
 
 

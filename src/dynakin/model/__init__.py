@@ -1,19 +1,22 @@
 """Models: what a person is made of (TOML), where the markers sit, the inertia tables, and how all is
 measured on a recording."""
 
-from dynakin.model.definition import ModelDefinition, available_models, load_model
+from dynakin.model.definition import Definition, ModelDefinition, available_models, load_model
 from dynakin.model.initial import InitialModel
 from dynakin.model.initialise import initialise
 from dynakin.model.marker_set import available_marker_sets, load_marker_set
 from dynakin.model.measure import measure
+from dynakin.model.opensim import OpenSimDefinition, load_opensim
 from dynakin.model.priors import Bounds, Priors
 from dynakin.model.subject import Subject
 from dynakin.model.table import load_table
 
 __all__ = [
     "Bounds",
+    "Definition",
     "InitialModel",
     "ModelDefinition",
+    "OpenSimDefinition",
     "Priors",
     "Subject",
     "available_marker_sets",
@@ -21,6 +24,7 @@ __all__ = [
     "initialise",
     "load_marker_set",
     "load_model",
+    "load_opensim",
     "load_table",
     "measure",
 ]

@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import Protocol
+
 import numpy as np
 
 from dynakin.errors import ModelError
 from dynakin.model.frames import Trial
 from dynakin.model.subject import Subject
-from dynakin.recordings import Recording, check_plates
+from dynakin.recordings import GroundFrame, Recording, check_plates
 
 
-def find_mass(subject: Subject, trials: list[Trial]) -> tuple[float, str]:
+class OnPlates(Protocol):
+    """A recording and its ground frame: a ``Trial``, say."""
+
+    @property
+    def recording(self) -> Recording: ...
+    @property
+    def ground(self) -> GroundFrame: ...
+
+
+def find_mass(subject: Subject, trials: Sequence[OnPlates]) -> tuple[float, str]:
     """Mass (kg) and where it comes from: told, from the plates while standing still, from the file, or, with a
     warning, from the plates' mean over a movement.
 

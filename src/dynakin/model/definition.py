@@ -9,6 +9,7 @@ from pathlib import Path
 from dynakin.errors import ModelError
 from dynakin.model.marker_schema import MarkerSetFile
 from dynakin.model.marker_set import load_marker_set
+from dynakin.model.opensim.definition import OpenSimDefinition, load_opensim
 from dynakin.model.schema import ModelFile
 from dynakin.model.subject import Subject
 from dynakin.model.table import BodyTable, load_table
@@ -46,13 +47,18 @@ class ModelDefinition:
         return self.model.name
 
 
+Definition = ModelDefinition | OpenSimDefinition
+
+
 def load_model(
     name_or_path: str | Path,
     subject: Subject | None = None,
     markers: str | Path = "auto",
     table: str | Path = "dumas",
-) -> ModelDefinition:
-    """A built-in model ("sagittal7", "squat7") or a TOML file, with the subject, marker set and table to use.
+) -> Definition:
+    """A built-in model ("sagittal7", "squat7"), a TOML file, or an OpenSim model (.osim, versions 3 and 4).
+
+    An OpenSim model brings its own markers and inertia; ``load_opensim`` has its options.
 
     Args:
         subject: who is measured; nothing is known where not given.
@@ -63,11 +69,24 @@ def load_model(
     Raises:
         ModelError: an unknown name (the nearest is suggested), or a wrong file (file and key are named).
     """
-    name, known = str(name_or_path), available_models()
+    name = str(name_or_path)
+    if Path(name_or_path).suffix.casefold() == ".osim":
+        if str(markers) != "auto":
+            raise ModelError(f"markers is {str(markers)!r}, expected auto: {name} has markers of its own")
+        return load_opensim(name, subject)
+    return load_built_in_or_toml(name, subject, markers, table)
+
+
+def load_built_in_or_toml(
+    name: str, subject: Subject | None = None, markers: str | Path = "auto", table: str | Path = "dumas"
+) -> ModelDefinition:
+    """``load_model`` of what is no OpenSim model."""
+    known = available_models()
     path = Path(str(_FOLDER / f"{name}.toml")) if name in known else Path(name)
     if name not in known and (path.suffix != ".toml" or not path.exists()):
         raise ModelError(
-            f"model {name!r}: unknown{nearest(name, known)}; expected {', '.join(known)} or a .toml file that exists"
+            f"model {name!r}: unknown{nearest(name, known)}; expected {', '.join(known)}, or a .toml or .osim file "
+            "that exists"
         )
     model = validate(ModelFile, read_toml(path), str(path))
     who = subject or Subject()

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.errors import ModelError
 from dynakin.model.lumping import PlacedPart
 from dynakin.model.plan import ModelPlan
 from dynakin.recordings import GroundFrame
@@ -40,7 +41,11 @@ class InitialModel:
         mass_kg, height_m: as used; height None where nothing needed it.
         parts: the table's parts in each segment, as placed.
         messages: sentences on what was found, left out, locked or assumed.
-        plan: the same as plain data.
+        plan: the same as plain data; None for an OpenSim model.
+        feet: "right", "left" -> segment on which the ground acts; empty for a model fixed in the ground.
+        unmodelled_m: (M,) standard deviation of what neither a state nor the cameras explain of each marker; it is
+            added to the noise of the cameras.
+        dimensionless: geometry parameters that are factors, not lengths.
     """
 
     spec: _core.ModelSpec
@@ -60,4 +65,19 @@ class InitialModel:
     height_m: float | None
     parts: dict[str, list[PlacedPart]]
     messages: tuple[str, ...]
-    plan: ModelPlan
+    plan: ModelPlan | None
+    feet: dict[str, str] = field(default_factory=dict)
+    unmodelled_m: Array | float = 0.0
+    dimensionless: frozenset[str] = frozenset()
+
+    def measured_plan(self) -> ModelPlan:
+        """The plan.
+
+        Raises:
+            ModelError: there is none, for an OpenSim model.
+        """
+        if self.plan is None:
+            raise ModelError(
+                f"model {self.spec.name} comes from an OpenSim file; expected a built-in model or a .toml file for this"
+            )
+        return self.plan

@@ -6,9 +6,10 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.model.definition import ModelDefinition
+from dynakin.model.definition import Definition
 from dynakin.model.initial import InitialModel
 from dynakin.model.measure import measure
+from dynakin.model.opensim.definition import OpenSimDefinition
 from dynakin.model.priors import Bounds, Priors
 from dynakin.recordings import GroundFrame, Recording
 
@@ -18,7 +19,7 @@ _LOADED_N = 20.0  # a lesser load has no centre of pressure worth the name
 
 
 def initialise(
-    definition: ModelDefinition,
+    definition: Definition,
     recording: Recording,
     ground: GroundFrame | None = None,
     *,
@@ -29,7 +30,7 @@ def initialise(
     priors: Priors | None = None,
     bounds: Bounds | None = None,
 ) -> InitialModel:
-    """Fill a model with what a recording tells of the person.
+    """Fill a model with what a recording tells of the person; an OpenSim model brings its own lengths and places.
 
     Args:
         ground: directions of the ground frame; found in the recording (``vertical``, ``forward``) where not
@@ -43,6 +44,19 @@ def initialise(
         ModelError: the model, the markers and the recording do not fit; one line says what was found and
             expected.
     """
+    if isinstance(definition, OpenSimDefinition):
+        from dynakin.model.opensim.initial import lay_on
+
+        return lay_on(
+            definition,
+            recording,
+            ground,
+            static=static,
+            vertical=vertical,
+            forward=forward,
+            priors=priors,
+            bounds=bounds,
+        )
     plan, rest = measure(definition, recording, ground, static=static, side=side, vertical=vertical, forward=forward)
     from dynakin import _core  # the core is needed from here on only
     from dynakin.model.spec import in_layout, to_core

@@ -9,8 +9,9 @@ import numpy.typing as npt
 
 from dynakin.model.inertia import INERTIA_NAMES, PLANAR_INERTIA, RigidBody
 from dynakin.model.posture import Geometry
-from dynakin.model.priors import Bounds, Interval, Priors, inertia_bounds, inertia_prior
+from dynakin.model.priors import Bounds, Interval, Priors
 from dynakin.model.schema import ModelFile
+from dynakin.model.state_priors import state_bounds, state_prior
 
 Array = npt.NDArray[np.float64]
 
@@ -55,39 +56,14 @@ class ModelPlan:
 
     def prior(self, priors: Priors) -> dict[str, float]:
         """Standard deviation of every element that a state can have, by the core's name of it."""
-        sd: dict[str, float] = {}
-        for name, kind in self._kinds().items():
-            turn = kind == "rotation"
-            sd[name] = np.deg2rad(priors.rotation_deg) if turn else priors.translation_m
-            sd[f"{name}/speed"] = np.deg2rad(priors.rotation_speed_deg_s) if turn else priors.speed_m_s
-            sd[f"{name}/acceleration"] = (
-                np.deg2rad(priors.rotation_acceleration_deg_s2) if turn else priors.acceleration_m_s2
-            )
-        for name, value in self.geometry.lengths.items():
-            sd[f"length/{name}"] = priors.length_fraction * value
-        for site in self.sites:
-            sd |= {f"marker/{site.name}/{axis}": priors.marker_m for axis in "xyz"}
-        for segment, body in self.bodies.items():
-            entry = inertia_prior(body, self.reach[segment], priors)
-            sd |= {f"inertia/{segment}/{name}": value for name, value in entry.items()}
-        return sd
+        names = [site.name for site in self.sites]
+        return state_prior(self._kinds(), self.geometry.lengths, names, self.bodies, self.reach, priors)
 
     def bounds(self, bounds: Bounds) -> dict[str, Interval]:
         """Bounds of (9) by the core's names; speeds and accelerations have none."""
-        found: dict[str, Interval] = {c.name: c.limits for c in self.model.coordinates}
-        for name, value in self.geometry.lengths.items():
-            found[f"length/{name}"] = (
-                (1 - bounds.length_fraction) * value,
-                (1 + bounds.length_fraction) * value,
-            )
-        for site in self.sites:
-            for axis, value in zip("xyz", site.position, strict=True):
-                half = bounds.marker_threshold_m
-                found[f"marker/{site.name}/{axis}"] = (float(value) - half, float(value) + half)
-        for segment, body in self.bodies.items():
-            entry = inertia_bounds(body, self.reach[segment], bounds)
-            found |= {f"inertia/{segment}/{name}": interval for name, interval in entry.items()}
-        return found
+        limits = {c.name: c.limits for c in self.model.coordinates}
+        places = {site.name: site.position for site in self.sites}
+        return state_bounds(limits, self.geometry.lengths, places, self.bodies, self.reach, bounds)
 
     def table_values(self) -> dict[str, float]:
         """What the table gives, by the core's names."""

@@ -33,7 +33,9 @@ def landmark_paths(recording: Recording, initial: InitialModel, definition: Mode
     match = match_markers(marker_set, recording.marker_names, seen, str(recording.path or recording.name))
     trial = Trial.of(recording, match, initial.ground)
     sides = SIDES if initial.side == "both" else (initial.side,)
-    finders = [LandmarkFinder(match, side, definition.subject.sex, initial.plan.model.planar) for side in sides]
+    finders = [
+        LandmarkFinder(match, side, definition.subject.sex, initial.measured_plan().model.planar) for side in sides
+    ]
     each = [_one_side(finder, trial) for finder in finders]
     names = dict.fromkeys(name for paths in each for name in paths)
     return {name: np.mean([paths[name] for paths in each if name in paths], axis=0) for name in names}

@@ -10,7 +10,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from dynakin.errors import ConfigError
-from dynakin.model import InitialModel, ModelDefinition
+from dynakin.model import Definition, InitialModel, OpenSimDefinition
 from dynakin.recordings import Recording
 from dynakin.recordings.smoothing import CUTOFF_HZ, MAX_GAP_S, smooth
 from dynakin.reference.chain import Kinematics, PlanarChain
@@ -47,7 +47,7 @@ class Reference:
 def reference_methods(
     recording: Recording,
     initial: InitialModel,
-    definition: ModelDefinition,
+    definition: Definition,
     cutoff_hz: float | None = CUTOFF_HZ,
     *,
     lengths: Lengths = "constant",
@@ -71,13 +71,15 @@ def reference_methods(
     """
     if lengths not in ("constant", "frame"):
         raise ConfigError(f"lengths is {lengths!r}, expected constant or frame")
-    chain = PlanarChain.of(initial.plan)
+    plan = initial.measured_plan()
+    assert not isinstance(definition, OpenSimDefinition)  # it would have no plan
+    chain = PlanarChain.of(plan)
     landmarks = landmark_paths(recording, initial, definition)
-    angles = classical_angles(chain, initial.plan, landmarks)
+    angles = classical_angles(chain, plan, landmarks)
     smoothed = smooth(recording.time, angles, cutoff_hz, max_gap_s=max_gap_s, names=chain.coordinates)
     hinges = None
     if lengths == "frame":
-        paths = hinge_paths(chain, initial.plan, landmarks, angles)
+        paths = hinge_paths(chain, plan, landmarks, angles)
         flat = smooth(recording.time, paths.reshape(len(paths), -1), cutoff_hz, max_gap_s=max_gap_s)
         hinges = np.stack([flat.values, flat.rates, flat.seconds]).reshape(3, *paths.shape)
     kinematics = Kinematics(smoothed.values, smoothed.rates, smoothed.seconds, hinges)

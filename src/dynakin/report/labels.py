@@ -59,7 +59,7 @@ def parameter_label(parameter: Parameter, marker_names: dict[str, str]) -> str:
     """`inertia/thigh/mass` -> `thigh mass`, `marker/RKNE/x` -> `RKNE on the shank, x`."""
     parts = parameter.name.split("/")
     if parameter.kind == "length":
-        return f"{words(parts[-1])} length"
+        return words(parts[-1]) if parameter.unit == "1" else f"{words(parts[-1])} length"
     if parameter.kind == "marker":
         return f"{marker_names.get(parts[1], parts[1])} on the {words(parameter.segment)}, {parts[-1]}"
     return f"{words(parameter.segment)} {INERTIA_WORDS.get(parts[-1], parts[-1])}"

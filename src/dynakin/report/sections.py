@@ -166,7 +166,9 @@ def moment_section(estimate: Estimate) -> Section:
 def length_section(estimate: Estimate) -> Section:
     """Segment lengths over time between their bounds."""
     panels = [
-        _parameter_panel(estimate, p, sentence(words(p.name.split("/")[-1])), 1000.0, "mm")
+        _parameter_panel(
+            estimate, p, sentence(words(p.name.split("/")[-1])), *((1.0, "") if p.unit == "1" else (1000.0, "mm"))
+        )
         for p in estimate.parameters
         if p.kind == "length" and p.estimated
     ]

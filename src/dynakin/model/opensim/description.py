@@ -1,0 +1,158 @@
+"""An OpenSim model as plain data: what a file says, whatever its version; also what is written back."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial.transform import Rotation
+
+from dynakin.model.inertia import RigidBody
+from dynakin.model.opensim.functions import Function
+
+Array = npt.NDArray[np.float64]
+Vector = tuple[float, float, float]
+ZERO: Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Offset:
+    """A frame on a body: origin (m) and body-fixed X, Y, Z angles (rad)."""
+
+    translation: Vector = ZERO
+    orientation: Vector = ZERO
+
+    @property
+    def rotation(self) -> Array:
+        """R (3, 3) of the frame in its body."""
+        return np.asarray(Rotation.from_euler("XYZ", self.orientation).as_matrix())
+
+    def then(self, other: Offset) -> Offset:
+        """A frame that lies at ``other`` in this one."""
+        if self == Offset():
+            return other
+        if other.orientation == ZERO:
+            turned = self.orientation
+        else:
+            x, y, z = Rotation.from_matrix(self.rotation @ other.rotation).as_euler("XYZ")
+            turned = (float(x), float(y), float(z))
+        x, y, z = np.array(self.translation) + self.rotation @ np.array(other.translation)
+        return Offset((float(x), float(y), float(z)), turned)
+
+
+@dataclass(frozen=True)
+class Body:
+    """Mass (kg), its centre (3,) m, and the tensor about the centre: xx, yy, zz, xy, xz, yz (kg m^2)."""
+
+    name: str
+    mass: float
+    centre: Vector
+    inertia: tuple[float, ...]
+
+    @property
+    def rigid(self) -> RigidBody:
+        """About the body's origin."""
+        xx, yy, zz, xy, xz, yz = self.inertia
+        return RigidBody.from_centre(self.mass, self.centre, [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+
+    @classmethod
+    def of(cls, name: str, rigid: RigidBody) -> Body:
+        """The way back of ``rigid``."""
+        if rigid.mass == 0.0:
+            return cls(name, 0.0, ZERO, (0.0,) * 6)
+        x, y, z = (float(v) for v in rigid.centre)
+        c = rigid.centre
+        at_centre = rigid.inertia - rigid.mass * (np.dot(c, c) * np.eye(3) - np.outer(c, c))
+        entries = [at_centre[i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]
+        return cls(name, float(rigid.mass), (x, y, z), tuple(float(v) for v in entries))
+
+
+@dataclass(frozen=True)
+class Coordinate:
+    """A generalised coordinate (rad or m); limits are infinite where the file clamps it to none."""
+
+    name: str
+    value: float = 0.0
+    range: tuple[float, float] | None = None
+    clamped: bool = False
+    locked: bool = False
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """(lower, upper), rad or m."""
+        return self.range if self.clamped and self.range is not None else (-np.inf, np.inf)
+
+
+@dataclass(frozen=True)
+class JointAxis:
+    """Motion along or about ``direction`` (a unit vector in the joint's frame) by functions of a coordinate, applied
+    one after the other; none: a constant."""
+
+    kind: Literal["rotation", "translation"]
+    direction: Vector
+    coordinate: str | None
+    functions: tuple[Function, ...] = ()
+
+
+@dataclass(frozen=True)
+class Joint:
+    """How a body hangs on another: axes in the order of the chain, translations first."""
+
+    name: str
+    kind: str  # OpenSim's class
+    parent: str
+    parent_offset: Offset
+    child: str
+    child_offset: Offset
+    coordinates: tuple[Coordinate, ...]
+    axes: tuple[JointAxis, ...]
+
+
+@dataclass(frozen=True)
+class Coupler:
+    """One coordinate as functions of another."""
+
+    name: str
+    dependent: str
+    independent: str
+    functions: tuple[Function, ...]
+
+
+@dataclass(frozen=True)
+class Marker:
+    """A marker (3,) m on a body."""
+
+    name: str
+    body: str
+    location: Vector
+    fixed: bool = False
+
+
+@dataclass(frozen=True)
+class OpenSimModel:
+    """A whole model; joints in an order in which a parent comes before its children.
+
+    Attributes:
+        left_out: sentences on what of the file is not part of this.
+    """
+
+    name: str
+    path: Path
+    gravity: Vector
+    bodies: tuple[Body, ...]
+    joints: tuple[Joint, ...]
+    couplers: tuple[Coupler, ...]
+    markers: tuple[Marker, ...]
+    left_out: tuple[str, ...] = ()
+
+    def body(self, name: str) -> Body:
+        """The body of that name."""
+        return next(body for body in self.bodies if body.name == name)
+
+    @property
+    def mass(self) -> float:
+        """kg."""
+        return sum(body.mass for body in self.bodies)

@@ -1,0 +1,65 @@
+"""`dynakin model ... --export`: a model, with what a run found where asked, as an .osim file."""
+
+from __future__ import annotations
+
+import json
+import tomllib
+from pathlib import Path
+
+from dynakin.errors import ModelError
+from dynakin.model.initial import InitialModel
+from dynakin.model.opensim.definition import OpenSimDefinition
+from dynakin.model.opensim.description import OpenSimModel
+from dynakin.model.opensim.from_core import from_core
+from dynakin.model.opensim.identified import identified
+from dynakin.model.opensim.sites import with_mass
+
+
+def read_values(path: Path) -> dict[str, float]:
+    """Values by the core's names from a run's ``parameters.json``.
+
+    Raises:
+        ModelError: the file cannot be read or is none of that kind.
+    """
+    try:
+        entries = json.loads(path.read_text(encoding="utf-8"))["parameters"]
+        return {str(entry["name"]): float(entry["value"]) for entry in entries}
+    except OSError as error:
+        raise ModelError(f"{path}: cannot be read ({error.strerror or error})") from None
+    except (ValueError, KeyError, TypeError) as error:
+        raise ModelError(f"{path}: no parameters.json of a run ({error})") from None
+
+
+def mass_of_run(parameters: Path) -> float | None:
+    """The mass (kg) in the run's ``config.toml`` beside its parameters, None where there is none."""
+    path = parameters.with_name("config.toml")
+    if not path.exists():
+        return None
+    mass = tomllib.loads(path.read_text(encoding="utf-8")).get("mass_kg")
+    return None if mass is None else float(mass)
+
+
+def of_definition(definition: OpenSimDefinition, values: dict[str, float], mass_kg: float | None) -> OpenSimModel:
+    """The OpenSim model with masses that sum to ``mass_kg`` first, where given, and then these values.
+
+    Raises:
+        ModelError: a value of something that the model does not have: it was found with another model.
+    """
+    source = definition.source
+    known = {f"length/{name}" for name in definition.scales.values()}
+    known |= {f"marker/{marker.name}" for marker in source.markers}
+    known |= {f"inertia/{body.name}" for body in source.bodies}
+    for name in values:
+        kind, *rest = name.split("/")
+        if kind in ("length", "marker", "inertia") and f"{kind}/{rest[0]}" not in known:
+            raise ModelError(f"{source.path}: has no {name}, which the parameters hold: they are another model's")
+    if mass_kg is not None:
+        source = with_mass(source, mass_kg)
+    return identified(source, definition.scales, values)
+
+
+def of_initial(initial: InitialModel, values: dict[str, float]) -> OpenSimModel:
+    """A model that was measured on a recording."""
+    bounds = zip(initial.names, initial.lower, initial.upper, strict=True)
+    limits = {name: (float(low), float(high)) for name, low, high in bounds if "/" not in name}
+    return from_core(initial.spec, values, limits)

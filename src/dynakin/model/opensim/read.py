@@ -1,0 +1,158 @@
+"""Reads an .osim file, version 3 (joints inside bodies) or 4 (a set of joints between frames), without OpenSim."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from dynakin.model.opensim.bodies import read_body, read_couplers
+from dynakin.model.opensim.description import Coordinate, Joint, Marker, Offset, OpenSimModel
+from dynakin.model.opensim.frames import GROUND, Frames, read_offset
+from dynakin.model.opensim.joints import read_axes, read_coordinate
+from dynakin.model.opensim.xml_file import Node, read_xml
+from dynakin.model.validation import nearest
+
+_OLDEST = 20000  # before that, OpenSim 1's files are built otherwise
+_NOT_MECHANICS = {
+    "ForceSet": "muscles and other forces",
+    "ControllerSet": "controllers",
+    "ContactGeometrySet": "contact geometry",
+    "ProbeSet": "probes",
+}
+
+
+def read_osim(path: str | Path) -> OpenSimModel:
+    """The bodies, joints, coordinate couplers and markers of an OpenSim model.
+
+    Raises:
+        ModelError: not an OpenSim model, damaged, or with a part of its mechanics that is not supported (other joints,
+            functions and constraints): file, line and element are named, what was found and what was expected.
+    """
+    path = Path(path)
+    root = read_xml(path)
+    if root.tag != "OpenSimDocument":
+        root.fail("expected an OpenSimDocument")
+    version = int(root.name) if root.name.isdigit() else 0
+    model = root.need("Model")
+    if version < _OLDEST:
+        root.fail(f"found version {root.name or 'none'}, expected {_OLDEST} or more (OpenSim 2 to 4)")
+    newer = bool(model.objects("JointSet"))
+    joints = _joints_4(model) if newer else _joints_3(model)
+    bodies = tuple(read_body(node) for node in model.objects("BodySet") if node.name != GROUND)
+    if not bodies:
+        model.fail("expected bodies in BodySet")
+    _refuse_other_mechanics(model)
+    names = [c.name for _, joint in joints for c in joint.coordinates]
+    for name in names:
+        if names.count(name) > 1:
+            model.fail(f"coordinate {name!r} is in two joints")
+    couplers, said = read_couplers(model, set(names))
+    markers = _markers(model, Frames(model) if newer else None, {GROUND, *(body.name for body in bodies)})
+    gravity = model.numbers("gravity", 3, (0.0, -9.80665, 0.0))
+    return OpenSimModel(
+        name=model.name or path.stem,
+        path=path,
+        gravity=(gravity[0], gravity[1], gravity[2]),
+        bodies=bodies,
+        joints=_in_order(model, joints, [body.name for body in bodies]),
+        couplers=couplers,
+        markers=markers,
+        left_out=(*said, *_left_out(model)),
+    )
+
+
+def _coordinates(joint: Node, nodes: list[Node]) -> tuple[Coordinate, ...]:
+    return tuple(read_coordinate(node, f"{joint.name}_coord_{k}") for k, node in enumerate(nodes))
+
+
+def _joints_4(model: Node) -> list[tuple[Node, Joint]]:
+    frames = Frames(model)
+    found = []
+    for node in model.objects("JointSet"):
+        base = f"/jointset/{node.name}"
+        coordinates = _coordinates(node, (node.find("coordinates") or Node("", "", 0, node.path)).children)
+        axes = read_axes(node, coordinates)  # first, so that an unknown joint is refused as such
+        parent, parent_offset = frames.resolve(node, base, "parent_frame")
+        child, child_offset = frames.resolve(node, base, "child_frame")
+        joint = Joint(node.name, node.tag, parent, parent_offset, child, child_offset, coordinates, axes)
+        found.append((node, joint))
+    return found
+
+
+def _joints_3(model: Node) -> list[tuple[Node, Joint]]:
+    found = []
+    for body in model.objects("BodySet"):
+        holder = body.find("Joint") or body.find("joint")
+        node = holder.children[0] if holder is not None and holder.children else None
+        if node is None:
+            continue  # ground; another body is missed when the joints are put in order
+        if node.flag("reverse"):
+            node.fail("a reversed joint is not supported")
+        coordinates = _coordinates(node, node.objects("CoordinateSet"))
+        axes = read_axes(node, coordinates)
+        parent_offset = read_offset(node, "location_in_parent", "orientation_in_parent")
+        child_offset = read_offset(node, "location", "orientation")
+        parent = node.word("parent_body") or node.fail("expected an element parent_body")
+        joint = Joint(node.name, node.tag, parent, parent_offset, body.name, child_offset, coordinates, axes)
+        found.append((node, joint))
+    return found
+
+
+def _in_order(model: Node, joints: list[tuple[Node, Joint]], bodies: list[str]) -> tuple[Joint, ...]:
+    """Joints from the ground outwards; refuses what is no tree."""
+    known = {GROUND, *bodies}
+    hung: dict[str, str] = {}
+    for node, joint in joints:
+        for role, end in (("parent", joint.parent), ("child", joint.child)):
+            if end not in known:
+                node.fail(f"{role} body {end!r} is not in the model{nearest(end, known)}")
+        if joint.child == GROUND:
+            node.fail("its child is the ground; expected the ground as parent")
+        if joint.child in hung:
+            node.fail(f"body {joint.child!r} hangs on joint {hung[joint.child]!r} already: loops are not supported")
+        hung[joint.child] = joint.name
+    for body in model.objects("BodySet"):
+        if body.name in bodies and body.name not in hung:
+            body.fail("no joint carries this body")
+    waiting, done, order = [joint for _, joint in joints], {GROUND}, []
+    while waiting:
+        ready = [joint for joint in waiting if joint.parent in done]
+        if not ready:
+            model.fail(f"joint {waiting[0].name!r} hangs in a circle that does not reach the ground")
+        order.append(ready[0])  # one at a time, so that an order that will do is kept
+        done.add(ready[0].child)
+        waiting.remove(ready[0])
+    return tuple(order)
+
+
+def _markers(model: Node, frames: Frames | None, bodies: set[str]) -> tuple[Marker, ...]:
+    found: dict[str, Marker] = {}
+    for node in model.objects("MarkerSet"):
+        if node.tag != "Marker":
+            continue
+        x, y, z = node.numbers("location", 3)
+        if frames is not None:
+            body, offset = frames.resolve(node, f"/markerset/{node.name}", "parent_frame")
+            x, y, z = offset.then(Offset((x, y, z))).translation
+        else:
+            body = node.word("body")
+            if body not in bodies:
+                node.fail(f"body {body!r} is not in the model{nearest(body, bodies)}")
+        if node.name in found:
+            node.fail("a marker of this name is there already")
+        found[node.name] = Marker(node.name, body, (x, y, z), node.flag("fixed"))
+    return tuple(found.values())
+
+
+def _refuse_other_mechanics(model: Node) -> None:
+    """Joints, bodies and constraints outside their sets would change the mechanics without being seen."""
+    for owner in ("components", "ComponentSet", "MiscellaneousComponentSet"):
+        for node in (model.find(owner) or Node("", "", 0, model.path)).walk():
+            if node.tag.endswith(("Joint", "Constraint")) or node.tag == "Body":
+                node.fail(f"found in {owner}, expected in JointSet, ConstraintSet or BodySet")
+
+
+def _left_out(model: Node) -> list[str]:
+    parts = [f"{len(model.objects(tag))} {words}" for tag, words in _NOT_MECHANICS.items() if model.objects(tag)]
+    return (
+        [f"Of the OpenSim model left out, as not part of its mechanics: {', '.join(parts)}, geometry."] if parts else []
+    )

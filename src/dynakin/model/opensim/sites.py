@@ -1,0 +1,64 @@
+"""Which of an OpenSim model's markers a recording has, under which names."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from dynakin.errors import ModelError
+from dynakin.model.opensim.definition import OpenSimDefinition
+from dynakin.model.opensim.description import Marker, OpenSimModel
+from dynakin.model.opensim.frames import GROUND
+from dynakin.model.validation import nearest
+from dynakin.recordings import Recording, plain_name
+
+_FEWEST = 3
+
+
+def sites(definition: OpenSimDefinition, recording: Recording) -> tuple[list[tuple[Marker, str]], list[str]]:
+    """Markers on bodies that are seen, each with its name in the recording, and sentences on the others.
+
+    Raises:
+        ModelError: fewer than three, or two recorded names that fit one marker.
+    """
+    source, where = definition.source, recording.path or recording.name
+    there = {marker.name: marker for marker in source.markers if marker.body != GROUND}
+    for name in definition.options.leave_out:
+        if name not in there:
+            raise ModelError(f"{source.path}: leave_out: no marker {name!r}{nearest(name, there)}")
+    recorded: dict[str, list[str]] = {}
+    for name in recording.marker_names:
+        if np.isfinite(recording.marker(name)).all(axis=1).any():
+            recorded.setdefault(plain_name(name), []).append(name)
+    found: list[tuple[Marker, str]] = []
+    for marker in there.values():
+        names = recorded.get(plain_name(marker.name), [])
+        if len(names) > 1:
+            raise ModelError(f"{where}: {' and '.join(names)} both fit marker {marker.name} of {source.path}")
+        if names and marker.name not in definition.options.leave_out:
+            found.append((marker, names[0]))
+    if len(found) < _FEWEST:
+        raise ModelError(
+            f"{where}: {len(found)} of the {len(there)} markers of {source.path} are seen, expected {_FEWEST} or more; "
+            f"the model has {', '.join(there) or 'none'}; the recording has {', '.join(recording.marker_names)}"
+        )
+    used = {name for _, name in found}
+    lacking = [name for name in there if name not in {marker.name for marker, _ in found}]
+    unknown = [name for name in recording.marker_names if name not in used]
+    said = [f"{len(found)} markers of {source.path.name} are measured."]
+    if lacking:
+        said.append(f"Markers of the model that are not measured: {', '.join(lacking)}.")
+    if unknown:
+        said.append(f"Markers of the recording that the model does not have, left out: {', '.join(unknown)}.")
+    return found, said
+
+
+def with_mass(source: OpenSimModel, mass_kg: float) -> OpenSimModel:
+    """The same model with all masses and inertias multiplied so that they sum to ``mass_kg``."""
+    factor = mass_kg / source.mass
+    bodies = tuple(
+        replace(body, mass=factor * body.mass, inertia=tuple(factor * value for value in body.inertia))
+        for body in source.bodies
+    )
+    return replace(source, bodies=bodies)

@@ -1,0 +1,107 @@
+"""From an OpenSim model to the core's specification."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+
+import numpy as np
+
+from dynakin import _core
+from dynakin.model.opensim.chains import ChainAxis, Placed, place
+from dynakin.model.opensim.description import Coordinate, Marker, OpenSimModel
+from dynakin.model.opensim.frames import GROUND
+
+AXES = [True, True, True]
+
+
+def free_coordinates(model: OpenSimModel) -> list[Coordinate]:
+    """Coordinates that no coupler drives, in the order of the joints."""
+    driven = {coupler.dependent for coupler in model.couplers}
+    return [c for joint in model.joints for c in joint.coordinates if c.name not in driven]
+
+
+def placements(model: OpenSimModel, scales: Mapping[str, str]) -> dict[str, Placed]:
+    """How each body is placed, by its name, in the order of the joints."""
+    couplers = {coupler.dependent: coupler for coupler in model.couplers}
+    return {joint.child: place(joint, couplers, scales) for joint in model.joints}
+
+
+def unseen(model: OpenSimModel, bodies: Collection[str]) -> list[str]:
+    """Free coordinates that move none of these bodies and are not locked by the file."""
+    placed = placements(model, {})
+    parents = {joint.child: joint.parent for joint in model.joints}
+    seen: set[str] = set()
+    for body in bodies:
+        at = body
+        while at != GROUND:
+            seen |= {axis.coordinate for axis in placed[at].axes}
+            at = parents[at]
+    return [c.name for c in free_coordinates(model) if c.name not in seen and not c.locked]
+
+
+def used_scales(placed: Mapping[str, Placed]) -> list[str]:
+    """Scale parameters that place something, in the order of the tree."""
+    names: dict[str, None] = {}
+    for segment in placed.values():
+        names |= {name: None for name, _ in segment.terms}
+        names |= {axis.scale: None for axis in segment.axes if axis.scale}
+    return list(names)
+
+
+def to_spec(
+    model: OpenSimModel,
+    scales: Mapping[str, str],
+    *,
+    markers: Sequence[Marker] | None = None,
+    estimate_scales: bool = True,
+    estimate_places: bool = True,
+    estimate_inertia: Collection[str] = (),
+    values: Mapping[str, float] | None = None,
+    lock: Collection[str] = (),
+) -> _core.ModelSpec:
+    """The core's specification.
+
+    Args:
+        scales: scale parameter of each body that has one, as `scale_names` gives them.
+        markers: those that are measured; all of the model's that sit on bodies where not given.
+        estimate_inertia: bodies whose ten numbers are estimated.
+        values: coordinates at the start, by name; the file's defaults where not given.
+        lock: coordinates that are locked beside those of the file.
+    """
+    placed = placements(model, scales)
+    parents = {joint.child: joint.parent for joint in model.joints}
+    start = dict(values or {})
+    moving = {axis.coordinate for segment in placed.values() for axis in segment.axes}
+    sites = [m for m in model.markers if m.body != GROUND] if markers is None else markers
+    return _core.ModelSpec(
+        name=model.name,
+        coordinates=[
+            _core.CoordinateSpec(c.name, start.get(c.name, c.value), c.locked or c.name in lock)
+            for c in free_coordinates(model)
+            if c.name in moving
+        ],
+        parameters=[_core.ParameterSpec(name, 1.0, estimate_scales) for name in used_scales(placed)],
+        segments=[
+            _core.SegmentSpec(
+                name=name,
+                parent=parents[name],
+                rotation=segment.rotation,
+                translation=segment.translation,
+                lengths=[_core.LengthTerm(parameter, direction) for parameter, direction in segment.terms],
+                axes=[_axis(axis) for axis in segment.axes],
+                inertia=model.body(name).rigid.vector,
+                inertia_estimated=[name in estimate_inertia] * 10,
+            )
+            for name, segment in placed.items()
+        ],
+        markers=[
+            _core.MarkerSpec(m.name, m.body, np.array(m.location), AXES, [estimate_places and not m.fixed] * 3)
+            for m in sites
+        ],
+        gravity=np.array(model.gravity),
+    )
+
+
+def _axis(axis: ChainAxis) -> _core.AxisSpec:
+    functions = [_core.FunctionSpec(f.kind, f.coefficients, f.x, f.y) for f in axis.functions]
+    return _core.AxisSpec(axis.coordinate, axis.kind, axis.direction, list(axis.coefficients), axis.scale, functions)

@@ -1,0 +1,74 @@
+"""Prior standard deviations and bounds of every element that a state can have, by the core's names of them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.model.inertia import RigidBody
+from dynakin.model.priors import Bounds, Interval, Priors, inertia_bounds, inertia_prior
+
+Array = npt.NDArray[np.float64]
+
+
+def state_prior(
+    kinds: Mapping[str, str],
+    lengths: Mapping[str, float],
+    markers: Iterable[str],
+    bodies: Mapping[str, RigidBody],
+    reach: Mapping[str, float],
+    priors: Priors,
+) -> dict[str, float]:
+    """Standard deviations.
+
+    Args:
+        kinds: "rotation" or "translation" of each coordinate. lengths: values of the geometry parameters.
+        reach: length (m) that a segment's first moments are compared with.
+    """
+    sd: dict[str, float] = {}
+    for name, kind in kinds.items():
+        turn = kind == "rotation"
+        sd[name] = np.deg2rad(priors.rotation_deg) if turn else priors.translation_m
+        sd[f"{name}/speed"] = np.deg2rad(priors.rotation_speed_deg_s) if turn else priors.speed_m_s
+        sd[f"{name}/acceleration"] = (
+            np.deg2rad(priors.rotation_acceleration_deg_s2) if turn else priors.acceleration_m_s2
+        )
+    for name, value in lengths.items():
+        sd[f"length/{name}"] = priors.length_fraction * value
+    for marker in markers:
+        sd |= {f"marker/{marker}/{axis}": priors.marker_m for axis in "xyz"}
+    for segment, body in bodies.items():
+        entry = inertia_prior(body, reach[segment], priors)
+        sd |= {f"inertia/{segment}/{name}": value for name, value in entry.items()}
+    return sd
+
+
+def state_bounds(
+    limits: Mapping[str, Interval],
+    lengths: Mapping[str, float],
+    places: Mapping[str, Array],
+    bodies: Mapping[str, RigidBody],
+    reach: Mapping[str, float],
+    bounds: Bounds,
+) -> dict[str, Interval]:
+    """Bounds of (9); speeds and accelerations have none.
+
+    Args:
+        limits: of the coordinates. places: (3,) m of each marker on its segment; the others as in ``state_prior``.
+    """
+    found: dict[str, Interval] = dict(limits)
+    for name, value in lengths.items():
+        found[f"length/{name}"] = (
+            (1 - bounds.length_fraction) * value,
+            (1 + bounds.length_fraction) * value,
+        )
+    for name, place in places.items():
+        for axis, at in zip("xyz", place, strict=True):
+            half = bounds.marker_threshold_m
+            found[f"marker/{name}/{axis}"] = (float(at) - half, float(at) + half)
+    for segment, body in bodies.items():
+        entry = inertia_bounds(body, reach[segment], bounds)
+        found |= {f"inertia/{segment}/{name}": interval for name, interval in entry.items()}
+    return found

@@ -1,0 +1,203 @@
+"""A model that is written and read again is the same, and OpenSim sees the same in it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from core.bridge import to_core
+from core.random_models import planar_model, spatial_model, with_functions
+from oracle.spec import Spec
+from typer.testing import CliRunner
+
+from dynakin import _core
+from dynakin.cli.app import app
+from dynakin.errors import ModelError, OutputError
+from dynakin.model.opensim.description import OpenSimModel
+from dynakin.model.opensim.from_core import from_core
+from dynakin.model.opensim.identified import identified
+from dynakin.model.opensim.read import read_osim
+from dynakin.model.opensim.scales import scale_names
+from dynakin.model.opensim.spec import to_spec
+from dynakin.model.opensim.write import write_osim
+
+from .files import COUPLER, small_model
+from .states import as_state, coupled, random_motion
+
+SHIPPED = ["optimized_scale_and_markers.osim", "unscaled_generic.osim"]
+
+
+def same(a: _core.ModelSpec, b: _core.ModelSpec) -> None:
+    """Two specifications are equal to 1e-12, name by name."""
+    assert [(c.name, c.locked) for c in a.coordinates] == [(c.name, c.locked) for c in b.coordinates]
+    assert [p.name for p in a.parameters] == [p.name for p in b.parameters]
+    close([c.value for c in a.coordinates], [c.value for c in b.coordinates])
+    for s, t in zip(a.segments, b.segments, strict=True):
+        assert (s.name, s.parent) == (t.name, t.parent)
+        close(s.rotation, t.rotation)
+        close(s.translation, t.translation)
+        close(s.inertia, t.inertia)
+        assert [term.parameter for term in s.lengths] == [term.parameter for term in t.lengths]
+        for term, other in zip(s.lengths, t.lengths, strict=True):
+            close(term.direction, other.direction)
+        for axis, twin in zip(s.axes, t.axes, strict=True):
+            assert (axis.coordinate, axis.kind, axis.scale) == (twin.coordinate, twin.kind, twin.scale)
+            close(axis.direction, twin.direction)
+            close(axis.coefficients, twin.coefficients)
+            for f, g in zip(axis.functions, twin.functions, strict=True):
+                assert f.kind == g.kind
+                close([*f.coefficients, *f.x, *f.y], [*g.coefficients, *g.x, *g.y])
+    assert [(m.name, m.segment) for m in a.markers] == [(m.name, m.segment) for m in b.markers]
+    close([m.position for m in a.markers], [m.position for m in b.markers])
+
+
+def close(a: object, b: object) -> None:
+    np.testing.assert_allclose(np.asarray(a, float), np.asarray(b, float), rtol=0, atol=1e-12)
+
+
+def again(model: OpenSimModel, folder: Path) -> OpenSimModel:
+    path = folder / "again.osim"
+    write_osim(model, path)
+    return read_osim(path)
+
+
+@pytest.mark.parametrize("kind", ["PinJoint", "FreeJoint", "PlanarJoint", "WeldJoint", "BallJoint", "CustomJoint"])
+@pytest.mark.parametrize("version", [3, 4])
+def test_small_models_come_back(kind: str, version: int, tmp_path: Path) -> None:
+    model = read_osim(small_model(tmp_path, kind, version, COUPLER if kind == "CustomJoint" else ""))
+    found = again(model, tmp_path)
+    scales = scale_names(model)
+    same(to_spec(found, scales), to_spec(model, scales))
+    assert (found.couplers, found.gravity) == (model.couplers, model.gravity)
+    assert [j.coordinates for j in found.joints] == [j.coordinates for j in model.joints]
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_shipped_models_come_back(name: str, data_dir: Path, tmp_path: Path) -> None:
+    model = read_osim(data_dir / "opencap_subject4" / name)
+    found = again(model, tmp_path)
+    scales = scale_names(model)
+    same(to_spec(found, scales), to_spec(model, scales))
+    assert [j.kind for j in found.joints] == [j.kind for j in model.joints]
+    assert {c.name: c.limits for j in found.joints for c in j.coordinates} == {
+        c.name: c.limits for j in model.joints for c in j.coordinates
+    }
+
+
+def found_values(model: OpenSimModel, scales: dict[str, str]) -> tuple[_core.Model, dict[str, float]]:
+    """Values away from the file's for everything that is estimated."""
+    heavy = [body.name for body in model.bodies if body.mass > 0.0]
+    core = _core.Model(to_spec(model, scales, estimate_inertia=heavy))
+    rng, x = np.random.default_rng(5), core.initial_state()
+    values = dict(zip(core.layout.names, x, strict=True))
+    for name in values:
+        kind = name.split("/")[0]
+        factor = {"length": 0.1, "marker": 0.0, "inertia": 0.02}.get(kind, 0.0)
+        values[name] *= 1.0 + factor * rng.uniform(-1.0, 1.0)
+        values[name] += 0.01 * rng.normal() if kind == "marker" else 0.0
+    return core, {name: value for name, value in values.items() if name.count("/") and not name.endswith("ion")}
+
+
+@pytest.mark.parametrize("source", ["small", *SHIPPED])
+def test_what_a_run_found_is_written(source: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
+    if source == "small":
+        path = small_model(tmp_path, "CustomJoint", 4, COUPLER)
+    else:
+        path = request.getfixturevalue("data_dir") / "opencap_subject4" / source
+    model = read_osim(path)
+    scales = scale_names(model)
+    core, values = found_values(model, scales)
+    estimated = again(identified(model, scales, values), tmp_path)
+    exported = _core.Model(to_spec(estimated, {}))
+    rng, index = np.random.default_rng(6), {name: k for k, name in enumerate(core.layout.names)}
+    for _ in range(5):
+        motion = random_motion(model, rng)
+        x = as_state(core, motion)
+        for name, value in values.items():
+            if name in index and name.split("/")[0] in ("length", "marker", "inertia"):
+                x[index[name]] = value
+        y = as_state(exported, motion)
+        close(_core.marker_positions(exported, y), _core.marker_positions(core, x))
+        expected = _core.wrench(core, x)
+        np.testing.assert_allclose(_core.wrench(exported, y), expected, rtol=0, atol=1e-10 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_opensim_loads_what_is_written(name: str, data_dir: Path, tmp_path: Path) -> None:
+    pytest.importorskip("opensim", reason="OpenSim is not installed (pip install opensim)")
+    from .peer import Peer
+
+    model = read_osim(data_dir / "opencap_subject4" / name)
+    scales = scale_names(model)
+    estimated = again(identified(model, scales, found_values(model, scales)[1]), tmp_path)
+    core, peer, rng = _core.Model(to_spec(estimated, {})), Peer(tmp_path / "again.osim"), np.random.default_rng(7)
+    there = [core.segment_names.index(body) for body in peer.bodies]
+    for _ in range(5):
+        motion = random_motion(model, rng)
+        q, qd, _ = coupled(model, motion)
+        peer.at(q, qd)
+        R, origins = _core.segment_poses(core, as_state(core, motion))
+        close(R[there], peer.poses()[0])
+        close(origins[there], peer.poses()[1])
+        close(_core.marker_positions(core, as_state(core, motion)), peer.marker_places())
+
+
+TREES = [planar_model(2), planar_model(50, n_segments=7), *(spatial_model(s, nonlinear=False) for s in range(100, 106))]
+TREES += [spatial_model(s) for s in range(4)]
+
+
+@pytest.mark.parametrize("spec", TREES, ids=lambda s: s.name)
+def test_a_specification_becomes_an_opensim_model(spec: Spec, tmp_path: Path) -> None:
+    """Any tree: chains split over massless bodies, coordinates that move several joints."""
+    before = to_core(spec)
+    after = to_spec(again(from_core(before), tmp_path), {})
+    a, b = _core.Model(before), _core.Model(after)
+    rng = np.random.default_rng(8)
+    x, y = a.initial_state(), b.initial_state()
+    free = [c.name for c in before.coordinates if not c.locked]
+    assert sorted(free) == sorted(c.name for c in after.coordinates if not c.locked)
+    values = {
+        name: rng.normal() for name in (*free, *(f"{n}/speed" for n in free), *(f"{n}/acceleration" for n in free))
+    }
+    for model, state in ((a, x), (b, y)):
+        for k, name in enumerate(model.layout.names):
+            state[k] = values.get(name, state[k])
+    close(_core.marker_positions(b, y), _core.marker_positions(a, x))
+    np.testing.assert_allclose(_core.wrench(b, y), _core.wrench(a, x), rtol=1e-9, atol=1e-9)
+
+
+def test_a_chain_that_opensim_lacks_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(OutputError, match="no form in OpenSim"):
+        write_osim(from_core(to_core(with_functions(spatial_model(20), 20))), tmp_path / "x.osim")
+
+
+def test_the_command_line_exports(tmp_path: Path) -> None:
+    path, out = small_model(tmp_path, "PinJoint", 4), tmp_path / "out.osim"
+    found = {
+        "schema_version": 1,
+        "parameters": [{"name": "marker/m/x", "value": 0.4}, {"name": "length/scale_base", "value": 1.1}],
+    }
+    parameters = tmp_path / "parameters.json"
+    parameters.write_text(json.dumps(found))
+    command = ["model", str(path), "--export", str(out), "--parameters", str(parameters), "--mass", "10"]
+    result = CliRunner().invoke(app, command)
+    assert result.exit_code == 0, result.output
+    model = read_osim(out)
+    assert model.mass == pytest.approx(10.0)
+    assert model.markers[0].location == (0.4, 0.2, 0.3)
+    np.testing.assert_allclose(model.joints[1].parent_offset.translation, np.array([0.1, -0.3, 0.05]) * 1.1)
+
+
+def test_parameters_of_another_model_are_refused(tmp_path: Path) -> None:
+    from dynakin.model.opensim.definition import load_opensim
+    from dynakin.model.opensim.export import of_definition, read_values
+
+    definition = load_opensim(small_model(tmp_path, "PinJoint", 4))
+    with pytest.raises(ModelError, match="has no length/scale_femur"):
+        of_definition(definition, {"length/scale_femur": 1.0}, None)
+    wrong = tmp_path / "parameters.json"
+    wrong.write_text("[]")
+    with pytest.raises(ModelError, match=r"no parameters\.json of a run"):
+        read_values(wrong)

@@ -1,0 +1,119 @@
+"""An OpenSim model laid on a recording: what is measured, what the file gives, what is estimated."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dynakin
+from dynakin import _core
+from dynakin.errors import ModelError
+from dynakin.model import Subject, initialise, load_model, load_opensim
+from dynakin.model.opensim.initial import feet_of, limits_of
+from dynakin.model.opensim.read import read_osim
+from dynakin.model.opensim.skin import skin_of
+from dynakin.recordings import Recording
+
+from .files import small_model, version_4
+
+FILE = "optimized_scale_and_markers.osim"
+
+
+@pytest.fixture(scope="module")
+def folder(data_dir: Path) -> Path:
+    return data_dir / "opencap_subject4"
+
+
+@pytest.fixture(scope="module")
+def squats(folder: Path) -> Recording:
+    return dynakin.read(folder / "squats1.trc", folder / "squats1_grf.mot")
+
+
+def test_everything_from_the_file_but_mass_and_posture(folder: Path, squats: Recording) -> None:
+    definition = load_model(folder / FILE, Subject(mass_kg=60.05))
+    found = initialise(definition, squats)
+    source = read_osim(folder / FILE)
+    assert len(found.spec.markers) == 45
+    assert found.mass_kg == pytest.approx(60.05)
+    assert sum(s.inertia[0] for s in found.spec.segments) == pytest.approx(60.05)
+    assert found.feet == {"right": "calcn_r", "left": "calcn_l"}
+    places = {marker.name: marker.location for marker in source.markers}
+    for marker in found.spec.markers:
+        np.testing.assert_array_equal(marker.position, places[marker.name])
+    assert (found.lower <= found.x0).all() and (found.x0 <= found.upper).all()
+    assert (found.sd0 > 0.0).all() and np.isfinite(found.sd0).all()
+    measured = found.ground.points_to_ground(np.stack([squats.marker(name)[0] for name in found.recorded_markers]))
+    gap = _core.marker_positions(_core.Model(found.spec), found.x0) - measured
+    assert np.sqrt(np.nanmean((gap**2).sum(axis=1))) < 0.012
+    assert any("fits the markers to 11 mm" in text for text in found.messages)
+    assert any("93 muscles" in text for text in found.messages)
+
+
+def test_what_is_estimated_is_a_choice(folder: Path, squats: Recording) -> None:
+    path = folder / FILE
+    nothing = initialise(load_opensim(path, estimate=()), squats)
+    assert len(nothing.names) == 3 * 31  # toes have no markers
+    assert [c.name for c in nothing.spec.coordinates if c.locked] == ["mtp_angle_r", "mtp_angle_l"]
+    assert len(initialise(load_opensim(path, estimate=(), lock_unseen=False), squats).names) == 3 * 33
+    assert (nothing.unmodelled_m > 0.0).all()
+    few = initialise(load_opensim(path, scale=("femur_r", "femur_l"), share_sides=False, estimate=("lengths",)), squats)
+    assert [name for name in few.names if name.startswith("length")] == ["length/scale_femur_r", "length/scale_femur_l"]
+    shared = initialise(load_opensim(path, scale=("femur_r", "femur_l"), estimate=("lengths", "inertia")), squats)
+    k = shared.names.index("length/scale_femur")
+    assert (shared.x0[k], shared.lower[k], shared.upper[k]) == (1.0, 0.8, 1.2)
+    assert shared.dimensionless == {"scale_femur"}
+    bodies = {name.split("/")[1] for name in shared.names if name.startswith("inertia")}
+    assert "femur_r" in bodies and "patella_r" not in bodies
+
+
+def test_file_mass_where_nothing_tells(folder: Path) -> None:
+    recording = dynakin.read(folder / "squats1.trc")
+    assert initialise(load_model(folder / FILE), recording).mass_kg == pytest.approx(62.6)
+    unscaled = load_opensim(folder / FILE, Subject(mass_kg=70.0), scale_masses=False)
+    assert initialise(unscaled, recording).mass_kg == pytest.approx(62.6)
+
+
+def test_the_filter_runs_on_it(folder: Path, squats: Recording) -> None:
+    """Half a second: finite, and nearer to the markers than the file's places are."""
+    estimator = dynakin.Estimator(load_model(folder / FILE, Subject(mass_kg=60.05)))
+    initial = estimator.start(squats)
+    from dynakin.filter.samples import recording_arrays
+
+    markers, wrench = (values[:50] for values in recording_arrays(squats, initial, gaps=True))
+    arrays = estimator.run_arrays(squats.time[:50], markers, wrench)
+    gap = arrays["markers_estimated"] - markers
+    assert np.isfinite(arrays["state"]).all()
+    assert np.sqrt(np.nanmean((gap**2).sum(axis=2))) < 0.0085
+
+
+def test_wrong_requests_are_refused(folder: Path, squats: Recording, tmp_path: Path) -> None:
+    with pytest.raises(ModelError, match="0 of the 1 markers"):
+        initialise(load_opensim(small_model(tmp_path, "PinJoint", 4)), squats)
+    with pytest.raises(ModelError, match=r"no marker 'R_HJ'.*did you mean 'R_HJC'"):
+        initialise(load_opensim(folder / FILE, leave_out=("R_HJ",)), squats)
+    with pytest.raises(ModelError, match="estimate"):
+        load_opensim(folder / FILE, estimate=("masses",))
+    with pytest.raises(ModelError, match="unknown key 'scal'"):
+        load_opensim(folder / FILE, scal=None)
+    with pytest.raises(ModelError, match="expected auto"):
+        load_model(folder / FILE, markers="opencap")
+    sideways = tmp_path / "sideways.osim"
+    sideways.write_text(version_4("PinJoint", ("q",)).replace("0 -9.80665 0", "0 0 -9.80665"))
+    with pytest.raises(ModelError, match=r"gravity is 0 0 -9\.80665"):
+        initialise(load_opensim(sideways), squats)
+
+
+def test_a_whole_turn_is_no_limit(tmp_path: Path) -> None:
+    path = tmp_path / "turns.osim"
+    path.write_text(version_4("PinJoint", ("q",)).replace("<range>-2 2", "<range>-3.1415 3.1416", 1))
+    limits = limits_of(read_osim(path))
+    assert limits["base_rx"] == (-np.inf, np.inf)
+    assert limits["base_tx"] == limits["q"] == (-2.0, 2.0)
+    assert feet_of(read_osim(path)) == {}
+
+
+def test_noise_of_a_marker_comes_from_its_name_or_its_body() -> None:
+    assert skin_of("r.ASIS", "pelvis") == skin_of("L.ASIS", "elsewhere")
+    assert skin_of("cluster_7", "femur_r")[1] > skin_of("cluster_7", "calcn_r")[1] > 0.0
