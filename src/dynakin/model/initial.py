@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -41,6 +41,7 @@ class InitialModel:
         parts: the table's parts in each segment, as placed.
         messages: sentences on what was found, left out, locked or assumed.
         plan: the same as plain data.
+        feet: "right", "left" -> segment on which the ground acts; empty for a model fixed in the ground.
     """
 
     spec: _core.ModelSpec
@@ -61,3 +62,4 @@ class InitialModel:
     parts: dict[str, list[PlacedPart]]
     messages: tuple[str, ...]
     plan: ModelPlan
+    feet: dict[str, str] = field(default_factory=dict)

@@ -6,7 +6,7 @@ by bounded least squares with the core's analytic derivatives; limbs that do not
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -185,10 +185,11 @@ class _Body:
         assert best is not None
         return best
 
-    def starts(self) -> list[Array]:
+    def starts(self) -> Iterator[Array]:
         """First guesses: the body at rest laid on the markers as a whole, its root alone, then other headings."""
         if not self.floating:
-            return [self.rest]
+            yield self.rest
+            return
         at_rest = _core.marker_positions(self.model, self.state(self.rest))
         root = self.seen & (np.array(self.segment_of) == self.roots[0])
         poses = [
@@ -200,7 +201,8 @@ class _Body:
         for angle in np.deg2rad([0.0, 90.0, 180.0, 270.0]):
             turn = Rotation.from_rotvec(angle * up).as_matrix()
             poses.append((turn, here - turn @ centre))
-        return [self.moved(*pose) for pose in poses]
+        for pose in poses:
+            yield self.moved(*pose)
 
     def moved(self, turn: Array, shift: Array) -> Array:
         """The rest posture carried along by a rigid motion: the root's coordinates for p -> turn p + shift."""
@@ -214,22 +216,18 @@ class _Body:
             return np.concatenate([p_now - p_to, _ARM * (R_now - R_to).ravel()])
 
         angles = self.turns[self.base]
-        best = None
+        best, least = self.rest.copy(), (np.inf, np.inf)
         for k in range(-1, 3 * int(angles.sum())):  # half a turn off is a saddle: quarter turns of each angle too
             start = self.rest[self.base].copy()
             if k >= 0:
                 start[np.flatnonzero(angles)[k // 3]] += 0.5 * np.pi * (k % 3 + 1)
             found = least_squares(gap, start)
-            if best is None or found.cost < best.cost:
-                best = found
-            if best.cost < 1e-12:
-                break
-        assert best is not None
-        q = self.rest.copy()
-        q[self.base] = best.x
-        endless = self.turns & np.isinf(self.lower)
-        q[endless] = (q[endless] + np.pi) % (2.0 * np.pi) - np.pi
-        return np.asarray(q)
+            end = np.where(angles, (found.x + np.pi) % (2.0 * np.pi) - np.pi, found.x)
+            # Three angles have two readings of every pose; the one with the smaller turns is meant.
+            rank = (round(float(found.cost), 9), float(np.abs(end - self.rest[self.base])[angles].sum()))
+            if rank < least:
+                least, best[self.base] = rank, end
+        return np.asarray(best)
 
     def mended(self, fit: _Fit) -> _Fit:
         """Starts the joints above the segment that fits worst again, elsewhere within their limits."""
