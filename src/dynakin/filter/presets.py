@@ -18,6 +18,8 @@ def default() -> Noise:
         marker_place=0.0,
         jerk=100.0,
         jerk_translation=10.0,
+        floating_jerk=1e4,
+        floating_jerk_translation=1e3,
         length_drift=3e-6,
         soft_tissue=0.5,
         soft_tissue_least_m=0.002,

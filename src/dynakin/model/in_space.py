@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +11,7 @@ from dynakin import _core
 from dynakin.errors import ModelError
 from dynakin.model.frames import Trial
 from dynakin.model.plan import ModelPlan, Site
-from dynakin.model.pose_start import start_posture
+from dynakin.model.pose_start import Interval, PoseFit, near, start_posture
 from dynakin.model.sites import Candidate, site_of
 from dynakin.model.spec import to_core
 
@@ -19,11 +19,22 @@ Array = npt.NDArray[np.float64]
 
 _SEEN = 0.6
 """Share of the markers that a frame must show to start from it."""
+_SPEED_FRAMES, _SPEED_S = 9, 0.1
+"""Frames from which the first speeds are taken, and the time that they may span."""
 _FRAMES = 5
 """Frames on which a marker is placed that the calibration does not show."""
 
 
-def started(plan: ModelPlan, trial: Trial, unplaced: tuple[Candidate, ...]) -> tuple[ModelPlan, list[str]]:
+@dataclass(frozen=True)
+class Started:
+    """A plan that stands where the trial begins, and the speeds (rad/s, m/s) of its coordinates there."""
+
+    plan: ModelPlan
+    speeds: dict[str, float]
+    messages: list[str]
+
+
+def started(plan: ModelPlan, trial: Trial, unplaced: tuple[Candidate, ...]) -> Started:
     """The plan with its coordinates fitted to the trial's first frame, and with the markers seen only later.
 
     Raises:
@@ -60,7 +71,28 @@ def started(plan: ModelPlan, trial: Trial, unplaced: tuple[Candidate, ...]) -> t
         messages.append(f"Start from frame {first} ({trial.recording.time[first]:.2f} s): markers are missing before.")
     fit = start_posture(model, paths[first], limits=limits, where=trial.match.where)
     messages.append(f"Start: all coordinates fitted to the markers, {1000.0 * fit.rms_m:.1f} mm (root mean square).")
-    return replace(plan, start=fit.coordinates), messages
+    speeds = _speeds(model, paths, trial, first, fit, limits)
+    return Started(replace(plan, start=fit.coordinates), speeds, messages)
+
+
+def _speeds(
+    model: _core.Model, paths: Array, trial: Trial, first: int, fit: PoseFit, limits: dict[str, Interval]
+) -> dict[str, float]:
+    """Rates of the coordinates at the first frame, by a parabola through the next ones; people start in mid-stride."""
+    time = trial.recording.time
+    frames = [k for k in range(first, min(first + _SPEED_FRAMES, len(time))) if np.isfinite(paths[k]).any()]
+    frames = [k for k in frames if time[k] - time[first] <= _SPEED_S]
+    if len(frames) < 4:
+        return {}
+    start, values = fit.x, [fit.coordinates]
+    for frame in frames[1:]:
+        start, found = near(model, start, paths[frame], limits)
+        values.append(found)
+    t = time[frames] - time[first]
+    powers = np.stack([np.ones_like(t), t, t**2], axis=1)
+    table = np.array([[value[name] for name in fit.coordinates] for value in values])
+    slopes = np.linalg.lstsq(powers, table, rcond=None)[0][1]
+    return dict(zip(fit.coordinates, map(float, slopes), strict=True))
 
 
 def _paths(trial: Trial, sites: tuple[Site, ...]) -> Array:

@@ -48,17 +48,21 @@ def initialise(
     from dynakin import _core  # the core is needed from here on only
     from dynakin.model.spec import in_layout, to_core
 
-    messages = list(rest.messages)
+    messages, speeds = list(rest.messages), dict[str, float]()
     if plan.model.sided:
         from dynakin.model.in_space import started
 
-        plan, found = started(plan, rest.trial, rest.unplaced)
-        messages += found
+        begun = started(plan, rest.trial, rest.unplaced)
+        plan, speeds = begun.plan, begun.speeds
+        messages += begun.messages
     spec = to_core(plan)
     core = _core.Model(spec)
     names = list(core.layout.names)
     limits = plan.bounds(bounds or Bounds())
     x0 = np.array(core.initial_state(), dtype=float)
+    for at, name in enumerate(names):
+        if name.endswith("/speed"):
+            x0[at] = speeds.get(name.removesuffix("/speed"), x0[at])
     lower = in_layout(names, {name: pair[0] for name, pair in limits.items()}, -np.inf)
     upper = in_layout(names, {name: pair[1] for name, pair in limits.items()}, np.inf)
     outside = (x0 < lower) | (x0 > upper)

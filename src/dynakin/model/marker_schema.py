@@ -181,7 +181,7 @@ class MarkerSetFile(Strict):
     height_source: str = ""
     markers: Annotated[tuple[Marker, ...], Field(min_length=1)]
     landmarks: dict[str, tuple[Recipe, ...]]
-    in_space: dict[str, tuple[Recipe, ...]] = Field(default={})  # landmarks of models in space, where they are other ones
+    in_space: dict[str, tuple[Recipe, ...]] = Field(default={})  # landmarks of models in space
 
     def recipes(self, planar: bool) -> dict[str, tuple[Recipe, ...]]:
         """Landmarks of planar models, or of models in space."""

@@ -85,6 +85,22 @@ def start_posture(
     return PoseFit(dict(zip(names, map(float, q), strict=True)), x, body.distances(best.q), best.rms)
 
 
+def near(
+    model: _core.Model, x: Array, markers: Array, limits: Mapping[str, Interval]
+) -> tuple[Array, dict[str, float]]:
+    """State (n,) and coordinates of the fit that is reached from a state x (n,), one frame (M, 3) later, say.
+
+    Raises:
+        ModelError: fewer than three markers.
+    """
+    body = _Body(model, np.asarray(markers, dtype=float), dict(limits), "next frame")
+    q = body.solve(x[: body.n_free], wrap=False).q
+    state = np.array(x, dtype=float)
+    state[: body.n_free] = q
+    values, _, _ = _core.coordinates(model, state)
+    return state, dict(zip(model.coordinate_names, map(float, values), strict=True))
+
+
 def _median(frames: Array) -> Array:
     """Median (M, 3) over frames (T, M, 3), NaN where a marker is in none."""
     found = np.full(frames.shape[1:], np.nan)
@@ -152,7 +168,7 @@ class _Body:
         rows = _core.marker_jacobian(self.model, self.state(q))[self.rows.ravel(), : self.n_free]
         return np.vstack([rows, np.diag(self.pull)])
 
-    def solve(self, start: Array) -> _Fit:
+    def solve(self, start: Array, wrap: bool = True) -> _Fit:
         """Bounded least squares over all free coordinates."""
         free = self.lower < self.upper
         q = np.clip(start, self.lower, self.upper)
@@ -170,7 +186,7 @@ class _Body:
             max_nfev=200,
         )
         end = full(found.x).copy()
-        endless = self.turns & np.isinf(self.lower) & np.isinf(self.upper)
+        endless = self.turns & np.isinf(self.lower) & np.isinf(self.upper) & wrap
         end[endless] = (end[endless] + np.pi) % (2.0 * np.pi) - np.pi
         return _Fit(end, float(np.sqrt(np.nanmean(self.distances(end) ** 2))))
 
