@@ -109,7 +109,10 @@ def continuous_noise(initial: InitialModel, noise: Noise, layout: _core.StateLay
         density[k] = jerk[kinds[coordinate]]
     offset, size = layout.blocks["lengths"]
     density[offset : offset + size] = noise.length_drift
-    for block, time in (("soft_tissue", noise.soft_tissue_time_s), ("plates", noise.plate_time_s)):
+    skin_s = noise.soft_tissue_time_s
+    if initial.feet and noise.floating_soft_tissue_time_s is not None:
+        skin_s = noise.floating_soft_tissue_time_s
+    for block, time in (("soft_tissue", skin_s), ("plates", noise.plate_time_s)):
         offset, size = layout.blocks[block]
         for k in range(offset, offset + size):
             if layout.names[k] != "plates/delay":

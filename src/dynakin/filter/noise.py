@@ -60,6 +60,9 @@ class Noise(BaseModel):
     of its own: a foot is not as rigid, nor its toe as fixed in the ground, as a model has it."""
     soft_tissue_time_s: Seconds = 1.0
     """Time constant of that displacement (first-order Gauss-Markov process)."""
+    floating_soft_tissue_time_s: Seconds | None = None
+    """The same for a model that is fixed nowhere; not given: as ``soft_tissue_time_s``. A step lasts half a second, and
+    skin that takes longer to come back looks like longer bones."""
 
     marker_sd_m: Annotated[float, Field(gt=0.0)] | None = None
     """Noise of the cameras, m, for all markers; not given: R of the marker set, which holds soft tissue too."""

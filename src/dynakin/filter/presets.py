@@ -24,6 +24,7 @@ def default() -> Noise:
         soft_tissue=0.5,
         soft_tissue_least_m=0.002,
         soft_tissue_time_s=5.0,
+        floating_soft_tissue_time_s=0.5,
         marker_sd_m=0.0007,
         force=100.0,
         moment=25.0,

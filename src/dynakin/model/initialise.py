@@ -52,7 +52,7 @@ def initialise(
     if plan.model.sided:
         from dynakin.model.in_space import started
 
-        begun = started(plan, rest.trial, rest.unplaced)
+        begun = started(plan, rest.trial, rest.unplaced, rest.still)
         plan, speeds = begun.plan, begun.speeds
         messages += begun.messages
     spec = to_core(plan)

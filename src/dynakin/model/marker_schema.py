@@ -24,6 +24,7 @@ class Marker(Strict):
     centre: tuple[str, ...] = ()
     variance: Annotated[float, Field(gt=0.0)] | None = None  # m^2, R of the measurement
     soft_tissue_mm: Annotated[float, Field(ge=0.0)] = 10.0  # how far skin and flesh move here, at full squat
+    soft_tissue_in_space_mm: Annotated[float, Field(ge=0.0)] | None = None  # in models in space, where feet move
     reason: str = ""
     landmark_only: bool = False  # virtual, or used for a joint centre only
     in_space: bool = False  # a measurement of models in space only; for planar ones as landmark_only
@@ -37,6 +38,11 @@ class Marker(Strict):
         if not self.landmark_only and (self.variance is None or not self.segment):
             raise ValueError("segment and variance are needed (or landmark_only = true)")
         return self
+
+    def soft_tissue_m(self, planar: bool) -> float:
+        """Declared displacement (m): a planar model's foot is fixed in the ground, one in space bends at the toes."""
+        in_space = self.soft_tissue_in_space_mm
+        return 1e-3 * (self.soft_tissue_mm if planar or in_space is None else in_space)
 
     def measures(self, planar: bool) -> bool:
         """Whether it is a measurement of a planar model, or of one in space."""

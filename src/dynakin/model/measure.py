@@ -20,7 +20,7 @@ from dynakin.model.plan import ModelPlan
 from dynakin.model.posture import Geometry, Posture, find_geometry, find_posture, frame_landmarks
 from dynakin.model.schema import ModelFile
 from dynakin.model.sites import Candidate, candidates, find_locks, place_sites
-from dynakin.recordings import GroundFrame, Recording, find_ground_frame
+from dynakin.recordings import GroundFrame, Recording, find_ground_frame, standing_window
 from dynakin.recordings.foot_contact import foot_contact
 
 Array = npt.NDArray[np.float64]
@@ -38,6 +38,7 @@ class Measured:
     messages: tuple[str, ...]
     trial: Trial
     unplaced: tuple[Candidate, ...]  # markers of a model in space that the calibration frames do not show
+    still: bool  # the person stands still in the calibration frames
 
 
 def measure(
@@ -117,8 +118,10 @@ def measure(
     )  # fmt: skip
     report(model, plan, mass_kg, messages)
     placed_names = {site.recorded for site in sites}
+    window = standing_window(source.recording)
+    still = window is not None and window.start <= frames[0] < window.stop
     left = tuple(c for c in chosen if c.recorded not in placed_names)
-    return plan, Measured(trial.ground, side, mass_kg, height_m, parts, tuple(messages), trial, left)
+    return plan, Measured(trial.ground, side, mass_kg, height_m, parts, tuple(messages), trial, left, still)
 
 
 def _common(match: MarkerMatch, other: MarkerMatch) -> MarkerMatch:

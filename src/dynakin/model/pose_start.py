@@ -54,6 +54,7 @@ def start_posture(
     markers: Array,
     *,
     limits: Mapping[str, Interval] | None = None,
+    good_m: float = GOOD_M,
     bad_m: float = BAD_M,
     where: str = "start",
 ) -> PoseFit:
@@ -65,6 +66,7 @@ def start_posture(
             head anywhere.
         markers: (M, 3) or (T, M, 3) m, ground frame, in the order of the model's markers; NaN: not seen.
         limits: name -> (lower, upper) rad or m of coordinates that have any.
+        good_m: root mean square distance from which on nothing else is tried.
         bad_m: root mean square distance from which the fit is refused.
         where: opens the messages (a file's name).
 
@@ -75,7 +77,7 @@ def start_posture(
     measured = np.asarray(markers, dtype=float)
     if measured.ndim == 3:
         measured = _median(measured)
-    body = _Body(model, measured, dict(limits or {}), where)
+    body = _Body(model, measured, dict(limits or {}), where, good_m)
     best = body.fit()
     _refuse(body, best, bad_m, where)
     x = np.array(model.initial_state(), dtype=float)
@@ -120,7 +122,10 @@ class _Fit:
 class _Body:
     """The model with everything fixed but its coordinates, and the markers that it is laid on."""
 
-    def __init__(self, model: _core.Model, measured: Array, limits: dict[str, Interval], where: str) -> None:
+    def __init__(
+        self, model: _core.Model, measured: Array, limits: dict[str, Interval], where: str, good_m: float = GOOD_M
+    ) -> None:
+        self.good_m = good_m
         self.model = _core.Model(_bare(model.spec))
         spec = self.model.spec
         if measured.shape != (len(spec.markers), 3):
@@ -196,7 +201,7 @@ class _Body:
         for start in self.starts():
             found = self.mended(self.solve(start))
             best = found if best is None or found.rms < best.rms else best
-            if best.rms < GOOD_M:
+            if best.rms < self.good_m:
                 break
         assert best is not None
         return best
@@ -249,7 +254,7 @@ class _Body:
         """Starts the joints above the segment that fits worst again, elsewhere within their limits."""
         rng = np.random.default_rng(0)  # the same start for the same markers
         for _ in range(_RESTARTS):
-            if fit.rms < GOOD_M:
+            if fit.rms < self.good_m:
                 break
             away = self.distances(fit.q)
             worst = self.segment_of[int(np.nanargmax(away))]
@@ -305,7 +310,7 @@ def _paths(spec: _core.ModelSpec, order: dict[str, int]) -> tuple[list[list[int]
 
 def _refuse(body: _Body, fit: _Fit, bad_m: float, where: str) -> None:
     """Raises a ModelError that tells what is wrong, where the fit is bad."""
-    if fit.rms < GOOD_M:
+    if fit.rms < body.good_m:
         return
     found = f"{where}: the model fits the markers to {1000.0 * fit.rms:.0f} mm only (root mean square)"
     at_rest, own = _core.marker_positions(body.model, body.state(body.rest))[body.seen], body.measured[body.seen]

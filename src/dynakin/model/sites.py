@@ -143,13 +143,13 @@ def place_sites(
                 f"Marker {c.recorded} is not seen in the calibration frames: placed from "
                 f"{trial.recording.time[later[0]]:.2f} s on."
             )
-        sites.append(site_of(c, local))
+        sites.append(site_of(c, local, model.sided))
     return sites, messages
 
 
-def site_of(candidate: Candidate, local: np.ndarray) -> Site:
+def site_of(candidate: Candidate, local: np.ndarray, in_space: bool) -> Site:
     """A marker of the set at its place (3,) m on its segment."""
     marker = candidate.marker
     assert marker.variance is not None  # the schema asks for it
     name = marker.aliases(candidate.key[1])[0]
-    return Site(name, candidate.recorded, candidate.segment, local, marker.variance, 1e-3 * marker.soft_tissue_mm)
+    return Site(name, candidate.recorded, candidate.segment, local, marker.variance, marker.soft_tissue_m(not in_space))
