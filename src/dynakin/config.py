@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 
 from dynakin.errors import ConfigError, ModelError
 from dynakin.filter import Noise, presets
+from dynakin.filter.extend import QUANTITIES, Quantity
 from dynakin.model import Bounds, Priors, Subject
 from dynakin.model.subject import Sex
 from dynakin.model.validation import Strict, nearest, validate
@@ -24,7 +25,7 @@ class RunConfig(Strict):
     trial: Path = Field(examples=["squat.c3d"])
     """Recording to estimate: .c3d, .trc or .csv. Paths are relative to this file."""
     model: str = Field(examples=["squat7"])
-    """Built-in model (squat7, sagittal7) or a .toml file of your own."""
+    """Built-in model (fullbody, squat7, sagittal7) or a .toml file of your own."""
     output: Path = Field(examples=["out/squat"])
     """Folder for the results. It is replaced if it holds an earlier output, and refused if it holds anything else."""
 
@@ -50,6 +51,11 @@ class RunConfig(Strict):
     """Estimate each frame from all frames, those after it too. Not given: as it would be live."""
     side: Literal["auto", "right", "left", "both"] = "auto"
     """Which side's markers a model uses that has one leg for both: auto (fewest gaps), right, left, both."""
+    estimate: tuple[Quantity, ...] = QUANTITIES
+    """Which parameters are estimated: lengths, markers (their places), soft_tissue (displacements), inertia. The others
+    stay as they are at the start."""
+    plates: dict[str, Literal["right", "left"]] | None = Field(default=None, examples=[{"plate 1": "right"}])
+    """Which foot stands on a plate ("plate 1" = "right"), for floating models. Not given: found."""
     vertical: str = "auto"
     """Axis of the laboratory that points up: auto (found), or one of +X -X +Y -Y +Z -Z."""
     forward: str | tuple[float, float, float] = "auto"

@@ -22,8 +22,9 @@ def changed(tmp_path: Path, folder: str, name: str, old: str, new: str) -> Path:
 
 
 def test_every_built_in_model_loads() -> None:
-    assert available_models() == ["sagittal7", "squat7"]
-    for name in available_models():
+    assert available_models() == ["fullbody", "sagittal7", "squat7"]
+    assert len(load_model("fullbody").model.segments) == 15
+    for name in ("sagittal7", "squat7"):
         definition = load_model(name)
         assert definition.name == name
         assert len(definition.model.coordinates) == 7

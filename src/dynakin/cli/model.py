@@ -142,7 +142,7 @@ def _marker_sets(definition: ModelDefinition) -> list[MarkerSetFile]:
 def _sites(model: ModelFile, marker_set: MarkerSetFile) -> list[tuple[str, str]]:
     """Markers of the set that the model carries, each with its segment."""
     home = {part: s.name for s in model.segments for part in s.parts} | {s.name: s.name for s in model.segments}
-    return [(m.name, home[m.segment]) for m in marker_set.markers if not m.landmark_only and m.segment in home]
+    return [(m.name, home[m.segment]) for m in marker_set.markers if m.measures(planar=True) and m.segment in home]
 
 
 def _markers(model: ModelFile, marker_set: MarkerSetFile) -> Table:

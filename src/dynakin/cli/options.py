@@ -17,6 +17,9 @@ Preset = Annotated[str | None, typer.Option(help="Noise settings: default, paper
 Side = Annotated[str | None, typer.Option(help="Markers of a one-legged model: auto, right, left, both.")]
 Vertical = Annotated[str | None, typer.Option(help="Laboratory axis that points up: auto, +Y, +Z, ...")]
 Forward = Annotated[str | None, typer.Option(help="Facing direction: auto, an axis or three numbers (0,1,0).")]
+Estimated = Annotated[
+    str | None, typer.Option("--estimate", help="Parameters: some of lengths,markers,soft_tissue,inertia; or none.")
+]
 TableName = Annotated[str | None, typer.Option("--table", help="Inertia table: dumas, deleva or a .csv file.")]
 PlateFilter = Annotated[float | None, typer.Option("--plate-filter-hz", help="Low-pass filter on the plates, Hz.")]
 ForceThreshold = Annotated[

@@ -11,6 +11,7 @@ import typer
 
 from dynakin.cli.console import busy, out, progress_bar
 from dynakin.cli.options import (
+    Estimated,
     Force,
     ForceThreshold,
     Forward,
@@ -36,11 +37,16 @@ from dynakin.recordings import read
 from dynakin.report import read_sensitivity, save_figures
 from dynakin.results import Estimate, check_output_writable
 
+LARGEST_BENCH = 250
+"""States up to which a run also tells what the recording says of the constants: it filters a dozen motions more."""
+
 
 def run(
     trial: Annotated[Path, typer.Argument(help="Recording (.c3d, .trc, .csv), or a configuration (.toml).")],
     forces: Force = None,
-    model: Annotated[str | None, typer.Option(help="Model: squat7, sagittal7, a .toml or .osim file.")] = None,
+    model: Annotated[
+        str | None, typer.Option(help="Model: fullbody, squat7, sagittal7, a .toml or .osim file.")
+    ] = None,
     markers: Markers = None,
     static: Static = None,
     mass: Mass = None,
@@ -49,6 +55,7 @@ def run(
     preset: Preset = None,
     smooth: Annotated[bool | None, typer.Option("--smooth", help="Estimate each frame from all frames.")] = None,
     side: Side = None,
+    estimate: Estimated = None,
     vertical: Vertical = None,
     forward: Forward = None,
     table: TableName = None,
@@ -74,6 +81,7 @@ def run(
         "preset": preset,
         "smooth": smooth,
         "side": side,
+        "estimate": estimated(estimate),
         "vertical": vertical,
         "forward": forward_direction(forward),
         "table": table,
@@ -87,13 +95,13 @@ def run(
         raise typer.BadParameter("--sensitivity is a figure for papers, expected --figures FOLDER with it")
     grid = None if sensitivity is None else read_sensitivity(sensitivity)
     with progress_bar("estimating") as progress:
-        estimate, comparison, told = estimate_from(config, progress)
+        found, comparison, told = estimate_from(config, progress)
     with busy("writing results and report"):
-        folder = estimate.save(config.output, comparison=comparison, identifiability=told)
-    print_summary(estimate, folder)
+        folder = found.save(config.output, comparison=comparison, identifiability=told)
+    print_summary(found, folder)
     if figures is not None:
         with busy("drawing figures"):
-            written = save_figures(estimate, figures, comparison=comparison, sensitivity=grid)
+            written = save_figures(found, figures, comparison=comparison, sensitivity=grid)
         out().print(f"Figures  {figures} ({len(written)} files)", soft_wrap=True)
 
 
@@ -130,16 +138,32 @@ def estimate_from(
         side=config.side,
         vertical=config.vertical,
         forward=config.forward,
+        estimate=config.estimate,
+        plates=config.plates,
     )
     estimate = estimator.run(recording, static=static, smooth=config.smooth, progress=progress)
     estimate = replace(estimate, config=config.as_used() | estimate.config)
     assert estimator.initial is not None
+    n_states = len(estimator.initial.names)
     comparison = trial_of({config.preset: estimate}, estimator.initial, model, whatever=True)
+    if n_states > LARGEST_BENCH:
+        note = (
+            f"What the recording tells of the constants is left out: with {n_states} states it takes many minutes; "
+            "dynakin model --identifiability tells."
+        )
+        return replace(estimate, messages=[*estimate.messages, note]), comparison, None
     try:
         return estimate, comparison, identifiability(estimator, estimate)
     except DynakinError as error:  # a trial of a few frames, say: no reason to lose the estimate
         note = f"What the recording tells of the constants is left out: {error.message}"
         return replace(estimate, messages=[*estimate.messages, note]), comparison, None
+
+
+def estimated(text: str | None) -> list[str] | None:
+    """`--estimate lengths,markers` as a list; "none" is an empty one. The words are checked with the configuration."""
+    if text is None:
+        return None
+    return [] if text.strip() == "none" else [part.strip() for part in text.split(",") if part.strip()]
 
 
 def forward_direction(text: str | None) -> str | tuple[float, ...] | None:

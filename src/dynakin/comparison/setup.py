@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from dynakin.errors import ConfigError
 from dynakin.filter import Estimator, Noise, presets
+from dynakin.filter.extend import QUANTITIES, Quantity
 from dynakin.model import Bounds, Definition, Priors
 from dynakin.reference import CUTOFF_HZ
 
@@ -19,7 +20,7 @@ class Setup:
         definition: what `load_model` returns.
         noise: settings of each filter that is compared, by the name of its preset.
         cutoff_hz: of the reference methods' zero-lag low-pass, Hz.
-        priors, bounds, side, vertical, forward: as `Estimator` takes them.
+        priors, bounds, side, vertical, forward, estimate: as `Estimator` takes them.
     """
 
     definition: Definition
@@ -30,6 +31,7 @@ class Setup:
     side: str = "auto"
     vertical: str = "auto"
     forward: str | tuple[float, float, float] = "auto"
+    estimate: tuple[Quantity, ...] = QUANTITIES
 
     def __post_init__(self) -> None:
         if not self.noise:
@@ -47,4 +49,5 @@ class Setup:
             side=self.side,
             vertical=self.vertical,
             forward=self.forward,
+            estimate=self.estimate,
         )

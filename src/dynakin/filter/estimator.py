@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -12,12 +12,14 @@ from dynakin.errors import ConfigError, DivergenceError, RecordingError
 from dynakin.filter import presets
 from dynakin.filter.alignment import PASSES, delay_of, in_step, in_words, is_late
 from dynakin.filter.assemble import assemble
-from dynakin.filter.extend import continuous_noise, extended, initial_covariance
+from dynakin.filter.extend import QUANTITIES, Quantity, continuous_noise, extended, initial_covariance
 from dynakin.filter.live import StepEstimate, deviations_of, step_estimate
 from dynakin.filter.noise import Noise, gate_limits
 from dynakin.filter.samples import Sample, foreign_load, recording_arrays, sample_arrays
 from dynakin.filter.smoothing import check_can_smooth, smoothed
+from dynakin.filter.total_wrench import foreign_total, leave_out_unknown
 from dynakin.model import Bounds, Definition, InitialModel, Priors, initialise
+from dynakin.model.validation import nearest
 from dynakin.recordings import Recording, check_plates
 from dynakin.results import Estimate
 
@@ -34,6 +36,9 @@ class Estimator:
         priors, bounds: prior standard deviations and half widths of (9); see `dynakin.model.priors`.
         side: limb markers of a lumped model ("auto", "right", "left", "both").
         vertical, forward: laboratory directions, found in the recording where "auto".
+        estimate: kinds of parameters to estimate, of "lengths", "markers", "soft_tissue" and "inertia"; the others stay
+            as they are at the start (displacements of skin are then noise of the markers).
+        plates: plate -> "right" or "left", where a floating model's own assignment of plates to feet is wrong.
         lag: frames by which `delayed` lies behind `step`, for smoothing while it is measured; 0: none.
     """
 
@@ -47,8 +52,14 @@ class Estimator:
         side: str = "auto",
         vertical: str = "auto",
         forward: str | tuple[float, float, float] = "auto",
+        estimate: Sequence[Quantity] = QUANTITIES,
+        plates: Mapping[str, str] | None = None,
         lag: int = 0,
     ) -> None:
+        for kind in estimate:
+            if kind not in QUANTITIES:
+                known = ", ".join(QUANTITIES)
+                raise ConfigError(f"estimate: {kind!r} is unknown{nearest(kind, QUANTITIES)}; expected some of {known}")
         if lag < 0:
             raise ConfigError(f"lag is {lag}, expected 0 frames or more")
         self.model = model
@@ -58,6 +69,8 @@ class Estimator:
         self.side = side
         self.vertical = vertical
         self.forward = forward
+        self.estimate = tuple(kind for kind in QUANTITIES if kind in estimate)
+        self.plates = dict(plates or {})
         self.lag = lag
         self.initial: InitialModel | None = None
         self._filter: _core.Filter | None = None
@@ -90,14 +103,7 @@ class Estimator:
         initial = self.start(recording, static=static)
         assert self._core_model is not None
         markers, wrench = recording_arrays(recording, initial, gaps=self.noise.recover)
-        check = check_plates(recording, initial.ground, initial.mass_kg)
-        if check.refusal:
-            raise RecordingError(f"{recording.path or recording.name}: {check.refusal}")
-        notes = list(check.messages)
-        foreign = foreign_load(check, initial.mass_kg, self.noise.plate_load_tolerance)
-        if foreign:
-            wrench[:] = np.nan
-            notes.append(foreign)
+        notes, foreign = self._judge_plates(recording, initial, wrench)
         try:
             arrays, wrench, clock = self._in_step(initial, recording.time, markers, wrench, progress)
             if smooth:
@@ -110,6 +116,30 @@ class Estimator:
         assert self._filter is not None
         covariances = (initial_covariance(initial, self.noise), self._filter.covariance)
         return assemble(arrays, self._core_model, initial, recording, (markers, wrench), config, notes, covariances)
+
+    def _judge_plates(self, recording: Recording, initial: InitialModel, wrench: Array) -> tuple[list[str], str | None]:
+        """Leaves out (NaN, in place) what is not the whole wrench (T, 6).
+
+        Returns:
+            Sentences, and why the plates are not used at all where that is so.
+        """
+        notes: list[str] = []
+        if initial.feet:
+            notes += leave_out_unknown(recording, initial, wrench, self.plates)
+            if not recording.plates:
+                return notes, notes[-1]
+        check = check_plates(recording, initial.ground, None if initial.feet else initial.mass_kg)
+        if check.refusal:
+            raise RecordingError(f"{recording.path or recording.name}: {check.refusal}")
+        if initial.feet:
+            foreign = foreign_total(wrench, initial.mass_kg, self.noise.plate_load_tolerance)
+        else:
+            foreign = foreign_load(check, initial.mass_kg, self.noise.plate_load_tolerance)
+        notes = [*check.messages, *notes]
+        if foreign:
+            wrench[:] = np.nan
+            notes.append(foreign)
+        return notes, foreign
 
     def _in_step(
         self, initial: InitialModel, time: Array, markers: Array, wrench: Array, progress: Progress | None
@@ -150,7 +180,7 @@ class Estimator:
 
     def start_from(self, initial: InitialModel) -> InitialModel:
         """Make the filter ready to step from a model that was measured before, or changed since."""
-        initial = extended(initial, self.noise)
+        initial = extended(initial, self.noise, self.estimate)
         self._core_model = _core.Model(initial.spec)
         self._filter = _core.Filter(
             self._core_model, self.filter_settings(initial), initial.x0, initial_covariance(initial, self.noise)
@@ -258,6 +288,7 @@ class Estimator:
             "side": self.side,
             "vertical": self.vertical,
             "forward": self.forward if isinstance(self.forward, str) else list(self.forward),
+            "estimate": list(self.estimate),
             "noise": self.noise.model_dump(mode="json"),
             "priors": self.priors.model_dump(mode="json"),
             "bounds": self.bounds.model_dump(mode="json"),
@@ -282,7 +313,11 @@ class Estimator:
             process_density=density,
             decay_rate=decay,
             marker_variance=noise.marker_variance(
-                initial.recorded_markers, initial.marker_variance, initial.soft_tissue_m, initial.unmodelled_m
+                initial.recorded_markers,
+                initial.marker_variance,
+                initial.soft_tissue_m,
+                initial.unmodelled_m,
+                "soft_tissue" in self.estimate,
             ),
             wrench_covariance=noise.wrench_covariance(),
             reference_point=initial.plate_centre if point == "auto" else np.array(point, dtype=float),

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
+from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -12,19 +14,28 @@ from dynakin.filter.noise import Noise
 from dynakin.model import InitialModel
 
 Array = npt.NDArray[np.float64]
+Quantity = Literal["lengths", "markers", "soft_tissue", "inertia"]
+QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
+"""Parameters that can be estimated: segment lengths, marker places, displacements of skin and flesh, inertia."""
 
 
-def extended(initial: InitialModel, noise: Noise) -> InitialModel:
+def extended(initial: InitialModel, noise: Noise, estimate: Collection[Quantity] = QUANTITIES) -> InitialModel:
     """The same model with the states that these noise settings ask for; places, bounds and priors follow their names.
 
     Displacements of soft tissue and errors of the plates start at 0 with the standard deviations declared.
+
+    Args:
+        estimate: kinds of parameters to estimate; the others stay where the model has them.
     """
     spec = initial.spec
-    sd = noise.soft_tissue_sd(initial.soft_tissue_m)
+    sd = noise.soft_tissue_sd(initial.soft_tissue_m) * ("soft_tissue" in estimate)
     markers = spec.markers
     for marker, value in zip(markers, sd, strict=True):
-        marker.soft_tissue = [bool(axis and value > 0.0) for axis in marker.estimated]
+        marker.soft_tissue = [bool(axis and value > 0.0) for axis in marker.measured]
+        if "markers" not in estimate:
+            marker.estimated = [False] * 3
     spec.markers = markers
+    _hold(spec, estimate)
     spec.wrench_offset = [
         bool(seen and value > 0.0) for seen, value in zip(spec.wrench_measured, noise.plate_sd(), strict=True)
     ]
@@ -46,6 +57,19 @@ def extended(initial: InitialModel, noise: Noise) -> InitialModel:
         upper=carried(initial.upper, np.inf),
         table=carried(initial.table, np.nan),
     )
+
+
+def _hold(spec: _core.ModelSpec, estimate: Collection[Quantity]) -> None:
+    if "lengths" not in estimate:
+        parameters = spec.parameters
+        for parameter in parameters:
+            parameter.estimated = False
+        spec.parameters = parameters
+    if "inertia" not in estimate:
+        segments = spec.segments
+        for segment in segments:
+            segment.inertia_estimated = [False] * 10
+        spec.segments = segments
 
 
 def _added_sd(spec: _core.ModelSpec, noise: Noise, soft_tissue: Array) -> dict[str, float]:
@@ -78,13 +102,17 @@ def continuous_noise(initial: InitialModel, noise: Noise, layout: _core.StateLay
     """Density (n,) of the white noise that drives each element, and the rate (n,) 1/s at which it decays."""
     density, decay = np.zeros(layout.size), np.zeros(layout.size)
     kinds = {axis.coordinate: axis.kind for segment in initial.spec.segments for axis in segment.axes}
+    jerk = noise.jerk_densities(floating=bool(initial.feet))
     offset, size = layout.blocks["accelerations"]
     for k in range(offset, offset + size):
         coordinate = layout.names[k].removesuffix("/acceleration")
-        density[k] = noise.jerk if kinds[coordinate] == "rotation" else noise.jerk_translation
+        density[k] = jerk[kinds[coordinate]]
     offset, size = layout.blocks["lengths"]
     density[offset : offset + size] = noise.length_drift
-    for block, time in (("soft_tissue", noise.soft_tissue_time_s), ("plates", noise.plate_time_s)):
+    skin_s = noise.soft_tissue_time_s
+    if initial.feet and noise.floating_soft_tissue_time_s is not None:
+        skin_s = noise.floating_soft_tissue_time_s
+    for block, time in (("soft_tissue", skin_s), ("plates", noise.plate_time_s)):
         offset, size = layout.blocks[block]
         for k in range(offset, offset + size):
             if layout.names[k] != "plates/delay":

@@ -43,6 +43,12 @@ class Noise(BaseModel):
     jerk_translation: Variance = 0.0
     """The same of each translation, m^2/s^5."""
 
+    floating_jerk: Variance | None = None
+    """The jerk's density of each rotation of a model that is fixed nowhere: it walks, and its limbs swing. Not given:
+    as ``jerk``."""
+    floating_jerk_translation: Variance | None = None
+    """The same of each translation."""
+
     length_drift: Variance = 0.0
     """Spectral density of a random walk of each length, m^2/s: skin that follows an angle and joints that are no hinges
     look like lengths, and do not average out; without it a length is thought to be known the better the longer."""
@@ -57,6 +63,9 @@ class Noise(BaseModel):
     of its own: a foot is not as rigid, nor its toe as fixed in the ground, as a model has it."""
     soft_tissue_time_s: Seconds = 1.0
     """Time constant of that displacement (first-order Gauss-Markov process)."""
+    floating_soft_tissue_time_s: Seconds | None = None
+    """The same for a model that is fixed nowhere; not given: as ``soft_tissue_time_s``. A step lasts half a second, and
+    skin that takes longer to come back looks like longer bones."""
 
     marker_sd_m: Annotated[float, Field(gt=0.0)] | None = None
     """Noise of the cameras, m, for all markers; not given: R of the marker set, which holds soft tissue too."""
@@ -127,23 +136,39 @@ class Noise(BaseModel):
         """Standard deviations (6,) of the plates' slow error, N and N m."""
         return np.array([self.plate_force] * 3 + [self.plate_moment] * 3)
 
+    def jerk_densities(self, floating: bool) -> dict[str, float]:
+        """Density by kind of axis, of a model that is fixed in the ground or of a floating one."""
+        rotation, translation = self.jerk, self.jerk_translation
+        if floating:
+            rotation = rotation if self.floating_jerk is None else self.floating_jerk
+            translation = translation if self.floating_jerk_translation is None else self.floating_jerk_translation
+        return {"rotation": rotation, "translation": translation}
+
     def soft_tissue_sd(self, declared_m: Array) -> Array:
         """Standard deviation (M,) m of each marker's displacement; 0 where none is estimated."""
         sd = self.soft_tissue * declared_m
         return np.where(sd < self.soft_tissue_least_m, 0.0, sd)
 
     def marker_variance(
-        self, names: Sequence[str], of_set: Array, declared_m: Array, unmodelled_m: Array | float = 0.0
+        self,
+        names: Sequence[str],
+        of_set: Array,
+        declared_m: Array,
+        unmodelled_m: Array | float = 0.0,
+        soft_tissue_estimated: bool = True,
     ) -> Array:
         """R (M,) m^2 of markers with these names in the recording.
 
         Args:
             of_set: (M,) m^2, as the marker set has it. declared_m: (M,) m, size of the soft tissue's displacement.
             unmodelled_m: (M,) m, of ``InitialModel``; the marker set's R holds it already.
+            soft_tissue_estimated: False: all of the displacement is noise.
         """
         variance = self.marker_scale * of_set
         if self.marker_sd_m is not None:
             unmodelled = np.where(self.soft_tissue_sd(declared_m) == 0.0, self.soft_tissue_least_m, 0.0)
+            if not soft_tissue_estimated:
+                unmodelled = np.maximum(self.soft_tissue * declared_m, self.soft_tissue_least_m)
             variance = self.marker_sd_m**2 + unmodelled**2 + unmodelled_m**2
         return np.array([self.marker.get(name, value) for name, value in zip(names, variance, strict=True)])
 

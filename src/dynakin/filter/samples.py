@@ -41,7 +41,7 @@ def recording_arrays(recording: Recording, initial: InitialModel, *, gaps: bool 
             any of its markers, or a wrench that is not finite.
     """
     where = recording.path or recording.name
-    if not recording.plates:
+    if not recording.plates and not initial.feet:
         raise RecordingError(
             f"{where}: no force plates, expected at least one: the wrench is a measurement of this filter "
             "(a force file can be given beside the markers)"
@@ -57,9 +57,11 @@ def recording_arrays(recording: Recording, initial: InitialModel, *, gaps: bool 
             f"{where}: frame {k + 1} ({recording.time[k]:.3f} s) has none of the model's {seen.shape[1]} markers, "
             f"expected at least one ({len(blind)} such frame{'s' if len(blind) > 1 else ''})"
         )
+    if not recording.plates:  # a floating model needs none: all rows of the wrench are left out
+        return np.ascontiguousarray(markers), np.full((recording.n_frames, 6), np.nan)
     wrench = initial.ground.wrench_to_ground(recording.total_wrench())
     bad = np.flatnonzero(~np.isfinite(wrench).all(axis=1))
-    if len(bad) and gaps and len(bad) < len(wrench):
+    if len(bad) and (initial.feet or (gaps and len(bad) < len(wrench))):
         wrench[bad] = np.nan
     elif len(bad):
         k = int(bad[0])

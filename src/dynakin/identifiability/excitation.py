@@ -64,7 +64,11 @@ def _trusting(estimator: Estimator) -> Estimator:
     assert estimator.initial is not None
     free = {"marker_gate": 0.0, "wrench_gate": 0.0, "recover": False, "constraint": "none", "iterate_beyond": None}
     made = Estimator(
-        estimator.model, estimator.noise.model_copy(update=free), priors=estimator.priors, bounds=estimator.bounds
+        estimator.model,
+        estimator.noise.model_copy(update=free),
+        priors=estimator.priors,
+        bounds=estimator.bounds,
+        estimate=estimator.estimate,
     )
     made.start_from(estimator.initial)
     return made

@@ -108,7 +108,7 @@ def choose_side(match: MarkerMatch, recording: Recording, side: str) -> tuple[st
     for own in SIDES:
         gaps[own] = 0.0
         for marker in match.marker_set.markers:
-            if marker.landmark_only or not marker.aliases(own):
+            if not marker.measures(planar=True) or not marker.aliases(own):
                 continue
             name = match.names.get((marker.name, own))
             path = recording.marker(name) if name else np.full((recording.n_frames, 3), np.nan)

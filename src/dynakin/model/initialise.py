@@ -11,6 +11,7 @@ from dynakin.model.initial import InitialModel
 from dynakin.model.measure import measure
 from dynakin.model.opensim.definition import OpenSimDefinition
 from dynakin.model.priors import Bounds, Priors
+from dynakin.model.schema import ModelFile
 from dynakin.recordings import GroundFrame, Recording
 
 Array = npt.NDArray[np.float64]
@@ -61,15 +62,24 @@ def initialise(
     from dynakin import _core  # the core is needed from here on only
     from dynakin.model.spec import in_layout, to_core
 
+    messages, speeds = list(rest.messages), dict[str, float]()
+    if plan.model.sided:
+        from dynakin.model.in_space import started
+
+        begun = started(plan, rest.trial, rest.unplaced, rest.still)
+        plan, speeds = begun.plan, begun.speeds
+        messages += begun.messages
     spec = to_core(plan)
     core = _core.Model(spec)
     names = list(core.layout.names)
     limits = plan.bounds(bounds or Bounds())
     x0 = np.array(core.initial_state(), dtype=float)
+    for at, name in enumerate(names):
+        if name.endswith("/speed"):
+            x0[at] = speeds.get(name.removesuffix("/speed"), x0[at])
     lower = in_layout(names, {name: pair[0] for name, pair in limits.items()}, -np.inf)
     upper = in_layout(names, {name: pair[1] for name, pair in limits.items()}, np.inf)
     outside = (x0 < lower) | (x0 > upper)
-    messages = list(rest.messages)
     for k in np.flatnonzero(outside):
         messages.append(
             f"Start of {names[k]} ({x0[k]:.3f}) lies beyond its bounds {lower[k]:.3f} to {upper[k]:.3f}: "
@@ -94,7 +104,13 @@ def initialise(
         parts=rest.parts,
         messages=tuple(messages),
         plan=plan,
+        feet=feet_of(plan.model),
     )
+
+
+def feet_of(model: ModelFile) -> dict[str, str]:
+    """Foot -> segment that carries it, of a model whose sides are apart."""
+    return {s.side: s.name for s in model.segments if s.side is not None and "foot" in s.parts}
 
 
 def first_centre_of_pressure(recording: Recording, ground: GroundFrame) -> Array:

@@ -18,6 +18,7 @@ import numpy.typing as npt
 
 from dynakin.errors import ModelError
 from dynakin.model.inertia import RigidBody
+from dynakin.model.mirroring import SUFFIXES
 from dynakin.model.posture import Posture, axes_from
 from dynakin.model.schema import ModelFile, Segment
 from dynakin.model.table import PAIRED, BodyTable, Part
@@ -74,6 +75,7 @@ def place_parts(
     where = f'segments "{segment.name}"'
     placed: list[PlacedPart] = []
     end = np.zeros(3)
+    landmarks = of_side(landmarks, segment.side)
     for name in segment.parts:
         part = table.part(name)
         length, measured = part_length(part, landmarks, height_m, where)
@@ -83,12 +85,25 @@ def place_parts(
             origin, rotation = end, axes_from(part.axis, -along if part.axis == "y" else along)
             end = end + length * along
         else:
+            own = (segment.origin or "").removesuffix(SUFFIXES.get(segment.side or "", ""))
+            if origin_G is None and part.origin.end == own:
+                origin_G = posture.origins[segment.name]  # its own joint, which nothing but the length tells of
             if origin_G is None:
                 raise ModelError(f"{where}: part {name!r} starts at landmark {part.origin.end!r}, which is not known")
             origin = posture.to_local(segment.name, origin_G)
             rotation = _part_rotation(part, landmarks, posture.rotations[segment.name])
-        placed.append(PlacedPart(name, length, measured, rotation, origin, scaled_body(part, mass_kg, length)))
+        body = scaled_body(part, mass_kg, length)
+        body = body.mirrored() if segment.side == "left" else body  # the table's frames are the right side's
+        placed.append(PlacedPart(name, length, measured, rotation, origin, body))
     return placed
+
+
+def of_side(landmarks: Mapping[str, Array], side: str | None) -> Mapping[str, Array]:
+    """One side's landmarks under their plain names, where a limb's sides are modelled apart."""
+    if side is None:
+        return landmarks
+    suffix = SUFFIXES[side]
+    return {name.removesuffix(suffix): place for name, place in landmarks.items() if name.endswith(suffix)}
 
 
 def _part_rotation(part: Part, landmarks: Mapping[str, Array], R_GS: Array) -> Array:

@@ -24,8 +24,10 @@ class Marker(Strict):
     centre: tuple[str, ...] = ()
     variance: Annotated[float, Field(gt=0.0)] | None = None  # m^2, R of the measurement
     soft_tissue_mm: Annotated[float, Field(ge=0.0)] = 10.0  # how far skin and flesh move here, at full squat
+    soft_tissue_in_space_mm: Annotated[float, Field(ge=0.0)] | None = None  # in models in space, where feet move
     reason: str = ""
     landmark_only: bool = False  # virtual, or used for a joint centre only
+    in_space: bool = False  # a measurement of models in space only; for planar ones as landmark_only
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
@@ -36,6 +38,15 @@ class Marker(Strict):
         if not self.landmark_only and (self.variance is None or not self.segment):
             raise ValueError("segment and variance are needed (or landmark_only = true)")
         return self
+
+    def soft_tissue_m(self, planar: bool) -> float:
+        """Declared displacement (m): a planar model's foot is fixed in the ground, one in space bends at the toes."""
+        in_space = self.soft_tissue_in_space_mm
+        return 1e-3 * (self.soft_tissue_mm if planar or in_space is None else in_space)
+
+    def measures(self, planar: bool) -> bool:
+        """Whether it is a measurement of a planar model, or of one in space."""
+        return not (self.landmark_only or (planar and self.in_space))
 
     def aliases(self, side: str) -> tuple[str, ...]:
         """Names under which a recording may have it on "right", "left" or in the "centre"."""
@@ -85,6 +96,47 @@ class Fraction(Strict):
     female: float
 
 
+class Offset(Strict):
+    """A point beside another: a joint centre inward of the one marker that sits over it.
+
+    The direction is that of ``along``, or, with ``inward``, towards the body's middle plane: the mean of the line
+    between the two ASIS and of the right angle to the foot (heel to toe), made square to ``square_to``; with ``bend``
+    (three landmarks of a limb, proximal to distal) it is the normal of the limb's plane as far as the limb is bent.
+    The distance is a fraction of the height, or of the distance between both sides of the marker ``scale``, and
+    ``add_m`` (a marker's radius).
+    """
+
+    origin: str
+    along: tuple[str, str] | None = None
+    inward: bool = False
+    asis: str = ""
+    foot: tuple[str, str] | None = None
+    square_to: tuple[str, str] | None = None
+    bend: tuple[str, str, str] | None = None
+    per_height: float | None = None
+    scale: str | None = None  # a marker: the distance between its two sides
+    per_scale: float | None = None
+    add_m: float = 0.0
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        if self.inward == (self.along is not None):
+            raise ValueError("expected either along or inward = true")
+        if self.inward and (not self.asis or self.square_to is None):
+            raise ValueError("inward needs asis and square_to")
+        if (self.per_height is None) == (self.per_scale is None) or (self.per_scale is None) != (self.scale is None):
+            raise ValueError("expected either per_height, or scale and per_scale")
+        return self
+
+    @property
+    def inputs(self) -> tuple[str, ...]:
+        """Markers and landmarks it starts from, on its own side."""
+        found = [self.origin]
+        for several in (self.along, self.square_to, self.bend, self.foot):
+            found += list(several or ())
+        return tuple(dict.fromkeys([*found, *(name for name in (self.asis, self.scale) if name)]))
+
+
 class Recipe(Strict):
     """One way to find a landmark: mean of markers or landmarks, a regression, or a proportion of a line."""
 
@@ -93,13 +145,14 @@ class Recipe(Strict):
     pelvis: PelvisRegression | None = None
     polar: PolarRegression | None = None
     fraction: Fraction | None = None
+    offset: Offset | None = None
     source: str = ""
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
-        given = [key for key in ("mean", "pelvis", "polar", "fraction") if getattr(self, key) is not None]
+        given = [key for key in ("mean", "pelvis", "polar", "fraction", "offset") if getattr(self, key) is not None]
         if len(given) != 1:
-            raise ValueError(f"exactly one of mean, pelvis, polar, fraction expected, found {given or 'none'}")
+            raise ValueError(f"exactly one of mean, pelvis, polar, fraction, offset expected, found {given or 'none'}")
         if given[0] != "mean" and self.sides == "both":
             raise ValueError("sides = 'both' is possible with mean only")
         if given[0] != "mean" and not self.source:
@@ -115,6 +168,8 @@ class Recipe(Strict):
             return (self.pelvis.asis, self.pelvis.psis)
         if self.polar is not None:
             return (self.polar.origin, *self.polar.along, *self.polar.scale)
+        if self.offset is not None:
+            return self.offset.inputs
         assert self.fraction is not None
         return self.fraction.between
 
@@ -132,6 +187,11 @@ class MarkerSetFile(Strict):
     height_source: str = ""
     markers: Annotated[tuple[Marker, ...], Field(min_length=1)]
     landmarks: dict[str, tuple[Recipe, ...]]
+    in_space: dict[str, tuple[Recipe, ...]] = Field(default={})  # landmarks of models in space
+
+    def recipes(self, planar: bool) -> dict[str, tuple[Recipe, ...]]:
+        """Landmarks of planar models, or of models in space."""
+        return self.landmarks if planar else {**self.landmarks, **self.in_space}
 
     @model_validator(mode="after")
     def _references(self) -> Self:
@@ -139,10 +199,20 @@ class MarkerSetFile(Strict):
         for name in names:
             if names.count(name) > 1:
                 raise ValueError(f"markers: the name {name!r} is given twice")
-            if name in self.landmarks:
+            if name in self.landmarks or name in self.in_space:
                 raise ValueError(f"landmarks: {name!r} is also the name of a marker")
-        known = {*names, *self.landmarks}
-        for landmark, recipes in self.landmarks.items():
+        self._check(self.landmarks, names)
+        self._check(self.recipes(planar=False), names)
+        for key in ("heel_toe", "pelvis_back_front", "height_marker"):
+            value = getattr(self, key) or ()
+            for name in (value,) if isinstance(value, str) else value:
+                if name not in names:
+                    raise ValueError(f"{key}: no marker {name!r}{nearest(name, names)}")
+        return self
+
+    def _check(self, landmarks: dict[str, tuple[Recipe, ...]], names: list[str]) -> None:
+        known = {*names, *landmarks}
+        for landmark, recipes in landmarks.items():
             if not recipes:
                 raise ValueError(f"landmarks.{landmark}: no recipe")
             for recipe in recipes:
@@ -151,23 +221,15 @@ class MarkerSetFile(Strict):
                         raise ValueError(
                             f"landmarks.{landmark}: {source!r} is neither marker nor landmark{nearest(source, known)}"
                         )
-        self._refuse_circles()
-        for key in ("heel_toe", "pelvis_back_front", "height_marker"):
-            value = getattr(self, key) or ()
-            for name in (value,) if isinstance(value, str) else value:
-                if name not in names:
-                    raise ValueError(f"{key}: no marker {name!r}{nearest(name, names)}")
-        return self
 
-    def _refuse_circles(self) -> None:
         def visit(name: str, above: tuple[str, ...]) -> None:
             if name in above:
                 raise ValueError(f"landmarks: {' -> '.join((*above, name))} is a circle")
-            for recipe in self.landmarks.get(name, ()):
+            for recipe in landmarks.get(name, ()):
                 for source in recipe.inputs:
                     visit(source, (*above, name))
 
-        for name in self.landmarks:
+        for name in landmarks:
             visit(name, ())
 
     def marker(self, name: str) -> Marker:

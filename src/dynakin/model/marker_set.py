@@ -63,11 +63,11 @@ class MarkerMatch:
         ]
         return FacingPairs(found[0], found[1])
 
-    def sites(self, side: str) -> list[tuple[Marker, MarkerKey, str]]:
-        """Markers that become sites of the model on "right", "left" or "both" sides, in the order of the
-        set."""
+    def sites(self, side: str, planar: bool = True) -> list[tuple[Marker, MarkerKey, str]]:
+        """Markers that become sites of a planar model on "right", "left" or "both" sides, or of one in space; in the
+        order of the set."""
         sides = ("centre", "right", "left") if side == "both" else ("centre", side)
-        keys = [(m, (m.name, s)) for m in self.marker_set.markers if not m.landmark_only for s in sides if m.aliases(s)]
+        keys = [(m, (m.name, s)) for m in self.marker_set.markers if m.measures(planar) for s in sides if m.aliases(s)]
         return [(marker, key, self.names[key]) for marker, key in keys if key in self.names]
 
     def absent(self, name: str) -> str:

@@ -13,14 +13,15 @@ from dynakin.model.body import find_height, find_mass
 from dynakin.model.checks import check_masses, fixed_lengths, reach, refuse_moving_origin, report
 from dynakin.model.definition import ModelDefinition
 from dynakin.model.frames import Trial, choose_side
-from dynakin.model.landmarks import LandmarkFinder
+from dynakin.model.landmarks import SIDES, LandmarkFinder, slope
 from dynakin.model.lumping import PlacedPart, segment_bodies
 from dynakin.model.marker_set import MarkerKey, MarkerMatch, choose_marker_set, match_markers
 from dynakin.model.plan import ModelPlan
 from dynakin.model.posture import Geometry, Posture, find_geometry, find_posture, frame_landmarks
 from dynakin.model.schema import ModelFile
-from dynakin.model.sites import candidates, find_locks, place_sites
-from dynakin.recordings import GroundFrame, Recording, find_ground_frame
+from dynakin.model.sites import Candidate, candidates, find_locks, place_sites
+from dynakin.recordings import GroundFrame, Recording, find_ground_frame, standing_window
+from dynakin.recordings.foot_contact import foot_contact
 
 Array = npt.NDArray[np.float64]
 
@@ -35,6 +36,9 @@ class Measured:
     height_m: float | None
     parts: dict[str, list[PlacedPart]]
     messages: tuple[str, ...]
+    trial: Trial
+    unplaced: tuple[Candidate, ...]  # markers of a model in space that the calibration frames do not show
+    still: bool  # the person stands still in the calibration frames
 
 
 def measure(
@@ -61,14 +65,23 @@ def measure(
 
     trial = matched(recording, ground)
     messages += trial.ground.how
-    side, how = choose_side(trial.match, recording, side)
-    messages.append(how)
+    if not model.sided:
+        side, how = choose_side(trial.match, recording, side)
+        messages.append(how)
+    else:
+        side = "both"
     chosen, left_out = candidates(model, trial.match, side)
     locks, bare, locked = find_locks(model, trial.match, chosen)
     messages += left_out + locked
 
     source = trial if static is None else matched(static, None)
-    finder = LandmarkFinder(_common(trial.match, source.match), side, subject.sex, model.planar)
+    # A planar model starts from the trial's own landmarks; in space it starts from markers (pose_start).
+    common = source.match if model.sided else _common(trial.match, source.match)
+    finder = LandmarkFinder(common, side, subject.sex, model.planar, in_space=model.sided)
+    if model.sided:
+        entries = [r for r in (static, recording) if r is not None]
+        finder.height_m, _ = find_height(subject, entries, source)
+        finder.sole = flat_slopes(source)
     needed = needed_markers(model, finder, locks)
     refuse_moving_origin(model, trial, finder)
     wished = needed | table_markers(definition, finder)
@@ -79,7 +92,7 @@ def measure(
     source = trial if static is None else _at_origin(model, source, finder, frames)
     messages.append(f"Lengths and marker places: {which}.")
     standing = source.median(frames)
-    landmarks = finder.find(standing)
+    landmarks = finder.find_in_space(standing) if model.sided else finder.find(standing)
 
     mass_kg, how = find_mass(subject, [source, trial] if static is not None else [trial])
     messages.append(how)
@@ -98,13 +111,17 @@ def measure(
         model, definition.table, landmarks, posture, mass_kg, height_m if height_m is not None else np.nan
     )
     check_masses(model, bodies, parts, mass_kg, height_m, messages)
-    start = _first_posture(model, geometry, finder, trial, needed, posture, messages)
+    start = posture if model.sided else _first_posture(model, geometry, finder, trial, needed, posture, messages)
     plan = ModelPlan(
         model, geometry, start.coordinates, fixed_lengths(model, bare), bodies,
         {s.name: reach(model, s.name, geometry, parts[s.name]) for s in model.segments}, tuple(sites),
     )  # fmt: skip
     report(model, plan, mass_kg, messages)
-    return plan, Measured(trial.ground, side, mass_kg, height_m, parts, tuple(messages))
+    placed_names = {site.recorded for site in sites}
+    window = standing_window(source.recording)
+    still = window is not None and window.start <= frames[0] < window.stop
+    left = tuple(c for c in chosen if c.recorded not in placed_names)
+    return plan, Measured(trial.ground, side, mass_kg, height_m, parts, tuple(messages), trial, left, still)
 
 
 def _common(match: MarkerMatch, other: MarkerMatch) -> MarkerMatch:
@@ -128,12 +145,29 @@ def needed_markers(model: ModelFile, finder: LandmarkFinder, locks: dict[str, fl
         wanted.setdefault(model.ground.origin, f"the ground origin of model {model.name}")
     keys: set[MarkerKey] = set()
     for name, why in wanted.items():
-        finder.require(name, why)
-        keys |= finder.markers_of(name)
+        own, plain = finder.of_side(name)
+        own.require(plain, why)
+        keys |= own.markers_of(plain)
     for length in model.lengths:
         if length.between is not None and all(finder.known(name) for name in length.between):
             keys |= finder.markers_of(length.between[0]) | finder.markers_of(length.between[1])
     return keys
+
+
+def flat_slopes(trial: Trial) -> dict[str, float]:
+    """Side -> slope (rad) of the line from heel to toe while that foot stands flat; none for a foot that never does."""
+    found: dict[str, float] = {}
+    pair = trial.match.marker_set.heel_toe
+    for side in SIDES:
+        names = [trial.match.names.get((name, side)) for name in pair or ()]
+        contact = foot_contact(trial.recording, trial.ground, [n for n in names if n]) if all(names) else None
+        if contact is None or contact.touching.shape[1] != 2:
+            continue
+        flat = contact.touching.all(axis=1)
+        if flat.any():
+            heel, toe = (trial.ground.points_to_ground(trial.recording.marker(str(n))) for n in names)
+            found[side] = float(np.median(slope((toe - heel)[flat])))
+    return found
 
 
 def table_markers(definition: ModelDefinition, finder: LandmarkFinder) -> set[MarkerKey]:
@@ -166,7 +200,7 @@ def _unmeasured_lengths(
 ) -> dict[str, float]:
     found: dict[str, float] = {}
     for length in definition.model.lengths:
-        if length.between is None or all(name in landmarks for name in length.between):
+        if length.between is None or all(name in landmarks for pair in length.pairs() for name in pair):
             continue
         part = definition.table.parts.get(length.name)
         if part is None or part.length_per_height is None or height_m is None:

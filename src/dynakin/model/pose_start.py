@@ -6,7 +6,7 @@ by bounded least squares with the core's analytic derivatives; limbs that do not
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -54,6 +54,7 @@ def start_posture(
     markers: Array,
     *,
     limits: Mapping[str, Interval] | None = None,
+    good_m: float = GOOD_M,
     bad_m: float = BAD_M,
     where: str = "start",
 ) -> PoseFit:
@@ -65,6 +66,7 @@ def start_posture(
             head anywhere.
         markers: (M, 3) or (T, M, 3) m, ground frame, in the order of the model's markers; NaN: not seen.
         limits: name -> (lower, upper) rad or m of coordinates that have any.
+        good_m: root mean square distance from which on nothing else is tried.
         bad_m: root mean square distance from which the fit is refused.
         where: opens the messages (a file's name).
 
@@ -75,7 +77,7 @@ def start_posture(
     measured = np.asarray(markers, dtype=float)
     if measured.ndim == 3:
         measured = _median(measured)
-    body = _Body(model, measured, dict(limits or {}), where)
+    body = _Body(model, measured, dict(limits or {}), where, good_m)
     best = body.fit()
     _refuse(body, best, bad_m, where)
     x = np.array(model.initial_state(), dtype=float)
@@ -83,6 +85,22 @@ def start_posture(
     q, _, _ = _core.coordinates(model, x)
     names = model.coordinate_names
     return PoseFit(dict(zip(names, map(float, q), strict=True)), x, body.distances(best.q), best.rms)
+
+
+def near(
+    model: _core.Model, x: Array, markers: Array, limits: Mapping[str, Interval]
+) -> tuple[Array, dict[str, float]]:
+    """State (n,) and coordinates of the fit that is reached from a state x (n,), one frame (M, 3) later, say.
+
+    Raises:
+        ModelError: fewer than three markers.
+    """
+    body = _Body(model, np.asarray(markers, dtype=float), dict(limits), "next frame")
+    q = body.solve(x[: body.n_free], wrap=False).q
+    state = np.array(x, dtype=float)
+    state[: body.n_free] = q
+    values, _, _ = _core.coordinates(model, state)
+    return state, dict(zip(model.coordinate_names, map(float, values), strict=True))
 
 
 def _median(frames: Array) -> Array:
@@ -104,7 +122,10 @@ class _Fit:
 class _Body:
     """The model with everything fixed but its coordinates, and the markers that it is laid on."""
 
-    def __init__(self, model: _core.Model, measured: Array, limits: dict[str, Interval], where: str) -> None:
+    def __init__(
+        self, model: _core.Model, measured: Array, limits: dict[str, Interval], where: str, good_m: float = GOOD_M
+    ) -> None:
+        self.good_m = good_m
         self.model = _core.Model(_bare(model.spec))
         spec = self.model.spec
         if measured.shape != (len(spec.markers), 3):
@@ -152,7 +173,7 @@ class _Body:
         rows = _core.marker_jacobian(self.model, self.state(q))[self.rows.ravel(), : self.n_free]
         return np.vstack([rows, np.diag(self.pull)])
 
-    def solve(self, start: Array) -> _Fit:
+    def solve(self, start: Array, wrap: bool = True) -> _Fit:
         """Bounded least squares over all free coordinates."""
         free = self.lower < self.upper
         q = np.clip(start, self.lower, self.upper)
@@ -170,7 +191,7 @@ class _Body:
             max_nfev=200,
         )
         end = full(found.x).copy()
-        endless = self.turns & np.isinf(self.lower) & np.isinf(self.upper)
+        endless = self.turns & np.isinf(self.lower) & np.isinf(self.upper) & wrap
         end[endless] = (end[endless] + np.pi) % (2.0 * np.pi) - np.pi
         return _Fit(end, float(np.sqrt(np.nanmean(self.distances(end) ** 2))))
 
@@ -180,15 +201,16 @@ class _Body:
         for start in self.starts():
             found = self.mended(self.solve(start))
             best = found if best is None or found.rms < best.rms else best
-            if best.rms < GOOD_M:
+            if best.rms < self.good_m:
                 break
         assert best is not None
         return best
 
-    def starts(self) -> list[Array]:
+    def starts(self) -> Iterator[Array]:
         """First guesses: the body at rest laid on the markers as a whole, its root alone, then other headings."""
         if not self.floating:
-            return [self.rest]
+            yield self.rest
+            return
         at_rest = _core.marker_positions(self.model, self.state(self.rest))
         root = self.seen & (np.array(self.segment_of) == self.roots[0])
         poses = [
@@ -200,7 +222,8 @@ class _Body:
         for angle in np.deg2rad([0.0, 90.0, 180.0, 270.0]):
             turn = Rotation.from_rotvec(angle * up).as_matrix()
             poses.append((turn, here - turn @ centre))
-        return [self.moved(*pose) for pose in poses]
+        for pose in poses:
+            yield self.moved(*pose)
 
     def moved(self, turn: Array, shift: Array) -> Array:
         """The rest posture carried along by a rigid motion: the root's coordinates for p -> turn p + shift."""
@@ -214,28 +237,24 @@ class _Body:
             return np.concatenate([p_now - p_to, _ARM * (R_now - R_to).ravel()])
 
         angles = self.turns[self.base]
-        best = None
+        best, least = self.rest.copy(), (np.inf, np.inf)
         for k in range(-1, 3 * int(angles.sum())):  # half a turn off is a saddle: quarter turns of each angle too
             start = self.rest[self.base].copy()
             if k >= 0:
                 start[np.flatnonzero(angles)[k // 3]] += 0.5 * np.pi * (k % 3 + 1)
             found = least_squares(gap, start)
-            if best is None or found.cost < best.cost:
-                best = found
-            if best.cost < 1e-12:
-                break
-        assert best is not None
-        q = self.rest.copy()
-        q[self.base] = best.x
-        endless = self.turns & np.isinf(self.lower)
-        q[endless] = (q[endless] + np.pi) % (2.0 * np.pi) - np.pi
-        return np.asarray(q)
+            end = np.where(angles, (found.x + np.pi) % (2.0 * np.pi) - np.pi, found.x)
+            # Three angles have two readings of every pose; the one with the smaller turns is meant.
+            rank = (round(float(found.cost), 9), float(np.abs(end - self.rest[self.base])[angles].sum()))
+            if rank < least:
+                least, best[self.base] = rank, end
+        return np.asarray(best)
 
     def mended(self, fit: _Fit) -> _Fit:
         """Starts the joints above the segment that fits worst again, elsewhere within their limits."""
         rng = np.random.default_rng(0)  # the same start for the same markers
         for _ in range(_RESTARTS):
-            if fit.rms < GOOD_M:
+            if fit.rms < self.good_m:
                 break
             away = self.distances(fit.q)
             worst = self.segment_of[int(np.nanargmax(away))]
@@ -291,7 +310,7 @@ def _paths(spec: _core.ModelSpec, order: dict[str, int]) -> tuple[list[list[int]
 
 def _refuse(body: _Body, fit: _Fit, bad_m: float, where: str) -> None:
     """Raises a ModelError that tells what is wrong, where the fit is bad."""
-    if fit.rms < GOOD_M:
+    if fit.rms < body.good_m:
         return
     found = f"{where}: the model fits the markers to {1000.0 * fit.rms:.0f} mm only (root mean square)"
     at_rest, own = _core.marker_positions(body.model, body.state(body.rest))[body.seen], body.measured[body.seen]

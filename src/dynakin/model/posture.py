@@ -194,10 +194,11 @@ def find_geometry(
     for length in model.lengths:
         if length.value_m is not None:
             lengths[length.name] = length.value_m
-        elif length.between is not None and all(name in landmarks for name in length.between):
-            start, end = length.between
-            lengths[length.name] = float(np.linalg.norm(landmarks[end] - landmarks[start]))
+        elif all(name in landmarks for pair in length.pairs() for name in pair):
+            apart = [float(np.linalg.norm(landmarks[end] - landmarks[start])) for start, end in length.pairs()]
+            lengths[length.name] = float(np.mean(apart))
             if lengths[length.name] < 1e-3:
+                start, end = length.pairs()[0]
                 raise ModelError(f"length {length.name}: landmarks {start} and {end} lie at one place")
     directions = {s.name: [np.array(t.direction) for t in s.placement] for s in model.segments}
     given = {name: value for name, value in locks.items() if value is not None}
@@ -209,7 +210,8 @@ def find_geometry(
         above = _without(model, segment)
         posture = find_posture(above, geometry, landmarks)
         offset = posture.to_local(segment.parent, landmarks[segment.origin]) - np.array(segment.translation)
-        lengths[segment.placement[0].length] = float(np.linalg.norm(offset))
+        if segment.side is None:
+            lengths[segment.placement[0].length] = float(np.linalg.norm(offset))
         directions[segment.name] = [offset / np.linalg.norm(offset)]
     posture = find_posture(model, geometry, landmarks)
     locked = {name: posture.coordinates[name] if value is None else value for name, value in locks.items()}

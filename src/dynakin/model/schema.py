@@ -7,11 +7,12 @@ examples.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
+from dynakin.model.mirroring import SUFFIXES, mirrored
 from dynakin.model.validation import Strict, nearest
 
 Vector3 = Annotated[tuple[float, float, float], Field(description="three numbers")]
@@ -80,6 +81,7 @@ class Segment(Strict):
     origin: str | None = None  # landmark of the joint by which it hangs
     frame: Literal["ground"] | Frame = "ground"  # "ground": axes of the ground frame while standing
     parts: tuple[str, ...] = ()  # names of the table and of the marker set
+    side: Literal["right", "left"] | None = None  # of a limb whose sides are modelled apart
     both_sides: bool = False  # lump right and left
     straight: Vector3 | None = None  # lay the parts one after the other along this direction
     translation: Vector3 = (0.0, 0.0, 0.0)
@@ -115,6 +117,7 @@ class Coordinate(Strict):
     value_deg: float | None = None
     value_m: float | None = None
     locked: bool = False
+    as_measured: bool = False  # locked at the angle found while standing
     source: str = ""
 
     @model_validator(mode="after")
@@ -145,6 +148,7 @@ class Length(Strict):
 
     name: str
     between: LandmarkPair | None = None
+    shared: bool = False  # the same for both sides: measured on each, the mean is taken
     value_m: Annotated[float, Field(gt=0.0)] | None = None
     estimated: bool = True
 
@@ -153,6 +157,14 @@ class Length(Strict):
         if (self.between is None) == (self.value_m is None):
             raise ValueError("expected either between = [landmark, landmark] or value_m")
         return self
+
+    def pairs(self) -> tuple[LandmarkPair, ...]:
+        """The landmarks between which it is measured: one pair, or one a side."""
+        if self.between is None:
+            return ()
+        if not self.shared:
+            return (self.between,)
+        return tuple((f"{self.between[0]}{s}", f"{self.between[1]}{s}") for s in SUFFIXES.values())
 
 
 class Ground(Strict):
@@ -174,6 +186,16 @@ class ModelFile(Strict):
     lengths: tuple[Length, ...] = ()
     coordinates: tuple[Coordinate, ...]
     segments: Annotated[tuple[Segment, ...], Field(min_length=1)]
+
+    @property
+    def sided(self) -> bool:
+        """Whether right and left limbs are modelled apart."""
+        return any(segment.side is not None for segment in self.segments)
+
+    @model_validator(mode="before")
+    @classmethod
+    def _both_sides(cls, data: Any) -> Any:
+        return mirrored(data) if isinstance(data, dict) else data
 
     @model_validator(mode="after")
     def _references(self) -> Self:

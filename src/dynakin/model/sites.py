@@ -11,6 +11,7 @@ from dynakin.model.frames import FIRST_FRAMES, Trial
 from dynakin.model.landmarks import LandmarkFinder
 from dynakin.model.marker_schema import Marker
 from dynakin.model.marker_set import MarkerKey, MarkerMatch
+from dynakin.model.mirroring import SUFFIXES
 from dynakin.model.plan import Site
 from dynakin.model.posture import Geometry, Posture, find_posture
 from dynakin.model.schema import ModelFile
@@ -28,24 +29,31 @@ class Candidate:
 
 def candidates(model: ModelFile, match: MarkerMatch, side: str) -> tuple[list[Candidate], list[str]]:
     """Markers of the chosen side on the model's segments, and sentences on those that are left out."""
-    home = {part: s.name for s in model.segments for part in s.parts} | {s.name: s.name for s in model.segments}
-    sites = match.sites(side)
-    chosen = [Candidate(m, key, name, home[m.segment]) for m, key, name in sites if m.segment in home]
+    sites = match.sites(side, not model.sided)
+    homes = {key: _home(model, m.segment, key[1]) for m, key, _ in sites}
+    chosen = [Candidate(m, key, name, home) for m, key, name in sites if (home := homes[key]) is not None]
     messages = [
         f"Marker {name} left out: model {model.name} has no segment {marker.segment!r}."
-        for marker, _, name in sites
-        if marker.segment not in home
+        for marker, key, name in sites
+        if homes[key] is None
     ]
     sides = ("right", "left", "centre") if side == "both" else (side, "centre")
     absent = [
         marker.aliases(s)[0]
         for marker in match.marker_set.markers
         for s in sides
-        if not marker.landmark_only and marker.aliases(s) and (marker.name, s) not in match.names
+        if marker.measures(not model.sided) and marker.aliases(s) and (marker.name, s) not in match.names
     ]
     if absent:
         messages.append(f"Markers that the recording lacks, left out: {', '.join(absent)}.")
     return chosen, messages
+
+
+def _home(model: ModelFile, name: str, side: str) -> str | None:
+    """The segment that has this part of the body, or this name, on this side."""
+    own = [s for s in model.segments if s.side in (None, side)]
+    plain = next((s.name for s in own if name in (s.name, s.name.removesuffix(SUFFIXES.get(side, "")))), None)
+    return plain or next((s.name for s in own if name in s.parts), None)
 
 
 def find_locks(
@@ -60,7 +68,9 @@ def find_locks(
     for candidate in chosen:
         counts[candidate.segment] += 1
     by_name = {segment.name: segment for segment in model.segments}
-    locks: dict[str, float | None] = {c.name: c.value or 0.0 for c in model.coordinates if c.locked}
+    locks: dict[str, float | None] = {
+        c.name: None if c.as_measured else c.value or 0.0 for c in model.coordinates if c.locked
+    }
     bare: set[str] = set()
     messages: list[str] = []
     for name, count in counts.items():
@@ -68,12 +78,12 @@ def find_locks(
         if count == 1:
             one = next(c.recorded for c in chosen if c.segment == name)
             messages.append(f"Segment {name} has one marker only ({one}): its angle leans on its neighbours.")
-        if count or not segment.axes:
+        if count or all(locks.get(axis.coordinate) is not None for axis in segment.axes):
             continue
         rule = segment.without_markers
         if rule is None:
             parts = {name, *segment.parts}
-            fitting = [m for m in match.marker_set.markers if m.segment in parts and not m.landmark_only]
+            fitting = [m for m in match.marker_set.markers if m.segment in parts and m.measures(not model.sided)]
             tried = ", ".join(alias for m in fitting for alias in (*m.right, *m.left, *m.centre))
             raise ModelError(
                 f"{match.where}: segment {name!r} has no marker (tried "
@@ -115,6 +125,8 @@ def place_sites(
         point = standing.get(c.key)
         if point is not None and np.isfinite(point).all():
             local = posture.to_local(c.segment, point * flat)
+        elif model.sided:
+            continue  # placed from frames that show it, once the rest of the body stands (`in_space`)
         else:
             later = np.flatnonzero(trial.usable(needed | {c.key}))[:FIRST_FRAMES]
             if not len(later):
@@ -131,7 +143,13 @@ def place_sites(
                 f"Marker {c.recorded} is not seen in the calibration frames: placed from "
                 f"{trial.recording.time[later[0]]:.2f} s on."
             )
-        assert c.marker.variance is not None  # the schema asks for it
-        name = c.marker.aliases(c.key[1])[0]
-        sites.append(Site(name, c.recorded, c.segment, local, c.marker.variance, 1e-3 * c.marker.soft_tissue_mm))
+        sites.append(site_of(c, local, model.sided))
     return sites, messages
+
+
+def site_of(candidate: Candidate, local: np.ndarray, in_space: bool) -> Site:
+    """A marker of the set at its place (3,) m on its segment."""
+    marker = candidate.marker
+    assert marker.variance is not None  # the schema asks for it
+    name = marker.aliases(candidate.key[1])[0]
+    return Site(name, candidate.recorded, candidate.segment, local, marker.variance, marker.soft_tissue_m(not in_space))

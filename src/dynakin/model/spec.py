@@ -42,7 +42,7 @@ def to_core(plan: ModelPlan) -> _core.ModelSpec:
                 _core.AxisSpec(
                     coordinate=axis.coordinate,
                     kind=axis.kind,
-                    direction=np.array(axis.direction),
+                    direction=np.array(axis.direction) / np.linalg.norm(axis.direction),
                     coefficients=list(axis.coefficients),
                     scale=axis.scale,
                 )

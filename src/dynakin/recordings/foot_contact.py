@@ -1,0 +1,80 @@
+"""When each foot stands on the floor, from its markers alone: near the floor, and slow."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.recordings.frame import GroundFrame
+from dynakin.recordings.landmarks import find_marker
+from dynakin.recordings.recording import Array, Recording
+from dynakin.recordings.standing import marker_speeds
+
+Flags = npt.NDArray[np.bool_]
+
+NEAR_FLOOR_M = 0.025
+"""Height of a marker over its own lowest place (5th percentile) up to which the skin under it may touch the floor."""
+SLOW_M_S = 0.5
+"""Speed up to which a foot stands. A swinging toe passes the floor within 2 cm too, but at 1.5 to 5 m/s."""
+GAP_S = 0.08
+"""Shorter interruptions of a stance, or stances, are none: a foot takes 0.2 s and more for a step."""
+BEFORE_S, AFTER_S = 0.05, 0.15
+"""A foot may bear load that long before its markers are slow (heel strike), and after the last one has left the floor
+(push-off: the toe rolls on while the marker over it rises)."""
+
+
+@dataclass(frozen=True, eq=False)
+class FootContact:
+    """What the markers tell of one foot.
+
+    Attributes:
+        outline: (T, K, 2) m, horizontal places [X, Z of the ground] of its markers, NaN where not seen.
+        touching: (T, K) markers that are near the floor and slow.
+        stands: (T,) in a stance; short gaps closed.
+        stances: frames [first, end) of each stance, not padded.
+    """
+
+    outline: Array
+    touching: Flags
+    stands: Flags
+    stances: tuple[tuple[int, int], ...]
+
+    def padded(self, stance: tuple[int, int], rate: float) -> slice:
+        """The frames in which this stance may bear load, as far as markers tell."""
+        before, after = round(BEFORE_S * rate), round(AFTER_S * rate)
+        return slice(max(0, stance[0] - before), min(len(self.stands), stance[1] + after))
+
+
+def foot_contact(recording: Recording, ground: GroundFrame, names: list[str]) -> FootContact | None:
+    """Contact of the foot that has these markers (heel, toe, ...), None where the recording has none of them."""
+    own = list(dict.fromkeys(marker for name in names if (marker := find_marker(recording, name))))
+    own = [name for name in own if np.isfinite(recording.marker(name)).all(axis=1).any()]
+    if not own:
+        return None
+    places = ground.points_to_ground(np.stack([recording.marker(name) for name in own], axis=1))
+    columns = [recording.marker_names.index(name) for name in own]
+    speed = marker_speeds(recording)[:, columns]
+    height = places[:, :, 1] - np.nanpercentile(places[:, :, 1], 5.0, axis=0)
+    with np.errstate(invalid="ignore"):
+        touching = (height < NEAR_FLOOR_M) & (speed < SLOW_M_S)
+    gap = max(1, round(GAP_S * recording.rate)) if recording.n_frames > 1 else 1
+    stands = _closed(np.asarray(touching.any(axis=1)), gap)
+    return FootContact(places[:, :, [0, 2]], touching, stands, tuple(runs(stands)))
+
+
+def runs(flags: Flags) -> list[tuple[int, int]]:
+    """Frames [first, end) of each stretch of true."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def _closed(flags: Flags, gap: int) -> Flags:
+    """Flags with short gaps closed, and then short stretches dropped, but for those at either end."""
+    flags = flags.copy()
+    for value in (True, False):
+        for first, end in runs(flags != value):
+            if end - first < gap and first > 0 and end < len(flags):
+                flags[first:end] = value
+    return flags

@@ -1,0 +1,151 @@
+"""Which foot stands on which plate, and when the total wrench is known."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dynakin import read
+from dynakin.errors import ConfigError
+from dynakin.recordings import GroundFrame, Plate, Recording, find_ground_frame
+from dynakin.recordings.foot_loads import MEASURED, OFF_PLATE, REASONS, SHARED, SWING, foot_loads, saturated
+
+LABORATORY = GroundFrame(np.eye(3), np.zeros(3), "+Y", np.array([1.0, 0.0, 0.0]))
+T = 400
+TIME = np.arange(T) / 100.0
+FEET = {"R": 0.1, "L": -0.1}
+CORNERS = np.array([[-0.3, 0.0, 0.4], [0.3, 0.0, 0.4], [0.3, 0.0, 0.0], [-0.3, 0.0, 0.0]])
+
+
+def plate(name: str, push: np.ndarray, cop: np.ndarray, corners: np.ndarray | None = None) -> Plate:
+    """Forces straight up at these places (T, 3)."""
+    force = np.zeros((T, 3))
+    force[:, 1] = push + np.where((push > 0.0) & (push < 900.0), 0.1 * np.sin(np.arange(T)), 0.0)  # never quite still
+    moment = np.cross(cop, force)
+    seen = np.where(push[:, None] > 10.0, cop, np.nan)
+    return Plate(name, force, moment, seen, np.zeros((T, 3)), corners)
+
+
+def walker(lift: dict[str, tuple[int, int]], plates: tuple[Plate, ...], forward: float = 0.0) -> Recording:
+    """Two feet with heel and toe; a foot is lifted 0.1 m and moved forward between two frames."""
+    names, paths = [], []
+    for side, z in FEET.items():
+        up, ahead = np.zeros(T), np.zeros(T)
+        if side in lift:
+            first, end = lift[side]
+            phase = np.clip((np.arange(T) - first) / (end - first), 0.0, 1.0)
+            up, ahead = 0.1 * np.sin(np.pi * phase), forward * phase
+        for marker, x in (("HEE", -0.1), ("TOE", 0.1)):
+            names.append(side + marker)
+            paths.append(np.stack([x + ahead, 0.03 + up, np.full(T, z)], axis=1))
+    return Recording("walker", None, TIME, tuple(names), np.stack(paths, axis=1), plates)
+
+
+def at(x: float, z: float) -> np.ndarray:
+    return np.broadcast_to([x, 0.0, z], (T, 3)).copy()
+
+
+def test_each_plate_goes_to_the_foot_under_which_it_lies_and_swing_is_zero() -> None:
+    lifted = slice(100, 200)
+    right, left = np.full(T, 300.0), np.full(T, 300.0)
+    right[lifted], left[lifted] = 0.0, 600.0
+    recording = walker({"R": (100, 200)}, (plate("a", left, at(0.0, -0.1)), plate("b", right, at(0.02, 0.12))))
+    loads = foot_loads(recording, LABORATORY)
+    assert loads.feet == ("right", "left")
+    assert loads.total_known.all() and loads.all_measured.all()
+    np.testing.assert_allclose(loads.wrench[:, 0, 1], right, atol=0.11)
+    np.testing.assert_allclose(loads.wrench[:, 1, 1], left, atol=0.11)
+    np.testing.assert_allclose(loads.wrench[:, 0, 3], -0.12 * loads.wrench[:, 0, 1], atol=1e-9)
+    assert (loads.reason[130:170, 0] == SWING).all() and (loads.reason[:, 1] == MEASURED).all()
+    assert any("a carries the left foot" in text for text in loads.messages)
+
+
+def test_a_step_beside_the_plates_leaves_the_total_out_while_it_may_bear_load() -> None:
+    right = np.where(np.arange(T) < 100, 300.0, 0.0)
+    left = np.full(T, 300.0)
+    recording = walker(
+        {"R": (100, 160)}, (plate("a", left, at(0.0, -0.1)), plate("b", right, at(0.0, 0.1))), forward=0.8
+    )
+    loads = foot_loads(recording, LABORATORY)
+    assert loads.total_known[:140].all() and not loads.total_known[165:].any()
+    assert (loads.reason[170:, 0] == OFF_PLATE).all() and np.isnan(loads.wrench[170:, 0]).all()
+    assert np.isfinite(loads.wrench[:, 1]).all()
+    assert any("right foot stands off the plates from 1.5" in text for text in loads.messages)
+
+
+def test_a_heel_beyond_the_edge_of_its_plate_is_off_it() -> None:
+    both = np.full(T, 300.0)
+    shifted = CORNERS + np.array([0.25, 0.0, 0.0])  # from x = -0.05: the heel markers at -0.1 lie 50 mm beyond
+    recording = walker(
+        {}, (plate("a", both, at(0.0, 0.1), shifted), plate("b", both, at(0.0, -0.1), CORNERS * [1, 1, -1]))
+    )
+    loads = foot_loads(recording, LABORATORY)
+    assert not loads.total_known.any() and (loads.reason[:, 0] == OFF_PLATE).all()
+    inside = walker(
+        {}, (plate("a", both, at(0.0, 0.1), CORNERS), plate("b", both, at(0.0, -0.1), CORNERS * [1, 1, -1]))
+    )
+    assert foot_loads(inside, LABORATORY).total_known.all()
+
+
+def test_two_feet_on_one_plate_share_it_and_their_sum_is_what_was_measured() -> None:
+    recording = walker({}, (plate("a", np.full(T, 600.0), at(0.01, 0.05)),))
+    loads = foot_loads(recording, LABORATORY)
+    assert loads.total_known.all() and not loads.all_measured.any()
+    assert (loads.reason == SHARED).all()
+    total = LABORATORY.wrench_to_ground(recording.total_wrench())
+    np.testing.assert_allclose(loads.wrench.sum(axis=1), total, atol=1e-9)
+    np.testing.assert_allclose(
+        loads.wrench[0, :, 1], [450.0, 150.0], rtol=1e-3
+    )  # 0.05 lies at three quarters of -0.1 to 0.1
+    assert any("Both feet stand on a" in text for text in loads.messages)
+
+
+def test_flight_is_measured_as_nothing_and_a_saturated_plate_is_not_measured() -> None:
+    jump = np.where((np.arange(T) >= 100) & (np.arange(T) < 160), 0.0, 300.0)
+    clipped = jump.copy()
+    clipped[200:220] = 900.0
+    recording = walker(
+        {"R": (100, 160), "L": (100, 160)}, (plate("a", jump, at(0.0, -0.1)), plate("b", clipped, at(0.0, 0.1)))
+    )
+    loads = foot_loads(recording, LABORATORY)
+    assert loads.total_known[100:160].all() and not loads.wrench[110:150].any()
+    assert not loads.total_known[200:220].any() and loads.total_known[220:].all()
+    np.testing.assert_array_equal(saturated(clipped), clipped == 900.0)
+    assert "plate not measured" in REASONS
+
+
+def test_a_user_knows_better_and_a_load_where_nobody_stands_is_said() -> None:
+    push = np.full(T, 300.0)
+    plates = (plate("a", push, at(0.0, -0.1)), plate("b", push, at(0.0, 0.1)), plate("c", push, at(2.0, 0.1)))
+    loads = foot_loads(walker({}, plates), LABORATORY)
+    assert not loads.total_known.any()
+    assert any(text.startswith("Warning: c carries up to 300 N") for text in loads.messages)
+    told = foot_loads(walker({}, plates), LABORATORY, assigned={"c": "right"})
+    assert told.total_known.all()
+    np.testing.assert_allclose(told.wrench[:, 0, 1], 600.0, rtol=1e-3)
+    with pytest.raises(ConfigError, match="'d' is not in walker; expected one of a, b, c"):
+        foot_loads(walker({}, plates), LABORATORY, assigned={"d": "right"})
+
+
+def test_real_plates(data_dir: Path) -> None:
+    folder = data_dir / "opencap_subject4"
+    squat = read(folder / "squats1.trc", folder / "squats1_grf.mot")
+    loads = foot_loads(squat, find_ground_frame(squat))
+    assert loads.all_measured.all()
+    assert any("plate 1 carries the right foot" in text for text in loads.messages)
+    walk = read(folder / "walking1.trc", folder / "walking1_grf.mot")
+    loads = foot_loads(walk, find_ground_frame(walk))
+    assert not loads.total_known[walk.time < 0.1].any()  # the left foot still pushes off beside the plates
+    assert loads.total_known[(walk.time > 0.25) & (walk.time < 1.2)].all()
+    gait = read(data_dir / "plugin_gait" / "GaitNormal_1.c3d")
+    ground = find_ground_frame(gait)
+    loads = foot_loads(gait, ground)
+    known = loads.total_known
+    assert known[(gait.time > 0.45) & (gait.time < 1.8)].all() and not known[gait.time < 0.3].any()
+    total = ground.wrench_to_ground(gait.total_wrench())
+    assert np.abs(loads.wrench.sum(axis=1) - total)[known].max() < 10.0  # an empty plate's noise is nobody's
+    turned = replace(gait, plates=tuple(replace(p, corners=None) for p in gait.plates))
+    assert foot_loads(turned, ground).total_known[(gait.time > 0.45) & (gait.time < 1.8)].all()
