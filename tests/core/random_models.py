@@ -157,8 +157,10 @@ def floating_model(seed: int, feet: int = 2) -> Spec:
     for name in limbs:
         first = name == "trunk" or name.endswith("_0")
         own = []
-        for _ in range(int(rng.integers(1, 4))):
-            coordinates.append(Coordinate(f"q{len(coordinates)}", rng.uniform(-0.5, 0.5), bool(rng.random() < 0.1)))
+        side, _, place = name.partition("_")
+        for k in range(int(rng.integers(1, 4))):
+            label = f"leg{place}_{k}_{side[0]}" if place else f"{name}_{k}"
+            coordinates.append(Coordinate(label, rng.uniform(-0.5, 0.5), bool(rng.random() < 0.1)))
             own.append(Axis(coordinates[-1].name, "rotation", unit_vector(rng)))
             if rng.random() < 0.3:
                 own[-1].coefficients = [0.1, float(rng.uniform(0.5, 1.2)), float(rng.uniform(-0.3, 0.3))]

@@ -115,6 +115,10 @@ def test_metrics_hold_the_keys_of_the_design(estimate: Estimate) -> None:
     metrics = compute_metrics(estimate)
     assert set(metrics) == {
         "schema_version",
+        "peak_moments_per_kg",
+        "work",
+        "asymmetry",
+        "feet",
         "window",
         "markers",
         "wrench",

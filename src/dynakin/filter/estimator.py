@@ -13,6 +13,7 @@ from dynakin.filter import presets
 from dynakin.filter.alignment import PASSES, delay_of, in_step, in_words, is_late
 from dynakin.filter.assemble import assemble
 from dynakin.filter.extend import continuous_noise, extended, initial_covariance
+from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.filter.live import StepEstimate, deviations_of, step_estimate
 from dynakin.filter.noise import Noise, gate_limits
 from dynakin.filter.samples import Sample, foreign_load, recording_arrays, sample_arrays
@@ -23,6 +24,7 @@ from dynakin.results import Estimate
 
 Array = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]
+Feet = Callable[[InitialModel], FootWrenches | None]
 
 
 class Estimator:
@@ -71,6 +73,7 @@ class Estimator:
         *,
         static: Recording | None = None,
         smooth: bool = False,
+        feet: Feet | None = None,
         progress: Progress | None = None,
     ) -> Estimate:
         """Estimate a whole recording.
@@ -79,6 +82,9 @@ class Estimator:
             recording: markers and plates, as `read` gives them.
             static: the same person and markers, standing: lengths and marker places are taken from it.
             smooth: whether each frame is estimated from all frames, those after it too (`filter.smoothing`).
+            feet: gives the wrench of each foot once the model is measured and its ground frame known. Moments are then
+                those that the feet's wrenches leave, adjusted so that nothing is left at the root; the state does not
+                depend on it. For models with a floating root.
             progress: called with (frames done, frames in all) now and then.
 
         Raises:
@@ -98,28 +104,38 @@ class Estimator:
         if foreign:
             wrench[:] = np.nan
             notes.append(foreign)
+        on_feet = None if feet is None or foreign else feet(initial)
         try:
-            arrays, wrench, clock = self._in_step(initial, recording.time, markers, wrench, progress)
+            arrays, shift, clock = self._in_step(initial, recording.time, markers, wrench, on_feet, progress)
+            wrench = in_step(recording.time, wrench, shift) if shift else wrench
+            on_feet = on_feet and on_feet.in_step(recording.time, shift)
             if smooth:
                 self.start_from(initial)
-                arrays = self.run_smoothed_arrays(recording.time, markers, wrench, progress)
+                arrays = self.run_smoothed_arrays(recording.time, markers, wrench, progress, on_feet)
         except ValueError as error:  # a frame that the core refuses, named by it
             raise RecordingError(f"{recording.path or recording.name}: {error}") from None
         config = self.settings() | {"smooth": smooth}
         notes += [] if foreign else clock
         assert self._filter is not None
         covariances = (initial_covariance(initial, self.noise), self._filter.covariance)
-        return assemble(arrays, self._core_model, initial, recording, (markers, wrench), config, notes, covariances)
+        measured = (markers, wrench)
+        return assemble(arrays, self._core_model, initial, recording, measured, config, notes, covariances, on_feet)
 
     def _in_step(
-        self, initial: InitialModel, time: Array, markers: Array, wrench: Array, progress: Progress | None
-    ) -> tuple[dict[str, Array], Array, list[str]]:
+        self,
+        initial: InitialModel,
+        time: Array,
+        markers: Array,
+        wrench: Array,
+        feet: FootWrenches | None,
+        progress: Progress | None,
+    ) -> tuple[dict[str, Array], float, list[str]]:
         """`run_arrays`, again with the plates brought into step where they turn out to lag.
 
         Returns:
-            The arrays, the wrench (T, 6) as the last run took it, and what there is to say of the plates' clock.
+            The arrays, the seconds by which the last run took the plates earlier, and what there is to say of that.
         """
-        arrays, shift, taken = self.run_arrays(time, markers, wrench, progress), 0.0, wrench
+        arrays, shift = self.run_arrays(time, markers, wrench, progress, feet), 0.0
         for _ in range(PASSES):
             delay = self._delay(arrays)
             if delay is None or not is_late(delay):
@@ -127,8 +143,8 @@ class Estimator:
             shift += delay[0]
             taken = in_step(time, wrench, shift)
             self.start_from(initial)
-            arrays = self.run_arrays(time, markers, taken, progress)
-        return arrays, taken, in_words(shift, self._delay(arrays))
+            arrays = self.run_arrays(time, markers, taken, progress, feet and feet.in_step(time, shift))
+        return arrays, shift, in_words(shift, self._delay(arrays))
 
     def start(self, recording: Recording, *, static: Recording | None = None) -> InitialModel:
         """Measure the model on a recording (or the first seconds of a live one) and make the filter ready to step.
@@ -162,13 +178,19 @@ class Estimator:
         return initial
 
     def run_arrays(
-        self, time: Array, markers: Array, wrench: Array, progress: Progress | None = None
+        self,
+        time: Array,
+        markers: Array,
+        wrench: Array,
+        progress: Progress | None = None,
+        feet: FootWrenches | None = None,
     ) -> dict[str, Array]:
         """Run over arrays after `start` or `start_from`, which it needs anew before another run.
 
         Args:
             time: (T,) s. markers: (T, M, 3) m, ground frame, in the order of the model's markers. wrench: (T, 6) N and
                 N m, ground on person, about the ground origin. NaN: not measured.
+            feet: as in `run`.
 
         Returns:
             Arrays by name, as `_core.Filter.run` gives them.
@@ -179,12 +201,17 @@ class Estimator:
         if self._filter is None:
             raise ConfigError("run_arrays: the estimator has not been started; call start or start_from first")
         time, markers, wrench = (np.ascontiguousarray(values) for values in (time, markers, wrench))
-        arrays = self._filter.run(time, markers, wrench, progress, output_sd=True)
+        arrays = self._filter.run(time, markers, wrench, progress, output_sd=True, feet=self._loads(feet))
         self._time = float(time[-1])
         return arrays
 
     def run_smoothed_arrays(
-        self, time: Array, markers: Array, wrench: Array, progress: Progress | None = None
+        self,
+        time: Array,
+        markers: Array,
+        wrench: Array,
+        progress: Progress | None = None,
+        feet: FootWrenches | None = None,
     ) -> dict[str, Array]:
         """`run_arrays`, then backwards over the same frames: the smoothed arrays take the places of the filtered.
 
@@ -195,7 +222,7 @@ class Estimator:
             raise ConfigError("run_smoothed_arrays: the estimator has not been started; call start or start_from first")
         check_can_smooth(self.noise)
         time, markers, wrench = (np.ascontiguousarray(values) for values in (time, markers, wrench))
-        arrays = self._filter.run_smoothed(time, markers, wrench, progress)
+        arrays = self._filter.run_smoothed(time, markers, wrench, progress, feet=self._loads(feet))
         self._time = float(time[-1])
         return smoothed(arrays)
 
@@ -246,6 +273,13 @@ class Estimator:
         if self._filter is None or self._core_model is None:
             raise ConfigError("deviations: the estimator has not been started; call start(recording) first")
         return deviations_of(self._core_model, self._filter.state, self._filter.covariance)
+
+    def _loads(self, feet: FootWrenches | None) -> _core.FootLoads | None:
+        assert self._core_model is not None
+        if feet is None:
+            return None
+        feet.check(self._core_model)
+        return feet.core()
 
     def _delay(self, arrays: dict[str, Array]) -> tuple[float, float] | None:
         assert self.initial is not None
