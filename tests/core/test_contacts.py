@@ -7,7 +7,7 @@ import pytest
 from oracle.state import Layout, unpack
 
 from core.bridge import close, filter_of, model_of
-from core.random_models import FEET, ROOT, floating_model, random_state, settings, trial
+from core.random_models import FEET, ROOT, floating_model, prior_sd, random_state, settings, trial
 from core.test_derivatives import BLOCKS, central_differences, compare
 from dynakin import _core
 
@@ -202,6 +202,37 @@ def test_what_splits_the_feet_is_independent_of_their_sum():
     for i in range(2):
         # cov(e_i - A_i sum e, sum e) = R_i - A_i S
         close(R[i] - share[i] @ S, np.zeros((6, 6)), 1e-12)
+
+
+@pytest.mark.parametrize("contact", [BOTH, (MEASURED, UNMEASURED)])
+def test_deviations_are_those_of_many_trials(contact):
+    """The filter takes the plates' sum, the moments the same plates by foot: nothing is counted twice."""
+    spec = MODELS[1]
+    model, layout = model_of(spec), Layout(spec)
+    rng = np.random.default_rng(23)
+    start = random_state(layout, rng)
+    spread = 0.02 * prior_sd(layout)  # small, so that tangents do
+    split, R = rng.normal(size=6) * 50.0, covariances(rng) * 0.05
+    chosen = quiet_settings(spec) | {"total_mass": None, "marker_variance": np.full(len(spec.markers), 1e-8)}
+    chosen |= {"wrench_covariance": R.sum(axis=0), "reference_point": np.zeros(3)}
+    roots = np.linalg.cholesky(R)
+    errors, sds = [], []
+    for _ in range(300):
+        truth = start + spread * rng.normal(size=layout.size)
+        feet = np.array([split, _core.wrench(model, truth) - split])
+        plates = feet + (roots @ rng.normal(size=(2, 6, 1)))[..., 0]
+        markers = _core.marker_positions(model, truth) + 1e-4 * rng.normal(size=(len(spec.markers), 3))
+        f = filter_of(spec, chosen, start, np.diag(spread**2))
+        f.update(markers, plates.sum(axis=0) if contact == BOTH else np.full(6, np.nan))
+        found = _core.contact_moments(model, f.state, loads_of(plates, R, contact), 0, f.covariance)
+        expected = _core.joint_moments(model, truth, external_of(spec, feet))
+        errors.append(np.concatenate([found["moments"] - expected, (found["foot_wrench"] - feet).ravel()]))
+        sds.append(np.concatenate([found["moments_sd"], found["foot_wrench_sd"].ravel()]))
+    mean_square, variance = np.mean(np.square(errors), axis=0), np.mean(np.square(sds), axis=0)
+    seen = np.sqrt(variance) > 1e-6
+    assert seen.sum() > 20
+    ratio = mean_square[seen] / variance[seen]
+    assert ratio.min() > 0.7 and ratio.max() < 1.35  # chi-square over 300 draws: 1 +- 0.08
 
 
 def feet_trial(spec, frames, seed):

@@ -117,6 +117,7 @@ def test_metrics_hold_the_keys_of_the_design(estimate: Estimate) -> None:
         "schema_version",
         "peak_moments_per_kg",
         "work",
+        "angles",
         "asymmetry",
         "feet",
         "window",

@@ -30,11 +30,13 @@ from dynakin.comparison import Trial, trial_of
 from dynakin.config import RunConfig, make_config, read_config
 from dynakin.errors import DynakinError
 from dynakin.filter import Estimator
+from dynakin.filter.zero import standing_zero
 from dynakin.identifiability import Identifiability, identifiability
 from dynakin.model import load_model
-from dynakin.recordings import read
+from dynakin.recordings import read, without_plate_loads
 from dynakin.report import read_sensitivity, save_figures
 from dynakin.results import Estimate, check_output_writable
+from dynakin.results.angles import with_angles
 
 
 def run(
@@ -53,6 +55,8 @@ def run(
     forward: Forward = None,
     table: TableName = None,
     plate_filter: PlateFilter = None,
+    zero: Annotated[str | None, typer.Option(help="Zero of the joint angles: model, standing.")] = None,
+    signs: Annotated[str | None, typer.Option(help="Names and signs of the joint angles: opensim, clinical.")] = None,
     force_threshold: ForceThreshold = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder for the results.")] = None,
     figures: Annotated[
@@ -78,6 +82,8 @@ def run(
         "forward": forward_direction(forward),
         "table": table,
         "plate_filter_hz": plate_filter,
+        "zero": zero,
+        "signs": signs,
         "force_threshold_n": force_threshold,
         "output": output,
     }
@@ -121,6 +127,7 @@ def estimate_from(
         plate_filter_hz=config.plate_filter_hz,
         force_threshold_n=config.force_threshold_n,
     )
+    recording = without_plate_loads(recording, config.plate_loads, config.vertical)
     static = None if config.static is None else read(config.static)
     estimator = Estimator(
         model,
@@ -130,8 +137,12 @@ def estimate_from(
         side=config.side,
         vertical=config.vertical,
         forward=config.forward,
+        loads=config.loads,
     )
     estimate = estimator.run(recording, static=static, smooth=config.smooth, progress=progress)
+    if (config.zero, config.signs) != ("model", "opensim"):
+        zero = standing_zero(estimator, estimate, static) if config.zero == "standing" else {}
+        estimate = with_angles(estimate, zero, config.signs)
     estimate = replace(estimate, config=config.as_used() | estimate.config)
     assert estimator.initial is not None
     comparison = trial_of({config.preset: estimate}, estimator.initial, model, whatever=True)

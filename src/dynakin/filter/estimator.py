@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 import numpy.typing as npt
@@ -18,7 +18,7 @@ from dynakin.filter.live import StepEstimate, deviations_of, step_estimate
 from dynakin.filter.noise import Noise, gate_limits
 from dynakin.filter.samples import Sample, foreign_load, recording_arrays, sample_arrays
 from dynakin.filter.smoothing import check_can_smooth, smoothed
-from dynakin.model import Bounds, InitialModel, ModelDefinition, Priors, initialise
+from dynakin.model import Bounds, CarriedLoad, InitialModel, ModelDefinition, Priors, initialise, with_loads
 from dynakin.recordings import Recording, check_plates
 from dynakin.results import Estimate
 
@@ -36,6 +36,7 @@ class Estimator:
         priors, bounds: prior standard deviations and half widths of (9); see `dynakin.model.priors`.
         side: limb markers of a lumped model ("auto", "right", "left", "both").
         vertical, forward: laboratory directions, found in the recording where "auto".
+        loads: known bodies that the person carries; the subject's mass is then needed, without them.
         lag: frames by which `delayed` lies behind `step`, for smoothing while it is measured; 0: none.
     """
 
@@ -50,10 +51,14 @@ class Estimator:
         vertical: str = "auto",
         forward: str | tuple[float, float, float] = "auto",
         lag: int = 0,
+        loads: Sequence[CarriedLoad] = (),
     ) -> None:
         if lag < 0:
             raise ConfigError(f"lag is {lag}, expected 0 frames or more")
+        if loads and model.subject.mass_kg is None:
+            raise ConfigError("loads: the plates carry them too, expected the person's own mass beside them (mass_kg)")
         self.model = model
+        self.loads = tuple(loads)
         self.noise = noise or presets.default()
         self.priors = priors or Priors()
         self.bounds = bounds or Bounds()
@@ -96,11 +101,11 @@ class Estimator:
         initial = self.start(recording, static=static)
         assert self._core_model is not None
         markers, wrench = recording_arrays(recording, initial, gaps=self.noise.recover)
-        check = check_plates(recording, initial.ground, initial.mass_kg)
+        check = check_plates(recording, initial.ground, initial.weighed_kg)
         if check.refusal:
             raise RecordingError(f"{recording.path or recording.name}: {check.refusal}")
         notes = list(check.messages)
-        foreign = foreign_load(check, initial.mass_kg, self.noise.plate_load_tolerance)
+        foreign = foreign_load(check, initial.weighed_kg, self.noise.plate_load_tolerance)
         if foreign:
             wrench[:] = np.nan
             notes.append(foreign)
@@ -162,7 +167,20 @@ class Estimator:
             priors=self.priors,
             bounds=self.bounds,
         )
-        return self.start_from(initial)
+        return self.start_from(with_loads(initial, self.loads))
+
+    def again(self) -> Estimator:
+        """Another one with the same model and settings, not started."""
+        return Estimator(
+            self.model,
+            self.noise,
+            priors=self.priors,
+            bounds=self.bounds,
+            side=self.side,
+            vertical=self.vertical,
+            forward=self.forward,
+            loads=self.loads,
+        )
 
     def start_from(self, initial: InitialModel) -> InitialModel:
         """Make the filter ready to step from a model that was measured before, or changed since."""
@@ -290,6 +308,7 @@ class Estimator:
         return {
             "model": str(self.model.path if self.model.path.parent.name != "builtin" else self.model.name),
             "side": self.side,
+            "loads": [load.model_dump(mode="json") for load in self.loads],
             "vertical": self.vertical,
             "forward": self.forward if isinstance(self.forward, str) else list(self.forward),
             "noise": self.noise.model_dump(mode="json"),
@@ -320,7 +339,7 @@ class Estimator:
             ),
             wrench_covariance=noise.wrench_covariance(),
             reference_point=initial.plate_centre if point == "auto" else np.array(point, dtype=float),
-            total_mass=initial.mass_kg if noise.total_mass_use == "frame" else None,
+            total_mass=initial.weighed_kg if noise.total_mass_use == "frame" else None,
             total_mass_variance=noise.total_mass,
             lower=initial.lower,
             upper=initial.upper,

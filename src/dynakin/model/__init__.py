@@ -4,6 +4,7 @@ measured on a recording."""
 from dynakin.model.definition import ModelDefinition, available_models, load_model
 from dynakin.model.initial import InitialModel
 from dynakin.model.initialise import initialise
+from dynakin.model.loads import CarriedLoad, with_loads
 from dynakin.model.marker_set import available_marker_sets, load_marker_set
 from dynakin.model.measure import measure
 from dynakin.model.priors import Bounds, Priors
@@ -12,6 +13,7 @@ from dynakin.model.table import load_table
 
 __all__ = [
     "Bounds",
+    "CarriedLoad",
     "InitialModel",
     "ModelDefinition",
     "Priors",
@@ -23,4 +25,5 @@ __all__ = [
     "load_model",
     "load_table",
     "measure",
+    "with_loads",
 ]

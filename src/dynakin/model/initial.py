@@ -41,6 +41,7 @@ class InitialModel:
         parts: the table's parts in each segment, as placed.
         messages: sentences on what was found, left out, locked or assumed.
         plan: the same as plain data.
+        carried_kg: mass of the known loads (`model.loads`), not in ``mass_kg``.
     """
 
     spec: _core.ModelSpec
@@ -61,3 +62,9 @@ class InitialModel:
     parts: dict[str, list[PlacedPart]]
     messages: tuple[str, ...]
     plan: ModelPlan
+    carried_kg: float = 0.0
+
+    @property
+    def weighed_kg(self) -> float:
+        """What the plates carry: the person and the known loads, kg."""
+        return self.mass_kg + self.carried_kg

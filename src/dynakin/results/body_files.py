@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from dynakin.results.angles import angle_columns
 from dynakin.results.estimate import AXES, COMPONENTS, Estimate
 from dynakin.results.pressure import LOADED_N
 from dynakin.results.storage_file import write_storage
@@ -22,6 +23,8 @@ def write_body_files(estimate: Estimate, folder: Path) -> None:
         write_mass_centre(estimate, folder / "centre_of_mass.sto")
     if "joint_loads" in estimate.data:
         write_joint_reactions(estimate, folder / "joint_reactions.sto")
+    if "zero_offset" in estimate.data:
+        write_angles(estimate, folder / "angles.sto")
     if estimate.foot_names:
         write_feet(estimate, folder / "feet.sto")
 
@@ -37,6 +40,12 @@ def write_powers(estimate: Estimate, path: Path) -> None:
         estimate.powers(),
         notes,
     )
+
+
+def write_angles(estimate: Estimate, path: Path) -> None:
+    """``angles.sto``: joint angles in degrees from the zero and with the names and signs that were asked for."""
+    names, values, lines = angle_columns(estimate)
+    write_storage(path, "Joint angles", estimate.time, names, values, in_degrees=True, notes=["Degrees.", *lines])
 
 
 def write_mass_centre(estimate: Estimate, path: Path) -> None:

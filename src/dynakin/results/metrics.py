@@ -57,10 +57,23 @@ def compute_metrics(estimate: Estimate) -> dict[str, Any]:
         "identifiability": learned(estimate),
         "peak_moments_per_kg": _peak_moments(estimate, window),
         "work": work(estimate, window),
+        "angles": _angles(estimate),
         "asymmetry": asymmetry(estimate, window),
         "feet": foot_figures(estimate, window),
         "events": _events(estimate),
         "timing": asdict(estimate.timing),
+    }
+
+
+def _angles(estimate: Estimate) -> dict[str, Any] | None:
+    """Where the joint angles of ``angles.sto`` have their zero, by coordinate; None where none were asked for."""
+    if "zero_offset" not in estimate.data:
+        return None
+    degrees = np.degrees(estimate.data["zero_offset"].values)
+    turning = zip(estimate.coordinate_names, degrees, estimate.is_rotation(), strict=True)
+    return {
+        "signs": estimate.data.attrs["angle_signs"],
+        "zero_deg": {name: float(value) for name, value, turns in turning if turns},
     }
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.recordings import GroundFrame, Recording
+from dynakin.recordings import GroundFrame, Recording, Surface
+from dynakin.recordings import centre_of_pressure as recorded_pressure
 
 Array = npt.NDArray[np.float64]
 
@@ -17,19 +18,21 @@ def centre_of_pressure(wrench: Array, height_m: float, threshold_n: float = LOAD
     """Where on the level plane y = ``height_m`` a wrench has no moment but about the vertical.
 
     Args:
-        wrench: (..., 6) N and N m about the ground's origin, ground frame; what is not modelled is NaN.
+        wrench: (T, 6) N and N m about the ground's origin, ground frame; what is not modelled is NaN.
 
     Returns:
-        Point (..., 3) m and free moment (...) N m about the vertical; NaN where the vertical force is below
+        Point (T, 3) m and free moment (T,) N m about the vertical; NaN where the vertical force is below
         ``threshold_n`` or a component that it takes is not known (in a plane: z and the free moment).
     """
-    fx, fy, fz, mx, my, mz = np.moveaxis(np.asarray(wrench, dtype=float), -1, 0)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        loaded = fy >= threshold_n
-        x = np.where(loaded, (mz + height_m * fx) / fy, np.nan)
-        z = np.where(loaded, (height_m * fz - mx) / fy, np.nan)
-    y = np.where(loaded, height_m, np.nan)
-    return np.stack([x, y, z], axis=-1), my - (z * fx - x * fz)
+    wrench = np.asarray(wrench, dtype=float)
+    known = np.isfinite(wrench)
+    filled = np.where(known, wrench, 0.0)
+    floor = Surface(np.array([0.0, height_m, 0.0]), np.array([0.0, 1.0, 0.0]))
+    point, free = recorded_pressure(filled[..., :3], filled[..., 3:], floor, threshold_n)
+    in_plane, across = known[..., [0, 1, 5]].all(axis=-1), known[..., 1:4].all(axis=-1)
+    pushed = known[..., 1] & (filled[..., 1] >= threshold_n)
+    told = np.stack([in_plane, known[..., 1], across], axis=-1) & pushed[..., None]
+    return np.where(told, point, np.nan), np.where(known.all(axis=-1) & pushed, free[..., 1], np.nan)
 
 
 def floor_height(recording: Recording, ground: GroundFrame) -> float:
