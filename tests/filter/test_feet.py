@@ -150,6 +150,20 @@ def test_centres_of_pressure_carry_the_whole_wrench(estimate: Estimate) -> None:
     assert (point[loaded, 1] == estimate.floor_height_m).all()
 
 
+def test_joint_loads_along_the_axes_of_either_segment(estimate: Estimate) -> None:
+    ground = estimate.joint_loads()
+    names = [str(name) for name in estimate.data["joint_segment"].values]
+    thigh, shank = names.index("left_0"), names.index("left_1")
+    R = values(estimate, "joint_orientations")
+    for frame, own in (("child", shank), ("parent", thigh)):
+        turned = estimate.joint_loads(frame)[:, shank]
+        for k in (0, 10, 30):
+            np.testing.assert_allclose(turned[k, :3], R[k, own].T @ ground[k, shank, :3], atol=1e-10)
+            np.testing.assert_allclose(turned[k, 3:], R[k, own].T @ ground[k, shank, 3:], atol=1e-10)
+    np.testing.assert_array_equal(np.isnan(estimate.joint_loads("child")), np.isnan(ground))
+    np.testing.assert_array_equal(estimate.joint_loads("parent")[:30, 0], ground[:30, 0])  # the ground's own
+
+
 def test_powers_and_work(estimate: Estimate) -> None:
     power = estimate.powers()
     np.testing.assert_array_equal(power, values(estimate, "moments") * values(estimate, "speeds"))

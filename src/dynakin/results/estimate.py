@@ -6,7 +6,7 @@ from copy import deepcopy
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -115,6 +115,25 @@ class Estimate:
         """Moments (T, C) in N m/kg, forces in N/kg: over the body mass, NaN where that is not known."""
         moments = self.data["moments"].transpose("time", "coordinate").values
         return np.asarray(moments / (self.mass_kg or np.nan))
+
+    def joint_loads(self, frame: Literal["ground", "parent", "child"] = "ground") -> np.ndarray:
+        """What each segment's parent does to it through its joint (T, J, 6), N and N m about the joint's centre.
+
+        Args:
+            frame: axes: the ground's, those of the parent segment (the ground's where there is none), or those of the
+                segment itself. Out of a planar model's plane the loads are NaN.
+        """
+        loads = self.data["joint_loads"].transpose("time", "joint", "component").values
+        if frame == "ground":
+            return np.asarray(loads)
+        R_GB = self.data["joint_orientations"].transpose("time", "joint", "axis", "axis_").values
+        if frame == "parent":
+            parents = self.data["joint_parent"].values
+            R_GB = np.where((parents < 0)[:, None, None], np.eye(3), R_GB[:, parents])
+        vectors = np.nan_to_num(loads).reshape(*loads.shape[:2], 2, 3) @ R_GB  # rows: v' R_GB is (R_BG v)'
+        known = np.isfinite(loads) | np.isnan(loads).all(axis=(0, 1))  # a number turned away from may not be known
+        turned = np.where(known.all(axis=2, keepdims=True), vectors.reshape(loads.shape), np.nan)
+        return np.where(np.isnan(loads).all(axis=(0, 1)), np.nan, turned)
 
     @cached_property
     def floor_height_m(self) -> float:
