@@ -88,6 +88,14 @@ void subtree_dynamics(const Model& model, const StateRef& x, const KinematicStat
   }
 }
 
+void subtree_external(const Model& model, const std::vector<Force>* external, std::vector<Force>& out) {
+  const int n = static_cast<int>(model.segments().size());
+  for (int i = 0; i < n; ++i) out[i] = external ? (*external)[i] : Force{};
+  if (!external) return;
+  for (int i = n - 1; i >= 0; --i)
+    if (const int parent = model.segments()[i].parent; parent != k_none) out[parent] += out[i];
+}
+
 void joint_moments(const Model& model, const KinematicState& state, const DynamicState& dynamics,
                    const std::vector<Force>* external, Eigen::Ref<Eigen::VectorXd> out) {
   out.setZero();

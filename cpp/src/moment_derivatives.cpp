@@ -14,14 +14,6 @@ Vector3 times_transposed(const VelocityResponse& B, const Motion& m) {
   return 2.0 * B.momentum.cross(m.lin) + B.angular.transpose() * m.ang;
 }
 
-void sum_external(const Model& model, const std::vector<Force>* external, std::vector<Force>& out) {
-  const int n = static_cast<int>(model.segments().size());
-  for (int i = 0; i < n; ++i) out[i] = external ? (*external)[i] : Force{};
-  if (!external) return;
-  for (int i = n - 1; i >= 0; --i)
-    if (const int parent = model.segments()[i].parent; parent != k_none) out[parent] += out[i];
-}
-
 void vary(int column, const SubtreeState& t, const Motion& screw, const Motion& rate, const Motion& second,
           std::vector<Variation>& out) {
   out.push_back({column, screw, rate, second, by_position(t, screw, rate, second)});
@@ -117,7 +109,7 @@ MomentWorkspace::MomentWorkspace(const Model& model)
 void moment_jacobian(const Model& model, const StateRef& x, const KinematicState& state, const DynamicState& dynamics,
                      const std::vector<Force>* external, MomentWorkspace& work, MomentMatrix out) {
   out.setZero();
-  sum_external(model, external, work.external);
+  subtree_external(model, external, work.external);
   prepare(model, x, state, dynamics, work, out);
   const auto& variations = work.variations;
   // Each segment k with those it hangs on: other branches do not feel each other.

@@ -24,6 +24,13 @@ double deviation(const Row& row, const std::vector<int>& columns, const Eigen::M
 
 }  // namespace
 
+void row_variances(const Eigen::MatrixXd& J, const Eigen::MatrixXd& P, Eigen::MatrixXd& JP, double* out) {
+  JP.setZero();
+  for (Eigen::Index c = 0; c < P.cols(); ++c)
+    if (!J.col(c).isZero(0.0)) JP.noalias() += J.col(c) * P.col(c).transpose();
+  for (Eigen::Index k = 0; k < J.rows(); ++k) out[k] = JP.row(k).dot(J.row(k));
+}
+
 OutputDeviation::OutputDeviation(const Model& model) : model_(model), work_(model) {
   std::size_t widest = 0;
   for (std::size_t m = 0; m < model.markers().size(); ++m) {
@@ -56,11 +63,8 @@ void OutputDeviation::wrench(const KinematicState& state, const DynamicState& dy
 void OutputDeviation::moments(const StateRef& x, const KinematicState& state, const DynamicState& dynamics,
                               const Eigen::MatrixXd& P, double* out) {
   moment_jacobian(model_, x, state, dynamics, nullptr, work_, moment_J_);
-  moment_JP_.setZero();
-  for (Eigen::Index c = 0; c < P.cols(); ++c)  // most columns do not matter to moments
-    if (!moment_J_.col(c).isZero(0.0)) moment_JP_.noalias() += moment_J_.col(c) * P.col(c).transpose();
-  for (Eigen::Index k = 0; k < moment_J_.rows(); ++k)
-    out[k] = std::sqrt(std::max(moment_JP_.row(k).dot(moment_J_.row(k)), 0.0));
+  row_variances(moment_J_, P, moment_JP_, out);
+  for (Eigen::Index k = 0; k < moment_J_.rows(); ++k) out[k] = std::sqrt(std::max(out[k], 0.0));
 }
 
 }  // namespace dynakin

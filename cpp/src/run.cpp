@@ -43,7 +43,7 @@ RunRecord::RunRecord(const Model& model, std::size_t frames, bool output_sd)
 }
 
 void run_frames(Filter& filter, const double* time, const double* markers, const double* wrench, std::size_t first,
-                std::size_t end, RunRecord& record) {
+                std::size_t end, RunRecord& record, ContactRecord* contacts) {
   using clock = std::chrono::steady_clock;
   const Model& model = filter.model();
   const auto n = static_cast<std::size_t>(model.state_size());
@@ -74,13 +74,18 @@ void run_frames(Filter& filter, const double* time, const double* markers, const
     const Measurement& now = filter.evaluate();
     std::copy_n(now.predicted().data(), m, record.markers_estimated.data() + k * m);
     Eigen::Map<Vector6>(record.wrench_estimated.data() + 6 * k) = now.dynamics().wrench.vector();
-    joint_moments(model, now.kinematics(), now.dynamics(), nullptr,
-                  Eigen::Map<Eigen::VectorXd>(record.moments.data() + k * nc, nc));
-    if (!record.deviation) continue;
     const Eigen::MatrixXd& P = filter.covariance();
+    if (contacts)
+      contacts->report(k, filter.state(), now.kinematics(), now.dynamics(), record.deviation ? &P : nullptr,
+                       record.moments.data() + k * nc, record.moments_sd.data() + (record.deviation ? k * nc : 0));
+    else
+      joint_moments(model, now.kinematics(), now.dynamics(), nullptr,
+                    Eigen::Map<Eigen::VectorXd>(record.moments.data() + k * nc, nc));
+    if (!record.deviation) continue;
     record.deviation->markers(now.kinematics(), P, record.markers_sd.data() + k * m);
     record.deviation->wrench(now.kinematics(), now.dynamics(), P, record.wrench_sd.data() + 6 * k);
-    record.deviation->moments(filter.state(), now.kinematics(), now.dynamics(), P, record.moments_sd.data() + k * nc);
+    if (!contacts)
+      record.deviation->moments(filter.state(), now.kinematics(), now.dynamics(), P, record.moments_sd.data() + k * nc);
   }
 }
 

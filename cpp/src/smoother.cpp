@@ -43,11 +43,11 @@ Smoother::Smoother(Filter& filter, const double* time, const double* markers, co
   pass_.start();
 }
 
-void Smoother::forward(std::size_t first, std::size_t end, RunRecord& record) {
+void Smoother::forward(std::size_t first, std::size_t end, RunRecord& record, ContactRecord* contacts) {
   while (first < end) {
     if (first % stretch_ == 0) filter_.save(checkpoints_[first / stretch_]);
     const std::size_t next = std::min(end, (first / stretch_ + 1) * stretch_);
-    run_frames(filter_, time_, markers_, wrench_, first, next, record);
+    run_frames(filter_, time_, markers_, wrench_, first, next, record, contacts);
     first = next;
   }
   if (end == frames_) filter_.save(checkpoints_.back());
@@ -75,7 +75,7 @@ void Smoother::replay(std::size_t first, std::size_t end, const RunRecord& recor
   filter_.record_to(nullptr);
 }
 
-std::size_t Smoother::backward(const RunRecord& record, SmoothRecord& out) {
+std::size_t Smoother::backward(const RunRecord& record, SmoothRecord& out, ContactRecord* contacts) {
   using clock = std::chrono::steady_clock;
   if (left_ == 0) return 0;
   const std::size_t first = (left_ - 1) / stretch_ * stretch_;
@@ -83,7 +83,7 @@ std::size_t Smoother::backward(const RunRecord& record, SmoothRecord& out) {
   for (std::size_t k = left_; k-- > first;) {
     const Frame& frame = replayed_[k - first];
     const auto start = clock::now();
-    report(k, frame, out);
+    report(k, frame, out, contacts);
     pass_.undo(frame.tape, k > 0 ? time_[k] - time_[k - 1] : 0.0);
     out.backward_us[k] = std::chrono::duration<double, std::micro>(clock::now() - start).count();
   }
@@ -92,7 +92,7 @@ std::size_t Smoother::backward(const RunRecord& record, SmoothRecord& out) {
   return left_;
 }
 
-void Smoother::report(std::size_t k, const Frame& frame, SmoothRecord& out) {
+void Smoother::report(std::size_t k, const Frame& frame, SmoothRecord& out, ContactRecord* contacts) {
   const Model& model = filter_.model();
   const auto n = static_cast<std::size_t>(model.state_size());
   const std::size_t m = 3 * model.markers().size(), nc = model.coordinates().size();
@@ -106,10 +106,14 @@ void Smoother::report(std::size_t k, const Frame& frame, SmoothRecord& out) {
   for (std::size_t i = 0; i < m / 3; ++i)
     Eigen::Map<Vector3>(out.markers.data() + k * m + 3 * i) = kinematics_.markers[i];
   Eigen::Map<Vector6>(out.wrench.data() + 6 * k) = dynamics_.wrench.vector();
-  joint_moments(model, kinematics_, dynamics_, nullptr,
-                Eigen::Map<Eigen::VectorXd>(out.moments.data() + k * nc, static_cast<Eigen::Index>(nc)));
   deviation_.markers(kinematics_, P_, out.markers_sd.data() + k * m);
   deviation_.wrench(kinematics_, dynamics_, P_, out.wrench_sd.data() + 6 * k);
+  if (contacts) {
+    contacts->report(k, x_, kinematics_, dynamics_, &P_, out.moments.data() + k * nc, out.moments_sd.data() + k * nc);
+    return;
+  }
+  joint_moments(model, kinematics_, dynamics_, nullptr,
+                Eigen::Map<Eigen::VectorXd>(out.moments.data() + k * nc, static_cast<Eigen::Index>(nc)));
   deviation_.moments(x_, kinematics_, dynamics_, P_, out.moments_sd.data() + k * nc);
 }
 

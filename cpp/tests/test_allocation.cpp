@@ -4,6 +4,8 @@
 #include <new>
 
 #include "check.hpp"
+#include "dynakin/body.hpp"
+#include "dynakin/contacts.hpp"
 #include "dynakin/filter.hpp"
 #include "dynakin/fixed_lag.hpp"
 #include "dynakin/moment_derivatives.hpp"
@@ -142,6 +144,34 @@ void check_moments_allocate_nothing(const dynakin::ModelSpec& spec) {
   CHECK(jacobian.allFinite() && jacobian.norm() > 0.0);
 }
 
+// All kinds of contact, with deviations, and the joints' loads.
+void check_contacts_allocate_nothing(const dynakin::ModelSpec& spec) {
+  using namespace dynakin;
+  const Model model(spec);
+  const Eigen::VectorXd x = model.initial_state();
+  const Eigen::MatrixXd P = prior_for(model);
+  KinematicState kinematics(model);
+  DynamicState dynamics(model);
+  forward_kinematics(model, x, kinematics);
+  subtree_dynamics(model, x, kinematics, dynamics);
+  ContactMoments contacts(model, {0, static_cast<int>(model.segments().size()) - 1});
+  std::vector<FootLoad> loads(2);
+  Eigen::VectorXd moments(model.coordinates().size());
+  std::vector<double> moments_sd(model.coordinates().size()), wrench_sd(12);
+  std::vector<Force> joints(model.segments().size());
+  for (const Contact first : {Contact::none, Contact::measured, Contact::unmeasured}) {
+    loads[0].contact = first;
+    loads[1].contact = Contact::measured;
+    const long before = allocations;
+    CHECK(contacts.distribute(dynamics, loads));
+    contacts.moments(kinematics, dynamics, moments);
+    contacts.deviations(x, kinematics, dynamics, P, moments_sd.data(), wrench_sd.data());
+    joint_loads(model, kinematics, dynamics, nullptr, joints);
+    CHECK(allocations == before);
+    CHECK(moments.allFinite() && contacts.remainder().norm() < 1e-9 && wrench_sd[6] > 0.0);
+  }
+}
+
 // Bounds that bind, an equality, a gap; with and without deviations, and what is reported of the state with both.
 void check_fixed_lag_allocates_nothing(const dynakin::ModelSpec& spec, bool deviations) {
   using namespace dynakin;
@@ -198,6 +228,10 @@ TEST(keeping_bodies_possible_allocates_nothing) {
 TEST(the_moments_derivatives_allocate_nothing) {
   check_moments_allocate_nothing(planar_chain());
   check_moments_allocate_nothing(spatial_tree());
+}
+TEST(contacts_allocate_nothing) {
+  check_contacts_allocate_nothing(planar_chain());
+  check_contacts_allocate_nothing(spatial_tree());
 }
 TEST(a_fixed_lag_allocates_nothing) {
   for (bool deviations : {false, true}) {

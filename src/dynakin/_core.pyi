@@ -418,6 +418,26 @@ def plates_jacobian(model: Model, x: Annotated[NDArray[numpy.float64], dict(shap
     d plates / dx (6, n) as the filter has it; components that are not measured are 0.
     """
 
+class FootLoads:
+    """
+    Wrenches of the feet over a trial, how sure they are, and what touches.
+    """
+
+    def __init__(self, segments: Sequence[str], wrench: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], covariance: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None, None), order='C', device='cpu', writable=False)], contact: Annotated[NDArray[numpy.uint8], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> None:
+        """
+        segments: a name a foot. wrench (T, F, 6) N and N m, ground on person, about the ground origin; covariance (T, F, 6, 6) of each, positive definite; contact (T, F) uint8: 0 in the air, 1 measured, 2 not measured. wrench and covariance count where 1. Raises ValueError for other shapes or codes.
+        """
+
+def contact_moments(model: Model, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)], loads: FootLoads, frame: int = 0, covariance: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='F')] | None = None) -> dict:
+    """
+    Joint moments with the feet's wrenches of one frame, changed as little as their covariances allow to give the wrench that x needs. A dict: moments (C,), N m or N; jacobian, d moments / dx (C, n); foot_wrench (F, 6) as used; foot_adjustment (F, 6), its change; remainder (6,) that no foot gives; moment_source (C,): 0 measured, 1 derived from the motion, 2 unknown (NaN); with the covariance (n, n) of x also moments_sd, foot_wrench_sd.
+    """
+
+def whole_body(model: Model, states: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], segments: Sequence[str] = [], foot_wrench: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)] | None = None) -> dict:
+    """
+    Of states (T, n), with the wrenches foot_wrench (T, F, 6) on the named segments: mass (T,) kg, mass_centre and mass_centre_velocity (T, 3), joint_centres (T, S, 3) and orientations (T, S, 3, 3) R_GB of the segments, and joint_loads (T, S, 6): force and moment of the parent on each segment, ground axes, about its joint centre.
+    """
+
 class RecoverySettings:
     """When the motion counts as lost, and how it is sought anew."""
 
@@ -506,12 +526,12 @@ class Filter:
     def step(self, dt: float, markers: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], wrench: Annotated[NDArray[numpy.float64], dict(shape=(6), order='C')]) -> StepReport:
         """predict(dt), then update(markers, wrench)."""
 
-    def run(self, time: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], markers: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], wrench: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], progress: object | None = None, output_sd: bool = False) -> dict:
+    def run(self, time: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], markers: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], wrench: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], progress: object | None = None, output_sd: bool = False, feet: FootLoads | None = None) -> dict:
         """
-        Runs over time (T,), markers (T, M, 3) and wrench (T, 6); the first frame is an update only. Returns arrays by name; with output_sd also markers_sd, wrench_sd (of the body's own wrench) and moments_sd. Raises DivergenceError naming the frame. progress(done, total) is called now and then.
+        Runs over time (T,), markers (T, M, 3) and wrench (T, 6); the first frame is an update only. Returns arrays by name; with output_sd also markers_sd, wrench_sd (of the body's own wrench) and moments_sd. With feet the moments are those of contact_moments, and foot_wrench, foot_adjustment, remainder, moment_source (and foot_wrench_sd) come with them. Raises DivergenceError naming the frame. progress(done, total) is called now and then.
         """
 
-    def run_smoothed(self, time: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], markers: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], wrench: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], progress: object | None = None, output_sd: bool = False, stretch: int = 0) -> dict:
+    def run_smoothed(self, time: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], markers: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], wrench: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], progress: object | None = None, output_sd: bool = False, stretch: int = 0, feet: FootLoads | None = None) -> dict:
         """
         run, then backwards over the same frames: the arrays of run, and smoothed_state, _markers, _wrench and _moments, each also with _sd, and backward_us. The filter then stands where run would have left it; after an interruption it stands anywhere. progress counts both ways: total is twice the frames. Memory beside the arrays: T / stretch checkpoints and stretch frames; 0: sqrt(T). Raises ValueError where bounds are kept by constraint 'gain' or 'sigmoid'.
         """

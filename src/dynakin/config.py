@@ -11,9 +11,10 @@ from pydantic import Field, model_validator
 from dynakin.errors import ConfigError, ModelError
 from dynakin.filter import Noise, presets
 from dynakin.filter.extend import QUANTITIES, Quantity
-from dynakin.model import Bounds, Priors, Subject
+from dynakin.model import Bounds, CarriedLoad, Priors, Subject
 from dynakin.model.subject import Sex
 from dynakin.model.validation import Strict, nearest, validate
+from dynakin.recordings import PlateLoad
 
 # Keys that name files: relative to the configuration file that they stand in.
 _PATHS = ("trial", "forces", "static", "output")
@@ -65,6 +66,17 @@ class RunConfig(Strict):
     force_threshold_n: float | None = Field(default=None, examples=[10.0])
     """Load below which a plate counts as empty. Not given: 10 N for plates that are resampled."""
 
+    zero: Literal["model", "standing"] = "model"
+    """Zero of the joint angles in angles.sto: model, or standing (in the static trial, else in the trial itself)."""
+    signs: Literal["opensim", "clinical"] = "opensim"
+    """Names and signs of the joint angles in angles.sto: opensim (the coordinates'), or clinical."""
+    loads: tuple[CarriedLoad, ...] = ()
+    """Known bodies that the person carries: [[loads]] with segment, mass_kg, place_m (centre of mass in the segment's
+    frame, m), inertia_kg_m2 and name. mass_kg, the person's own, is then needed."""
+    plate_loads: tuple[PlateLoad, ...] = ()
+    """Constant loads on plates that are not the person's (a rail): [[plate_loads]] with plate, force_n, point_m,
+    moment_nm, laboratory frame."""
+
     noise: dict[str, Any] = Field(default_factory=dict)
     """Variances, SI units squared. Defaults: those of the preset."""
     priors: Priors = Priors()
@@ -82,6 +94,8 @@ class RunConfig(Strict):
         try:
             self.subject()
             self.noise_settings()
+            if self.loads and self.mass_kg is None:
+                raise ConfigError("loads: the plates carry them too, expected mass_kg, the person's own")
         except (ModelError, ConfigError) as error:
             raise ValueError(error.message) from None
         return self

@@ -141,6 +141,48 @@ def planar_model(seed: int, n_segments: int = 0) -> Spec:
     return Spec(name, coordinates, parameters, segments, markers, wrench_measured=list(PLANAR_WRENCH))
 
 
+FEET = ("left_2", "right_2")
+ROOT = ("tx", "ty", "tz", "rx", "ry", "rz")
+
+
+def floating_model(seed: int, feet: int = 2) -> Spec:
+    """A body whose root has all six freedoms, with a leg of three segments a foot (`FEET`) and two that hang free."""
+    rng = np.random.default_rng(seed)
+    parameters = [Parameter(f"l{k}", rng.uniform(0.2, 0.5), rng.random() < 0.75) for k in range(3)]
+    coordinates = [Coordinate(name, rng.uniform(-0.3, 0.3)) for name in ROOT]
+    kinds = ["translation"] * 3 + ["rotation"] * 3
+    axes = [Axis(name, kind, np.eye(3)[k % 3]) for k, (name, kind) in enumerate(zip(ROOT, kinds, strict=True))]
+    segments = [Segment("root", "ground", np.eye(3), np.zeros(3), [], axes, inertia(rng), [True] * 10)]
+    limbs = [f"{side}_{k}" for side in ("left", "right")[:feet] for k in range(3)] + ["trunk", "arm"]
+    for name in limbs:
+        first = name == "trunk" or name.endswith("_0")
+        own = []
+        side, _, place = name.partition("_")
+        for k in range(int(rng.integers(1, 4))):
+            label = f"leg{place}_{k}_{side[0]}" if place else f"{name}_{k}"
+            coordinates.append(Coordinate(label, rng.uniform(-0.5, 0.5), bool(rng.random() < 0.1)))
+            own.append(Axis(coordinates[-1].name, "rotation", unit_vector(rng)))
+            if rng.random() < 0.3:
+                own[-1].coefficients = [0.1, float(rng.uniform(0.5, 1.2)), float(rng.uniform(-0.3, 0.3))]
+        segments.append(
+            Segment(
+                name,
+                "root" if first else segments[-1].name,
+                rotation(rng),
+                rng.uniform(-0.2, 0.2, 3),
+                [Length(f"l{rng.integers(3)}", unit_vector(rng))],
+                own,
+                inertia(rng),
+                [bool(b) for b in rng.random(10) < 0.7],
+            )
+        )
+    markers = [
+        Marker(f"m{k}", s.name, rng.uniform(-0.2, 0.2, 3), [True] * 3, [bool(b) for b in rng.random(3) < 0.4])
+        for k, s in enumerate(s for s in segments for _ in range(3))
+    ]
+    return Spec(f"floating {seed}", coordinates, parameters, segments, markers)
+
+
 def with_slow_errors(spec: Spec, seed: int, delay: bool = True) -> Spec:
     """The same model with soft tissue under some markers' axes, and plates that err slowly and come late."""
     spec, rng = deepcopy(spec), np.random.default_rng(seed)

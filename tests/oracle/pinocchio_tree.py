@@ -38,8 +38,11 @@ def _joint(kind: str, direction: NDArray) -> Any:
     return pin.JointModelPrismaticUnaligned(direction)
 
 
-def solve(spec: Any, values: Values) -> dict[str, NDArray]:
-    """Poses, marker positions, total wrench and joint moments, all from Pinocchio's ``rnea``."""
+def solve(spec: Any, values: Values, external: NDArray | None = None) -> dict[str, NDArray]:
+    """Poses, marker positions, total wrench, joint moments and loads, energy and centre of mass, all from Pinocchio.
+
+    external: (S, 6) wrenches on the segments about the ground's origin, which ``rnea`` takes off moments and loads.
+    """
     model = pin.Model()
     model.gravity = pin.Motion(np.asarray(spec.gravity, float), np.zeros(3))
     base = model.addJoint(0, pin.JointModelFreeFlyer(), pin.SE3.Identity(), "base")
@@ -68,7 +71,12 @@ def solve(spec: Any, values: Values) -> dict[str, NDArray]:
         model.appendBodyToJoint(joint, _inertia(values.inertia[k]), place)
     data = model.createData()
     pin.forwardKinematics(model, data, np.array(position))
-    tau = pin.rnea(model, data, np.array(position), np.array(speed), np.array(acceleration))
+    applied = [pin.Force.Zero() for _ in range(model.njoints)]
+    for segment, wrench in zip(spec.segments, [] if external is None else external, strict=external is not None):
+        joint = joint_of[segment.name]
+        applied[joint] += data.oMi[joint].actInv(pin.Force(np.array(wrench, float)))
+    tau = pin.rnea(model, data, np.array(position), np.array(speed), np.array(acceleration), applied)
+    origin_loads = [data.oMi[j].act(data.f[j]) for j in range(model.njoints)]
     poses = [data.oMi[joint_of[s.name]] * place_of[s.name] for s in spec.segments]
     names = [s.name for s in spec.segments]
     moments = np.zeros(len(spec.coordinates))
@@ -85,4 +93,12 @@ def solve(spec: Any, values: Values) -> dict[str, NDArray]:
         ),
         "wrench": tau[:6].copy(),
         "moments": moments,
+        # A force of the joint's first axis is that of all its axes: they have no mass between them.
+        "loads": np.array([origin_loads[joint_of[s.name]].vector for s in spec.segments]),
+        "energy": np.array(
+            pin.computeKineticEnergy(model, data, np.array(position), np.array(speed))
+            + pin.computePotentialEnergy(model, data, np.array(position))
+        ),
+        "mass_centre": pin.centerOfMass(model, data, np.array(position), np.array(speed), False).copy(),
+        "mass_centre_velocity": data.vcom[0].copy(),
     }

@@ -58,3 +58,12 @@ def test_markers_in_their_own_unit_with_gaps(folder: Path, estimate: Estimate) -
     values = flat.getMatrix().to_numpy().reshape(expected.shape)
     np.testing.assert_allclose(values, expected, atol=1e-6, equal_nan=True)
     assert np.isnan(values).any()
+
+
+@pytest.mark.parametrize("name", ["powers.sto", "centre_of_pressure.sto"])
+def test_tables_of_the_body(folder: Path, estimate: Estimate, name: str) -> None:
+    table = opensim.TimeSeriesTable(str(folder / name))
+    assert table.getNumRows() == len(estimate.time)
+    if name == "powers.sto":
+        assert list(table.getColumnLabels()) == [f"{c}_power" for c in estimate.coordinate_names]
+        np.testing.assert_allclose(table.getMatrix().to_numpy(), estimate.powers(), rtol=1e-12, atol=1e-12)

@@ -26,6 +26,9 @@ struct DynamicState {
 // Needs forward_kinematics of the same x. The wrench is what the ground must give: weight and inertia together.
 void subtree_dynamics(const Model& model, const StateRef& x, const KinematicState& state, DynamicState& out);
 
+// Sum of the wrenches on each segment and on all that hangs on it; external as in joint_moments, out a segment each.
+void subtree_external(const Model& model, const std::vector<Force>* external, std::vector<Force>& out);
+
 // Moment (N m) or force (N) along each coordinate, locked ones too: S' (subtree force - external wrenches that act
 // there). external: a wrench a segment, already about the ground origin, or nullptr.
 void joint_moments(const Model& model, const KinematicState& state, const DynamicState& dynamics,

@@ -8,6 +8,9 @@
 
 namespace dynakin {
 
+// out[k] = (J P J')_kk. Most columns of J (rows, n) are zero, and cost nothing. JP: of J's size, to work in.
+void row_variances(const Eigen::MatrixXd& J, const Eigen::MatrixXd& P, Eigen::MatrixXd& JP, double* out);
+
 // Allocated once for a model. x, kinematics and dynamics belong together; P is the covariance of x.
 class OutputDeviation {
  public:

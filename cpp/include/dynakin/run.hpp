@@ -6,6 +6,7 @@
 #include <optional>
 #include <vector>
 
+#include "dynakin/contact_record.hpp"
 #include "dynakin/filter.hpp"
 #include "dynakin/output_sd.hpp"
 
@@ -30,8 +31,9 @@ struct RunRecord {
 };
 
 // Frames first to end - 1; frame 0 is an update only, the others step by the difference of their times.
+// With contacts, moments (and their deviations) are those that the feet's wrenches leave.
 // Throws DivergenceError naming the frame and its time.
 void run_frames(Filter& filter, const double* time, const double* markers, const double* wrench, std::size_t first,
-                std::size_t end, RunRecord& record);
+                std::size_t end, RunRecord& record, ContactRecord* contacts = nullptr);
 
 }  // namespace dynakin

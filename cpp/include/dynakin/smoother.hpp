@@ -35,9 +35,9 @@ class Smoother {
   Smoother& operator=(const Smoother&) = delete;
 
   // run_frames, from the first frame to the last, in as many calls as one likes.
-  void forward(std::size_t first, std::size_t end, RunRecord& record);
-  // The last stretch that is left; returns how many frames then are left.
-  std::size_t backward(const RunRecord& record, SmoothRecord& out);
+  void forward(std::size_t first, std::size_t end, RunRecord& record, ContactRecord* contacts = nullptr);
+  // The last stretch that is left; returns how many frames then are left. contacts: as in run_frames.
+  std::size_t backward(const RunRecord& record, SmoothRecord& out, ContactRecord* contacts = nullptr);
 
  private:
   struct Frame {
@@ -46,7 +46,7 @@ class Smoother {
     FrameTape tape;
   };
   void replay(std::size_t first, std::size_t end, const RunRecord& record);
-  void report(std::size_t k, const Frame& frame, SmoothRecord& out);
+  void report(std::size_t k, const Frame& frame, SmoothRecord& out, ContactRecord* contacts);
 
   Filter& filter_;
   const double *time_, *markers_, *wrench_;

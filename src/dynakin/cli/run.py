@@ -31,11 +31,13 @@ from dynakin.comparison import Trial, trial_of
 from dynakin.config import RunConfig, make_config, read_config
 from dynakin.errors import DynakinError
 from dynakin.filter import Estimator
+from dynakin.filter.zero import standing_zero
 from dynakin.identifiability import Identifiability, identifiability
 from dynakin.model import load_model
-from dynakin.recordings import read
+from dynakin.recordings import read, without_plate_loads
 from dynakin.report import read_sensitivity, save_figures
 from dynakin.results import Estimate, check_output_writable
+from dynakin.results.angles import with_angles
 
 LARGEST_BENCH = 250
 """States up to which a run also tells what the recording says of the constants: it filters a dozen motions more."""
@@ -60,6 +62,8 @@ def run(
     forward: Forward = None,
     table: TableName = None,
     plate_filter: PlateFilter = None,
+    zero: Annotated[str | None, typer.Option(help="Zero of the joint angles: model, standing.")] = None,
+    signs: Annotated[str | None, typer.Option(help="Names and signs of the joint angles: opensim, clinical.")] = None,
     force_threshold: ForceThreshold = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder for the results.")] = None,
     figures: Annotated[
@@ -86,6 +90,8 @@ def run(
         "forward": forward_direction(forward),
         "table": table,
         "plate_filter_hz": plate_filter,
+        "zero": zero,
+        "signs": signs,
         "force_threshold_n": force_threshold,
         "output": output,
     }
@@ -129,6 +135,7 @@ def estimate_from(
         plate_filter_hz=config.plate_filter_hz,
         force_threshold_n=config.force_threshold_n,
     )
+    recording = without_plate_loads(recording, config.plate_loads, config.vertical)
     static = None if config.static is None else read(config.static)
     estimator = Estimator(
         model,
@@ -140,8 +147,12 @@ def estimate_from(
         forward=config.forward,
         estimate=config.estimate,
         plates=config.plates,
+        loads=config.loads,
     )
     estimate = estimator.run(recording, static=static, smooth=config.smooth, progress=progress)
+    if (config.zero, config.signs) != ("model", "opensim"):
+        zero = standing_zero(estimator, estimate, static) if config.zero == "standing" else {}
+        estimate = with_angles(estimate, zero, config.signs)
     estimate = replace(estimate, config=config.as_used() | estimate.config)
     assert estimator.initial is not None
     n_states = len(estimator.initial.names)

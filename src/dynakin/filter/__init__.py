@@ -2,8 +2,9 @@
 
 from dynakin.filter import presets
 from dynakin.filter.estimator import Estimator
+from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.filter.live import StepEstimate
 from dynakin.filter.noise import Noise
 from dynakin.filter.samples import Sample
 
-__all__ = ["Estimator", "Noise", "Sample", "StepEstimate", "presets"]
+__all__ = ["Estimator", "FootWrenches", "Noise", "Sample", "StepEstimate", "presets"]

@@ -11,6 +11,7 @@ import xarray as xr
 
 from dynakin import _core
 from dynakin.filter.events import events_of
+from dynakin.filter.foot_wrenches import MEASURED, FootWrenches
 from dynakin.filter.parameters import parameters_of
 from dynakin.model import InitialModel
 from dynakin.recordings import Recording
@@ -28,6 +29,7 @@ def assemble(
     config: dict[str, Any],
     notes: Sequence[str],
     covariances: tuple[Array, Array],
+    feet: FootWrenches | None = None,
 ) -> Estimate:
     """Label what `Filter.run` returned and keep what is needed to judge it.
 
@@ -37,8 +39,9 @@ def assemble(
         config: what was asked for, as plain data.
         notes: sentences of the plates' check.
         covariances: P (n, n) before the first frame and after the last.
+        feet: the wrenches that the moments were made with, None where there were none.
     """
-    data = _dataset(arrays, model, initial, recording, measured)
+    data = _dataset(arrays, model, initial, recording, measured, feet)
     for name, covariance in zip(("initial_covariance", "final_covariance"), covariances, strict=True):
         data[name] = (("element", "element_"), covariance)
     prior_sd = np.sqrt(np.diag(covariances[0]))
@@ -75,6 +78,7 @@ def _dataset(
     initial: InitialModel,
     recording: Recording,
     measured: tuple[Array, Array],
+    feet: FootWrenches | None,
 ) -> xr.Dataset:
     spec = initial.spec
     axes = np.array(spec.markers[0].measured)
@@ -106,14 +110,16 @@ def _dataset(
     data["verdict"] = (("time", "sensor"), arrays["verdicts"])
     if any(any(marker.soft_tissue) for marker in spec.markers):
         data["soft_tissue_amplitude"] = ("marker", initial.soft_tissue_m, {"units": "m"})
-    data["joint_centres"] = (("time", "joint", "axis"), _joint_centres(arrays["state"], model), {"units": "m"})
+    data |= _body(arrays, model, axes, modelled, feet)
     names, parents, segments = _joints(spec)
     coords = {
         "time": recording.time,
         "coordinate": model.coordinate_names,
         "coordinate_type": ("coordinate", _types(spec)),
+        "coordinate_segment": ("coordinate", _moved(spec)),
         "marker": list(initial.recorded_markers),
         "axis": list(AXES),
+        "axis_": list(AXES),
         "sensor": [*initial.recorded_markers, "plates"],
         "marker_axes_modelled": ("axis", axes),
         "component": list(COMPONENTS),
@@ -123,7 +129,24 @@ def _dataset(
         "joint_parent": ("joint", parents),
         "joint_segment": ("joint", segments),
     }
+    if feet is not None:
+        coords |= {"foot": list(feet.names), "foot_segment": ("foot", list(feet.segments))}
+        data |= _feet(arrays, feet)
     return xr.Dataset(data, coords=coords)
+
+
+def _feet(arrays: Mapping[str, Array], feet: FootWrenches) -> dict[str, Any]:
+    per_foot = ("time", "foot", "component")
+    measured = np.where((feet.contact == MEASURED)[..., None], feet.wrench, np.nan)
+    return {
+        "foot_contact": (("time", "foot"), feet.contact),
+        "foot_wrench_measured": (per_foot, measured),
+        "foot_wrench": (per_foot, arrays["foot_wrench"]),
+        "foot_wrench_sd": (per_foot, arrays["foot_wrench_sd"]),
+        "foot_adjustment": (per_foot, np.where(np.isfinite(measured), arrays["foot_adjustment"], np.nan)),
+        "wrench_remainder": (("time", "component"), arrays["remainder"]),
+        "moment_source": (("time", "coordinate"), arrays["moment_source"]),
+    }
 
 
 def _coordinate_blocks(arrays: Mapping[str, Array], model: _core.Model) -> dict[str, Array]:
@@ -143,9 +166,19 @@ def _coordinate_blocks(arrays: Mapping[str, Array], model: _core.Model) -> dict[
     return blocks
 
 
-def _joint_centres(states: Array, model: _core.Model) -> Array:
-    """Origins (T, S, 3) m of all segments, ground frame: the joints by which they hang."""
-    return np.stack([_core.segment_poses(model, state)[1] for state in states])
+def _body(
+    arrays: Mapping[str, Array], model: _core.Model, axes: Array, modelled: Array, feet: FootWrenches | None
+) -> dict[str, Any]:
+    """Joint centres, centre of mass and loads of the joints; out of a model's plane they are NaN."""
+    on_feet = () if feet is None else (list(feet.segments), np.ascontiguousarray(arrays["foot_wrench"]))
+    found = _core.whole_body(model, np.ascontiguousarray(arrays["state"]), *on_feet)
+    return {
+        "joint_centres": (("time", "joint", "axis"), found["joint_centres"], {"units": "m"}),
+        "joint_orientations": (("time", "joint", "axis", "axis_"), found["orientations"], {"units": "1"}),
+        "joint_loads": (("time", "joint", "component"), np.where(modelled, found["joint_loads"], np.nan)),
+        "mass_centre": (("time", "axis"), np.where(axes, found["mass_centre"], np.nan)),
+        "mass_centre_velocity": (("time", "axis"), np.where(axes, found["mass_centre_velocity"], np.nan)),
+    }
 
 
 def _joints(spec: _core.ModelSpec) -> tuple[list[str], list[int], list[str]]:
@@ -159,6 +192,15 @@ def _joints(spec: _core.ModelSpec) -> tuple[list[str], list[int], list[str]]:
         names = segments
     parents = [segments.index(s.parent) if s.parent in segments else -1 for s in spec.segments]
     return names, parents, segments
+
+
+def _moved(spec: _core.ModelSpec) -> list[str]:
+    """Segment of the first joint that each coordinate moves."""
+    first: dict[str, str] = {}
+    for segment in spec.segments:
+        for axis in segment.axes:
+            first.setdefault(axis.coordinate, segment.name)
+    return [first[c.name] for c in spec.coordinates]
 
 
 def _types(spec: _core.ModelSpec) -> list[str]:

@@ -13,18 +13,20 @@ from dynakin.filter import presets
 from dynakin.filter.alignment import PASSES, delay_of, in_step, in_words, is_late
 from dynakin.filter.assemble import assemble
 from dynakin.filter.extend import QUANTITIES, Quantity, continuous_noise, extended, initial_covariance
+from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.filter.live import StepEstimate, deviations_of, step_estimate
 from dynakin.filter.noise import Noise, gate_limits
 from dynakin.filter.samples import Sample, foreign_load, recording_arrays, sample_arrays
 from dynakin.filter.smoothing import check_can_smooth, smoothed
 from dynakin.filter.total_wrench import foreign_total, leave_out_unknown
-from dynakin.model import Bounds, Definition, InitialModel, Priors, initialise
+from dynakin.model import Bounds, CarriedLoad, Definition, InitialModel, Priors, initialise, with_loads
 from dynakin.model.validation import nearest
 from dynakin.recordings import Recording, check_plates
 from dynakin.results import Estimate
 
 Array = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]
+Feet = Callable[[InitialModel], FootWrenches | None]
 
 
 class Estimator:
@@ -39,6 +41,7 @@ class Estimator:
         estimate: kinds of parameters to estimate, of "lengths", "markers", "soft_tissue" and "inertia"; the others stay
             as they are at the start (displacements of skin are then noise of the markers).
         plates: plate -> "right" or "left", where a floating model's own assignment of plates to feet is wrong.
+        loads: known bodies that the person carries; the subject's mass is then needed, without them.
         lag: frames by which `delayed` lies behind `step`, for smoothing while it is measured; 0: none.
     """
 
@@ -55,6 +58,7 @@ class Estimator:
         estimate: Sequence[Quantity] = QUANTITIES,
         plates: Mapping[str, str] | None = None,
         lag: int = 0,
+        loads: Sequence[CarriedLoad] = (),
     ) -> None:
         for kind in estimate:
             if kind not in QUANTITIES:
@@ -62,7 +66,10 @@ class Estimator:
                 raise ConfigError(f"estimate: {kind!r} is unknown{nearest(kind, QUANTITIES)}; expected some of {known}")
         if lag < 0:
             raise ConfigError(f"lag is {lag}, expected 0 frames or more")
+        if loads and model.subject.mass_kg is None:
+            raise ConfigError("loads: the plates carry them too, expected the person's own mass beside them (mass_kg)")
         self.model = model
+        self.loads = tuple(loads)
         self.noise = noise or presets.default()
         self.priors = priors or Priors()
         self.bounds = bounds or Bounds()
@@ -84,6 +91,7 @@ class Estimator:
         *,
         static: Recording | None = None,
         smooth: bool = False,
+        feet: Feet | None = None,
         progress: Progress | None = None,
     ) -> Estimate:
         """Estimate a whole recording.
@@ -92,6 +100,9 @@ class Estimator:
             recording: markers and plates, as `read` gives them.
             static: the same person and markers, standing: lengths and marker places are taken from it.
             smooth: whether each frame is estimated from all frames, those after it too (`filter.smoothing`).
+            feet: gives the wrench of each foot once the model is measured and its ground frame known. Moments are then
+                those that the feet's wrenches leave, adjusted so that nothing is left at the root; the state does not
+                depend on it. For models with a floating root.
             progress: called with (frames done, frames in all) now and then.
 
         Raises:
@@ -104,18 +115,22 @@ class Estimator:
         assert self._core_model is not None
         markers, wrench = recording_arrays(recording, initial, gaps=self.noise.recover)
         notes, foreign = self._judge_plates(recording, initial, wrench)
+        on_feet = None if feet is None or foreign else feet(initial)
         try:
-            arrays, wrench, clock = self._in_step(initial, recording.time, markers, wrench, progress)
+            arrays, shift, clock = self._in_step(initial, recording.time, markers, wrench, on_feet, progress)
+            wrench = in_step(recording.time, wrench, shift) if shift else wrench
+            on_feet = on_feet and on_feet.in_step(recording.time, shift)
             if smooth:
                 self.start_from(initial)
-                arrays = self.run_smoothed_arrays(recording.time, markers, wrench, progress)
+                arrays = self.run_smoothed_arrays(recording.time, markers, wrench, progress, on_feet)
         except ValueError as error:  # a frame that the core refuses, named by it
             raise RecordingError(f"{recording.path or recording.name}: {error}") from None
         config = self.settings() | {"smooth": smooth}
         notes += [] if foreign else clock
         assert self._filter is not None
         covariances = (initial_covariance(initial, self.noise), self._filter.covariance)
-        return assemble(arrays, self._core_model, initial, recording, (markers, wrench), config, notes, covariances)
+        measured = (markers, wrench)
+        return assemble(arrays, self._core_model, initial, recording, measured, config, notes, covariances, on_feet)
 
     def _judge_plates(self, recording: Recording, initial: InitialModel, wrench: Array) -> tuple[list[str], str | None]:
         """Leaves out (NaN, in place) what is not the whole wrench (T, 6).
@@ -128,13 +143,13 @@ class Estimator:
             notes += leave_out_unknown(recording, initial, wrench, self.plates)
             if not recording.plates:
                 return notes, notes[-1]
-        check = check_plates(recording, initial.ground, None if initial.feet else initial.mass_kg)
+        check = check_plates(recording, initial.ground, None if initial.feet else initial.weighed_kg)
         if check.refusal:
             raise RecordingError(f"{recording.path or recording.name}: {check.refusal}")
         if initial.feet:
-            foreign = foreign_total(wrench, initial.mass_kg, self.noise.plate_load_tolerance)
+            foreign = foreign_total(wrench, initial.weighed_kg, self.noise.plate_load_tolerance)
         else:
-            foreign = foreign_load(check, initial.mass_kg, self.noise.plate_load_tolerance)
+            foreign = foreign_load(check, initial.weighed_kg, self.noise.plate_load_tolerance)
         notes = [*check.messages, *notes]
         if foreign:
             wrench[:] = np.nan
@@ -142,14 +157,20 @@ class Estimator:
         return notes, foreign
 
     def _in_step(
-        self, initial: InitialModel, time: Array, markers: Array, wrench: Array, progress: Progress | None
-    ) -> tuple[dict[str, Array], Array, list[str]]:
+        self,
+        initial: InitialModel,
+        time: Array,
+        markers: Array,
+        wrench: Array,
+        feet: FootWrenches | None,
+        progress: Progress | None,
+    ) -> tuple[dict[str, Array], float, list[str]]:
         """`run_arrays`, again with the plates brought into step where they turn out to lag.
 
         Returns:
-            The arrays, the wrench (T, 6) as the last run took it, and what there is to say of the plates' clock.
+            The arrays, the seconds by which the last run took the plates earlier, and what there is to say of that.
         """
-        arrays, shift, taken = self.run_arrays(time, markers, wrench, progress), 0.0, wrench
+        arrays, shift = self.run_arrays(time, markers, wrench, progress, feet), 0.0
         for _ in range(PASSES):
             delay = self._delay(arrays)
             if delay is None or not is_late(delay):
@@ -157,8 +178,8 @@ class Estimator:
             shift += delay[0]
             taken = in_step(time, wrench, shift)
             self.start_from(initial)
-            arrays = self.run_arrays(time, markers, taken, progress)
-        return arrays, taken, in_words(shift, self._delay(arrays))
+            arrays = self.run_arrays(time, markers, taken, progress, feet and feet.in_step(time, shift))
+        return arrays, shift, in_words(shift, self._delay(arrays))
 
     def start(self, recording: Recording, *, static: Recording | None = None) -> InitialModel:
         """Measure the model on a recording (or the first seconds of a live one) and make the filter ready to step.
@@ -176,7 +197,20 @@ class Estimator:
             priors=self.priors,
             bounds=self.bounds,
         )
-        return self.start_from(initial)
+        return self.start_from(with_loads(initial, self.loads))
+
+    def again(self) -> Estimator:
+        """Another one with the same model and settings, not started."""
+        return Estimator(
+            self.model,
+            self.noise,
+            priors=self.priors,
+            bounds=self.bounds,
+            side=self.side,
+            vertical=self.vertical,
+            forward=self.forward,
+            loads=self.loads,
+        )
 
     def start_from(self, initial: InitialModel) -> InitialModel:
         """Make the filter ready to step from a model that was measured before, or changed since."""
@@ -192,13 +226,19 @@ class Estimator:
         return initial
 
     def run_arrays(
-        self, time: Array, markers: Array, wrench: Array, progress: Progress | None = None
+        self,
+        time: Array,
+        markers: Array,
+        wrench: Array,
+        progress: Progress | None = None,
+        feet: FootWrenches | None = None,
     ) -> dict[str, Array]:
         """Run over arrays after `start` or `start_from`, which it needs anew before another run.
 
         Args:
             time: (T,) s. markers: (T, M, 3) m, ground frame, in the order of the model's markers. wrench: (T, 6) N and
                 N m, ground on person, about the ground origin. NaN: not measured.
+            feet: as in `run`.
 
         Returns:
             Arrays by name, as `_core.Filter.run` gives them.
@@ -209,12 +249,17 @@ class Estimator:
         if self._filter is None:
             raise ConfigError("run_arrays: the estimator has not been started; call start or start_from first")
         time, markers, wrench = (np.ascontiguousarray(values) for values in (time, markers, wrench))
-        arrays = self._filter.run(time, markers, wrench, progress, output_sd=True)
+        arrays = self._filter.run(time, markers, wrench, progress, output_sd=True, feet=self._loads(feet))
         self._time = float(time[-1])
         return arrays
 
     def run_smoothed_arrays(
-        self, time: Array, markers: Array, wrench: Array, progress: Progress | None = None
+        self,
+        time: Array,
+        markers: Array,
+        wrench: Array,
+        progress: Progress | None = None,
+        feet: FootWrenches | None = None,
     ) -> dict[str, Array]:
         """`run_arrays`, then backwards over the same frames: the smoothed arrays take the places of the filtered.
 
@@ -225,7 +270,7 @@ class Estimator:
             raise ConfigError("run_smoothed_arrays: the estimator has not been started; call start or start_from first")
         check_can_smooth(self.noise)
         time, markers, wrench = (np.ascontiguousarray(values) for values in (time, markers, wrench))
-        arrays = self._filter.run_smoothed(time, markers, wrench, progress)
+        arrays = self._filter.run_smoothed(time, markers, wrench, progress, feet=self._loads(feet))
         self._time = float(time[-1])
         return smoothed(arrays)
 
@@ -277,6 +322,13 @@ class Estimator:
             raise ConfigError("deviations: the estimator has not been started; call start(recording) first")
         return deviations_of(self._core_model, self._filter.state, self._filter.covariance)
 
+    def _loads(self, feet: FootWrenches | None) -> _core.FootLoads | None:
+        assert self._core_model is not None
+        if feet is None:
+            return None
+        feet.check(self._core_model)
+        return feet.core()
+
     def _delay(self, arrays: dict[str, Array]) -> tuple[float, float] | None:
         assert self.initial is not None
         return delay_of(self.initial, arrays["state"][-1], arrays["state_sd"][-1])
@@ -286,6 +338,7 @@ class Estimator:
         return {
             "model": str(self.model.path if self.model.path.parent.name != "builtin" else self.model.name),
             "side": self.side,
+            "loads": [load.model_dump(mode="json") for load in self.loads],
             "vertical": self.vertical,
             "forward": self.forward if isinstance(self.forward, str) else list(self.forward),
             "estimate": list(self.estimate),
@@ -321,7 +374,7 @@ class Estimator:
             ),
             wrench_covariance=noise.wrench_covariance(),
             reference_point=initial.plate_centre if point == "auto" else np.array(point, dtype=float),
-            total_mass=initial.mass_kg if noise.total_mass_use == "frame" else None,
+            total_mass=initial.weighed_kg if noise.total_mass_use == "frame" else None,
             total_mass_variance=noise.total_mass,
             lower=initial.lower,
             upper=initial.upper,

@@ -24,13 +24,18 @@ _PLACES = {
     "wrench_sd": "smoothed_wrench_sd",
     "moments": "smoothed_moments",
     "moments_sd": "smoothed_moments_sd",
+    "foot_wrench": "smoothed_foot_wrench",
+    "foot_wrench_sd": "smoothed_foot_wrench_sd",
+    "foot_adjustment": "smoothed_foot_adjustment",
+    "remainder": "smoothed_remainder",
+    "moment_source": "smoothed_moment_source",
 }
 
 
 def smoothed(arrays: dict[str, Array]) -> dict[str, Array]:
     """`_core.Filter.run_smoothed`'s arrays with the smoothed ones in the places of the filtered."""
     kept = {name: values for name, values in arrays.items() if not name.startswith("smoothed_")}
-    return kept | {name: arrays[source] for name, source in _PLACES.items()}
+    return kept | {name: arrays[source] for name, source in _PLACES.items() if source in arrays}
 
 
 def can_smooth(noise: Noise) -> bool:

@@ -4,6 +4,7 @@ measured on a recording."""
 from dynakin.model.definition import Definition, ModelDefinition, available_models, load_model
 from dynakin.model.initial import InitialModel
 from dynakin.model.initialise import initialise
+from dynakin.model.loads import CarriedLoad, with_loads
 from dynakin.model.marker_set import available_marker_sets, load_marker_set
 from dynakin.model.measure import measure
 from dynakin.model.opensim import OpenSimDefinition, load_opensim
@@ -13,6 +14,7 @@ from dynakin.model.table import load_table
 
 __all__ = [
     "Bounds",
+    "CarriedLoad",
     "Definition",
     "InitialModel",
     "ModelDefinition",
@@ -27,4 +29,5 @@ __all__ = [
     "load_opensim",
     "load_table",
     "measure",
+    "with_loads",
 ]

@@ -46,6 +46,7 @@ class InitialModel:
         unmodelled_m: (M,) standard deviation of what neither a state nor the cameras explain of each marker; it is
             added to the noise of the cameras.
         dimensionless: geometry parameters that are factors, not lengths.
+        carried_kg: mass of the known loads (`model.loads`), not in ``mass_kg``.
     """
 
     spec: _core.ModelSpec
@@ -69,6 +70,12 @@ class InitialModel:
     feet: dict[str, str] = field(default_factory=dict)
     unmodelled_m: Array | float = 0.0
     dimensionless: frozenset[str] = frozenset()
+    carried_kg: float = 0.0
+
+    @property
+    def weighed_kg(self) -> float:
+        """What the plates carry: the person and the known loads, kg."""
+        return self.mass_kg + self.carried_kg
 
     def measured_plan(self) -> ModelPlan:
         """The plan.

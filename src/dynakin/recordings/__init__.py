@@ -13,6 +13,7 @@ from dynakin.recordings.frame import GroundFrame, find_ground_frame
 from dynakin.recordings.landmarks import DEFAULT_PAIRS, FacingPairs, find_marker, plain_name
 from dynakin.recordings.mot import Table, read_table
 from dynakin.recordings.options import ReadOptions
+from dynakin.recordings.plate_loads import PlateLoad, without_plate_loads
 from dynakin.recordings.plates import PlateCheck, check_plates
 from dynakin.recordings.pressure import DEFAULT_THRESHOLD_N, Surface, centre_of_pressure, plate_from_wrench
 from dynakin.recordings.read import FORCE_READERS, READERS, read, register_reader
@@ -32,6 +33,7 @@ __all__ = [
     "GroundFrame",
     "Plate",
     "PlateCheck",
+    "PlateLoad",
     "ReadOptions",
     "Recording",
     "Surface",
@@ -55,4 +57,5 @@ __all__ = [
     "register_reader",
     "resample",
     "standing_window",
+    "without_plate_loads",
 ]

@@ -6,7 +6,7 @@ from dynakin.results.fit import SignalFit, TruthError, marker_rms_mm, signal_fit
 from dynakin.results.marker_file import laboratory_markers, write_trc
 from dynakin.results.mean_curves import MeanCurve, estimate_curves
 from dynakin.results.metrics import SCHEMA_VERSION, compute_metrics, evaluation_window
-from dynakin.results.output_folder import OUTPUT_FILES, check_output_writable
+from dynakin.results.output_folder import OPTIONAL_FILES, OUTPUT_FILES, check_output_writable
 from dynakin.results.records import EVENT_KINDS, Event, Parameter, Timing
 from dynakin.results.repetitions import Found, Repetition, find_repetitions, repetitions_of
 from dynakin.results.storage_file import write_storage
@@ -15,6 +15,7 @@ __all__ = [
     "AXES",
     "COMPONENTS",
     "EVENT_KINDS",
+    "OPTIONAL_FILES",
     "OUTPUT_FILES",
     "SCHEMA_VERSION",
     "Consistency",

@@ -6,7 +6,7 @@ from copy import deepcopy
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 import xarray as xr
@@ -40,13 +40,24 @@ class Estimate:
     state, state_sd                                               (time, element)             as the element's own
     initial_covariance, final_covariance                          (element, element_)         as the elements' own
     joint_centres                                                 (time, joint, axis)         m
+    joint_orientations                                            (time, joint, axis, axis_)  1
+    joint_loads                                                   (time, joint, component)    N or N m
+    mass_centre, mass_centre_velocity                             (time, axis)                m, m/s
+    foot_wrench, foot_wrench_sd, foot_wrench_measured             (time, foot, component)     N or N m
+    foot_adjustment                                               (time, foot, component)     N or N m
+    wrench_remainder                                              (time, component)           N or N m
+    foot_contact, moment_source                                   (time, foot | coordinate)   codes
     nis, n_rows, log_likelihood                                   (time,)                     1
     ============================================================  ==========================  =====================
 
     ``*_predicted`` is what the model expects before the frame is used, ``*_estimated`` after it. What is not measured
     or not modelled is NaN. The coordinate variable ``coordinate_type`` says "rotation" or "translation" for each
     coordinate, ``marker_axes_modelled`` says for each axis whether the model explains it. The wrench is what the
-    ground does to the person, about the model's ground origin.
+    ground does to the person, about the model's ground origin. ``joint_loads`` is what a segment's parent does to it
+    through the joint by which it hangs, muscles and all, ground axes, about the joint's centre; ``joint_orientations``
+    turns a segment's axes into the ground's. The feet's variables are there if the moments were made with the feet's
+    wrenches: ``foot_contact`` is 0 in the air, 1 measured, 2 not measured; ``moment_source`` is 1 where a moment is
+    derived from the motion, because the only unmeasured contact lies behind it, and 2 where it is not known (NaN).
 
     ``recording`` is the recording as read (laboratory frame), ``ground`` the frame that carries it to the model's.
     """
@@ -83,6 +94,65 @@ class Estimate:
     def modelled_axes(self) -> np.ndarray:
         """(3,) bool: which ground axes of the markers the model explains (a planar model: x and y)."""
         return np.asarray(self.data["marker_axes_modelled"].values, dtype=bool)
+
+    @property
+    def foot_names(self) -> list[str]:
+        """The feet whose wrenches the moments were made with; none in a model that stands on its root."""
+        return [str(name) for name in self.data["foot"].values] if "foot" in self.data.coords else []
+
+    @property
+    def mass_kg(self) -> float | None:
+        """Body mass as used, kg."""
+        mass = self.config.get("mass_kg")
+        return None if mass is None else float(mass)
+
+    def powers(self) -> np.ndarray:
+        """Power (T, C) W of each coordinate, moment times speed; positive adds energy to the body."""
+        moments, speeds = (self.data[name].transpose("time", "coordinate").values for name in ("moments", "speeds"))
+        return np.asarray(moments * speeds)
+
+    def moments_per_kg(self) -> np.ndarray:
+        """Moments (T, C) in N m/kg, forces in N/kg: over the body mass, NaN where that is not known."""
+        moments = self.data["moments"].transpose("time", "coordinate").values
+        return np.asarray(moments / (self.mass_kg or np.nan))
+
+    def joint_loads(self, frame: Literal["ground", "parent", "child"] = "ground") -> np.ndarray:
+        """What each segment's parent does to it through its joint (T, J, 6), N and N m about the joint's centre.
+
+        Args:
+            frame: axes: the ground's, those of the parent segment (the ground's where there is none), or those of the
+                segment itself. Out of a planar model's plane the loads are NaN.
+        """
+        loads = self.data["joint_loads"].transpose("time", "joint", "component").values
+        if frame == "ground":
+            return np.asarray(loads)
+        R_GB = self.data["joint_orientations"].transpose("time", "joint", "axis", "axis_").values
+        if frame == "parent":
+            parents = self.data["joint_parent"].values
+            R_GB = np.where((parents < 0)[:, None, None], np.eye(3), R_GB[:, parents])
+        vectors = np.nan_to_num(loads).reshape(*loads.shape[:2], 2, 3) @ R_GB  # rows: v' R_GB is (R_BG v)'
+        known = np.isfinite(loads) | np.isnan(loads).all(axis=(0, 1))  # a number turned away from may not be known
+        turned = np.where(known.all(axis=2, keepdims=True), vectors.reshape(loads.shape), np.nan)
+        return np.where(np.isnan(loads).all(axis=(0, 1)), np.nan, turned)
+
+    @cached_property
+    def floor_height_m(self) -> float:
+        """Height of the plates' surface over the ground's origin, m."""
+        from dynakin.results.pressure import floor_height
+
+        return floor_height(self.recording, self.ground)
+
+    def centre_of_pressure(self, foot: str | None = None) -> tuple[np.ndarray, np.ndarray]:
+        """Centre of pressure (T, 3) m, ground frame, and free moment (T,) N m, of a foot or of the estimated total
+        wrench; NaN below `dynakin.results.pressure.LOADED_N` and where a model does not tell.
+
+        Raises:
+            KeyError: no such foot.
+        """
+        from dynakin.results.pressure import centre_of_pressure
+
+        wrench = self.data["wrench_estimated"] if foot is None else self.data["foot_wrench"].sel(foot=foot)
+        return centre_of_pressure(wrench.transpose("time", "component").values, self.floor_height_m)
 
     def metrics(self) -> dict[str, Any]:
         """The content of ``metrics.json`` (see `dynakin.results.metrics`); computed once, a copy is given."""

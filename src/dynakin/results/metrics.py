@@ -12,10 +12,13 @@ from dynakin.results.adaptation import adaptation
 from dynakin.results.bounds import parameter_bounds
 from dynakin.results.consistency import Consistency, consistency
 from dynakin.results.estimate import COMPONENTS, Estimate
+from dynakin.results.feet import foot_figures
 from dynakin.results.fit import WrenchFit, marker_rms_mm, wrench_fit
 from dynakin.results.kinematic_consistency import mismatch_in_words, speed_mismatch
 from dynakin.results.learned import learned
+from dynakin.results.power import work
 from dynakin.results.soft_tissue import soft_tissue
+from dynakin.results.symmetry import asymmetry
 
 SCHEMA_VERSION = 1
 """Version of ``metrics.json``, ``parameters.json`` and ``estimate.nc``; it grows when a key changes its meaning."""
@@ -52,8 +55,35 @@ def compute_metrics(estimate: Estimate) -> dict[str, Any]:
         "bounds": parameter_bounds(estimate, window),
         "soft_tissue": soft_tissue(estimate, window),
         "identifiability": learned(estimate),
+        "peak_moments_per_kg": _peak_moments(estimate, window),
+        "work": work(estimate, window),
+        "angles": _angles(estimate),
+        "asymmetry": asymmetry(estimate, window),
+        "feet": foot_figures(estimate, window),
         "events": _events(estimate),
         "timing": asdict(estimate.timing),
+    }
+
+
+def _angles(estimate: Estimate) -> dict[str, Any] | None:
+    """Where the joint angles of ``angles.sto`` have their zero, by coordinate; None where none were asked for."""
+    if "zero_offset" not in estimate.data:
+        return None
+    degrees = np.degrees(estimate.data["zero_offset"].values)
+    turning = zip(estimate.coordinate_names, degrees, estimate.is_rotation(), strict=True)
+    return {
+        "signs": estimate.data.attrs["angle_signs"],
+        "zero_deg": {name: float(value) for name, value, turns in turning if turns},
+    }
+
+
+def _peak_moments(estimate: Estimate, window: np.ndarray) -> dict[str, dict[str, float]]:
+    """Largest and smallest moment of each coordinate over the body mass; those that are not known are left out."""
+    values = estimate.moments_per_kg()[window]
+    return {
+        name: {"largest": float(np.nanmax(values[:, k])), "smallest": float(np.nanmin(values[:, k]))}
+        for k, name in enumerate(estimate.coordinate_names)
+        if np.isfinite(values[:, k]).any()
     }
 
 

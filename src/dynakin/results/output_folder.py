@@ -19,6 +19,8 @@ OUTPUT_FILES = (
     "markers.trc",
     "wrench.sto",
     "uncertainty.sto",
+    "powers.sto",
+    "centre_of_pressure.sto",
     "repetitions.csv",
     "parameters.json",
     "metrics.json",
@@ -26,6 +28,8 @@ OUTPUT_FILES = (
     "config.toml",
     "report.html",
 )
+OPTIONAL_FILES = ("centre_of_mass.sto", "joint_reactions.sto", "feet.sto", "angles.sto")
+"""Written where an estimate holds what they are made of, or where they were asked for."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +42,7 @@ class FolderKind:
     what: str
 
 
-RESULTS = FolderKind(OUTPUT_FILES, "metrics.json", "output folder of dynakin")
+RESULTS = FolderKind(OUTPUT_FILES + OPTIONAL_FILES, "metrics.json", "output folder of dynakin")
 # Left by file managers in any folder that somebody has looked at.
 _IGNORED = {".DS_Store", "Thumbs.db", "desktop.ini"}
 

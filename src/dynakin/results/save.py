@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from dynakin.results import motion_files
+from dynakin.results import body_files, motion_files
 from dynakin.results.config_file import write_config
 from dynakin.results.estimate import Estimate
 from dynakin.results.json_files import write_metrics, write_parameters
@@ -41,6 +41,7 @@ def save_estimate(
         motion_files.write_moments(estimate, made / "moments.sto")
         motion_files.write_wrench(estimate, made / "wrench.sto")
         motion_files.write_deviations(estimate, made / "uncertainty.sto")
+        body_files.write_body_files(estimate, made)
         write_curves(made / "repetitions.csv", curve_points(estimate.recording.name, curves))
         write_markers(estimate, made / "markers.trc")
         write_parameters(estimate, made / "parameters.json")

@@ -1,0 +1,87 @@
+"""Where the joints stand in a standing trial, by the model as a trial left it: the clinical zero."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from dynakin.errors import RecordingError
+from dynakin.filter.samples import recording_arrays
+from dynakin.filter.smoothing import can_smooth
+from dynakin.model import InitialModel, initialise, with_loads
+from dynakin.recordings import Recording, standing_window
+from dynakin.results import Estimate
+from dynakin.results.angles import mean_angles
+
+if TYPE_CHECKING:
+    from dynakin.filter.estimator import Estimator
+
+_HELD = 1e-3
+"""Of their prior standard deviations: the constants stay what the trial made them."""
+_CONSTANT = ("length/", "marker/", "inertia/")
+
+
+def standing_zero(estimator: Estimator, estimate: Estimate, static: Recording | None) -> dict[str, float]:
+    """Mean angle (rad) of each rotation while the person first stands still, in ``static`` or in the trial itself.
+
+    A smoothed trial stands by one set of constants from its first frame on. Otherwise the standing frames are estimated
+    anew with the lengths, marker places and inertia that the trial ended with, held there: with other places the same
+    posture shows other angles.
+
+    Raises:
+        RecordingError: nobody stands still for half a second. ModelError: the standing trial does not fit the model.
+    """
+    standing = estimate.recording if static is None else static
+    window = standing_window(standing)
+    if window is None:
+        raise RecordingError(
+            f"{standing.path or standing.name}: nobody stands still for 0.5 s, expected a standing person for the zero "
+            "(zero = 'standing'), there or in a trial of its own (--static)"
+        )
+    if static is None and estimate.config.get("smooth"):
+        coordinates = estimate.data["coordinates"].transpose("time", "coordinate").values[window]
+        return mean_angles(estimate.coordinate_names, estimate.is_rotation(), coordinates)
+    return _estimated_anew(estimator, estimate, standing, window)
+
+
+def _estimated_anew(estimator: Estimator, estimate: Estimate, standing: Recording, window: slice) -> dict[str, float]:
+    start = with_loads(_standing_model(estimator, standing), estimator.loads)
+    other = estimator.again()
+    initial = other.start_from(_as_identified(start, estimate))
+    still = standing.window(float(standing.time[window.start]), float(standing.time[window.stop - 1]))
+    markers = initial.ground.points_to_ground(
+        np.stack([still.marker(name) for name in initial.recorded_markers], axis=1)
+    )
+    wrench = recording_arrays(still, initial, gaps=True)[1] if still.plates else np.full((still.n_frames, 6), np.nan)
+    run = other.run_smoothed_arrays if can_smooth(other.noise) else other.run_arrays
+    state = run(still.time, markers, wrench)["state"]
+    free = [c.name for c in initial.spec.coordinates if not c.locked]
+    kinds = {axis.coordinate: axis.kind for segment in initial.spec.segments for axis in segment.axes}
+    turning = np.array([kinds[name] == "rotation" for name in free])
+    locked = {c.name: float(c.value) for c in initial.spec.coordinates if c.locked and kinds[c.name] == "rotation"}
+    return locked | mean_angles(free, turning, state[:, : len(free)])
+
+
+def _standing_model(estimator: Estimator, static: Recording) -> InitialModel:
+    return initialise(
+        estimator.model,
+        static,
+        static=static,
+        side=estimator.side,
+        vertical=estimator.vertical,
+        forward=estimator.forward,
+        priors=estimator.priors,
+        bounds=estimator.bounds,
+    )
+
+
+def _as_identified(start: InitialModel, estimate: Estimate) -> InitialModel:
+    """With the constants that a trial ended with; markers that it did not see keep their own."""
+    known = {p.name: p for p in estimate.parameters if p.estimated and p.name.startswith(_CONSTANT)}
+    x0, sd0 = start.x0.copy(), start.sd0.copy()
+    for k, name in enumerate(start.names):
+        if name in known:
+            x0[k], sd0[k] = known[name].value, _HELD * sd0[k]
+    return replace(start, x0=np.clip(x0, start.lower, start.upper), sd0=sd0)

@@ -1,0 +1,252 @@
+"""From the wrenches of two feet to what laboratories read, through filter, estimate and files."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+import xarray as xr
+from core.bridge import filter_of, to_core
+from core.random_models import FEET, ROOT, Trial, floating_model, prior_sd, settings, trial
+from oracle import measurement
+from oracle.state import Layout
+
+from dynakin import _core
+from dynakin.errors import ModelError
+from dynakin.filter import FootWrenches
+from dynakin.filter.assemble import assemble
+from dynakin.filter.foot_wrenches import IN_THE_AIR, MEASURED, NOT_MEASURED
+from dynakin.filter.smoothing import smoothed
+from dynakin.recordings import GroundFrame, Plate, Recording, read_table
+from dynakin.results import Estimate
+
+FRAMES = 60
+SPEC = floating_model(5)
+NAMES = ("left", "right")
+REFERENCE = np.array([[0.1, 0.0, -0.2], [0.1, 0.0, 0.2]])
+
+
+def contacts() -> np.ndarray:
+    """Both measured, one in the air, one beside the plates, none, both beside the plates."""
+    codes = np.full((FRAMES, 2), MEASURED, np.uint8)
+    codes[20:25, 1] = IN_THE_AIR
+    codes[25:35, 0] = NOT_MEASURED
+    codes[35:40] = IN_THE_AIR
+    codes[40:45] = NOT_MEASURED
+    return codes
+
+
+@pytest.fixture(scope="module")
+def data() -> Trial:
+    return trial(SPEC, 31, FRAMES, uneven=False, gaps=False)
+
+
+def feet_of(data: Trial, codes: np.ndarray) -> FootWrenches:
+    total = measurement.wrench(Layout(SPEC), data.truth)
+    share = np.linspace(0.3, 0.7, FRAMES)[:, None]
+    wrench = np.stack([share * total, (1 - share) * total], axis=1)
+    wrench += np.random.default_rng(32).normal(size=wrench.shape) * [3.0, 3.0, 3.0, 1.0, 1.0, 1.0]
+    return FootWrenches.of(NAMES, FEET, wrench, codes, 5.0, 2.0, REFERENCE)
+
+
+def estimate_of(data: Trial, feet: FootWrenches | None, smooth: bool = False) -> Estimate:
+    chosen = settings(SPEC, 33, bounds=False) | {"constraint": "none"}
+    core = filter_of(SPEC, chosen, data.x0, data.P0)
+    loads = None if feet is None else feet.core()
+    if smooth:
+        arrays = smoothed(core.run_smoothed(data.time, data.markers, data.wrench, output_sd=True, feet=loads))
+    else:
+        arrays = core.run(data.time, data.markers, data.wrench, output_sd=True, feet=loads)
+    layout, spec = Layout(SPEC), to_core(SPEC)
+    ground = GroundFrame(np.eye(3), np.zeros(3), "+Y", np.array([1.0, 0.0, 0.0]))
+    zero = np.zeros((FRAMES, 3))
+    plate = Plate("plate 1", data.wrench[:, :3], data.wrench[:, 3:], zero + np.array([0.1, -0.05, 0.0]), zero)
+    names = tuple(m.name for m in SPEC.markers)
+    recording = Recording("fall", None, data.time, names, data.markers, (plate,))
+    endless = np.full(layout.size, np.inf)
+    initial: Any = SimpleNamespace(
+        spec=spec,
+        names=tuple(layout.names),
+        x0=data.x0,
+        sd0=prior_sd(layout),
+        lower=-endless,
+        upper=endless,
+        table=np.full(layout.size, np.nan),
+        soft_tissue_m=np.zeros(len(names)),
+        ground=ground,
+        recorded_markers=names,
+        side="both",
+        mass_kg=50.0,
+        height_m=None,
+        messages=(),
+    )
+    measured = (data.markers, data.wrench)
+    covariances = (data.P0, core.covariance)
+    return assemble(arrays, _core.Model(spec), initial, recording, measured, {}, [], covariances, feet)
+
+
+@pytest.fixture(scope="module")
+def feet(data: Trial) -> FootWrenches:
+    return feet_of(data, contacts())
+
+
+@pytest.fixture(scope="module", params=[False, True], ids=["filtered", "smoothed"])
+def estimate(data: Trial, feet: FootWrenches, request: pytest.FixtureRequest) -> Estimate:
+    return estimate_of(data, feet, request.param)
+
+
+def values(estimate: Estimate, name: str) -> np.ndarray:
+    return np.asarray(estimate.data[name].values)
+
+
+def test_nothing_is_left_at_the_root_where_anything_touches(estimate: Estimate) -> None:
+    moments = estimate.data["moments"].sel(coordinate=list(ROOT)).values
+    touched = np.r_[0:35, 45:FRAMES]
+    assert np.abs(moments[touched]).max() < 1e-9
+    assert np.abs(values(estimate, "wrench_remainder")[touched]).max() < 1e-9
+    np.testing.assert_allclose(
+        values(estimate, "foot_wrench")[touched].sum(axis=1), values(estimate, "wrench_estimated")[touched], atol=1e-9
+    )
+    np.testing.assert_allclose(
+        values(estimate, "wrench_remainder")[35:40], values(estimate, "wrench_estimated")[35:40], atol=1e-12
+    )
+    assert np.isnan(moments[40:45]).all() and np.isnan(values(estimate, "wrench_remainder")[40:45]).all()
+
+
+def test_what_is_derived_and_what_is_not_known_is_marked(estimate: Estimate) -> None:
+    source = estimate.data["moment_source"].sel(coordinate="leg2_0_l").values
+    other = estimate.data["moment_source"].sel(coordinate="leg2_0_r").values
+    assert (source[25:35] == 1).all() and (other[25:35] == 0).all()
+    assert (source[40:45] == 2).all() and (other[40:45] == 2).all()
+    assert not source[:25].any() and not source[45:].any()
+    assert np.isnan(estimate.data["moments_sd"].sel(coordinate="leg2_0_r").values[40:45]).all()
+    arm = estimate.data["moments"].sel(coordinate="arm_0").values
+    assert np.isfinite(arm).all()
+
+
+def test_figures_of_the_feet(estimate: Estimate) -> None:
+    figures = estimate.metrics()["feet"]
+    assert figures["derived_frames"] == 10 and figures["unknown_frames"] == 5 and figures["flight_frames"] == 5
+    both = np.r_[0:25, 35:40, 45:FRAMES]
+    adjustment = values(estimate, "foot_adjustment")[:, 0, 1]
+    own = both[values(estimate, "foot_contact")[both, 0] == MEASURED]
+    rms = np.sqrt(np.mean(adjustment[own] ** 2))
+    assert figures["adjustment_rms"]["left"]["fy"] == pytest.approx(rms)
+    assert "10 of 60 frames one contact was not measured" in figures["verdict"]
+
+
+def test_centres_of_pressure_carry_the_whole_wrench(estimate: Estimate) -> None:
+    assert estimate.floor_height_m == pytest.approx(-0.05)
+    wrench = values(estimate, "foot_wrench")[:, 0]
+    point, free = estimate.centre_of_pressure("left")
+    loaded = np.nan_to_num(wrench[:, 1]) >= 20.0
+    assert loaded.any() and not loaded.all()
+    np.testing.assert_array_equal(np.isfinite(point).all(axis=1), loaded)
+    moment = np.cross(point, wrench[:, :3]) + np.outer(free, [0.0, 1.0, 0.0])
+    np.testing.assert_allclose(moment[loaded], wrench[loaded, 3:], atol=1e-9)
+    assert (point[loaded, 1] == estimate.floor_height_m).all()
+
+
+def test_joint_loads_along_the_axes_of_either_segment(estimate: Estimate) -> None:
+    ground = estimate.joint_loads()
+    names = [str(name) for name in estimate.data["joint_segment"].values]
+    thigh, shank = names.index("left_0"), names.index("left_1")
+    R = values(estimate, "joint_orientations")
+    for frame, own in (("child", shank), ("parent", thigh)):
+        turned = estimate.joint_loads(frame)[:, shank]
+        for k in (0, 10, 30):
+            np.testing.assert_allclose(turned[k, :3], R[k, own].T @ ground[k, shank, :3], atol=1e-10)
+            np.testing.assert_allclose(turned[k, 3:], R[k, own].T @ ground[k, shank, 3:], atol=1e-10)
+    np.testing.assert_array_equal(np.isnan(estimate.joint_loads("child")), np.isnan(ground))
+    np.testing.assert_array_equal(estimate.joint_loads("parent")[:30, 0], ground[:30, 0])  # the ground's own
+
+
+def test_powers_and_work(estimate: Estimate) -> None:
+    power = estimate.powers()
+    np.testing.assert_array_equal(power, values(estimate, "moments") * values(estimate, "speeds"))
+    work = estimate.metrics()["work"]["arm_0"]
+    own = power[:, estimate.coordinate_names.index("arm_0")]
+    assert work["positive_j"] + work["negative_j"] == pytest.approx(np.trapezoid(own, estimate.time))
+    assert work["positive_j"] >= 0.0 >= work["negative_j"]
+    assert work["positive_j_per_kg"] == pytest.approx(work["positive_j"] / 50.0)
+    assert not set(ROOT) & set(estimate.metrics()["work"])  # the root has no muscle
+    np.testing.assert_allclose(estimate.moments_per_kg(), values(estimate, "moments") / 50.0)
+
+
+def test_both_sides_are_compared(estimate: Estimate) -> None:
+    found = estimate.metrics()["asymmetry"]
+    angle = {side: estimate.data["coordinates"].sel(coordinate=f"leg0_0_{side}").values for side in "rl"}
+    r, left = np.ptp(angle["r"]), np.ptp(angle["l"])
+    assert found["coordinates"]["leg0_0"]["range"] == pytest.approx(100 * (r - left) / ((r + left) / 2))
+    assert -200 <= found["feet"]["impulse"] <= 200
+
+
+def test_files(estimate: Estimate, tmp_path: Path) -> None:
+    folder = estimate.save(tmp_path / "out")
+    feet = read_table(folder / "feet.sto")
+    columns = dict(zip(feet.names, feet.values.T, strict=True))
+    for side, foot in (("l", 0), ("r", 1)):
+        force, point, torque = (
+            np.stack([columns[f"ground_{kind}{a}"] for a in "xyz"], axis=1)
+            for kind in (f"force_{side}_v", f"force_{side}_p", f"torque_{side}_")
+        )
+        moment = np.cross(point, force) + torque
+        expected = values(estimate, "foot_wrench")[:, foot]
+        np.testing.assert_allclose(np.hstack([force, moment]), expected, atol=1e-9)
+    mass_centre = read_table(folder / "centre_of_mass.sto")
+    assert list(mass_centre.names) == ["com_x", "com_y", "com_z", "com_vx", "com_vy", "com_vz"]
+    np.testing.assert_allclose(mass_centre.values[:, :3], values(estimate, "mass_centre"), rtol=1e-12)
+    loads = read_table(folder / "joint_reactions.sto")
+    joint = [str(name) for name in estimate.data["joint"].values][3]
+    here = list(loads.names).index(f"{joint}_on_left_2_in_ground_fy")
+    np.testing.assert_allclose(loads.values[:, here], values(estimate, "joint_loads")[:, 3, 1], rtol=1e-12)
+    powers = read_table(folder / "powers.sto")
+    assert powers.names[0] == f"{estimate.coordinate_names[0]}_power"
+    with xr.open_dataset(folder / "estimate.nc") as stored:
+        np.testing.assert_array_equal(stored["foot_wrench"].values, values(estimate, "foot_wrench"))
+        assert stored["foot_contact"].attrs["units"].startswith("0 in the air")
+
+
+def test_the_feet_change_nothing_but_the_moments(data: Trial, feet: FootWrenches) -> None:
+    with_feet, without = estimate_of(data, feet), estimate_of(data, None)
+    for name in ("coordinates", "wrench_estimated", "state_sd", "mass_centre", "joint_centres"):
+        np.testing.assert_array_equal(values(with_feet, name), values(without, name))
+    assert without.foot_names == [] and without.metrics()["feet"] is None
+
+
+def test_errors_about_a_reference_point_are_carried_to_the_origin() -> None:
+    codes = np.full((1, 2), MEASURED)
+    feet = FootWrenches.of(NAMES, FEET, np.zeros((1, 2, 6)), codes, 20.0, 3.0, [[1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    rng = np.random.default_rng(34)
+    force, moment = rng.normal(size=(200_000, 3)) * 20.0, rng.normal(size=(200_000, 3)) * 3.0
+    drawn = np.cov(np.hstack([force, moment + np.cross([1.0, 0.0, 0.0], force)]).T)
+    np.testing.assert_allclose(feet.covariance[0, 0], drawn, atol=6.0)
+    np.testing.assert_allclose(feet.covariance[0, 1], np.diag([400.0] * 3 + [9.0] * 3))
+    assert feet.covariance[0, 0][5, 5] == pytest.approx(409.0)  # 20 N at 1 m is 20 N m
+
+
+def test_late_plates_are_taken_earlier(data: Trial, feet: FootWrenches) -> None:
+    late = feet.in_step(data.time, 0.01)  # a frame
+    np.testing.assert_allclose(late.wrench[10], feet.wrench[11], rtol=1e-6, atol=1e-6)
+    assert (late.contact[18] == MEASURED).all() and late.contact[19, 1] == IN_THE_AIR
+    half = feet.in_step(data.time, 0.005)
+    assert not ((half.contact == MEASURED) & ~np.isfinite(half.wrench).all(axis=2)).any()
+    assert feet.in_step(data.time, 0.0) is feet
+
+
+def test_feet_that_do_not_fit_are_told(data: Trial) -> None:
+    model = _core.Model(to_core(SPEC))
+    good = feet_of(data, contacts())
+    good.check(model)
+    wrong = FootWrenches(NAMES, ("left_2", "paw"), good.wrench, good.covariance, good.contact)
+    with pytest.raises(ModelError, match="foot 'right': segment 'paw' is not in the model, expected one of root"):
+        wrong.check(model)
+    twice = FootWrenches(NAMES, ("left_2", "left_2"), good.wrench, good.covariance, good.contact)
+    with pytest.raises(ModelError, match="'left_2' is given twice"):
+        twice.check(model)
+    blank = FootWrenches(NAMES, FEET, good.wrench * np.nan, good.covariance, good.contact)
+    with pytest.raises(ModelError, match="foot 'left': frame 1 is measured but its wrench is"):
+        blank.check(model)
