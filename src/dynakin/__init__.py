@@ -12,7 +12,7 @@ if not _cpu.supported():
 
 from dynakin.errors import DynakinError
 from dynakin.filter import Estimator, Noise, Sample, presets
-from dynakin.model import Bounds, ModelDefinition, Priors, Subject, initialise, load_model
+from dynakin.model import Bounds, ModelDefinition, Priors, Subject, initialise, load_model, load_opensim
 from dynakin.recordings import GroundFrame, Recording, read
 from dynakin.results import Estimate
 
@@ -32,6 +32,7 @@ __all__ = [
     "Subject",
     "initialise",
     "load_model",
+    "load_opensim",
     "presets",
     "read",
 ]

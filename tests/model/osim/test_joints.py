@@ -35,6 +35,13 @@ def test_a_coupled_coordinate_is_a_function_of_the_other(version: int, tmp_path:
     compare(path)
 
 
+@pytest.mark.parametrize("name", ["NaturalCubicSpline", "natCubicSpline"])
+def test_splines_under_their_older_names(name: str, tmp_path: Path) -> None:
+    path = small_model(tmp_path, "CustomJoint", 3)
+    path.write_text(path.read_text().replace("SimmSpline", name))
+    compare(path)
+
+
 def compare(path: Path) -> None:
     source, peer, rng = read_osim(path), Peer(path), np.random.default_rng(1)
     model = _core.Model(to_spec(source, scale_names(source)))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tomllib
 from pathlib import Path
 
 from dynakin.errors import ModelError
@@ -13,6 +12,7 @@ from dynakin.model.opensim.description import OpenSimModel
 from dynakin.model.opensim.from_core import from_core
 from dynakin.model.opensim.identified import identified
 from dynakin.model.opensim.sites import with_mass
+from dynakin.model.validation import read_toml
 
 
 def read_values(path: Path) -> dict[str, float]:
@@ -31,11 +31,15 @@ def read_values(path: Path) -> dict[str, float]:
 
 
 def mass_of_run(parameters: Path) -> float | None:
-    """The mass (kg) in the run's ``config.toml`` beside its parameters, None where there is none."""
+    """The mass (kg) in the run's ``config.toml`` beside its parameters, None where there is none.
+
+    Raises:
+        ModelError: that file is damaged.
+    """
     path = parameters.with_name("config.toml")
     if not path.exists():
         return None
-    mass = tomllib.loads(path.read_text(encoding="utf-8")).get("mass_kg")
+    mass = read_toml(path).get("mass_kg")
     return None if mass is None else float(mass)
 
 
