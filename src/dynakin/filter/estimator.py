@@ -18,10 +18,11 @@ from dynakin.filter.live import StepEstimate, deviations_of, step_estimate
 from dynakin.filter.noise import Noise, gate_limits
 from dynakin.filter.samples import Sample, foreign_load, recording_arrays, sample_arrays
 from dynakin.filter.smoothing import check_can_smooth, smoothed
-from dynakin.filter.total_wrench import foreign_total, leave_out_unknown
+from dynakin.filter.total_wrench import foot_wrenches, foreign_total, leave_out_unknown
 from dynakin.model import Bounds, CarriedLoad, Definition, InitialModel, Priors, initialise, with_loads
 from dynakin.model.validation import nearest
 from dynakin.recordings import Recording, check_plates
+from dynakin.recordings.foot_loads import FootLoads, foot_loads
 from dynakin.results import Estimate
 
 Array = npt.NDArray[np.float64]
@@ -100,9 +101,9 @@ class Estimator:
             recording: markers and plates, as `read` gives them.
             static: the same person and markers, standing: lengths and marker places are taken from it.
             smooth: whether each frame is estimated from all frames, those after it too (`filter.smoothing`).
-            feet: gives the wrench of each foot once the model is measured and its ground frame known. Moments are then
-                those that the feet's wrenches leave, adjusted so that nothing is left at the root; the state does not
-                depend on it. For models with a floating root.
+            feet: for models with a floating root: gives the wrench of each foot once the model is measured and its
+                ground frame known, instead of the plates' own division by `foot_loads`. Moments are those that the
+                feet's wrenches leave, adjusted so that nothing is left at the root; the state does not depend on it.
             progress: called with (frames done, frames in all) now and then.
 
         Raises:
@@ -114,8 +115,15 @@ class Estimator:
         initial = self.start(recording, static=static)
         assert self._core_model is not None
         markers, wrench = recording_arrays(recording, initial, gaps=self.noise.recover)
-        notes, foreign = self._judge_plates(recording, initial, wrench)
-        on_feet = None if feet is None or foreign else feet(initial)
+        loads = None
+        if initial.feet and recording.plates:
+            loads = foot_loads(recording, initial.ground, assigned=self.plates)
+        notes, foreign = self._judge_plates(recording, initial, wrench, loads)
+        on_feet = None
+        if feet is not None and not foreign:
+            on_feet = feet(initial)
+        elif loads is not None and not foreign:
+            on_feet = foot_wrenches(loads, initial, self.noise)
         try:
             arrays, shift, clock = self._in_step(initial, recording.time, markers, wrench, on_feet, progress)
             wrench = in_step(recording.time, wrench, shift) if shift else wrench
@@ -132,7 +140,9 @@ class Estimator:
         measured = (markers, wrench)
         return assemble(arrays, self._core_model, initial, recording, measured, config, notes, covariances, on_feet)
 
-    def _judge_plates(self, recording: Recording, initial: InitialModel, wrench: Array) -> tuple[list[str], str | None]:
+    def _judge_plates(
+        self, recording: Recording, initial: InitialModel, wrench: Array, loads: FootLoads | None
+    ) -> tuple[list[str], str | None]:
         """Leaves out (NaN, in place) what is not the whole wrench (T, 6).
 
         Returns:
@@ -140,9 +150,10 @@ class Estimator:
         """
         notes: list[str] = []
         if initial.feet:
-            notes += leave_out_unknown(recording, initial, wrench, self.plates)
-            if not recording.plates:
-                return notes, notes[-1]
+            if loads is None:
+                text = "No force plates: the total wrench is left out, and inertial parameters stay as the table has them."
+                return [text], text
+            notes += leave_out_unknown(loads, wrench)
         check = check_plates(recording, initial.ground, None if initial.feet else initial.weighed_kg)
         if check.refusal:
             raise RecordingError(f"{recording.path or recording.name}: {check.refusal}")
@@ -209,6 +220,8 @@ class Estimator:
             side=self.side,
             vertical=self.vertical,
             forward=self.forward,
+            estimate=self.estimate,
+            plates=self.plates,
             loads=self.loads,
         )
 

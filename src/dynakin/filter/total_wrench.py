@@ -2,33 +2,56 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.filter.foot_wrenches import IN_THE_AIR, MEASURED, NOT_MEASURED, FootWrenches
+from dynakin.filter.noise import Noise
 from dynakin.model import InitialModel
 from dynakin.recordings import Recording
-from dynakin.recordings.foot_loads import foot_loads
+from dynakin.recordings import foot_loads as on_plates
+from dynakin.recordings.foot_loads import LOADED_N, FootLoads
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
 
 
-def leave_out_unknown(
-    recording: Recording, initial: InitialModel, wrench: Array, assigned: Mapping[str, str]
-) -> list[str]:
-    """Make the rows of the total wrench (T, 6) NaN, in place, where the plates do not tell all of it.
+_CONTACT = {
+    on_plates.SWING: IN_THE_AIR,
+    on_plates.MEASURED: MEASURED,
+    on_plates.SHARED: MEASURED,
+    on_plates.OFF_PLATE: NOT_MEASURED,
+    on_plates.UNKNOWN: NOT_MEASURED,
+}
+_SHARED_PART = 0.2
+"""Part of a foot's load by which the division of a shared plate may err."""
+_SHARED_REACH_M = 0.1
+"""How far, as an arm of that force, its point may err."""
 
-    Args:
-        assigned: plate -> foot, where the user knows better.
+
+def foot_wrenches(loads: FootLoads, initial: InitialModel, noise: Noise) -> FootWrenches:
+    """Each foot's wrench with its uncertainty: the plates' noise at the foot's centre of pressure.
+
+    On a shared plate the division is known to a fifth of the load, and to the feet's distance.
+    """
+    contact = np.vectorize(_CONTACT.get, otypes=[np.uint8])(loads.reason)
+    wrench = np.nan_to_num(loads.wrench)
+    push = np.maximum(wrench[..., 1], LOADED_N)
+    zero = np.zeros_like(push)
+    pressure = np.stack([wrench[..., 5] / push, zero, -wrench[..., 3] / push], axis=-1)
+    shared = np.where(loads.reason == on_plates.SHARED, _SHARED_PART * push, 0.0)[..., None]
+    force = np.hypot(np.sqrt(noise.force / 2.0), shared)  # the noise declared is that of both together
+    moment = np.hypot(np.sqrt(noise.moment / 2.0), _SHARED_REACH_M * shared)
+    segments = [initial.feet[foot] for foot in loads.feet]
+    return FootWrenches.of(loads.feet, segments, loads.wrench, contact, force, moment, pressure)
+
+
+def leave_out_unknown(loads: FootLoads, wrench: Array) -> list[str]:
+    """Make the rows of the total wrench (T, 6) NaN, in place, where the plates do not tell all of it.
 
     Returns:
         What there is to say, with times.
     """
-    if not recording.plates:
-        return ["No force plates: the total wrench is left out, and inertial parameters stay as the table has them."]
-    loads = foot_loads(recording, initial.ground, assigned=assigned)
     wrench[~loads.total_known] = np.nan
     used = int(np.count_nonzero(np.isfinite(wrench).all(axis=1)))
     return [*loads.messages, f"The total wrench is measured in {used} of {len(wrench)} frames."]
