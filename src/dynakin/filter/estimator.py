@@ -151,7 +151,7 @@ class Estimator:
         notes: list[str] = []
         if initial.feet:
             if loads is None:
-                text = "No force plates: the total wrench is left out, and inertial parameters stay as the table has them."
+                text = "No force plates: the total wrench is left out; inertial parameters stay as the table has them."
                 return [text], text
             notes += leave_out_unknown(loads, wrench)
         check = check_plates(recording, initial.ground, None if initial.feet else initial.weighed_kg)

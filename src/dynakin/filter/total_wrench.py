@@ -8,7 +8,6 @@ import numpy.typing as npt
 from dynakin.filter.foot_wrenches import IN_THE_AIR, MEASURED, NOT_MEASURED, FootWrenches
 from dynakin.filter.noise import Noise
 from dynakin.model import InitialModel
-from dynakin.recordings import Recording
 from dynakin.recordings import foot_loads as on_plates
 from dynakin.recordings.foot_loads import LOADED_N, FootLoads
 from dynakin.units import GRAVITY_M_S2
