@@ -17,12 +17,9 @@ _REGIONS: dict[str, tuple[dict[str, str], str]] = {
     "pelvis": ({}, "pelvis"),
     "abdomen": ({}, "trunk"),
     "thorax": ({"sho": "shoulder", "acr": "shoulder"}, "trunk"),
-    "torso": ({"sho": "shoulder", "acr": "shoulder"}, "trunk"),
     "trunk": ({"sho": "shoulder", "acr": "shoulder"}, "trunk"),
     "upper_arm": ({}, "arm"),
     "forearm": ({}, "forearm"),
-    "hand": ({}, "forearm"),
-    "head": ({}, "head"),
 }
 
 
