@@ -97,3 +97,15 @@ def test_gait_with_plug_in_gait(data_dir: Path) -> None:
     plausible(estimator, estimate, np.ones(recording.n_frames, dtype=bool))
     events = [event for event in estimate.events if event.subject == "plates"]
     assert events and all(event.kind == "missing" for event in events)
+
+
+def test_a_standing_trial_may_wear_more_markers(data_dir: Path) -> None:
+    """Medial knee and ankle markers come off before people walk."""
+    name, forces, mass, height = WALK
+    recording = read(data_dir / name, data_dir / str(forces))
+    static = read(data_dir / "opencap_subject4" / "static1.trc")
+    estimator = Estimator(load_model("fullbody", Subject(mass_kg=mass, height_m=height)))
+    estimate = estimator.run(recording, static=static)
+    judged = (recording.time >= 0.15) & (recording.time <= 1.20)
+    plausible(estimator, estimate, judged)
+    assert any("standing from 0.00 to 5.16 s of static1" in text for text in estimate.messages)
