@@ -71,6 +71,7 @@ def estimate_of(data: Trial, feet: FootWrenches | None, smooth: bool = False) ->
         spec=spec,
         names=tuple(layout.names),
         dimensionless=frozenset(),
+        feet={},
         soft_tissue_m=np.zeros(len(SPEC.markers)),
         x0=data.x0,
         sd0=prior_sd(layout),
