@@ -10,6 +10,7 @@ from typing import Any
 from dynakin.comparison import Setup, halves
 from dynakin.config import RunConfig, make_config, read_config
 from dynakin.errors import ConfigError
+from dynakin.filter import presets as preset_files
 from dynakin.model import load_model
 from dynakin.recordings import Recording, read
 
@@ -81,7 +82,10 @@ def _case(trial: Path, given: dict[str, Any], presets: Sequence[str], cutoff_hz:
     content = read_config(trial) if is_config else {"trial": trial}
     # a configuration's own output is not where a comparison goes
     config = make_config(content | options | {"output": Path()}, str(trial) if is_config else "compare")
-    noise = {name: config.model_copy(update={"preset": name}).noise_settings() for name in (presets or [config.preset])}
+    noise = {
+        preset_files.title(name): config.model_copy(update={"preset": name}).noise_settings()
+        for name in (presets or [config.preset])
+    }
     setup = Setup(
         load_model(config.model, config.subject(), markers=config.markers, table=config.table),
         noise,

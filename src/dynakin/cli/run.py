@@ -29,7 +29,7 @@ from dynakin.cli.summary import print_summary
 from dynakin.comparison import Trial, trial_of
 from dynakin.config import RunConfig, make_config, read_config
 from dynakin.errors import DynakinError
-from dynakin.filter import Estimator
+from dynakin.filter import Estimator, presets
 from dynakin.identifiability import Identifiability, identifiability
 from dynakin.model import load_model
 from dynakin.recordings import read
@@ -134,7 +134,7 @@ def estimate_from(
     estimate = estimator.run(recording, static=static, smooth=config.smooth, progress=progress)
     estimate = replace(estimate, config=config.as_used() | estimate.config)
     assert estimator.initial is not None
-    comparison = trial_of({config.preset: estimate}, estimator.initial, model, whatever=True)
+    comparison = trial_of({presets.title(config.preset): estimate}, estimator.initial, model, whatever=True)
     try:
         return estimate, comparison, identifiability(estimator, estimate)
     except DynakinError as error:  # a trial of a few frames, say: no reason to lose the estimate

@@ -12,9 +12,10 @@ from dynakin.errors import ConfigError, DivergenceError, RecordingError
 from dynakin.filter import presets
 from dynakin.filter.alignment import PASSES, delay_of, in_step, in_words, is_late
 from dynakin.filter.assemble import assemble
-from dynakin.filter.extend import continuous_noise, extended, initial_covariance
+from dynakin.filter.core_filter import core_filter, filter_settings
+from dynakin.filter.extend import initial_covariance
 from dynakin.filter.live import StepEstimate, deviations_of, step_estimate
-from dynakin.filter.noise import Noise, gate_limits
+from dynakin.filter.noise import Noise
 from dynakin.filter.samples import Sample, foreign_load, recording_arrays, sample_arrays
 from dynakin.filter.smoothing import check_can_smooth, smoothed
 from dynakin.model import Bounds, InitialModel, ModelDefinition, Priors, initialise
@@ -89,17 +90,10 @@ class Estimator:
             check_can_smooth(self.noise)
         initial = self.start(recording, static=static)
         assert self._core_model is not None
-        markers, wrench = recording_arrays(recording, initial, gaps=self.noise.recover)
-        check = check_plates(recording, initial.ground, initial.mass_kg)
-        if check.refusal:
-            raise RecordingError(f"{recording.path or recording.name}: {check.refusal}")
-        notes = list(check.messages)
-        foreign = foreign_load(check, initial.mass_kg, self.noise.plate_load_tolerance)
-        if foreign:
-            wrench[:] = np.nan
-            notes.append(foreign)
+        markers, wrench, notes = self.measured(recording, initial)
+        foreign = bool(np.isnan(wrench).all())
         try:
-            arrays, wrench, clock = self._in_step(initial, recording.time, markers, wrench, progress)
+            arrays, wrench, clock = self.run_in_step(initial, recording.time, markers, wrench, progress)
             if smooth:
                 self.start_from(initial)
                 arrays = self.run_smoothed_arrays(recording.time, markers, wrench, progress)
@@ -111,8 +105,31 @@ class Estimator:
         covariances = (initial_covariance(initial, self.noise), self._filter.covariance)
         return assemble(arrays, self._core_model, initial, recording, (markers, wrench), config, notes, covariances)
 
-    def _in_step(
-        self, initial: InitialModel, time: Array, markers: Array, wrench: Array, progress: Progress | None
+    def measured(self, recording: Recording, initial: InitialModel) -> tuple[Array, Array, list[str]]:
+        """What the filter takes of a recording: markers (T, M, 3) m, wrench (T, 6), all NaN where the plates carry
+        something that the model does not have, and what there is to say of the plates.
+
+        Raises:
+            RecordingError: markers or plates do not fit the model.
+        """
+        markers, wrench = recording_arrays(recording, initial, gaps=self.noise.recover)
+        check = check_plates(recording, initial.ground, initial.mass_kg)
+        if check.refusal:
+            raise RecordingError(f"{recording.path or recording.name}: {check.refusal}")
+        notes = list(check.messages)
+        foreign = foreign_load(check, initial.mass_kg, self.noise.plate_load_tolerance)
+        if foreign:
+            wrench[:] = np.nan
+            notes.append(foreign)
+        return markers, wrench, notes
+
+    def run_in_step(
+        self,
+        initial: InitialModel,
+        time: Array,
+        markers: Array,
+        wrench: Array,
+        progress: Progress | None = None,
     ) -> tuple[dict[str, Array], Array, list[str]]:
         """`run_arrays`, again with the plates brought into step where they turn out to lag.
 
@@ -136,7 +153,15 @@ class Estimator:
         Raises:
             ModelError, RecordingError: as in `run`.
         """
-        initial = initialise(
+        return self.start_from(self.measure(recording, static=static))
+
+    def measure(self, recording: Recording, *, static: Recording | None = None) -> InitialModel:
+        """The model as measured on a recording, before any states are added that the noise asks for.
+
+        Raises:
+            ModelError, RecordingError: as in `run`.
+        """
+        return initialise(
             self.model,
             recording,
             static=static,
@@ -146,15 +171,10 @@ class Estimator:
             priors=self.priors,
             bounds=self.bounds,
         )
-        return self.start_from(initial)
 
     def start_from(self, initial: InitialModel) -> InitialModel:
         """Make the filter ready to step from a model that was measured before, or changed since."""
-        initial = extended(initial, self.noise)
-        self._core_model = _core.Model(initial.spec)
-        self._filter = _core.Filter(
-            self._core_model, self.filter_settings(initial), initial.x0, initial_covariance(initial, self.noise)
-        )
+        initial, self._core_model, self._filter = core_filter(initial, self.noise)
         if self.lag:
             check_can_smooth(self.noise)
         self._lag = _core.FixedLag(self._filter, self.lag) if self.lag else None
@@ -266,34 +286,4 @@ class Estimator:
     def filter_settings(self, initial: InitialModel) -> _core.FilterSettings:
         """The core's settings for a measured model: this noise, the marker set's variances, the bounds of (9)."""
         assert self._core_model is not None
-        unknown = set(self.noise.marker) - set(initial.recorded_markers)
-        if unknown:
-            raise ConfigError(
-                f"noise.marker: {', '.join(sorted(unknown))} not among the markers used; expected some of "
-                f"{', '.join(initial.recorded_markers)}"
-            )
-        noise, layout = self.noise, self._core_model.layout
-        point = noise.reference_point_m
-        unseen = np.inf if noise.unseen_sd is None else noise.unseen_sd
-        recovery = _core.RecoverySettings(blind_s=noise.blind_s, unseen_sd=unseen) if noise.recover else None
-        density, decay = continuous_noise(initial, noise, layout)
-        return _core.FilterSettings(
-            process_variance=noise.process_variance(layout),
-            process_density=density,
-            decay_rate=decay,
-            marker_variance=noise.marker_variance(
-                initial.recorded_markers, initial.marker_variance, initial.soft_tissue_m
-            ),
-            wrench_covariance=noise.wrench_covariance(),
-            reference_point=initial.plate_centre if point == "auto" else np.array(point, dtype=float),
-            total_mass=initial.mass_kg if noise.total_mass_use == "frame" else None,
-            total_mass_variance=noise.total_mass,
-            lower=initial.lower,
-            upper=initial.upper,
-            constraint=noise.constraint,
-            marker_gate=gate_limits(noise.marker_gate),
-            wrench_gate=gate_limits(noise.wrench_gate),
-            wrench_needs_markers=noise.recover,
-            iterate_beyond=np.inf if noise.iterate_beyond is None else noise.iterate_beyond,
-            recovery=recovery,
-        )
+        return filter_settings(initial, self.noise, self._core_model.layout)

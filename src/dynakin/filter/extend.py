@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +20,7 @@ def extended(initial: InitialModel, noise: Noise) -> InitialModel:
 
     Displacements of soft tissue and errors of the plates start at 0 with the standard deviations declared.
     """
-    spec = initial.spec
+    spec = copy(initial.spec)  # the same measured model serves other settings, in other threads
     sd = noise.soft_tissue_sd(initial.soft_tissue_m)
     markers = spec.markers
     for marker, value in zip(markers, sd, strict=True):
