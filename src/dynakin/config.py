@@ -65,7 +65,7 @@ class RunConfig(Strict):
     """Standard deviations at the first frame."""
     bounds: Bounds = Bounds()
     """Half widths of the bounds of equation (9)."""
-    grid: dict[str, tuple[float, float, int]] = {}
+    grid: dict[str, tuple[float, float, int]] | None = Field(default=None, examples=[{"jerk": [1.0, 1e4, 5]}])
     """Settings that `tune grid` varies: NAME = [from, to, steps], logarithmic. `run` does not read it."""
 
     ground: dict[str, Any] = Field(default_factory=dict)

@@ -1,4 +1,4 @@
-"""The engine: the same table whoever works, errors that stay with their task, and runs that go on where they stopped."""
+"""The engine: the same table whoever works, errors that stay with their task, runs that go on where they stopped."""
 
 from __future__ import annotations
 

@@ -18,6 +18,7 @@ from dynakin.cli.model import model
 from dynakin.cli.print_config import print_config
 from dynakin.cli.run import run
 from dynakin.cli.simulate import simulate
+from dynakin.cli.tune import tune
 from dynakin.errors import DynakinError
 
 # Typer carries its own copy of click or uses click's, depending on its version; its own name leads to either.
@@ -34,6 +35,7 @@ app = typer.Typer(
 for command in (run, demo, compare, simulate, check, model):
     app.command()(command)
 app.command("print-config")(print_config)
+app.add_typer(tune, name="tune")
 
 
 def _version(asked: bool) -> None:

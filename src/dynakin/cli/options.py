@@ -22,3 +22,6 @@ PlateFilter = Annotated[float | None, typer.Option("--plate-filter-hz", help="Lo
 ForceThreshold = Annotated[
     float | None, typer.Option("--force-threshold-n", help="Load below which a plate counts as empty, N.")
 ]
+Backend = Annotated[str, typer.Option(help="Who works: processes or threads of this machine, or dask.")]
+Jobs = Annotated[int | None, typer.Option(help="Workers at a time on this machine; else one a core.")]
+Scheduler = Annotated[str | None, typer.Option(help="Address of the Dask cluster's scheduler, tcp://HOST:PORT.")]

@@ -30,10 +30,10 @@ class ClusterPool:
             raise ConfigError(
                 "--backend dask: dask.distributed is not installed; expected pip install 'dynakin[cluster]'"
             ) from None
-        self._distributed = distributed
+        self._distributed: Any = distributed
         self._address = address
         try:
-            self._client = distributed.Client(address, timeout=TIMEOUT_S, set_as_default=False)
+            self._client = self._distributed.Client(address, timeout=TIMEOUT_S, set_as_default=False)
         except (OSError, ValueError) as error:
             text = " ".join(str(error).split())
             raise ConfigError(f"--scheduler {address}: no scheduler answers there ({text})") from None

@@ -23,12 +23,12 @@ LOST_M = 0.5
 
 # Criteria, all of them the smaller the better: title and unit.
 CRITERIA = {
-    "paper": ("sum of RMS differences, as the paper has it", "m + N + N m"),
-    "sigma": ("mean RMS difference, each channel in its declared sigma", "1"),
-    "nll": ("negative log-likelihood of the innovations, per row", "nat"),
-    "ahead": ("error 100 ms ahead over that of the last value held", "1"),
+    "paper": ("sum of RMS differences", "m + N + N m"),
+    "sigma": ("mean RMS difference in declared sigmas", "1"),
+    "nll": ("negative log-likelihood per row", "nat"),
+    "ahead": ("error 100 ms ahead, 1: of the last value held", "1"),
     "left_out": ("error of the marker that is left out", "mm"),
-    "nis": ("|ln| of the normalised innovation squared per row", "1"),
+    "nis": ("|ln| of the NIS per row", "1"),
 }
 
 
@@ -65,9 +65,10 @@ def run_score(trial: TuningTrial, noise: Noise, markers: Array | None = None, tr
     """The core's sums over the trial's frames that count; see `_core.Filter.score`."""
     _, _, core = core_filter(trial.initial, noise)
     given = trial.markers if markers is None else markers
-    return core.score(
+    found: dict[str, Any] = core.score(
         trial.time, given, trial.wrench, trial.first, trial.end, ahead=trial.ahead, lost_m=LOST_M, trace=trace
     )
+    return found
 
 
 def figures_of(trial: TuningTrial, noise: Noise, declared: Noise) -> dict[str, Any]:
@@ -148,7 +149,7 @@ def _declared_sd(trial: TuningTrial, noise: Noise) -> Array:
     lever = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
     wrench = noise.wrench_covariance()
     moments = np.diag(wrench[3:, 3:]) + np.diag(lever @ wrench[:3, :3] @ lever.T)
-    return np.sqrt(np.concatenate([np.repeat(markers, 3), np.diag(wrench)[:3], moments]))
+    return np.asarray(np.sqrt(np.concatenate([np.repeat(markers, 3), np.diag(wrench)[:3], moments])))
 
 
 def _parts(prefix: str) -> list[str]:

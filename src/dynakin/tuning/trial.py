@@ -59,7 +59,7 @@ class TuningTrial:
         change = channels[then] - channels[then - self.ahead]
         counts = np.isfinite(change).sum(axis=0)
         squares = np.where(np.isfinite(change), change**2, 0.0).sum(axis=0)
-        return np.sqrt(np.divide(squares, counts, out=np.full(len(counts), np.nan), where=counts > 0))
+        return np.asarray(np.sqrt(np.divide(squares, counts, out=np.full(len(counts), np.nan), where=counts > 0)))
 
     def identity(self) -> dict[str, object]:
         """Plain data that stands for this trial where rows are kept."""
