@@ -37,9 +37,11 @@ from dynakin.filter import presets
 from dynakin.reference import CUTOFF_HZ
 from dynakin.report import Sensitivity, save_sensitivity_figures
 from dynakin.report.sensitivity import GAIN_NAMES, GAIN_UNITS
-from dynakin.report.tuning_tables import criteria_text, grid_text
+from dynakin.report.tuning_tables import criteria_text, figures_text, grid_text, settings_text
 from dynakin.tuning import CRITERIA, Axis, Grid, Shared, axis, belongs_to, paper_axes, prepare, run_grid
-from dynakin.tuning.output import ROWS, open_folder, write_grid
+from dynakin.tuning.advice import recommendation
+from dynakin.tuning.fit import Fitter, belongs_to_fit, usual_names
+from dynakin.tuning.output import ROWS, open_folder, write_fit, write_grid
 from dynakin.tuning.settings import UNITS
 
 tune = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Choose noise settings by measurement.")
@@ -110,6 +112,59 @@ def grid(
     console.print(f"Table    {folder / 'grid.csv'}", soft_wrap=True)
     console.print(f"Figures  {folder}/figure3_*.png, .svg", soft_wrap=True)
     console.print(f"Presets  {folder}/preset_*.toml (dynakin run ... --preset FILE)", soft_wrap=True)
+
+
+@tune.command()
+def fit(
+    output: Output,
+    trials: Trials = None,
+    forces: Forces = None,
+    model: ModelName = None,
+    markers: Markers = None,
+    static: Static = None,
+    mass: Mass = None,
+    height: Height = None,
+    sex: Sex = None,
+    preset: Preset = None,
+    side: Side = None,
+    vertical: Vertical = None,
+    forward: Forward = None,
+    table: TableName = None,
+    plate_filter: PlateFilter = None,
+    force_threshold: ForceThreshold = None,
+    vary: Annotated[
+        list[str] | None, typer.Option(help="Setting to fit; may be repeated. Else those that the preset uses.")
+    ] = None,
+    criterion: Annotated[str, typer.Option(help="nll (likelihood), or ahead, sigma, paper, nis instead.")] = "nll",
+    backend: Backend = "processes",
+    jobs: Jobs = None,
+    scheduler: Scheduler = None,
+) -> None:
+    """Fit noise settings to recordings by maximum likelihood, with cross-validation over trials or halves.
+
+    A run that was stopped goes on where it was when it is started again with the same folder.
+    """
+    given = given_keys(
+        model, markers, static, mass, height, sex, side, vertical, forward, table, plate_filter, force_threshold
+    )
+    cases = cases_of(trials or [], forces or [], [], CUTOFF_HZ, given, "tune fit")
+    base = preset or cases[0].config.preset
+    shared = shared_of(cases, base)
+    names = tuple(vary) if vary else usual_names(shared.base)
+    folder = open_folder(output, ("fit.", "preset_"))
+    journal = Journal(folder / ROWS, belongs_to_fit(shared))
+    others = {name: make() for name, make in presets.PRESETS.items() if make() != shared.base}
+    with progress_bar("fitting") as progress, open_pool(backend, jobs, scheduler) as pool:
+        found = Fitter(shared, names, pool, journal, criterion, others, progress).run()
+    advice = recommendation(found)
+    write_fit(folder, found, presets.title(base), advice)
+    console = out()
+    for text in (settings_text(found), *figures_text(found)):
+        console.print(as_table(text))
+    for sentence in advice:
+        console.print(sentence)
+    console.print(f"\nPreset  {folder / 'preset_fit.toml'} (dynakin run ... --preset FILE)", soft_wrap=True)
+    console.print(f"Tables  {folder / 'fit.csv'}, {folder / 'fit.json'}", soft_wrap=True)
 
 
 def given_keys(

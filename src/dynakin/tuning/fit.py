@@ -151,7 +151,7 @@ class Fitter:
         folded = replace(shared, trials=tuple(parts))
         steps = 3 + len(parts)
         self._tell(0, steps)
-        everything = self._likelihood(folded)
+        everything = self._likelihood(shared)
         optimum = minimise(everything.costs, np.zeros(len(self.names)), REACH)
         self._tell(1, steps)
         hessian = curvature(everything.costs, optimum.point) if self.criterion == "nll" else None

@@ -72,6 +72,11 @@ class Likelihood:
             self.tried.append((tuple(float(x) for x in theta), found[-1]))
         return np.array(found)
 
+    def _part(self, number: int) -> str:
+        """Which frames of which trial: whole trials and halves share a journal."""
+        trial = self.shared.trials[number]
+        return f"{number:04d} {trial.first} to {trial.end}"
+
     def rows(self, settings: Sequence[dict[str, float]]) -> list[Row]:
         """All figures of some settings, together over the trials (`mean_row`, with ``n_rows`` summed)."""
         numbers = list(range(len(self.shared.trials)) if self.trials is None else self.trials)
@@ -79,7 +84,7 @@ class Likelihood:
         keys = []
         for point in settings:
             text = ",".join(f"{name}={value!r}" for name, value in point.items())
-            keys.append([f"{text}/{number:04d}" for number in numbers])
+            keys.append([f"{text}/{self._part(number)}" for number in numbers])
             for key, number in zip(keys[-1], numbers, strict=True):
                 tasks[key] = Task(key, (number, point))
         outcomes = {

@@ -6,15 +6,17 @@ import csv
 import json
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from dynakin.errors import OutputError
 from dynakin.filter.preset_file import write_preset
 from dynakin.results.versions import versions
+from dynakin.tuning.fit import Fit
 from dynakin.tuning.grid import Grid
 from dynakin.tuning.score import CRITERIA
-from dynakin.tuning.settings import changed
+from dynakin.tuning.settings import UNITS, changed
 
 ROWS = "rows.jsonl"
 """The journal: rows as they came. A folder that holds it is ours, and is gone on with."""
@@ -70,6 +72,38 @@ def write_grid(folder: Path, grid: Grid, base: str) -> None:
         write_preset(folder / f"preset_{name}.toml", changed(grid.base, grid.settings(best)), base, remarks)
         summary["optimum"][name] = {**best, "at_edge": grid.at_edge(best)}
     write_json(folder / "grid.json", summary)
+
+
+def write_fit(folder: Path, fit: Fit, base: str, advice: Sequence[str]) -> None:
+    """``fit.csv`` (a row a setting), ``fit.json`` (all of it) and ``preset_fit.toml``.
+
+    Args:
+        base: name of the preset from which the fit started. advice: its recommendation.
+
+    Raises:
+        OutputError: a file cannot be written.
+    """
+    rows = [asdict(s) | {"unit": UNITS[s.name], "known": s.known} for s in fit.settings]
+    write_csv(folder / "fit.csv", rows)
+    names = [trial.name for trial in fit.shared.trials]
+    write_json(
+        folder / "fit.json",
+        {
+            "versions": versions(),
+            "trials": names,
+            "base": base,
+            "criterion": fit.criterion,
+            "settings": rows,
+            "figures": fit.figures,
+            "held_out": [asdict(fold) for fold in fit.folds],
+            "hessian": None if fit.hessian is None else fit.hessian.tolist(),
+            "evaluations": fit.optimum.evaluations,
+            "converged": fit.optimum.converged,
+            "recommendation": list(advice),
+        },
+    )
+    remarks = [f"Written by `dynakin tune fit` on {', '.join(names)}.", *advice]
+    write_preset(folder / "preset_fit.toml", fit.noise, base, remarks)
 
 
 def _line(grid: Grid, cell: Mapping[str, Any]) -> dict[str, Any]:
