@@ -14,9 +14,10 @@ from pathlib import Path
 
 import dynakin
 from dynakin.engine import Journal, open_pool
+from dynakin.engine.folder import ROWS, open_folder
 from dynakin.filter import Estimator, presets
 from dynakin.tuning import Shared, belongs_to, paper_axes, prepare, run_grid
-from dynakin.tuning.output import ROWS, open_folder, write_grid
+from dynakin.tuning.output import write_grid
 
 ROOT = Path(__file__).resolve().parents[1]
 

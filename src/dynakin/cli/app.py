@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 import dynakin
+from dynakin.cli.batch import batch
 from dynakin.cli.check import check
 from dynakin.cli.compare import compare
 from dynakin.cli.console import print_error
@@ -32,7 +33,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (run, demo, compare, simulate, check, model):
+for command in (run, demo, compare, batch, simulate, check, model):
     app.command()(command)
 app.command("print-config")(print_config)
 app.add_typer(tune, name="tune")

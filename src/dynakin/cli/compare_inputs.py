@@ -3,26 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from dynakin.comparison import Setup, halves
-from dynakin.config import RunConfig, make_config, read_config
+from dynakin.comparison import halves
+from dynakin.comparison.case import Case, case_of
+from dynakin.config import make_config, read_config
 from dynakin.errors import ConfigError
-from dynakin.filter import presets as preset_files
-from dynakin.model import load_model
-from dynakin.recordings import Recording, read
-
-
-@dataclass(frozen=True, eq=False)
-class Case:
-    """A trial as read, with its subject's setup."""
-
-    recording: Recording
-    static: Recording | None
-    setup: Setup
-    config: RunConfig
 
 
 def chosen_trials(
@@ -88,24 +76,7 @@ def _case(trial: Path, given: dict[str, Any], presets: Sequence[str], cutoff_hz:
     content = read_config(trial) if is_config else {"trial": trial}
     # a configuration's own output is not where a comparison goes
     config = make_config(content | options | {"output": Path()}, str(trial) if is_config else command)
-    noise = {
-        preset_files.title(name): config.model_copy(update={"preset": name}).noise_settings()
-        for name in (presets or [config.preset])
-    }
-    setup = Setup(
-        load_model(config.model, config.subject(), markers=config.markers, table=config.table),
-        noise,
-        cutoff_hz,
-        config.priors,
-        config.bounds,
-        config.side,
-        config.vertical,
-        config.forward,
-    )
-    recording = read(
-        config.trial, config.forces, plate_filter_hz=config.plate_filter_hz, force_threshold_n=config.force_threshold_n
-    )
-    return Case(recording, None if config.static is None else read(config.static), setup, config)
+    return case_of(config, presets, cutoff_hz)
 
 
 def _times(n: int) -> str:

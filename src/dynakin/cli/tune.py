@@ -11,7 +11,7 @@ import numpy as np
 import typer
 from rich.padding import Padding
 
-from dynakin.cli.compare_inputs import Case, cases_of
+from dynakin.cli.compare_inputs import cases_of
 from dynakin.cli.console import as_table, busy, out, progress_bar
 from dynakin.cli.options import (
     Backend,
@@ -31,7 +31,9 @@ from dynakin.cli.options import (
     Vertical,
 )
 from dynakin.cli.run import forward_direction
+from dynakin.comparison.case import Case
 from dynakin.engine import Journal, open_pool
+from dynakin.engine.folder import ROWS, open_folder
 from dynakin.errors import ConfigError
 from dynakin.filter import presets
 from dynakin.reference import CUTOFF_HZ
@@ -41,7 +43,7 @@ from dynakin.report.tuning_tables import criteria_text, figures_text, grid_text,
 from dynakin.tuning import CRITERIA, Axis, Grid, Shared, axis, belongs_to, paper_axes, prepare, run_grid
 from dynakin.tuning.advice import recommendation
 from dynakin.tuning.fit import Fitter, belongs_to_fit, usual_names
-from dynakin.tuning.output import ROWS, open_folder, write_fit, write_grid
+from dynakin.tuning.output import write_fit, write_grid
 from dynakin.tuning.settings import UNITS
 
 tune = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Choose noise settings by measurement.")

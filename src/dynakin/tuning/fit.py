@@ -15,7 +15,7 @@ from dynakin.errors import ConfigError
 from dynakin.filter import Noise
 from dynakin.results.versions import versions
 from dynakin.tuning.likelihood import REACH, Likelihood
-from dynakin.tuning.optimise import Optimum, curvature, deviations, minimise
+from dynakin.tuning.optimise import SETTLED, Optimum, curvature, deviations, minimise
 from dynakin.tuning.score import CRITERIA, Shared
 from dynakin.tuning.settings import changed, check_setting, value_of
 
@@ -38,6 +38,8 @@ USUAL = (
     "plate_force",
     "plate_moment",
 )
+SETTLED_RELATIVE = 1e-5
+"""Relative change of another criterion than the likelihood at which the search ends."""
 KNOWN_WITHIN = 3.0
 """A setting is known where its 95 % interval is within this factor either way."""
 
@@ -152,7 +154,7 @@ class Fitter:
         steps = 3 + len(parts)
         self._tell(0, steps)
         everything = self._likelihood(shared)
-        optimum = minimise(everything.costs, np.zeros(len(self.names)), REACH)
+        optimum = self._minimise(everything, np.zeros(len(self.names)))
         self._tell(1, steps)
         hessian = curvature(everything.costs, optimum.point) if self.criterion == "nll" else None
         self._tell(2, steps)
@@ -163,13 +165,17 @@ class Fitter:
         folds = []
         for k, part in enumerate(parts):
             rest = self._likelihood(folded, [n for n in range(len(parts)) if n != k])
-            found = rest.settings(minimise(rest.costs, optimum.point, REACH).point)
+            found = rest.settings(self._minimise(rest, optimum.point).point)
             folds.append(Fold(part.name, found, self._figures(self._likelihood(folded, [k]), found)))
             self._tell(4 + k, steps)
         return Fit(shared, self.criterion, settings, figures, tuple(folds), optimum, hessian)
 
     def _likelihood(self, shared: Shared, trials: Sequence[int] | None = None) -> Likelihood:
         return Likelihood(shared, self.names, self.pool, self.journal, trials, self.criterion)
+
+    def _minimise(self, cost: Likelihood, start: Array) -> Optimum:
+        settled = SETTLED if self.criterion == "nll" else SETTLED_RELATIVE * abs(float(cost.costs([start])[0]))
+        return minimise(cost.costs, start, REACH, settled=settled)
 
     def _settings(self, cost: Likelihood, optimum: Optimum, hessian: Array | None) -> tuple[Fitted, ...]:
         k = len(self.names)

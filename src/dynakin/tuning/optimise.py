@@ -20,8 +20,8 @@ Costs = Callable[[Sequence[Array]], Array]
 STEP = 0.05
 """Of the differences, in ln(setting): wide enough that bounds which come and go do not show, narrow for a curvature."""
 CURVATURE_STEP = 0.15
-SETTLED = 1e-7
-"""Relative change of the cost at which the search ends."""
+SETTLED = 0.5
+"""Change of the cost in an iteration at which the search ends; in nats, half of what matters to anyone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +35,10 @@ class Optimum:
     converged: bool
 
 
-def minimise(costs: Costs, start: Array, reach: float, *, most_iterations: int = 60) -> Optimum:
-    """Search from ``start`` (k,), each element within ``reach`` of 0."""
+def minimise(
+    costs: Costs, start: Array, reach: float, *, settled: float = SETTLED, most_iterations: int = 60
+) -> Optimum:
+    """Search from ``start`` (k,), each element within ``reach`` of 0, until an iteration gains less than ``settled``."""
     count = 0
     scale = 1.0
 
@@ -58,7 +60,7 @@ def minimise(costs: Costs, start: Array, reach: float, *, most_iterations: int =
     first = float(costs([start])[0])
     scale = 1.0 / max(abs(first), 1.0)
     bounds = [(-reach, reach)] * len(start)
-    options = {"maxiter": most_iterations, "ftol": SETTLED, "gtol": 1e-9}
+    options = {"maxiter": most_iterations, "ftol": settled * scale, "gtol": 1e-9}
     found = minimize(with_gradient, start, jac=True, method="L-BFGS-B", bounds=bounds, options=options)
     point = np.asarray(found.x, dtype=float)
     at_limit = np.abs(point) > reach - STEP

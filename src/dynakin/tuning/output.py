@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import csv
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from dynakin.errors import OutputError
+from dynakin.engine.folder import write_csv, write_json
 from dynakin.filter.preset_file import write_preset
 from dynakin.results.versions import versions
 from dynakin.tuning.fit import Fit
@@ -18,29 +16,7 @@ from dynakin.tuning.grid import Grid
 from dynakin.tuning.score import CRITERIA
 from dynakin.tuning.settings import UNITS, changed
 
-ROWS = "rows.jsonl"
-"""The journal: rows as they came. A folder that holds it is ours, and is gone on with."""
 PAPER = "paper"
-
-
-def open_folder(folder: Path, own: Sequence[str]) -> Path:
-    """Make a folder for a tuning, or go on in one that was begun.
-
-    Args:
-        own: beginnings of the names that the tuning writes.
-
-    Raises:
-        OutputError: it cannot be made, or holds something else.
-    """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        names = sorted(entry.name for entry in folder.iterdir() if not entry.name.startswith("."))
-    except OSError as error:
-        raise OutputError(f"{folder}: cannot write results there ({error.strerror or error})") from None
-    foreign = [name for name in names if name != ROWS and not name.startswith(tuple(own))]
-    if foreign:
-        raise OutputError(f"{folder}: is no folder of this command (it holds {foreign[0]}); name a new or an empty one")
-    return folder
 
 
 def write_grid(folder: Path, grid: Grid, base: str) -> None:
@@ -112,30 +88,3 @@ def _line(grid: Grid, cell: Mapping[str, Any]) -> dict[str, Any]:
     logs = {f"log10_{name}": round(math.log10(value), 9) for name, value in settings.items()}
     rest = {name: value for name, value in cell.items() if name not in settings}
     return {**settings, **logs, "criterion": cell[PAPER], **rest}
-
-
-def write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Rows of the same columns; None is a blank cell, numbers keep all their digits.
-
-    Raises:
-        OutputError: the file cannot be written.
-    """
-    try:
-        with path.open("w", encoding="utf-8", newline="") as file:
-            writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-            writer.writeheader()
-            writer.writerows(rows)
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from None
-
-
-def write_json(path: Path, content: Any) -> None:
-    """
-    Raises:
-        OutputError: the file cannot be written.
-    """
-    try:
-        text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
-        path.write_text(text + "\n", encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from None
