@@ -60,7 +60,7 @@ void Filter::reset(const Eigen::VectorXd& x, const Eigen::MatrixXd& P) {
   const Eigen::MatrixXd correlation = scale.asDiagonal() * P * scale.asDiagonal();
   if (correlation.llt().info() != Eigen::Success) throw std::invalid_argument("P0: not positive definite");
   projection_.forget();
-  x_ = x0_ = x_before_ = x;
+  x_ = x0_ = x_before_ = x_ahead_ = x;
   P_ = P0_ = P_before_ = P;
   unbelieved_s_ = 0.0;
   last_ = StepReport{};
@@ -205,6 +205,13 @@ void Filter::restore(const Checkpoint& checkpoint) {
 
 const Measurement& Filter::evaluate() {
   measurement_.evaluate(x_);
+  return measurement_;
+}
+
+const Measurement& Filter::foresee(double dt) {
+  x_ahead_ = x_;
+  predict_mean(model_, settings_, dt, x_ahead_);
+  measurement_.evaluate(x_ahead_);
   return measurement_;
 }
 

@@ -84,6 +84,8 @@ class Filter {
   const std::vector<Verdict>& verdicts() const { return gate_.verdicts(); }
   // Kinematics and dynamics at the present state, for what is reported of it.
   const Measurement& evaluate();
+  // The same at the state that is expected in dt seconds; the filter stays where it is.
+  const Measurement& foresee(double dt);
 
  private:
   using MarkerRef = Eigen::Ref<const MarkerMatrix>;
@@ -103,7 +105,7 @@ class Filter {
 
   const Model model_;  // copies: a filter stands alone
   const FilterSettings settings_;
-  Eigen::VectorXd x_, dx_, step_, predicted_, x0_, x_before_;
+  Eigen::VectorXd x_, dx_, step_, predicted_, x0_, x_before_, x_ahead_;
   Eigen::MatrixXd P_, P0_, P_before_;
   Measurement measurement_;
   Gate gate_;

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from copy import copy
 from dataclasses import replace
 from typing import Literal, get_args
 
@@ -27,7 +28,7 @@ def extended(initial: InitialModel, noise: Noise, estimate: Collection[Quantity]
     Args:
         estimate: kinds of parameters to estimate; the others stay where the model has them.
     """
-    spec = initial.spec
+    spec = copy(initial.spec)  # the same measured model serves other settings, in other threads
     sd = noise.soft_tissue_sd(initial.soft_tissue_m) * ("soft_tissue" in estimate)
     markers = spec.markers
     for marker, value in zip(markers, sd, strict=True):
