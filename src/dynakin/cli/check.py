@@ -163,7 +163,7 @@ def _marker_set_table(recording: Recording) -> Table:
 
 def _fit(marker_set: MarkerSetFile, names: set[str]) -> tuple[int, list[str]]:
     """How many of the set's markers (each side counts) are among plain names, and which are not."""
-    sites = [marker.aliases(side) for marker in marker_set.markers for side in ("right", "left", "centre")]
+    sites = [marker.aliases(side) for marker in marker_set.usual for side in ("right", "left", "centre")]
     sites = [aliases for aliases in sites if aliases]
     missing = [aliases[0] for aliases in sites if not any(plain_name(alias) in names for alias in aliases)]
     return len(sites) - len(missing), missing

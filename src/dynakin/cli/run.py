@@ -37,6 +37,9 @@ from dynakin.recordings import read
 from dynakin.report import read_sensitivity, save_figures
 from dynakin.results import Estimate, check_output_writable
 
+LARGEST_BENCH = 250
+"""States up to which a run also tells what the recording says of the constants: it filters a dozen motions more."""
+
 
 def run(
     trial: Annotated[Path, typer.Argument(help="Recording (.c3d, .trc, .csv), or a configuration (.toml).")],
@@ -139,7 +142,14 @@ def estimate_from(
     estimate = estimator.run(recording, static=static, smooth=config.smooth, progress=progress)
     estimate = replace(estimate, config=config.as_used() | estimate.config)
     assert estimator.initial is not None
+    n_states = len(estimator.initial.names)
     comparison = trial_of({config.preset: estimate}, estimator.initial, model, whatever=True)
+    if n_states > LARGEST_BENCH:
+        note = (
+            f"What the recording tells of the constants is left out: with {n_states} states it takes many minutes; "
+            "dynakin model --identifiability tells."
+        )
+        return replace(estimate, messages=[*estimate.messages, note]), comparison, None
     try:
         return estimate, comparison, identifiability(estimator, estimate)
     except DynakinError as error:  # a trial of a few frames, say: no reason to lose the estimate

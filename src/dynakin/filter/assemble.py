@@ -101,7 +101,7 @@ def _dataset(
     for name in ("nis", "n_rows", "log_likelihood", "constrained", "constraints_met", "tracking", "step_us"):
         data[name] = ("time", arrays[name])
     data["verdict"] = (("time", "sensor"), arrays["verdicts"])
-    if any(any(marker.soft_tissue) for marker in spec.markers):
+    if initial.feet or any(any(marker.soft_tissue) for marker in spec.markers):
         data["soft_tissue_amplitude"] = ("marker", initial.soft_tissue_m, {"units": "m"})
     data["joint_centres"] = (("time", "joint", "axis"), _joint_centres(arrays["state"], model), {"units": "m"})
     names, parents, segments = _joints(spec)

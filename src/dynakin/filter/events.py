@@ -23,6 +23,7 @@ def events_of(
     time = data["time"].values
     events = [
         *_missing(data),
+        *(_total_unknown(data) if initial.feet else ()),
         *_refused(data),
         *_tracking(data),
         *_held(data, unseen_sd),
@@ -45,6 +46,12 @@ def _missing(data: xr.Dataset) -> list[Event]:
         for k, name in enumerate(names)
         for event in _stretches(data["time"].values, lost[:, k], "missing", name, "not measured")
     ]
+
+
+def _total_unknown(data: xr.Dataset) -> list[Event]:
+    """Stretches in which the plates of a floating model do not tell the total wrench, or were not used."""
+    lost = np.isnan(data["wrench_measured"].values).all(axis=1)
+    return _stretches(data["time"].values, lost, "missing", "plates", "total wrench not known, left out")
 
 
 def _refused(data: xr.Dataset) -> list[Event]:

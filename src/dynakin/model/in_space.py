@@ -103,8 +103,8 @@ def _averaged(plan: ModelPlan, paths: Array, limits: dict[str, Interval]) -> tup
             fits.append(fit.rms_m)
         rms.append(1000.0 * float(np.sqrt(np.mean(np.square(fits)))))
         places = np.array(found)
-        seen = np.isfinite(places).all(axis=2)
-        means = [places[seen[:, k], k].mean(axis=0) if seen[:, k].any() else None for k in range(len(plan.sites))]
+        seen = [places[np.isfinite(places[:, k]).all(axis=1), k] for k in range(len(plan.sites))]
+        means = [own.mean(axis=0) if len(own) else None for own in seen]
         plan = replace(
             plan,
             sites=tuple(

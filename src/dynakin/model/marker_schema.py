@@ -232,6 +232,12 @@ class MarkerSetFile(Strict):
         for name in landmarks:
             visit(name, ())
 
+    @property
+    def usual(self) -> tuple[Marker, ...]:
+        """Markers by which a recording is known to have this set; what only models in space use is extra."""
+        used = {source for recipes in self.landmarks.values() for recipe in recipes for source in recipe.inputs}
+        return tuple(marker for marker in self.markers if marker.measures(planar=True) or marker.name in used)
+
     def marker(self, name: str) -> Marker:
         """The marker of that name (it exists: references are checked)."""
         return next(marker for marker in self.markers if marker.name == name)

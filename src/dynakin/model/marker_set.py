@@ -121,7 +121,7 @@ def choose_marker_set(recorded: Iterable[str]) -> MarkerSetFile:
         candidate = load_marker_set(name)
         if name.endswith("-all"):
             continue  # a larger variant of another set: by name only
-        sites = [m.aliases(s) for m in candidate.markers for s in ("right", "left", "centre") if m.aliases(s)]
+        sites = [m.aliases(s) for m in candidate.usual for s in ("right", "left", "centre") if m.aliases(s)]
         hits = sum(any(plain_name(alias) in names for alias in aliases) for aliases in sites)
         score = (hits / len(sites), hits, candidate)
         if best is None or score[:2] > best[:2]:

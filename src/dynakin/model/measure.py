@@ -85,8 +85,9 @@ def measure(
     needed = needed_markers(model, finder, locks)
     refuse_moving_origin(model, trial, finder)
     wished = needed | table_markers(definition, finder)
-    frames, which = trial.calibration_frames(needed, wished)
-    trial = _at_origin(model, trial, finder, frames)
+    if static is None or not model.sided:  # else the trial may lack markers that only the standing person wears
+        frames, which = trial.calibration_frames(needed, wished)
+        trial = _at_origin(model, trial, finder, frames)
     if static is not None:
         frames, which = source.calibration_frames(needed, wished)
     source = trial if static is None else _at_origin(model, source, finder, frames)

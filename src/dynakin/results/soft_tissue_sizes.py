@@ -18,6 +18,8 @@ _REGIONS: dict[str, tuple[dict[str, str], str]] = {
     "abdomen": ({}, "trunk"),
     "thorax": ({"sho": "shoulder", "acr": "shoulder"}, "trunk"),
     "trunk": ({"sho": "shoulder", "acr": "shoulder"}, "trunk"),
+    "torso": ({"sho": "shoulder", "acr": "shoulder"}, "trunk"),
+    "head": ({}, "head"),
     "upper_arm": ({}, "arm"),
     "forearm": ({}, "forearm"),
 }
