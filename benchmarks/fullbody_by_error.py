@@ -138,7 +138,8 @@ def tell(title: str, rows: Sequence[Errors]) -> None:
     for j, name in enumerate(names):
         if not name.startswith("pelvis_t") or name == "pelvis_tilt":
             values = mean["angle"][j], offset[j], mean["speed"][j], mean["moment"][j]
-            print("    {:18s} {:6.2f} deg, offset {:6.2f} deg, {:6.3f} rad/s, {:7.2f} N m".format(name, *values))
+            row = "    {:18s} {:6.2f} deg, offset {:6.2f} deg, {:6.3f} rad/s, {:7.2f} N m".format(name, *values)
+            print(row if not name.startswith("pelvis") else row.rpartition(",")[0])
 
 
 def main() -> None:
