@@ -38,7 +38,7 @@ class Optimum:
 def minimise(
     costs: Costs, start: Array, reach: float, *, settled: float = SETTLED, most_iterations: int = 60
 ) -> Optimum:
-    """Search from ``start`` (k,), each element within ``reach`` of 0, until an iteration gains less than ``settled``."""
+    """Search from ``start`` (k,), each element within ``reach`` of 0, until an iteration gains less than that."""
     count = 0
     scale = 1.0
 
