@@ -170,6 +170,12 @@ class Fitter:
             self._tell(4 + k, steps)
         return Fit(shared, self.criterion, settings, figures, tuple(folds), optimum, hessian)
 
+    def only(self) -> tuple[Optimum, Noise]:
+        """The optimum on all trials and its settings, and nothing else of `run`."""
+        everything = self._likelihood(self.shared)
+        optimum = self._minimise(everything, np.zeros(len(self.names)))
+        return optimum, changed(self.shared.base, everything.settings(optimum.point))
+
     def _likelihood(self, shared: Shared, trials: Sequence[int] | None = None) -> Likelihood:
         return Likelihood(shared, self.names, self.pool, self.journal, trials, self.criterion)
 
