@@ -45,11 +45,11 @@ class WithTruth:
     names: tuple[str, ...]
 
 
-def trial_of(seed: int, duration: float) -> WithTruth:
-    made = simulate("sagittal7", "squat", seed, duration)
+def trial_of(seed: int, duration: float, rate: float = 100.0, noise: Noise | None = None) -> WithTruth:
+    made = simulate("sagittal7", "squat", seed, duration, rate)
     subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
     definition = dynakin.load_model("sagittal7", subject=subject, markers="opencap")
-    trial = prepare(made.recording, Estimator(definition, presets.paper()))
+    trial = prepare(made.recording, Estimator(definition, noise or presets.paper()))
     names = tuple(c.name for c in trial.initial.spec.coordinates if not c.locked)
     truth = made.truth.data.sel(coordinate=list(names))
     values = (truth[key].transpose("time", "coordinate").values for key in ("coordinates", "moments"))

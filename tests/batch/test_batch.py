@@ -15,7 +15,7 @@ from dynakin.cli import main
 from dynakin.errors import ConfigError
 from dynakin.simulation import simulate
 
-SUBJECTS, TRIALS, SECONDS, RATE_HZ = 8, 3, 4.2, 50.0
+SUBJECTS, TRIALS, SECONDS, RATE_HZ = 8, 3, 5.0, 50.0
 CORRUPT, SWAPPED = "S3/squat_2", "S6/squat_1"
 
 

@@ -20,7 +20,9 @@ Costs = Callable[[Sequence[Array]], Array]
 STEP = 0.02
 """Of the differences, in ln(setting): wide enough that bounds which come and go do not show, narrow for a curvature."""
 CURVATURE_STEP = 0.15
-PATIENCE = 4
+LOST = 0.1
+"""A cost this much above the best, as a share of it, is no more than that: a line search draws parabolas through it."""
+PATIENCE = 8
 """Gradients in a row without a gain after which the search ends."""
 SETTLED = 0.5
 """Change of the cost in an iteration at which the search ends; in nats, half of what matters to anyone."""
@@ -66,6 +68,7 @@ def minimise(
                 moved[k] = side[k]
                 points.append(moved)
         values = costs(points)
+        values = np.minimum(values, best + LOST * abs(best))
         count += len(points)
         idle = 0 if values[0] < best - settled else idle + 1
         if values[0] < best:
