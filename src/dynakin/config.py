@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal, Self
 
@@ -135,8 +136,11 @@ class RunConfig(Strict):
         return plain
 
 
-def read_config(path: Path) -> dict[str, Any]:
+def read_config(path: Path, paths: Sequence[str] = _PATHS) -> dict[str, Any]:
     """The keys of a configuration file, its relative paths made relative to where the file lies.
+
+    Args:
+        paths: keys that name files.
 
     Raises:
         ConfigError: no such file, or not TOML (with the line).
@@ -147,7 +151,7 @@ def read_config(path: Path) -> dict[str, Any]:
         raise ConfigError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{path}: not a TOML file: {error}") from None
-    for key in _PATHS:
+    for key in paths:
         if isinstance(content.get(key), str):
             content[key] = str(path.parent / content[key])
     for key in ("model", "markers", "table", "preset"):  # a name, or a file beside the configuration

@@ -51,7 +51,7 @@ def read_dataset(path: Path, output: Path | None = None) -> Dataset:
         ConfigError: the file cannot be read, a key is unknown or missing, no trial is found for a subject, or two
             trials of a subject have one name.
     """
-    content = read_config(path)
+    content = read_config(path, paths=("output",))  # the others lie with subjects and trials
     entries = content.get("subjects")
     if not isinstance(entries, list) or not entries or not all(isinstance(entry, dict) for entry in entries):
         raise ConfigError(f"{path}: no subjects, expected a table [[subjects]] for each")

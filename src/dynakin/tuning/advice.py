@@ -11,13 +11,18 @@ WORSE = 1.05
 
 def recommendation(fit: Fit) -> list[str]:
     """Sentences: whether to use the fitted settings, which of them the recordings do not tell, what to look at."""
-    found = [_whether(fit)]
+    found = []
     limit = [s.name for s in fit.settings if s.at_limit]
     if limit:
+        rest = " ".join(f"--vary {s.name}" for s in fit.settings if not s.at_limit)
         found.append(
-            f"At the end of its range: {', '.join(limit)}. The recordings want it as far out as it may go, which "
-            "mostly means that it stands for something else; leave it at its start."
+            f"Do not use the fitted settings as they are: at the end of its range: {', '.join(limit)}. Such a setting "
+            "stands for something else, mostly for recordings that were smoothed before; fit again without it"
+            f"{f' ({rest})' if rest else ''}. Held out, still: "
         )
+        found[-1] += _whether(fit)[0].lower() + _whether(fit)[1:]
+    else:
+        found.append(_whether(fit))
     unknown = [s.name for s in fit.settings if not s.known and not s.at_limit and s.low is not None]
     if unknown:
         found.append(f"Not told by these recordings (interval wider than a factor 3): {', '.join(unknown)}.")

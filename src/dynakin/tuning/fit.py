@@ -17,7 +17,7 @@ from dynakin.results.versions import versions
 from dynakin.tuning.likelihood import REACH, Likelihood
 from dynakin.tuning.optimise import SETTLED, Optimum, curvature, deviations, minimise
 from dynakin.tuning.score import CRITERIA, Shared
-from dynakin.tuning.settings import changed, check_setting, value_of
+from dynakin.tuning.settings import changed, check_setting, together, value_of
 
 Array = npt.NDArray[np.float64]
 
@@ -95,7 +95,7 @@ class Fit:
     @property
     def noise(self) -> Noise:
         """The fitted settings."""
-        return changed(self.shared.base, {s.name: s.value for s in self.settings})
+        return changed(self.shared.base, together(self.shared.base, {s.name: s.value for s in self.settings}))
 
 
 def usual_names(noise: Noise) -> tuple[str, ...]:
@@ -170,6 +170,12 @@ class Fitter:
             self._tell(4 + k, steps)
         return Fit(shared, self.criterion, settings, figures, tuple(folds), optimum, hessian)
 
+    def only(self) -> tuple[Optimum, Noise]:
+        """The optimum on all trials and its settings, and nothing else of `run`."""
+        everything = self._likelihood(self.shared)
+        optimum = self._minimise(everything, np.zeros(len(self.names)))
+        return optimum, changed(self.shared.base, together(self.shared.base, everything.settings(optimum.point)))
+
     def _likelihood(self, shared: Shared, trials: Sequence[int] | None = None) -> Likelihood:
         return Likelihood(shared, self.names, self.pool, self.journal, trials, self.criterion)
 
@@ -193,7 +199,7 @@ class Fitter:
         return tuple(found)
 
     def _figures(self, where: Likelihood, fitted: Mapping[str, float]) -> dict[str, dict[str, Any]]:
-        asked: dict[str, dict[str, Any]] = {"fitted": dict(fitted), "start": {}}
+        asked: dict[str, dict[str, Any]] = {"fitted": together(self.shared.base, fitted), "start": {}}
         # the total mass as a row at each frame would count as likelihood: all are judged on the recordings alone
         mass = {"total_mass_use": where.shared.base.total_mass_use, "total_mass": where.shared.base.total_mass}
         asked |= {name: noise.model_dump(mode="json") | mass for name, noise in self.others.items()}

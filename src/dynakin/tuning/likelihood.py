@@ -13,7 +13,7 @@ from dynakin.engine.tasks import Row
 from dynakin.errors import DynakinError
 from dynakin.tuning.grid import mean_row
 from dynakin.tuning.score import Shared, score_task
-from dynakin.tuning.settings import value_of
+from dynakin.tuning.settings import together, value_of
 
 Array = npt.NDArray[np.float64]
 
@@ -58,7 +58,7 @@ class Likelihood:
 
     def costs(self, points: Sequence[Array]) -> Array:
         """Minus the log posterior (P,) at each point (k,): summed over the trials, with the prior."""
-        rows = self.rows([self.settings(theta) for theta in points])
+        rows = self.rows([together(self.shared.base, self.settings(theta)) for theta in points])
         found = []
         for theta, row in zip(points, rows, strict=True):
             prior = 0.5 * float(np.sum((theta / PRIOR_SD) ** 2))

@@ -17,9 +17,13 @@ from scipy.optimize import minimize
 Array = npt.NDArray[np.float64]
 Costs = Callable[[Sequence[Array]], Array]
 
-STEP = 0.05
+STEP = 0.02
 """Of the differences, in ln(setting): wide enough that bounds which come and go do not show, narrow for a curvature."""
 CURVATURE_STEP = 0.15
+LOST = 0.1
+"""A cost this much above the best, as a share of it, is no more than that: a line search draws parabolas through it."""
+PATIENCE = 8
+"""Gradients in a row without a gain after which the search ends."""
 SETTLED = 0.5
 """Change of the cost in an iteration at which the search ends; in nats, half of what matters to anyone."""
 
@@ -35,15 +39,26 @@ class Optimum:
     converged: bool
 
 
+class _Settled(Exception):
+    """Nothing is gained any more."""
+
+
 def minimise(
     costs: Costs, start: Array, reach: float, *, settled: float = SETTLED, most_iterations: int = 60
 ) -> Optimum:
-    """Search from ``start`` (k,), each element within ``reach`` of 0, until an iteration gains less than that."""
-    count = 0
-    scale = 1.0
+    """Search from ``start`` (k,), each element within ``reach`` of 0, until little is gained.
+
+    Args:
+        settled: the search ends where ``PATIENCE`` gradients in a row bring less than this: a line search that looks
+            for more than the differences can tell would go on for long.
+    """
+    count, idle = 1, 0
+    best_point = np.array(start, dtype=float)
+    best = first = float(costs([best_point])[0])
+    scale = 1.0 / max(abs(first), 1.0)
 
     def with_gradient(theta: Array) -> tuple[float, Array]:
-        nonlocal count
+        nonlocal count, idle, best, best_point
         # one-sided at a limit: no point beyond it
         above, below = (np.clip(theta + sign * STEP, -reach, reach) for sign in (1.0, -1.0))
         points = [theta]
@@ -53,18 +68,25 @@ def minimise(
                 moved[k] = side[k]
                 points.append(moved)
         values = costs(points)
+        values = np.minimum(values, best + LOST * abs(best))
         count += len(points)
+        idle = 0 if values[0] < best - settled else idle + 1
+        if values[0] < best:
+            best, best_point = float(values[0]), theta.copy()
+        if idle > PATIENCE:
+            raise _Settled
         slopes = (values[1::2] - values[2::2]) / (above - below)
         return float(values[0]) * scale, slopes * scale
 
-    first = float(costs([start])[0])
-    scale = 1.0 / max(abs(first), 1.0)
     bounds = [(-reach, reach)] * len(start)
-    options = {"maxiter": most_iterations, "ftol": settled * scale, "gtol": 1e-9}
-    found = minimize(with_gradient, start, jac=True, method="L-BFGS-B", bounds=bounds, options=options)
-    point = np.asarray(found.x, dtype=float)
-    at_limit = np.abs(point) > reach - STEP
-    return Optimum(point, float(found.fun) / scale, count + 1, at_limit, bool(found.success))
+    options = {"maxiter": most_iterations, "ftol": settled * scale, "gtol": 1e-12}
+    try:
+        converged = bool(
+            minimize(with_gradient, start, jac=True, method="L-BFGS-B", bounds=bounds, options=options).success
+        )
+    except _Settled:
+        converged = True
+    return Optimum(best_point, best, count, np.abs(best_point) > reach - STEP, converged)
 
 
 def curvature(costs: Costs, point: Array) -> Array:

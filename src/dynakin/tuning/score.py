@@ -74,7 +74,11 @@ def run_score(trial: TuningTrial, noise: Noise, markers: Array | None = None, tr
 def figures_of(trial: TuningTrial, noise: Noise, declared: Noise) -> dict[str, Any]:
     """Figures as of `score_task`. declared: the settings whose sigmas are the units of ``sigma``: not those that are
     being tried, or the largest would win."""
-    sums = run_score(trial, noise)
+    return figures_from(run_score(trial, noise), trial, declared)
+
+
+def figures_from(sums: Mapping[str, Any], trial: TuningTrial, declared: Noise) -> dict[str, Any]:
+    """`figures_of` what `run_score` gave."""
     blank = dict.fromkeys([*CRITERIA, "n_rows", "log_likelihood", "nis_per_row", *_parts(""), *_parts("ahead_")])
     found = {"divergence": sums["divergence"] or None, "done": int(sums["done"])} | blank
     if sums["divergence"] or sums["n_rows"] == 0:
@@ -126,7 +130,7 @@ def left_out_error(trial: TuningTrial, noise: Noise, hidden: Array, marker: int)
     return 1000.0 * float(np.sqrt(squares[seen].mean())) if seen.any() else None
 
 
-def _rms(sums: dict[str, Any], name: str) -> Array:
+def _rms(sums: Mapping[str, Any], name: str) -> Array:
     """(3M + 6,); NaN where nothing was measured."""
     counts = sums[f"{name}_counts"]
     mean = np.divide(sums[f"{name}_squares"], counts, out=np.full(len(counts), np.nan), where=counts > 0)

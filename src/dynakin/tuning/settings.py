@@ -94,3 +94,16 @@ def value_of(noise: Noise, name: str) -> float:
         found = "not given" if value is None else "0"
         raise ConfigError(f"setting {name!r} is {found} in these settings, expected a positive value to start from")
     return float(value)
+
+
+def together(base: Noise, settings: Mapping[str, float]) -> dict[str, float]:
+    """Settings with those that go with them.
+
+    With ``soft_tissue`` goes the size below which it counts as noise, so that no marker gains or loses a state on the
+    way: the likelihood would jump there.
+    """
+    found = dict(settings)
+    if "soft_tissue" in found and "soft_tissue_least_m" not in found and base.soft_tissue > 0.0:
+        least = base.soft_tissue_least_m * found["soft_tissue"] / base.soft_tissue
+        found["soft_tissue_least_m"] = least * (1.0 - 1e-9)  # a size that lies on the limit stays on its side
+    return found
