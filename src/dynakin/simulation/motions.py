@@ -62,7 +62,7 @@ def choose_movement(
     path = Path(motion)
     if path.suffix.casefold() in (".mot", ".sto") and path.is_file():
         return file_movement(path, body, cutoff_hz)
-    every = tuple(dict.fromkeys((*MOTIONS, *MOTIONS_IN_SPACE)))
+    every = tuple(MOTIONS_IN_SPACE if body.in_space else MOTIONS)
     near = difflib.get_close_matches(str(motion), every, n=1)
     hint = f" (did you mean {near[0]!r}?)" if near else ""
     raise ConfigError(
