@@ -54,11 +54,11 @@ def minimise(
     """
     count, idle = 1, 0
     best_point = np.array(start, dtype=float)
-    best = first = float(costs([best_point])[0])
+    best = first = before = float(costs([best_point])[0])
     scale = 1.0 / max(abs(first), 1.0)
 
     def with_gradient(theta: Array) -> tuple[float, Array]:
-        nonlocal count, idle, best, best_point
+        nonlocal count, idle, best, best_point, before
         # one-sided at a limit: no point beyond it
         above, below = (np.clip(theta + sign * STEP, -reach, reach) for sign in (1.0, -1.0))
         points = [theta]
@@ -70,16 +70,18 @@ def minimise(
         values = costs(points)
         values = np.minimum(values, best + LOST * abs(best))
         count += len(points)
-        idle = 0 if values[0] < best - settled else idle + 1
         if values[0] < best:
             best, best_point = float(values[0]), theta.copy()
+        idle += 1
+        if best < before - settled:
+            idle, before = 0, best
         if idle > PATIENCE:
             raise _Settled
         slopes = (values[1::2] - values[2::2]) / (above - below)
         return float(values[0]) * scale, slopes * scale
 
     bounds = [(-reach, reach)] * len(start)
-    options = {"maxiter": most_iterations, "ftol": settled * scale, "gtol": 1e-12}
+    options = {"maxiter": most_iterations, "ftol": 1e-15, "gtol": 1e-12}
     try:
         converged = bool(
             minimize(with_gradient, start, jac=True, method="L-BFGS-B", bounds=bounds, options=options).success
