@@ -142,10 +142,7 @@ def _axes(low: float, high: float, start: float, end: float, x: Place, y: Place,
     ]
     middle = (_TOP + _BOTTOM) // 2
     parts.append(f'<text x="{(_LEFT + _RIGHT) // 2}" y="{_HEIGHT - 70}" text-anchor="middle">{escape(x_label)}</text>')
-    parts.append(
-        f'<text transform="translate(65 {middle}) rotate(-90)" text-anchor="middle">'
-        f"{escape(unit)}</text>"
-    )
+    parts.append(f'<text transform="translate(65 {middle}) rotate(-90)" text-anchor="middle">{escape(unit)}</text>')
     return "".join(parts)
 
 

@@ -114,10 +114,11 @@ def rms_bars(key: str, rms: dict[str, float | None]) -> Panel:
     values = [value for value in rms.values() if value is not None]
     figure, axes = new_axes(4.3, 0.42 + 0.2 * len(names), fitted=True)
     places = np.arange(len(names))[::-1]
+    decimals = 1 if max(values, default=1.0) >= 1.0 else 2
     axes.barh(places, values, color=ESTIMATED, height=0.62)
     for place, value in zip(places, values, strict=True):
         axes.annotate(
-            f"{value:.1f} mm",
+            f"{value:.{decimals}f} mm",
             (value, place),
             xytext=(4, 0),
             textcoords="offset points",
