@@ -73,7 +73,7 @@ def _displacements(estimate: Estimate, metrics: dict[str, Any]) -> TextTable:
     names, carriers = short_marker_names(estimate.marker_names), marker_segments(estimate)
     found = metrics["soft_tissue"]["markers"]
     order = sorted(found, key=lambda name: -(found[name]["max_mm"] or 0.0))
-    rows = [
+    rows: list[tuple[str, ...]] = [
         (
             names.get(name, name),
             words(carriers.get(name, "")),
