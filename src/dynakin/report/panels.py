@@ -127,7 +127,7 @@ def rms_bars(key: str, rms: dict[str, float | None]) -> Panel:
             fontsize=8,
         )
     axes.set_yticks(places, names, color=INK)
-    axes.set_xlim(0.0, 1.18 * max(values, default=1.0))
+    axes.set_xlim(0.0, 1.18 * max(values, default=1.0) or 1.0)
     axes.set_ylim(-0.6, len(names) - 0.4)
     axes.grid(False)
     axes.set_xticks([])

@@ -248,7 +248,7 @@ def spatial_moment_section(estimate: Estimate) -> Section:
             wide = own_sd is not None and band_is_too_wide(moments[:, k], np.nan_to_num(own_sd))
             derived = source[:, k] == _SOURCE_DERIVED
             lines.append(Line(moments[:, k], SIDE_COLOURS[side], 1.2, None if wide else own_sd, derived))
-            low, high = (f"{edge(moments[:, k]):.2f}".replace("-", "−") for edge in (np.nanmin, np.nanmax))
+            low, high = (_two_digits(float(edge(moments[:, k]))) for edge in (np.nanmin, np.nanmax))
             notes.append(f"{f'{side} ' if side else ''}{low} to {high}")
         return (
             chart(joint.title, unit, estimate.time, lines[::-1], note="; ".join(notes), least_range=0.02)
@@ -283,6 +283,10 @@ def spatial_moment_section(estimate: Estimate) -> Section:
         band="" if sd is None else "± 2 standard deviations",
         parts=_by_region("moments", joints, draw),
     )
+
+
+def _two_digits(value: float) -> str:
+    return f"{round(value, 2) + 0.0:.2f}".replace("-", "−")
 
 
 def _sides_with(estimate: Estimate, marked: npt.NDArray[np.bool_]) -> str:
