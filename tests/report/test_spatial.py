@@ -94,9 +94,7 @@ def test_angles_follow_the_zero_and_the_signs_that_were_asked_for(spatial: Estim
 def test_moments_are_per_kg_and_derived_ones_dashed(spatial: Estimate) -> None:
     section = spatial_moment_section(spatial)
     knee, hip = section.parts[0].panels[1], section.parts[0].panels[0]
-    assert knee.note == f"right −{90 / MASS_KG:.2f} to 0.00; left −{45 / MASS_KG:.2f} to 0.00".replace(
-        "to 0.00", "to −0.00"
-    )
+    assert knee.note == "right −1.50 to 0.00; left −0.75 to 0.00"
     assert "stroke-dasharray" in knee.svg and knee.svg.count("stroke-dasharray") == 1  # the left one only
     assert "N m/kg</text>" in hip.svg
     assert "derived from the motion in 17 % of the frames (legs)" in section.text

@@ -11,7 +11,7 @@ from dynakin.comparison import Setup, halves
 from dynakin.config import RunConfig, make_config, read_config
 from dynakin.errors import ConfigError
 from dynakin.model import load_model
-from dynakin.recordings import Recording, read
+from dynakin.recordings import Recording, read, without_plate_loads
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,10 +91,14 @@ def _case(trial: Path, given: dict[str, Any], presets: Sequence[str], cutoff_hz:
         config.side,
         config.vertical,
         config.forward,
+        config.estimate,
+        config.plates,
+        config.loads,
     )
     recording = read(
         config.trial, config.forces, plate_filter_hz=config.plate_filter_hz, force_threshold_n=config.force_threshold_n
     )
+    recording = without_plate_loads(recording, config.plate_loads, config.vertical)
     return Case(recording, None if config.static is None else read(config.static), setup, config)
 
 
