@@ -57,7 +57,9 @@ def compare(
         list[Path] | None, typer.Argument(metavar="TRIAL...", help="Recordings, or a configuration (.toml) for each.")
     ] = None,
     forces: Annotated[list[Path] | None, typer.Option("--forces", help="Ground forces, one a trial, in order.")] = None,
-    model: Annotated[str | None, typer.Option(help="Model: squat7, sagittal7 or a .toml file.")] = None,
+    model: Annotated[
+        str | None, typer.Option(help="Model: fullbody, squat7, sagittal7, a .toml or .osim file.")
+    ] = None,
     markers: Markers = None,
     static: Static = None,
     mass: Mass = None,

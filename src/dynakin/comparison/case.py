@@ -9,7 +9,7 @@ from dynakin.comparison.setup import Setup
 from dynakin.config import RunConfig
 from dynakin.filter import presets as known_presets
 from dynakin.model import load_model
-from dynakin.recordings import Recording, read
+from dynakin.recordings import Recording, read, without_plate_loads
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,8 +44,12 @@ def case_of(config: RunConfig, presets: Sequence[str], cutoff_hz: float) -> Case
         config.side,
         config.vertical,
         config.forward,
+        config.estimate,
+        config.plates,
+        config.loads,
     )
     recording = read(
         config.trial, config.forces, plate_filter_hz=config.plate_filter_hz, force_threshold_n=config.force_threshold_n
     )
+    recording = without_plate_loads(recording, config.plate_loads, config.vertical)
     return Case(recording, None if config.static is None else read(config.static), setup, config)

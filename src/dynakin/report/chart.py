@@ -124,7 +124,7 @@ def _range(lines: Sequence[Line], levels: Sequence[float], least: float) -> tupl
 
 def _axes(low: float, high: float, start: float, end: float, x: Place, y: Place, unit: str, x_label: str) -> str:
     parts = []
-    ticks = MaxNLocator(5).tick_values(low, high)
+    ticks = np.asarray(MaxNLocator(5).tick_values(low, high))
     ticks = ticks[(ticks >= low) & (ticks <= high)]
     levels = "".join(f"M{_LEFT} {int(y(np.array(tick)))}H{_RIGHT}" for tick in ticks)
     parts.append(f'<path d="{levels}" stroke="{GRID}" stroke-width="7"/>')
@@ -132,7 +132,7 @@ def _axes(low: float, high: float, start: float, end: float, x: Place, y: Place,
         f'<text x="{_LEFT - 30}" y="{int(y(np.array(tick))) + 28}" text-anchor="end">{text}</text>'
         for tick, text in zip(ticks, _labels(ticks), strict=True)
     ]
-    moments = MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]).tick_values(start, end)
+    moments = np.asarray(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]).tick_values(start, end))
     moments = moments[(moments >= start - 1e-9) & (moments <= end + 1e-9)]
     marks = "".join(f"M{int(x(np.array(at)))} {_BOTTOM}v30" for at in moments)
     parts.append(f'<path d="M{_LEFT} {_BOTTOM}H{_RIGHT}{marks}" stroke="#b8c0c8" stroke-width="7"/>')
@@ -142,10 +142,7 @@ def _axes(low: float, high: float, start: float, end: float, x: Place, y: Place,
     ]
     middle = (_TOP + _BOTTOM) // 2
     parts.append(f'<text x="{(_LEFT + _RIGHT) // 2}" y="{_HEIGHT - 70}" text-anchor="middle">{escape(x_label)}</text>')
-    parts.append(
-        f'<text transform="translate(65 {middle}) rotate(-90)" text-anchor="middle">'
-        f"{escape(unit)}</text>"
-    )
+    parts.append(f'<text transform="translate(65 {middle}) rotate(-90)" text-anchor="middle">{escape(unit)}</text>')
     return "".join(parts)
 
 

@@ -97,7 +97,9 @@ def _headline(estimate: Estimate, metrics: dict[str, Any]) -> list[dict[str, str
         value = " / ".join(number(moment, digits=2) for moment in moments)
         tiles.append({"value": value, "unit": "N m", "label": f"ground moment {names}, RMS"})
     tiles.append({"value": f"{len(stuck)} of {len(free)}", "unit": "", "label": "parameters on a bound"})
-    tiles.append({"value": number(estimate.timing.median_us, digits=2), "unit": "µs", "label": "a step, median"})
+    slow = estimate.timing.median_us >= 1000.0
+    step = number(estimate.timing.median_us * (1e-3 if slow else 1.0), digits=2)
+    tiles.append({"value": step, "unit": "ms" if slow else "µs", "label": "a step, median"})
     return tiles
 
 

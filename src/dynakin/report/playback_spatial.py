@@ -21,7 +21,7 @@ from dynakin.results.pressure import centre_of_pressure
 
 Array = npt.NDArray[np.float64]
 
-_FOLLOWED_FROM_MM = 1800.0
+_FOLLOWED_FROM_MM = 1200.0
 """A person whose middle covers more ground than this is followed."""
 _START = (40.0, 12.0)
 VIEWS = {"Right": (0, 0), "Front": (90, 0), "Left": (180, 0), "Back": (-90, 0), "Above": (0, 90), "Aslant": _START}

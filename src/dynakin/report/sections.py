@@ -22,6 +22,7 @@ from dynakin.report.labels import (
 )
 from dynakin.report.method_sections import methods_section
 from dynakin.report.panels import Panel
+from dynakin.report.plot import ESTIMATED
 from dynakin.report.repetition_sections import repetition_section
 from dynakin.report.section import Section
 from dynakin.report.spatial_repetitions import spatial_repetition_section
@@ -263,7 +264,7 @@ def _parameter_panel(estimate: Estimate, p: Parameter, title: str, factor: float
         reach = 3.0 * float(np.ptp(element)) + 2.0 * float(np.nanmax(sd))
         middle = float(np.median(element))
         bounds = [Bound(factor * v, word) for v, word in levels if v is not None and abs(v - middle) <= reach]
-        line = Line(factor * element, charts.ESTIMATED, 1.3, factor * sd)
+        line = Line(factor * element, ESTIMATED, 1.3, factor * sd)
         return chart(title, unit, estimate.time, [line], note=note, bounds=bounds)
     return charts.parameter_path(
         p.name,

@@ -8,15 +8,16 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.report.body import marker_segments
 from dynakin.report.chart import Line, chart
 from dynakin.report.colours import SIDE_COLOURS
-from dynakin.report.labels import COMPONENT_LABELS, number, sentence, short_marker_names
+from dynakin.report.labels import COMPONENT_LABELS, number, sentence, short_marker_names, words
 from dynakin.report.method_styles import LineStyle
 from dynakin.report.panels import Panel, band_is_too_wide, rms_bars
 from dynakin.report.plot import ESTIMATED, MEASURED
 from dynakin.report.section import Section
-from dynakin.report.text_tables import TextTable
 from dynakin.report.sides import REGIONS, Joint, joints_of
+from dynakin.report.text_tables import TextTable
 from dynakin.results import AXES, COMPONENTS, Estimate
 from dynakin.results.angles import convention_of
 from dynakin.results.feet import MEASURED as CONTACT_MEASURED
@@ -57,12 +58,33 @@ def spatial_marker_section(estimate: Estimate, metrics: dict[str, Any]) -> Secti
     return Section(
         "markers",
         "Markers",
-        f"Root mean square distance in space between {window['start_s']:.4g} and {window['end_s']:.4g} s.",
+        f"Root mean square distance in space between {window['start_s']:.4g} and {window['end_s']:.4g} s. Where soft "
+        "tissue is estimated, an estimated marker holds its displacement: how far each moves on its segment says how "
+        "well a rigid body fits.",
+        tables=[_displacements(estimate, metrics)] if metrics["soft_tissue"]["markers"] else [],
         wide=titled,
         folded=folded,
         folded_title="Every marker over time: estimated less measured",
         lines=tuple(LineStyle(_DIRECTIONS[axis], _AXIS_COLOURS[axis], 1.2) for axis in AXES),
     )
+
+
+def _displacements(estimate: Estimate, metrics: dict[str, Any]) -> TextTable:
+    names, carriers = short_marker_names(estimate.marker_names), marker_segments(estimate)
+    found = metrics["soft_tissue"]["markers"]
+    order = sorted(found, key=lambda name: -(found[name]["max_mm"] or 0.0))
+    rows: list[tuple[str, ...]] = [
+        (
+            names.get(name, name),
+            words(carriers.get(name, "")),
+            number(found[name]["rms_mm"], digits=2),
+            number(found[name]["max_mm"], digits=2),
+            number(found[name]["declared_mm"], digits=2),
+        )
+        for name in order
+    ]
+    headings = ("marker", "segment", "RMS, mm", "largest, mm", "declared, mm")
+    return TextTable("Movement of each marker on its segment", headings, rows, (2, 3, 4), folded=True)
 
 
 def spatial_wrench_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
@@ -188,9 +210,9 @@ def spatial_angle_section(estimate: Estimate) -> Section:
             own = sign * factor * (values[:, k] - offset[k])
             wide = band_is_too_wide(own, factor * sd[:, k])
             lines.append(Line(own, SIDE_COLOURS[side], 1.2, None if wide else factor * sd[:, k]))
-            ranges.append(f"{f'{side} ' if side else ''}{number(np.nanmin(own))} to {number(np.nanmax(own), unit)}")
+            ranges.append(f"{f'{side} ' if side else ''}{number(np.nanmin(own))} to {number(np.nanmax(own))}")
             if wide:
-                ranges[-1] += f" (2 sd {number(2.0 * factor * float(np.median(sd[:, k])), unit, digits=2)})"
+                ranges[-1] += f" (2 sd {number(2.0 * factor * float(np.median(sd[:, k])), digits=2)})"
         title = joint.title
         if found:
             way = found[0].positive if sign == found[0].sign else found[0].negative
@@ -226,7 +248,7 @@ def spatial_moment_section(estimate: Estimate) -> Section:
             wide = own_sd is not None and band_is_too_wide(moments[:, k], np.nan_to_num(own_sd))
             derived = source[:, k] == _SOURCE_DERIVED
             lines.append(Line(moments[:, k], SIDE_COLOURS[side], 1.2, None if wide else own_sd, derived))
-            low, high = number(np.nanmin(moments[:, k]), digits=2), number(np.nanmax(moments[:, k]), unit, digits=2)
+            low, high = (_two_digits(float(edge(moments[:, k]))) for edge in (np.nanmin, np.nanmax))
             notes.append(f"{f'{side} ' if side else ''}{low} to {high}")
         return (
             chart(joint.title, unit, estimate.time, lines[::-1], note="; ".join(notes), least_range=0.02)
@@ -236,8 +258,11 @@ def spatial_moment_section(estimate: Estimate) -> Section:
 
     root = root_coordinates(estimate)
     joints = [joint for joint in joints_of(estimate) if joint.region != "Whole body"]
-    left_over = [float(np.nanmax(np.abs(_of(estimate, "moments", "coordinate")[:, k]), initial=0.0))
-                 for k, name in enumerate(estimate.coordinate_names) if name in root]
+    left_over = [
+        float(np.nanmax(np.abs(_of(estimate, "moments", "coordinate")[:, k]), initial=0.0))
+        for k, name in enumerate(estimate.coordinate_names)
+        if name in root
+    ]
     shares = [
         f"{what} in {number(100.0 * share, '%', digits=2)} of the frames ({who})"
         for code, what in ((_SOURCE_DERIVED, "derived from the motion"), (_SOURCE_UNKNOWN, "not known"))
@@ -260,11 +285,15 @@ def spatial_moment_section(estimate: Estimate) -> Section:
     )
 
 
+def _two_digits(value: float) -> str:
+    return f"{round(value, 2) + 0.0:.2f}".replace("-", "−")
+
+
 def _sides_with(estimate: Estimate, marked: npt.NDArray[np.bool_]) -> str:
     """Which coordinates a mark touches, in a few words."""
     touched = [joint for joint in joints_of(estimate) if any(marked[:, k].any() for k in joint.columns.values())]
-    regions = [region for region in REGIONS if any(joint.region == region for joint in touched)]
-    return " and ".join(region.lower() for region in regions) or "locked joints"
+    regions = [region for region in REGIONS[:-1] if any(joint.region == region for joint in touched)]
+    return " and ".join(region.lower() for region in regions) or "joints that are held still"
 
 
 def _by_region(key: str, joints: list[Joint], draw: Callable[[Joint], Panel | None]) -> list[Section]:

@@ -17,7 +17,7 @@ from dynakin.report.text_tables import TextTable
 from dynakin.results import Estimate
 
 _NOT_MEANT = 0.02
-"""Below this share of the largest value of its kind a quantity is too small for a ratio of the sides to say anything."""
+"""Below this share of the largest of its kind a quantity is too small for a ratio of the sides to say anything."""
 
 
 def power_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
