@@ -1,6 +1,6 @@
 """dynakin beside OpenSim and biorbd on the same recordings in one run: fit, residuals, angles, forecasts, step times.
 
-    make peers-bench        (or OMP_NUM_THREADS=1 python benchmarks/peers.py [part ...])
+    make peers        (or OMP_NUM_THREADS=1 python benchmarks/peers.py [part ...])
 
 Needs the shared recordings (DYNAKIN_TEST_DATA or ../shared/data) and the extra `peers` (opensim, biorbd). Parts: fit,
 residual, angles, forecast, times. Prints the tables of BENCHMARKS.md.
@@ -126,7 +126,8 @@ def left_over(title: str, estimate: Estimate) -> None:
 
 def residuals(peer: Kinematics) -> None:
     print(
-        "\n### What inverse dynamics leaves at the pelvis: `squats1`\n\n| method | force, N | moment, N m |\n|---|---|---|"
+        "\n### What inverse dynamics leaves at the pelvis: `squats1`\n\n"
+        "| method | force, N | moment, N m |\n|---|---|---|"
     )
     for mass in (None, MASS["squats1"]):
         for cutoff in (6.0, None):
@@ -185,8 +186,8 @@ def told(estimate: Estimate, judged: Array) -> None:
     worst = sorted(ratio, key=lambda n: -ratio[n])[:3]
     beyond = sum(value > 1.5 for value in ratio.values())
     print(
-        f"| soft tissue, RMS over declared size | median {np.median(list(ratio.values())):.2f}, {beyond} of {len(ratio)} "
-        f"beyond 1.5; largest {', '.join(f'{n} {ratio[n]:.1f}' for n in worst)} | 1.5 |"
+        f"| soft tissue, RMS over declared size | median {np.median(list(ratio.values())):.2f}, {beyond} of "
+        f"{len(ratio)} beyond 1.5; largest {', '.join(f'{n} {ratio[n]:.1f}' for n in worst)} | 1.5 |"
     )
     refused = (data["verdict"].values == 2).sum(axis=0)
     often = [f"{s} {k}" for s, k in zip(data["sensor"].values, refused, strict=True) if k]
