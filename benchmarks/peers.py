@@ -93,7 +93,7 @@ def fit(peer: Kinematics) -> None:
 def mean_pressure(recording: Recording) -> Array:
     """Mean centre of pressure (3,) m of all plates together, weighted by their load."""
     load_n = np.stack([plate.force[:, 1] for plate in recording.plates])
-    centre = np.stack([np.nan_to_num(plate.centre_of_pressure) for plate in recording.plates])
+    centre = np.stack([np.nan_to_num(plate.cop) for plate in recording.plates])
     return np.asarray((load_n[..., None] * centre).sum(axis=(0, 1)) / load_n.sum())
 
 
