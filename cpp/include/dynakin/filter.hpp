@@ -91,6 +91,7 @@ class Filter {
   using MarkerRef = Eigen::Ref<const MarkerMatrix>;
   Tracking believe(const MarkerRef& markers);
   void leave_out_refused();
+  double uncertainty_seen() const;
   UpdateSums correct(const MarkerRef& markers, const Vector6& wrench);
   UpdateSums iterate(const MarkerRef& markers, const Vector6& wrench, int most);
   void constrain(double nis, StepReport& report);
