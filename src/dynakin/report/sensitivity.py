@@ -100,9 +100,7 @@ def sensitivity_figure(grid: Sensitivity) -> Figure:
     what = "Slices through the optimum" if pairs else "Optimum"
     unit = "" if grid.unit == "1" else f", in {grid.unit}"
     lost = "; hatched: the filter diverged" if not np.isfinite(grid.criterion).all() else ""
-    figure.suptitle(
-        f"{what} (○: {number(low)}{unit}, at 10^({at})){lost}", x=0.01, ha="left", fontsize=8.5, color=INK
-    )
+    figure.suptitle(f"{what} (○: {number(low)}{unit}, at 10^({at})){lost}", x=0.01, ha="left", fontsize=8.5, color=INK)
     return figure
 
 
