@@ -5,7 +5,7 @@
 Every trial is of a drawn subject with soft tissue and noise of the default sizes, at 100 Hz; nothing but mass, height
 and sex is told. A walk is measured on the same person's quiet standing (``static``). Errors are taken after 5 s of a
 squat and after 0.5 s of a walk; angles about their mean error, whose size is told apart. Moments are judged while every
-foot that carries stands on a plate, those of the legs with the feet's wrenches as the plates measured them.
+foot that carries stands on a plate.
 """
 
 from __future__ import annotations
@@ -18,9 +18,7 @@ import numpy as np
 
 import dynakin
 from dynakin.filter import Noise, presets
-from dynakin.recordings.foot_loads import foot_loads
 from dynakin.simulation import SimulatedTrial, simulate
-from dynakin.simulation.mechanics import rotation_about
 
 SUBJECT = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
 DURATION_S = {"squat": 15.0, "gait": 4.0}
@@ -53,36 +51,8 @@ class Errors:
     moment: Array
 
 
-def carried_by_feet(
-    estimate: dynakin.Estimate, estimator: dynakin.Estimator, trial: SimulatedTrial
-) -> dict[str, Array]:
-    """What the measured wrenches of the feet (T, 6) do along each coordinate of the legs, N m: the estimate's moments,
-    with all loads through the pelvis, are too large by it."""
-    initial, data = estimator.initial, estimate.data
-    loads = foot_loads(trial.recording, initial.ground)
-    angle = {str(n): data["coordinates"].sel(coordinate=n).values for n in data["coordinate"].values}
-    turned: dict[str, Array] = {}
-    found = dict.fromkeys(angle, 0.0)
-    for segment in initial.spec.segments:
-        R = turned.get(segment.parent, np.eye(3)) @ segment.rotation
-        point = data["joint_centres"].sel(joint=segment.name).transpose("time", "axis").values
-        for axis in segment.axes:
-            if axis.kind != "rotation":
-                continue
-            slope = axis.coefficients[1]
-            along = np.broadcast_to(R @ axis.direction, point.shape) * slope
-            R = R @ rotation_about(axis.direction, slope * angle[axis.coordinate])
-            if axis.coordinate[:-2] in LEG:
-                wrench = loads.wrench[:, ("right", "left").index({"r": "right", "l": "left"}[axis.coordinate[-1]])]
-                moment = wrench[:, 3:] - np.cross(point, wrench[:, :3])
-                found[axis.coordinate] = np.sum(along * moment, axis=1)
-        turned[segment.name] = R
-    return found
-
-
-def errors(estimate: dynakin.Estimate, estimator: dynakin.Estimator, trial: SimulatedTrial, motion: str) -> Errors:
+def errors(estimate: dynakin.Estimate, trial: SimulatedTrial, motion: str) -> Errors:
     """Errors of the coordinates that the estimate and the truth share and that are free."""
-    carried = carried_by_feet(estimate, estimator, trial)
     data, truth = estimate.data, trial.truth.data
     moved = {str(n) for n in truth["coordinate"].values if np.ptp(truth["speeds"].sel(coordinate=n).values) > 0.0}
     names = [str(n) for n in data["coordinate"].values if str(n) in moved]
@@ -92,7 +62,6 @@ def errors(estimate: dynakin.Estimate, estimator: dynakin.Estimator, trial: Simu
         key: data[key].transpose(*order).values - truth[key].transpose(*order).values
         for key in ("coordinates", "speeds", "moments")
     }
-    off["moments"] -= np.stack([np.zeros(len(data["time"])) + carried[name] for name in names], axis=1)
     time = trial.recording.time
     window = time >= START_S[motion]
     angle = np.degrees(off["coordinates"][window])
@@ -116,7 +85,7 @@ def one_trial(motion: str, markers: str, seed: int, changes: dict[str, float]) -
     for name, smooth in (("live", False), ("smoothed", True)):
         estimator = dynakin.Estimator(definition, Noise(**(presets.default().model_dump() | changes)))
         estimate = estimator.run(trial.recording, static=static, smooth=smooth)
-        found[name] = errors(estimate, estimator, trial, motion)
+        found[name] = errors(estimate, trial, motion)
     return found
 
 
