@@ -33,7 +33,6 @@ from dynakin.errors import DynakinError
 from dynakin.filter import Estimator, presets
 from dynakin.filter.zero import standing_zero
 from dynakin.identifiability import Identifiability, identifiability
-from dynakin.model import load_model
 from dynakin.recordings import read, without_plate_loads
 from dynakin.report import read_sensitivity, save_figures
 from dynakin.results import Estimate, check_output_writable
@@ -128,7 +127,7 @@ def estimate_from(
     Raises:
         DynakinError: anything that is wrong with the input, in one line.
     """
-    model = load_model(config.model, config.subject(), markers=config.markers, table=config.table)
+    model = config.definition()
     recording = read(
         config.trial,
         config.forces,
