@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal, Self
@@ -14,7 +13,7 @@ from dynakin.filter import Noise, presets
 from dynakin.filter.extend import QUANTITIES, Quantity
 from dynakin.model import Bounds, CarriedLoad, Definition, OpenSimOptions, Priors, Subject, load_model
 from dynakin.model.subject import Sex
-from dynakin.model.validation import Strict, nearest, validate
+from dynakin.model.validation import Strict, nearest, read_toml, validate
 from dynakin.recordings import PlateLoad
 
 # Keys that name files: relative to the configuration file that they stand in.
@@ -155,12 +154,7 @@ def read_config(path: Path, paths: Sequence[str] = _PATHS) -> dict[str, Any]:
     Raises:
         ConfigError: no such file, or not TOML (with the line).
     """
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"{path}: not a TOML file: {error}") from None
+    content = read_toml(path, ConfigError)
     for key in paths:
         if isinstance(content.get(key), str):
             content[key] = str(path.parent / content[key])
