@@ -19,7 +19,7 @@ class OpenSimOptions(Strict):
     """What of an OpenSim model can be estimated, and what is taken as the file has it."""
 
     scale: Literal["all"] | tuple[str, ...] | None = "all"
-    """Bodies with a scale parameter, on which the joints placed on that body depend; None: none."""
+    """Bodies with a scale parameter, on which the joints placed on that body depend; []: none."""
     share_sides: bool = True
     """Whether mirrored bodies (femur_r, femur_l) share one."""
     scale_masses: bool = True
