@@ -1,0 +1,102 @@
+"""Ways to identify a subject, each as a function from trials to (inertia, geometry): what the study compares."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from dynakin import _core
+from dynakin.comparison.freeze import final_values
+from dynakin.errors import DynakinError
+from dynakin.filter import Estimator, presets
+from dynakin.identification import Common, MeasuredTrial, Posterior, Unknowns, at_start, identify_batch
+from dynakin.identification.batch import FIRST_SIGMA, PLANE
+from dynakin.recordings import Recording
+from dynakin.reference.condensed import stacked
+from dynakin.reference.base_parameters import base_parameters
+from dynakin.reference.identification import free_parameters
+
+Array = np.ndarray
+
+
+def filtered(common: Common, recordings: Sequence[Recording], preset: str) -> Array | None:
+    """phi that a filter ends with, mean over the trials that it does not lose; None where it loses all."""
+    names, found = Unknowns.of(common).bodies.names, []
+    for recording in recordings:
+        given = common.estimator
+        estimator = Estimator(given.model, presets.preset(preset), side=given.side, vertical=given.vertical)
+        try:
+            values = final_values(estimator.run(recording, static=common.static))
+        except DynakinError:
+            continue
+        found.append([values[name] for name in names])
+    return np.mean(found, axis=0) if found else None
+
+
+def regressor(common: Common, states: Array) -> Array:
+    """(T, 3, 4 S): the wrench is linear in phi."""
+    unknowns = Unknowns.of(common)
+    return np.array([_core.wrench_jacobian(common.core, x) for x in states])[:, PLANE][:, :, unknowns.inertia]
+
+
+def free(common: Common, trials: Sequence[MeasuredTrial]) -> Array:
+    """Free least squares with the declared weights; what no frame sees stays at the table."""
+    bodies = Unknowns.of(common).bodies
+    table = bodies.phi(np.zeros(len(bodies.sd)))
+    scale = np.repeat(bodies.mass, 4) * np.tile([1.0, 0.3, 0.3, 0.09], len(bodies.mass))
+    Y = np.concatenate([regressor(common, trial.movement.states) for trial in trials])
+    y = np.concatenate([trial.wrench[:, PLANE] for trial in trials])
+    every = np.ones(len(table), dtype=bool)
+    problem = stacked(bodies.names, table, scale, every, Y, y, mass_kg=bodies.total, sigma=FIRST_SIGMA)
+    return free_parameters(problem, base_parameters(problem).rank)
+
+
+def base_estimate(common: Common, trials: Sequence[MeasuredTrial], like: Posterior) -> Array:
+    """Base parameters with the prior that the table's spread gives them, weights as in ``like``; no body is asked to be
+    possible. What the base parameters do not hold stays where it moves with them in the prior."""
+    bodies = Unknowns.of(common).bodies
+    start = np.zeros(len(bodies.sd))
+    table, J = bodies.phi(start), bodies.jacobian(start)
+    spread = J * bodies.sd  # (4 S, 4 S): phi = table + spread z, z of unit variance
+    H, g = np.eye(len(start)), np.zeros(len(start))
+    for k, trial in enumerate(trials):
+        step = float(np.median(np.diff(trial.movement.time)))
+        weight = step / (like.sigma[k] ** 2 * like.tau_s[k])
+        Y = regressor(common, trial.movement.states)
+        left = trial.wrench[:, PLANE] - Y @ table
+        H += np.einsum("tki,k,tkj->ij", Y @ spread, weight, Y @ spread)
+        g += np.einsum("tki,k,tk->i", Y @ spread, weight, left)
+    return table + spread @ np.linalg.solve(H, g)
+
+
+def predicted(common: Common, states: Array, phi: Array, geometry: Posterior | None = None) -> Array:
+    """(T, 3) fx, fy, mz with these inertial parameters, and lengths and zeros of ``geometry``."""
+    posterior = geometry or at_start(Unknowns.of(common, inertia=False))
+    moved = posterior.unknowns.states(states, posterior.theta)
+    return regressor(common, moved) @ phi
+
+
+def batch(common: Common, trials: Sequence[MeasuredTrial], *, inertia: bool, geometry: bool) -> Posterior:
+    """The library's estimate."""
+    return identify_batch(common, trials, Unknowns.of(common, inertia=inertia, geometry=geometry))
+
+
+def all_candidates(
+    common: Common, trials: Sequence[MeasuredTrial], recordings: Sequence[Recording], filters: Sequence[str] = ()
+) -> dict[str, tuple[Array, Posterior | None]]:
+    """phi and geometry by name of the candidate."""
+    geometry = batch(common, trials, inertia=False, geometry=True)
+    inertia = batch(common, trials, inertia=True, geometry=False)
+    both = batch(common, trials, inertia=True, geometry=True)
+    found: dict[str, tuple[Array, Posterior | None]] = {"table": (geometry.phi, None)}
+    for preset in filters:
+        phi = filtered(common, recordings, preset)
+        if phi is not None:
+            found[f"filter, {preset}"] = (phi, None)
+    found["least squares, free"] = (free(common, trials), None)
+    found["base parameters, prior"] = (base_estimate(common, trials, inertia), None)
+    found["bodies"] = (inertia.phi, None)
+    found["geometry"] = (geometry.phi, geometry)
+    found["geometry and bodies"] = (both.phi, both)
+    return found

@@ -1,0 +1,120 @@
+"""What a batch identification asks for: bodies, lengths, zeros of angles, and each trial's own plates."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin import _core
+from dynakin.identification.bodies import BodyPriors, PlanarBodies
+from dynakin.identification.trials import Common
+
+Array = npt.NDArray[np.float64]
+
+NUISANCE = 4  # a trial: slow error of fx, fy, mz, and the plates' delay
+
+
+@dataclass(frozen=True)
+class GeometryPriors:
+    """Standard deviations of what geometry may be wrong by."""
+
+    length_m: float = 0.010
+    """Of each length: joint centres by regression are 1 to 2 cm off, those by landmarks less."""
+    zero_deg: float = 2.0
+    """Of each angle's zero. Skin and landmarks turn a segment's frame by 1 to 4 deg (docs/validation.md)."""
+    plate_force_n: float = 3.0
+    """A trial's own constant error of each force."""
+    plate_moment_nm: float = 1.0
+    """The same of the moment about the ground origin."""
+    plate_delay_s: float = 0.005
+    """The plates' delay behind the markers."""
+
+
+@dataclass(frozen=True, eq=False)
+class Unknowns:
+    """theta (U,) = [u of the bodies; lengths (m); zeros (rad)], deviations from the start, and which are free.
+
+    A zero is added to its angle at every frame; a length to its own. What is not free stays 0.
+
+    Attributes:
+        names: (U,). sd: (U,) prior standard deviations. bodies: u -> phi.
+        lengths, rotations, inertia: their columns in a state of the core's model.
+        nuisance_sd: (4,) of a trial's plates: fx, fy (N), mz (N m), delay (s).
+        free: (U,) bool.
+    """
+
+    names: tuple[str, ...]
+    sd: Array
+    bodies: PlanarBodies
+    lengths: Array
+    rotations: Array
+    inertia: Array
+    nuisance_sd: Array
+    free: npt.NDArray[np.bool_]
+
+    @classmethod
+    def of(
+        cls,
+        common: Common,
+        *,
+        inertia: bool = True,
+        geometry: bool = True,
+        body_priors: BodyPriors | None = None,
+        priors: GeometryPriors | None = None,
+    ) -> Unknowns:
+        """All of a measured planar model's; ``inertia`` and ``geometry`` say what is free.
+
+        Raises:
+            ModelError: the model is not planar.
+        """
+        priors = priors or GeometryPriors()
+        bodies = PlanarBodies.of(common.initial, body_priors)
+        names = list(common.core.layout.names)
+        kinds = {axis.coordinate: axis.kind for segment in common.initial.spec.segments for axis in segment.axes}
+        rotations = [k for k in _range(common.columns("coordinates")) if kinds[names[k]] == "rotation"]
+        lengths = list(_range(common.columns("lengths")))
+        parts = ("a", "cx", "cy", "k")
+        words = [f"body/{segment}/{part}" for segment in bodies.segments for part in parts]
+        words += [names[k] for k in lengths] + [f"zero/{names[k]}" for k in rotations]
+        sd = np.concatenate(
+            [
+                bodies.sd,
+                np.full(len(lengths), priors.length_m),
+                np.full(len(rotations), np.deg2rad(priors.zero_deg)),
+            ]
+        )
+        plates = [priors.plate_force_n] * 2 + [priors.plate_moment_nm, priors.plate_delay_s]
+        free = np.array([inertia] * len(bodies.sd) + [geometry] * (len(lengths) + len(rotations)))
+        columns = np.array([names.index(name) for name in bodies.names])
+        return cls(tuple(words), sd, bodies, np.array(lengths), np.array(rotations), columns, np.array(plates), free)
+
+    def split(self, theta: Array) -> tuple[Array, Array, Array]:
+        """u, lengths, zeros."""
+        first, second = len(self.bodies.sd), len(self.bodies.sd) + len(self.lengths)
+        return theta[:first], theta[first:second], theta[second:]
+
+    def states(self, states: Array, theta: Array) -> Array:
+        """States (T, n) with what ``theta`` says."""
+        u, lengths, zeros = self.split(theta)
+        found = states.copy()
+        found[:, self.lengths] += lengths
+        found[:, self.rotations] += zeros
+        found[:, self.inertia] = self.bodies.phi(u)
+        return found
+
+    def wrench(self, core: _core.Model, states: Array, theta: Array) -> Array:
+        """What the plates should say of a movement (T, 6), N and N m about the ground origin."""
+        return np.array([_core.wrench(core, x) for x in self.states(states, theta)])
+
+    def jacobian(self, core: _core.Model, states: Array, theta: Array) -> Array:
+        """d wrench / d theta (T, 6, U)."""
+        u, _, _ = self.split(theta)
+        rows = np.array([_core.wrench_jacobian(core, x) for x in self.states(states, theta)])
+        bodies = rows[:, :, self.inertia] @ self.bodies.jacobian(u)
+        return np.concatenate([bodies, rows[:, :, self.lengths], rows[:, :, self.rotations]], axis=2)
+
+
+def _range(columns: slice) -> range:
+    return range(columns.start, columns.stop)
