@@ -13,8 +13,8 @@ from dynakin.filter import Estimator, presets
 from dynakin.identification import Common, MeasuredTrial, Posterior, Unknowns, at_start, identify_batch
 from dynakin.identification.batch import FIRST_SIGMA, PLANE
 from dynakin.recordings import Recording
-from dynakin.reference.condensed import stacked
 from dynakin.reference.base_parameters import base_parameters
+from dynakin.reference.condensed import stacked
 from dynakin.reference.identification import free_parameters
 
 Array = np.ndarray

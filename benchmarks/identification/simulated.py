@@ -51,11 +51,7 @@ def one(model: str, seed: int, duration_s: float, filters: tuple[str, ...]) -> d
     for k, task in enumerate(TASKS):
         others = [j for j in range(len(TASKS)) if j != k]
         candidates = all_candidates(common, [trials[j] for j in others], [sims[j].recording for j in others], filters)
-        if filters:
-            candidates |= {"true bodies": (true, None)}
-        else:
-            candidates |= {"true bodies": (true, None), "true bodies, geometry": (true, candidates["geometry"][1])}
-            candidates |= {"table, both's geometry": (candidates["table"][0], candidates["geometry and bodies"][1])}
+        candidates |= {"true bodies": (true, None)}
         for name, (phi, geometry) in candidates.items():
             raw = common.with_plates(trials[k].movement, sims[k].recording, as_measured=True)
             found[task, name] = judged(raw, predicted(common, trials[k].movement.states, phi, geometry))
@@ -78,8 +74,8 @@ def main() -> None:
         print(f"seed {seed} done", flush=True)
     names = list(dict.fromkeys(name for _, name in rows))
     for task in TASKS:
-        print(f"\nleft out: {task}   FX, FY (N), MZ (N m): mean RMS over {len(rows[task, 'table'])} seeds; share of MZ's "
-              "gap; sds from truth")  # fmt: skip
+        count = len(rows[task, "table"])
+        print(f"\nleft out: {task}. RMS FX, FY (N), MZ (N m), mean of {count} seeds; share of the gap; sds from truth")
         table, true = (np.array(rows[task, name])[:, 2] for name in ("table", "true bodies"))
         for name in names:
             if (task, name) not in rows:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -105,5 +104,6 @@ class PlanarBodies:
         return self.total * weight / weight.sum(), self.centre + c, self.gyration * np.exp(k)
 
 
-def _flags(initial: InitialModel) -> Sequence[bool]:
-    return np.any([segment.inertia_estimated for segment in initial.spec.segments], axis=0).tolist()
+def _flags(initial: InitialModel) -> list[bool]:
+    """Which of the ten numbers some segment estimates."""
+    return [bool(flag) for flag in np.any([s.inertia_estimated for s in initial.spec.segments], axis=0)]

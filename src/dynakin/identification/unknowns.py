@@ -18,12 +18,14 @@ NUISANCE = 4  # a trial: slow error of fx, fy, mz, and the plates' delay
 
 @dataclass(frozen=True)
 class GeometryPriors:
-    """Standard deviations of what geometry may be wrong by."""
+    """Standard deviations of what geometry may be wrong by. Tight on purpose: with 10 mm and 2 deg a subject's
+    simulated tasks predict one another worse (docs/identification.md), as skin that follows a posture is no constant.
+    """
 
-    length_m: float = 0.010
-    """Of each length: joint centres by regression are 1 to 2 cm off, those by landmarks less."""
-    zero_deg: float = 2.0
-    """Of each angle's zero. Skin and landmarks turn a segment's frame by 1 to 4 deg (docs/validation.md)."""
+    length_m: float = 0.004
+    """Of each length."""
+    zero_deg: float = 0.5
+    """Of each angle's zero."""
     plate_force_n: float = 3.0
     """A trial's own constant error of each force."""
     plate_moment_nm: float = 1.0

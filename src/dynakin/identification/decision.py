@@ -1,0 +1,111 @@
+"""Whether identified parameters earn their place: each trial predicted from its markers by the others.
+
+Of fewer than three trials halves are left out instead: with two, a standing trial would have to foretell a squat all by
+itself. A fold leaves out a whole trial or half, never single frames: the model's error is alike from frame to frame, so
+single frames would judge themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.identification.batch import PLANE, Posterior, at_start, identify_batch
+from dynakin.identification.trials import Common, MeasuredTrial
+from dynakin.identification.unknowns import Unknowns
+
+Array = npt.NDArray[np.float64]
+Progress = Callable[[int, int], None]
+Use = Literal["table", "bodies"]
+USES: tuple[Use, ...] = get_args(Use)
+
+GAIN = 0.97
+"""Mean RMS over the table's from which on the table is left: 3 % is within what two halves of a trial differ by."""
+WORST = 1.10
+"""And the worst trial must not lose more than this."""
+
+
+@dataclass(frozen=True, eq=False)
+class Decision:
+    """What cross-validation found.
+
+    Attributes:
+        use: the winner. folds: names of what was left out. rms: (folds, 3) fx, fy (N), mz (N m) of what was left out,
+            predicted from its markers, by candidate.
+    """
+
+    use: Use
+    folds: tuple[str, ...]
+    rms: dict[Use, Array]
+
+    def ratios(self, use: Use) -> Array:
+        """(folds,) RMS over the table's, mean over the components."""
+        return np.asarray((self.rms[use] / self.rms["table"]).mean(axis=1))
+
+    def in_words(self) -> list[str]:
+        """Sentences."""
+        found = {use: np.sqrt((self.rms[use] ** 2).mean(axis=0)) for use in USES}
+        said = [
+            "Each left out in turn and predicted from its markers alone by what the others say: "
+            f"{', '.join(self.folds)}."
+        ]
+        for use, (fx, fy, mz) in found.items():
+            said.append(f"{use.capitalize()}: FX {fx:.1f} N, FY {fy:.1f} N, MZ {mz:.1f} N m.")
+        gain = 100.0 * (1.0 - self.ratios("bodies").mean())
+        worst = 100.0 * (self.ratios("bodies").max() - 1.0)
+        verdict = f"held-out gain {gain:.0f} % (mean over components and parts; at the worst part {-worst:+.0f} %)"
+        if self.use == "table":
+            return [
+                *said,
+                f"The table is kept: {verdict}; expected a gain of {100.0 * (1.0 - GAIN):.0f} % and no loss of more "
+                f"than {100.0 * (WORST - 1.0):.0f} %.",
+            ]
+        return [*said, f"The identified bodies are used: {verdict}."]
+
+
+def parts_of(trials: Sequence[MeasuredTrial]) -> list[MeasuredTrial]:
+    """What is left out in turn: the trials, or the halves of fewer than three."""
+    if len(trials) > 2:
+        return list(trials)
+    middles = [len(trial.movement.time) // 2 for trial in trials]
+    return [
+        trial.part(half)
+        for trial, middle in zip(trials, middles, strict=True)
+        for half in (slice(None, middle), slice(middle, None))
+    ]
+
+
+def estimate(common: Common, trials: Sequence[MeasuredTrial], use: Use) -> Posterior:
+    """The table, or the batch estimate of the bodies.
+
+    Geometry stays as measured: lengths and zeros of angles predict as well in this batch, but a filter that follows its
+    markers undoes them (docs/identification.md).
+    """
+    unknowns = Unknowns.of(common, inertia=use == "bodies", geometry=False)
+    return at_start(unknowns) if use == "table" else identify_batch(common, trials, unknowns)
+
+
+def decide(common: Common, trials: Sequence[MeasuredTrial], progress: Progress | None = None) -> Decision:
+    """Cross-validation over the identification trials.
+
+    Raises:
+        RecordingError: too few frames with the plates' wrench.
+    """
+    parts = parts_of(trials)
+    rms: dict[Use, Array] = {use: np.zeros((len(parts), 3)) for use in USES}
+    for k, left_out in enumerate(parts):
+        others = [part for j, part in enumerate(parts) if j != k]
+        for use in USES:
+            predicted = estimate(common, others, use).wrench(common, left_out.movement.states)
+            error = (left_out.wrench - predicted)[:, PLANE]
+            rms[use][k] = np.sqrt(np.nanmean(error**2, axis=0))
+        if progress is not None:
+            progress(k + 1, len(parts))
+    halves = (", first half", ", second half") * len(trials) if len(trials) <= 2 else ("",) * len(trials)
+    names = tuple(part.movement.recording.name + half for part, half in zip(parts, halves, strict=True))
+    ratios = Decision("bodies", names, rms).ratios("bodies")
+    return Decision("bodies" if ratios.mean() <= GAIN and ratios.max() <= WORST else "table", names, rms)
