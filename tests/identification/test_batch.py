@@ -46,7 +46,7 @@ def test_what_is_not_free_stays_and_the_mass_is_kept(case: Case) -> None:
 
 def test_kinematics_do_not_depend_on_the_plates(case: Case) -> None:
     recording = case.sims[1].recording
-    loads = tuple(replace(plate, wrench=3.0 * plate.wrench) for plate in recording.plates)
+    loads = tuple(replace(plate, force=3.0 * plate.force, moment=-plate.moment) for plate in recording.plates)
     np.testing.assert_array_equal(
         case.common.see(replace(recording, plates=loads)).states, case.trials[1].movement.states
     )

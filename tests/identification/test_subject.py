@@ -76,7 +76,7 @@ def test_change_between_two_sessions(identified: Identified) -> None:
 def test_command_line(case: Case, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     folder = case.sims[0].save(tmp_path / "trial")
     trial = next(folder.glob("*.trc"))
-    forces = next(folder.glob("*grf*.mot"), None) or next(folder.glob("*.mot"))
+    forces = folder / "forces.mot"
     file = tmp_path / "subject.toml"
     options = ["--model", "sagittal7", "--markers", "opencap", "--mass", "70", "--sex", "male"]
     assert main(["identify", str(trial), "--forces", str(forces), *options, "-o", str(file)]) == 0
