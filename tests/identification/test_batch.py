@@ -41,7 +41,11 @@ def test_what_is_not_free_stays_and_the_mass_is_kept(case: Case) -> None:
     found = identify_batch(case.common, case.trials, unknowns)
     assert not found.theta[~unknowns.free].any()
     assert found.phi[0::4].sum() == pytest.approx(case.common.initial.mass_kg, rel=1e-9)
-    assert (np.diag(found.covariance) <= unknowns.sd**2 * (1 + 1e-9)).all()
+    sure = identify_batch(case.common, case.trials, replace(unknowns, considered_sd=0.0 * unknowns.sd))
+    assert (np.diag(sure.covariance) <= unknowns.sd**2 * (1 + 1e-9)).all()
+    np.testing.assert_array_equal(sure.theta, found.theta)
+    wider = np.linalg.eigvalsh(found.covariance - sure.covariance)
+    assert wider.min() > -1e-12 and wider.max() > 0.0
 
 
 def test_kinematics_do_not_depend_on_the_plates(case: Case) -> None:

@@ -3,7 +3,8 @@
 The cost is sum over trials and frames of r' W r + theta' P^-1 theta, r = measured - predicted wrench. W is not the
 plates' noise: r is the model's own error, which lasts for many frames, so each component weighs
 1 / (s^2 tau), s its RMS over the trial and tau the frames that its error lasts, both measured on the residuals of
-the pass before.
+the pass before. The covariance counts what is held as uncertain too (Schmidt 1966, "consider" parameters): a length
+that is wrong shows as a mass that is wrong, however many frames there are.
 """
 
 from __future__ import annotations
@@ -34,8 +35,7 @@ class Posterior:
     """What the trials say.
 
     Attributes:
-        unknowns: what was asked. theta: (U,) deviations from the start. covariance: (U, U), the prior's where nothing
-            was asked for the free ones, 0 for those held.
+        unknowns: what was asked. theta: (U,) deviations from the start. covariance: (U, U), 0 for those held.
         sigma: (N, 3) RMS residual by trial, N and N m. tau_s: (N, 3) seconds that a residual lasts.
         nuisance: (N, 4) each trial's slow errors of fx, fy, mz and its delay.
     """
@@ -89,6 +89,7 @@ def identify_batch(common: Common, trials: Sequence[MeasuredTrial], unknowns: Un
     x = np.zeros(size)
     for _ in range(PASSES):
         H, g, stacked = np.diag(prior**-2.0), np.zeros(size), []
+        C = np.zeros((size, int((~free).sum())))
         theta[free] = x[:count]
         for k, (trial, rows) in enumerate(zip(trials, chosen, strict=True)):
             own = slice(count + NUISANCE * k, count + NUISANCE * (k + 1))
@@ -100,6 +101,8 @@ def identify_batch(common: Common, trials: Sequence[MeasuredTrial], unknowns: Un
             weight = 1.0 / (sigma[k] ** 2 * tau[k])
             H += np.einsum("tki,k,tkj->ij", columns, weight, columns, optimize=True)
             g += np.einsum("tki,k,tk->i", columns, weight, target, optimize=True)
+            held = A[:, :, : len(free)][:, :, ~free]
+            C += np.einsum("tki,k,tkj->ij", columns, weight, held, optimize=True)
             stacked.append((columns, target))
         factor = cho_factor(H)
         x = cho_solve(factor, g)
@@ -110,7 +113,9 @@ def identify_batch(common: Common, trials: Sequence[MeasuredTrial], unknowns: Un
                 tau[k] = [integrated_autocorrelation(left[:, c]) for c in range(3)]
     theta[free] = x[:count]
     covariance = np.zeros((len(theta), len(theta)))
-    covariance[np.ix_(free, free)] = cho_solve(factor, np.eye(size))[:count, :count]
+    through = cho_solve(factor, C) * unknowns.considered_sd[~free]  # errors of what is held, on what is free
+    spread = cho_solve(factor, np.eye(size)) + through @ through.T
+    covariance[np.ix_(free, free)] = spread[:count, :count]
     seconds = tau * np.array(step)[:, None]
     return Posterior(unknowns, theta, covariance, sigma, seconds, x[count:].reshape(-1, NUISANCE))
 

@@ -26,6 +26,10 @@ class GeometryPriors:
     """Of each length."""
     zero_deg: float = 0.5
     """Of each angle's zero."""
+    considered_length_m: float = 0.008
+    """What a length that is held may be wrong by: it widens the deviations of what is estimated."""
+    considered_zero_deg: float = 2.0
+    """The same of a zero: landmarks and skin turn a segment's frame by 1 to 4 deg (docs/validation.md)."""
     plate_force_n: float = 3.0
     """A trial's own constant error of each force."""
     plate_moment_nm: float = 1.0
@@ -43,6 +47,7 @@ class Unknowns:
     Attributes:
         names: (U,). sd: (U,) prior standard deviations. bodies: u -> phi.
         lengths, rotations, inertia: their columns in a state of the core's model.
+        considered_sd: (U,) what each may be wrong by while it is held.
         nuisance_sd: (4,) of a trial's plates: fx, fy (N), mz (N m), delay (s).
         free: (U,) bool.
     """
@@ -53,6 +58,7 @@ class Unknowns:
     lengths: Array
     rotations: Array
     inertia: Array
+    considered_sd: Array
     nuisance_sd: Array
     free: npt.NDArray[np.bool_]
 
@@ -80,17 +86,27 @@ class Unknowns:
         parts = ("a", "cx", "cy", "k")
         words = [f"body/{segment}/{part}" for segment in bodies.segments for part in parts]
         words += [names[k] for k in lengths] + [f"zero/{names[k]}" for k in rotations]
-        sd = np.concatenate(
-            [
-                bodies.sd,
-                np.full(len(lengths), priors.length_m),
-                np.full(len(rotations), np.deg2rad(priors.zero_deg)),
-            ]
+        sd, considered = (
+            np.concatenate([bodies.sd, np.full(len(lengths), length), np.full(len(rotations), np.deg2rad(zero))])
+            for length, zero in (
+                (priors.length_m, priors.zero_deg),
+                (priors.considered_length_m, priors.considered_zero_deg),
+            )
         )
         plates = [priors.plate_force_n] * 2 + [priors.plate_moment_nm, priors.plate_delay_s]
         free = np.array([inertia] * len(bodies.sd) + [geometry] * (len(lengths) + len(rotations)))
         columns = np.array([names.index(name) for name in bodies.names])
-        return cls(tuple(words), sd, bodies, np.array(lengths), np.array(rotations), columns, np.array(plates), free)
+        return cls(
+            tuple(words),
+            sd,
+            bodies,
+            np.array(lengths),
+            np.array(rotations),
+            columns,
+            considered,
+            np.array(plates),
+            free,
+        )
 
     def split(self, theta: Array) -> tuple[Array, Array, Array]:
         """u, lengths, zeros."""
