@@ -10,8 +10,8 @@ from dynakin import _core
 from dynakin.comparison.freeze import final_values
 from dynakin.errors import DynakinError
 from dynakin.filter import Estimator, presets
-from dynakin.identification import Common, MeasuredTrial, Posterior, Unknowns, at_start, identify_batch
-from dynakin.identification.batch import FIRST_SIGMA, PLANE
+from dynakin.identification import Common, MeasuredTrial, Posterior, Unknowns, about, at_start, identify_batch
+from dynakin.identification.batch import FIRST_SIGMA
 from dynakin.recordings import Recording
 from dynakin.reference.base_parameters import base_parameters
 from dynakin.reference.condensed import stacked
@@ -34,21 +34,37 @@ def filtered(common: Common, recordings: Sequence[Recording], preset: str) -> Ar
     return np.mean(found, axis=0) if found else None
 
 
-def regressor(common: Common, states: Array) -> Array:
-    """(T, 3, 4 S): the wrench is linear in phi."""
+def regressor(common: Common, trial: MeasuredTrial) -> Array:
+    """(T, r, e) about the trial's reference point: the wrench is linear in phi."""
     unknowns = Unknowns.of(common)
-    return np.array([_core.wrench_jacobian(common.core, x) for x in states])[:, PLANE][:, :, unknowns.inertia]
+    rows = np.array([_core.wrench_jacobian(common.core, x) for x in trial.movement.states])[:, :, unknowns.inertia]
+    return about(rows.swapaxes(1, 2), trial.reference).swapaxes(1, 2)[:, common.rows]
+
+
+def known(common: Common, trial: MeasuredTrial) -> tuple[Array, Array, Array]:
+    """Regressor (T, r, e), wrench (T, r) and the frames (T,) in which it is known."""
+    wrench = about(trial.wrench, trial.reference)[:, common.rows]
+    return regressor(common, trial), wrench, np.isfinite(wrench).all(axis=1)
+
+
+def prior_spread(common: Common) -> Array:
+    """(e, e) A with phi = table + A z, z of unit variance: what the table may be wrong by."""
+    bodies = Unknowns.of(common).bodies
+    P = bodies.covariance(np.zeros(len(bodies.sd)), np.diag(bodies.sd**2))
+    values, vectors = np.linalg.eigh(P)
+    return vectors * np.sqrt(np.maximum(values, 0.0))
 
 
 def free(common: Common, trials: Sequence[MeasuredTrial]) -> Array:
     """Free least squares with the declared weights; what no frame sees stays at the table."""
     bodies = Unknowns.of(common).bodies
     table = bodies.phi(np.zeros(len(bodies.sd)))
-    scale = np.repeat(bodies.mass, 4) * np.tile([1.0, 0.3, 0.3, 0.09], len(bodies.mass))
-    Y = np.concatenate([regressor(common, trial.movement.states) for trial in trials])
-    y = np.concatenate([trial.wrench[:, PLANE] for trial in trials])
+    scale = np.linalg.norm(prior_spread(common), axis=1)
     every = np.ones(len(table), dtype=bool)
-    problem = stacked(bodies.names, table, scale, every, Y, y, mass_kg=bodies.total, sigma=FIRST_SIGMA)
+    parts = [(Y[on], y[on]) for Y, y, on in (known(common, trial) for trial in trials)]
+    Y, y = (np.concatenate(values) for values in zip(*parts, strict=True))
+    sigma = FIRST_SIGMA[common.rows].tolist()
+    problem = stacked(bodies.names, table, scale, every, Y, y, mass_kg=bodies.total, sigma=sigma)
     return free_parameters(problem, base_parameters(problem).rank)
 
 
@@ -56,25 +72,24 @@ def base_estimate(common: Common, trials: Sequence[MeasuredTrial], like: Posteri
     """Base parameters with the prior that the table's spread gives them, weights as in ``like``; no body is asked to be
     possible. What the base parameters do not hold stays where it moves with them in the prior."""
     bodies = Unknowns.of(common).bodies
-    start = np.zeros(len(bodies.sd))
-    table, J = bodies.phi(start), bodies.jacobian(start)
-    spread = J * bodies.sd  # (4 S, 4 S): phi = table + spread z, z of unit variance
-    H, g = np.eye(len(start)), np.zeros(len(start))
+    table, spread = bodies.phi(np.zeros(len(bodies.sd))), prior_spread(common)
+    H, g = np.eye(spread.shape[1]), np.zeros(spread.shape[1])
     for k, trial in enumerate(trials):
         step = float(np.median(np.diff(trial.movement.time)))
         weight = step / (like.sigma[k] ** 2 * like.tau_s[k])
-        Y = regressor(common, trial.movement.states)
-        left = trial.wrench[:, PLANE] - Y @ table
-        H += np.einsum("tki,k,tkj->ij", Y @ spread, weight, Y @ spread)
-        g += np.einsum("tki,k,tk->i", Y @ spread, weight, left)
+        Y, y, on = known(common, trial)
+        A, left = Y[on] @ spread, y[on] - Y[on] @ table
+        H += np.einsum("tki,k,tkj->ij", A, weight, A, optimize=True)
+        g += np.einsum("tki,k,tk->i", A, weight, left)
     return table + spread @ np.linalg.solve(H, g)
 
 
 def predicted(common: Common, states: Array, phi: Array, geometry: Posterior | None = None) -> Array:
-    """(T, 3) fx, fy, mz with these inertial parameters, and lengths and zeros of ``geometry``."""
+    """(T, 6) with these inertial parameters, and lengths and zeros of ``geometry``."""
     posterior = geometry or at_start(Unknowns.of(common, inertia=False))
     moved = posterior.unknowns.states(states, posterior.theta)
-    return regressor(common, moved) @ phi
+    moved[:, posterior.unknowns.inertia] = phi
+    return np.array([_core.wrench(common.core, x) for x in moved])
 
 
 def batch(common: Common, trials: Sequence[MeasuredTrial], *, inertia: bool, geometry: bool) -> Posterior:

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import dynakin
 from dynakin.errors import ModelError
-from dynakin.identification import PlanarBodies, Unknowns
+from dynakin.identification import PlanarBodies, Unknowns, bodies_of
 from dynakin.simulation import simulate
 from identification.conftest import Case
 
@@ -53,9 +53,9 @@ def test_jacobian_of_the_wrench_is_the_central_difference(case: Case) -> None:
     np.testing.assert_allclose(unknowns.jacobian(core, states, theta), numeric, atol=2e-6)
 
 
-def test_a_spatial_model_is_refused_in_one_line() -> None:
+def test_a_model_that_estimates_no_inertia_is_refused_in_one_line() -> None:
     sim = simulate("sagittal7", "sway", 1, 3.0)
     subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
     estimator = dynakin.Estimator(dynakin.load_model("sagittal7", subject=subject), estimate=["lengths"])
-    with pytest.raises(ModelError, match="identification is for planar models"):
-        PlanarBodies.of(estimator.start(sim.recording))
+    with pytest.raises(ModelError, match=r"model sagittal7: identification needs .* this one estimates no inertia"):
+        bodies_of(estimator.start(sim.recording))

@@ -18,16 +18,16 @@ from scipy.linalg import cho_factor, cho_solve
 
 from dynakin.errors import RecordingError
 from dynakin.identification.coloured import integrated_autocorrelation
-from dynakin.identification.trials import Common, MeasuredTrial
-from dynakin.identification.unknowns import NUISANCE, Unknowns
+from dynakin.identification.trials import Common, MeasuredTrial, about
+from dynakin.identification.unknowns import Unknowns
 
 Array = npt.NDArray[np.float64]
 
 PASSES = 4  # linearised anew, and weights measured anew, at each
-FIRST_SIGMA = (10.0, 20.0, 10.0)  # N, N, N m: size of a planar model's error before anything is known of it
-LEAST_SIGMA = (1.0, 1.0, 1.0)  # a residual that was fitted is smaller than the error
+FIRST_SIGMA = np.array([10.0, 20.0, 10.0, 10.0, 10.0, 10.0])
+"""N, N m (fx ... mz): size of a model's error before anything is known of it (DESIGN section 3)."""
+LEAST_SIGMA = 1.0  # N or N m: a residual that was fitted is smaller than the error
 FIRST_TAU_S = 0.25
-PLANE = [0, 1, 5]  # fx, fy, mz
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +36,8 @@ class Posterior:
 
     Attributes:
         unknowns: what was asked. theta: (U,) deviations from the start. covariance: (U, U), 0 for those held.
-        sigma: (N, 3) RMS residual by trial, N and N m. tau_s: (N, 3) seconds that a residual lasts.
-        nuisance: (N, 4) each trial's slow errors of fx, fy, mz and its delay.
+        sigma: (N, r) RMS residual by trial and component of `Common.rows`, N and N m. tau_s: (N, r) seconds that a
+            residual lasts. nuisance: (N, r + 1) each trial's slow error of each component, and its delay.
     """
 
     unknowns: Unknowns
@@ -49,14 +49,13 @@ class Posterior:
 
     @property
     def phi(self) -> Array:
-        """(4 S,) inertial parameters, by ``unknowns.bodies.names``."""
+        """(e,) inertial parameters, by ``unknowns.bodies.names``."""
         return self.unknowns.bodies.phi(self.unknowns.split(self.theta)[0])
 
     def phi_covariance(self) -> Array:
-        """(4 S, 4 S) of ``phi``, to first order."""
+        """(e, e) of ``phi``, to first order."""
         u = self.unknowns.split(self.theta)[0]
-        J = self.unknowns.bodies.jacobian(u)
-        return np.asarray(J @ self.covariance[: len(u), : len(u)] @ J.T)
+        return self.unknowns.bodies.covariance(u, self.covariance[: len(u), : len(u)])
 
     def wrench(self, common: Common, states: Array) -> Array:
         """Predicted (T, 6) of a movement's states."""
@@ -65,9 +64,10 @@ class Posterior:
 
 def at_start(unknowns: Unknowns) -> Posterior:
     """The table and the geometry as measured, with the prior."""
-    nothing = np.zeros((0, 3))
+    own = len(unknowns.nuisance_sd)
+    nothing = np.zeros((0, own - 1))
     covariance = np.diag(np.where(unknowns.free, unknowns.sd, 0.0) ** 2)
-    return Posterior(unknowns, np.zeros(len(unknowns.sd)), covariance, nothing, nothing, np.zeros((0, NUISANCE)))
+    return Posterior(unknowns, np.zeros(len(unknowns.sd)), covariance, nothing, nothing, np.zeros((0, own)))
 
 
 def identify_batch(common: Common, trials: Sequence[MeasuredTrial], unknowns: Unknowns) -> Posterior:
@@ -76,25 +76,26 @@ def identify_batch(common: Common, trials: Sequence[MeasuredTrial], unknowns: Un
     Raises:
         RecordingError: no trial has a second of frames with the wrench.
     """
-    chosen = [_known(trial) for trial in trials]
+    rows, own_count = common.rows, len(unknowns.nuisance_sd)
+    chosen = [_known(trial, rows) for trial in trials]
     step = [float(np.median(np.diff(trial.movement.time))) for trial in trials]
-    if not any(len(rows) * dt >= 1.0 for rows, dt in zip(chosen, step, strict=True)):
+    if not any(len(frames) * dt >= 1.0 for frames, dt in zip(chosen, step, strict=True)):
         raise RecordingError("identification: no trial has a second of frames with the plates' wrench, expected one")
-    sigma = np.tile(np.array(FIRST_SIGMA), (len(trials), 1))
-    tau = np.array([[max(1.0, FIRST_TAU_S / dt)] * 3 for dt in step])
+    sigma = np.tile(FIRST_SIGMA[rows], (len(trials), 1))
+    tau = np.array([[max(1.0, FIRST_TAU_S / dt)] * len(rows) for dt in step])
     free, count = unknowns.free, int(unknowns.free.sum())
     theta = np.zeros(len(unknowns.sd))
-    size = count + NUISANCE * len(trials)
+    size = count + own_count * len(trials)
     prior = np.concatenate([unknowns.sd[free], np.tile(unknowns.nuisance_sd, len(trials))])
     x = np.zeros(size)
     for _ in range(PASSES):
         H, g, stacked = np.diag(prior**-2.0), np.zeros(size), []
         C = np.zeros((size, int((~free).sum())))
         theta[free] = x[:count]
-        for k, (trial, rows) in enumerate(zip(trials, chosen, strict=True)):
-            own = slice(count + NUISANCE * k, count + NUISANCE * (k + 1))
-            A, b = _rows(common, trial, rows, unknowns, theta)
-            columns = np.zeros((len(rows), 3, size))
+        for k, (trial, frames) in enumerate(zip(trials, chosen, strict=True)):
+            own = slice(count + own_count * k, count + own_count * (k + 1))
+            A, b = _rows(common, trial, frames, unknowns, theta)
+            columns = np.zeros((len(frames), len(rows), size))
             columns[:, :, :count] = A[:, :, : len(free)][:, :, free]
             columns[:, :, own] = A[:, :, len(free) :]
             target = b + columns @ np.concatenate([x[:count], np.zeros(size - count)])
@@ -110,29 +111,31 @@ def identify_batch(common: Common, trials: Sequence[MeasuredTrial], unknowns: Un
             left = target - columns @ x
             if len(left):
                 sigma[k] = np.maximum(np.sqrt((left**2).mean(axis=0)), LEAST_SIGMA)
-                tau[k] = [integrated_autocorrelation(left[:, c]) for c in range(3)]
+                tau[k] = [integrated_autocorrelation(left[:, c]) for c in range(len(rows))]
     theta[free] = x[:count]
     covariance = np.zeros((len(theta), len(theta)))
     through = cho_solve(factor, C) * unknowns.considered_sd[~free]  # errors of what is held, on what is free
     spread = cho_solve(factor, np.eye(size)) + through @ through.T
     covariance[np.ix_(free, free)] = spread[:count, :count]
     seconds = tau * np.array(step)[:, None]
-    return Posterior(unknowns, theta, covariance, sigma, seconds, x[count:].reshape(-1, NUISANCE))
+    return Posterior(unknowns, theta, covariance, sigma, seconds, x[count:].reshape(-1, own_count))
 
 
-def _known(trial: MeasuredTrial) -> npt.NDArray[np.intp]:
-    return np.flatnonzero(np.isfinite(trial.wrench[:, PLANE]).all(axis=1))
+def _known(trial: MeasuredTrial, rows: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
+    return np.flatnonzero(np.isfinite(trial.wrench[:, rows]).all(axis=1))
 
 
 def _rows(
     common: Common, trial: MeasuredTrial, frames: npt.NDArray[np.intp], unknowns: Unknowns, theta: Array
 ) -> tuple[Array, Array]:
-    """d (fx, fy, mz) / d [theta; nuisance] (T, 3, U + 4), and what is left of the measurement (T, 3)."""
-    states = trial.movement.states
+    """d wrench / d [theta; nuisance] (T, r, U + r + 1), and what is left of the measurement (T, r), about the trial's
+    reference point."""
+    states, rows = trial.movement.states, common.rows
     if len(frames) == 0:
-        return np.zeros((0, 3, len(theta) + NUISANCE)), np.zeros((0, 3))
-    predicted = unknowns.wrench(common.core, states, theta)[:, PLANE]
+        return np.zeros((0, len(rows), len(theta) + len(rows) + 1)), np.zeros((0, len(rows)))
+    predicted = about(unknowns.wrench(common.core, states, theta), trial.reference)[:, rows]
     slope = np.gradient(predicted, trial.movement.time, axis=0)[frames]
-    J = unknowns.jacobian(common.core, states[frames], theta)[:, PLANE]
-    own = np.concatenate([np.tile(np.eye(3), (len(frames), 1, 1)), -slope[:, :, None]], axis=2)
-    return np.concatenate([J, own], axis=2), trial.wrench[frames][:, PLANE] - predicted[frames]
+    J = unknowns.jacobian(common.core, states[frames], theta)
+    J = about(J.swapaxes(1, 2), trial.reference).swapaxes(1, 2)[:, rows]
+    own = np.concatenate([np.tile(np.eye(len(rows)), (len(frames), 1, 1)), -slope[:, :, None]], axis=2)
+    return np.concatenate([J, own], axis=2), about(trial.wrench[frames], trial.reference)[:, rows] - predicted[frames]

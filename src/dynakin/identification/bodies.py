@@ -8,24 +8,14 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ModelError
+from dynakin.identification.body_priors import BodyPriors, masses_of
+from dynakin.identification.spatial_bodies import SpatialBodies
 from dynakin.model import InitialModel
 from dynakin.model.inertia import INERTIA_NAMES, PLANAR_INERTIA
 
 Array = npt.NDArray[np.float64]
 
 _PLANAR = ("mass", "mx", "my", "izz")
-
-
-@dataclass(frozen=True)
-class BodyPriors:
-    """Standard deviations about the table, a segment."""
-
-    log_mass: float = 0.10
-    """Of the logarithm of each mass, before the total is held: tables differ by that much (model.priors)."""
-    centre_fraction: float = 0.03
-    """Of the centre of mass along each axis, over the segment's length. Tables differ by 2 to 5 %."""
-    log_gyration: float = 0.07
-    """Of the logarithm of the radius of gyration about the centre of mass."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,18 +39,8 @@ class PlanarBodies:
 
     @classmethod
     def of(cls, initial: InitialModel, priors: BodyPriors | None = None) -> PlanarBodies:
-        """The bodies that a measured planar model estimates; those that are held keep their mass.
-
-        Raises:
-            ModelError: the model is not planar, or estimates no inertia.
-        """
+        """The bodies that a measured planar model estimates; those that are held keep their mass."""
         priors = priors or BodyPriors()
-        wanted = {name for name, flag in zip(INERTIA_NAMES, _flags(initial), strict=True) if flag}
-        if wanted != set(PLANAR_INERTIA):
-            raise ModelError(
-                f"model {initial.spec.name}: identification is for planar models (mass, mx, my and izz of each "
-                f"segment), this one estimates {', '.join(sorted(wanted)) or 'no inertia'}"
-            )
         chosen = [segment for segment in initial.spec.segments if any(segment.inertia_estimated)]
         held = sum(float(s.inertia[0]) for s in initial.spec.segments if not any(s.inertia_estimated))
         table = np.array([[s.inertia[INERTIA_NAMES.index(name)] for name in _PLANAR] for s in chosen], dtype=float)
@@ -72,6 +52,11 @@ class PlanarBodies:
         ]  # fmt: skip
         total = initial.weighed_kg - held
         return cls(tuple(s.name for s in chosen), total, mass, centre, gyration, np.array(sd).ravel())
+
+    @property
+    def unknowns(self) -> tuple[str, ...]:
+        """(4 S,) names of u."""
+        return tuple(f"body/{segment}/{part}" for segment in self.segments for part in ("a", "cx", "cy", "k"))
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -98,12 +83,40 @@ class PlanarBodies:
         J[k, 3, k, 3] = 2.0 * m * r**2
         return J.reshape(4 * count, 4 * count)
 
+    def covariance(self, u: Array, spread: Array) -> Array:
+        """(4 S, 4 S) of phi, to first order, where u has the covariance ``spread`` (4 S, 4 S)."""
+        J = self.jacobian(u)
+        return np.asarray(J @ spread @ J.T)
+
+    def masses(self, u: Array) -> Array:
+        """(S,) kg."""
+        return self._split(u)[0]
+
+    def centre_moves(self, u: Array) -> Array:
+        """(S, 2) m by which each centre of mass left the table's."""
+        return np.column_stack([u[1::4], u[2::4]])
+
     def _split(self, u: Array) -> tuple[Array, Array, Array]:
         a, c, k = u[0::4], np.column_stack([u[1::4], u[2::4]]), u[3::4]
-        weight = self.mass * np.exp(a - a.max())
-        return self.total * weight / weight.sum(), self.centre + c, self.gyration * np.exp(k)
+        return masses_of(self.total, self.mass, a), self.centre + c, self.gyration * np.exp(k)
 
 
-def _flags(initial: InitialModel) -> list[bool]:
-    """Which of the ten numbers some segment estimates."""
-    return [bool(flag) for flag in np.any([s.inertia_estimated for s in initial.spec.segments], axis=0)]
+Bodies = PlanarBodies | SpatialBodies
+
+
+def bodies_of(initial: InitialModel, priors: BodyPriors | None = None) -> Bodies:
+    """The bodies of a measured model, in the plane or in space, by the numbers of each that it estimates.
+
+    Raises:
+        ModelError: it estimates none, or neither the four of the plane nor all ten.
+    """
+    flags = [tuple(segment.inertia_estimated) for segment in initial.spec.segments if any(segment.inertia_estimated)]
+    wanted = {name for flag in flags for name, on in zip(INERTIA_NAMES, flag, strict=True) if on}
+    if len(set(flags)) == 1 and wanted == set(PLANAR_INERTIA):
+        return PlanarBodies.of(initial, priors)
+    if len(set(flags)) == 1 and wanted == set(INERTIA_NAMES):
+        return SpatialBodies.of(initial, priors)
+    raise ModelError(
+        f"model {initial.spec.name}: identification needs segments that estimate mass, mx, my and izz (in the plane) "
+        f"or all ten inertial numbers (in space), this one estimates {', '.join(sorted(wanted)) or 'no inertia'}"
+    )

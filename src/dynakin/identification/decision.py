@@ -14,9 +14,10 @@ from typing import Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.identification.batch import PLANE, Posterior, at_start, identify_batch
-from dynakin.identification.trials import Common, MeasuredTrial
+from dynakin.identification.batch import Posterior, at_start, identify_batch
+from dynakin.identification.trials import Common, MeasuredTrial, Movement, about, middle_of
 from dynakin.identification.unknowns import Unknowns
+from dynakin.results import COMPONENTS
 
 Array = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]
@@ -34,13 +35,14 @@ class Decision:
     """What cross-validation found.
 
     Attributes:
-        use: the winner. folds: names of what was left out. rms: (folds, 3) fx, fy (N), mz (N m) of what was left out,
-            predicted from its markers, by candidate.
+        use: the winner. folds: names of what was left out. rms: (folds, r) of what was left out, predicted from its
+            markers, by candidate. components: (r,) of them, fx, fy, fz (N), mx, my, mz (N m).
     """
 
     use: Use
     folds: tuple[str, ...]
     rms: dict[Use, Array]
+    components: tuple[str, ...] = ("fx", "fy", "mz")
 
     def ratios(self, use: Use) -> Array:
         """(folds,) RMS over the table's, mean over the components."""
@@ -53,8 +55,12 @@ class Decision:
             "Each left out in turn and predicted from its markers alone by what the others say: "
             f"{', '.join(self.folds)}."
         ]
-        for use, (fx, fy, mz) in found.items():
-            said.append(f"{use.capitalize()}: FX {fx:.1f} N, FY {fy:.1f} N, MZ {mz:.1f} N m.")
+        for use, values in found.items():
+            each = [
+                f"{name.upper()} {value:.1f} {'N' if name.startswith('f') else 'N m'}"
+                for name, value in zip(self.components, values, strict=True)
+            ]
+            said.append(f"{use.capitalize()}: {', '.join(each)}.")
         gain = 100.0 * (1.0 - self.ratios("bodies").mean())
         worst = 100.0 * (self.ratios("bodies").max() - 1.0)
         verdict = f"held-out gain {gain:.0f} % (mean over components and parts; at the worst part {-worst:+.0f} %)"
@@ -71,7 +77,7 @@ def parts_of(trials: Sequence[MeasuredTrial]) -> list[MeasuredTrial]:
     """What is left out in turn: the trials, or the halves of fewer than three."""
     if len(trials) > 2:
         return list(trials)
-    middles = [len(trial.movement.time) // 2 for trial in trials]
+    middles = [middle_of(len(trial.movement.time)) for trial in trials]
     return [
         trial.part(half)
         for trial, middle in zip(trials, middles, strict=True)
@@ -89,23 +95,43 @@ def estimate(common: Common, trials: Sequence[MeasuredTrial], use: Use) -> Poste
     return at_start(unknowns) if use == "table" else identify_batch(common, trials, unknowns)
 
 
+def foretell(
+    common: Common, others: Sequence[MeasuredTrial], left_out: Movement, uses: Sequence[Use] = USES
+) -> dict[Use, Array]:
+    """(T, 6) by candidate: what the other trials say of a movement. Its plates are not in here: a `Movement` has none.
+
+    Raises:
+        RecordingError: the others have too few frames with the plates' wrench.
+    """
+    return {use: estimate(common, others, use).wrench(common, left_out.states) for use in uses}
+
+
+def rms_of(common: Common, trial: MeasuredTrial, predicted: Array) -> Array:
+    """(r,) RMS of a prediction (T, 6) against the plates, about the trial's reference point: the metric."""
+    rows = common.rows
+    error = about(trial.wrench, trial.reference)[:, rows] - about(predicted, trial.reference)[:, rows]
+    return np.asarray(np.sqrt(np.nanmean(error**2, axis=0)))
+
+
 def decide(common: Common, trials: Sequence[MeasuredTrial], progress: Progress | None = None) -> Decision:
     """Cross-validation over the identification trials.
 
     Raises:
         RecordingError: too few frames with the plates' wrench.
     """
+    halves = (", first half", ", second half") * len(trials) if len(trials) <= 2 else ("",) * len(trials)
     parts = parts_of(trials)
-    rms: dict[Use, Array] = {use: np.zeros((len(parts), 3)) for use in USES}
-    for k, left_out in enumerate(parts):
+    names, found = [], []
+    for k, (left_out, half) in enumerate(zip(parts, halves, strict=True)):
         others = [part for j, part in enumerate(parts) if j != k]
-        for use in USES:
-            predicted = estimate(common, others, use).wrench(common, left_out.movement.states)
-            error = (left_out.wrench - predicted)[:, PLANE]
-            rms[use][k] = np.sqrt(np.nanmean(error**2, axis=0))
+        if np.isfinite(left_out.wrench[:, common.rows]).all(axis=1).any():  # else there is nothing to judge by
+            predicted = foretell(common, others, left_out.movement)
+            found.append({use: rms_of(common, left_out, wrench) for use, wrench in predicted.items()})
+            names.append(left_out.movement.recording.name + half)
         if progress is not None:
             progress(k + 1, len(parts))
-    halves = (", first half", ", second half") * len(trials) if len(trials) <= 2 else ("",) * len(trials)
-    names = tuple(part.movement.recording.name + half for part, half in zip(parts, halves, strict=True))
-    ratios = Decision("bodies", names, rms).ratios("bodies")
-    return Decision("bodies" if ratios.mean() <= GAIN and ratios.max() <= WORST else "table", names, rms)
+    rms: dict[Use, Array] = {use: np.array([each[use] for each in found]) for use in USES}
+    components = tuple(COMPONENTS[k] for k in common.rows)
+    ratios = Decision("bodies", tuple(names), rms, components).ratios("bodies")
+    use: Use = "bodies" if ratios.mean() <= GAIN and ratios.max() <= WORST else "table"
+    return Decision(use, tuple(names), rms, components)

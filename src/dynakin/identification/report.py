@@ -33,19 +33,26 @@ def base_of_batch(batch: Batch) -> tuple[Array, Array, Array]:
 
 def _moved(posterior: Posterior) -> list[str]:
     bodies = posterior.unknowns.bodies
-    mass, sd = posterior.phi[0::4], np.sqrt(np.diag(posterior.phi_covariance()))[0::4]
+    u = posterior.unknowns.split(posterior.theta)[0]
+    mass = bodies.masses(u)
+    each = len(bodies.names) // len(mass)
+    sd = np.sqrt(np.diag(posterior.phi_covariance()))[::each]
     masses = [
         f"{words(segment)} {m:.2f} kg (table {t:.2f}, sd {s:.2f})"
-        for segment, m, t, s in zip(bodies.segments, mass, bodies.mass, sd, strict=True)
+        for segment, m, t, s in zip(bodies.segments, mass, bodies.masses(0.0 * u), sd, strict=True)
     ]
-    u = posterior.theta[: len(bodies.sd)]
     centres = [
-        f"{words(segment)} {1e3 * x:+.0f} mm forward, {1e3 * y:+.0f} mm up"
-        for segment, x, y in zip(bodies.segments, u[1::4], u[2::4], strict=True)
-        if max(abs(x), abs(y)) >= _CENTRE_M
+        f"{words(segment)} {_directions(move)}"
+        for segment, move in zip(bodies.segments, bodies.centre_moves(u), strict=True)
+        if np.abs(move).max() >= _CENTRE_M
     ]
-    moved = listed(centres, 20) if centres else f"none by {1e3 * _CENTRE_M:.0f} mm"
-    return [f"Masses, {bodies.total:.2f} kg in all: {listed(masses, 20)}.", f"Centres of mass that moved: {moved}."]
+    moved = listed(centres, 40) if centres else f"none by {1e3 * _CENTRE_M:.0f} mm"
+    return [f"Masses, {bodies.total:.2f} kg in all: {listed(masses, 40)}.", f"Centres of mass that moved: {moved}."]
+
+
+def _directions(move: Array) -> str:
+    """Of a segment's own axes (2,) or (3,), m."""
+    return ", ".join(f"{1e3 * x:+.0f} mm {way}" for x, way in zip(move, ("forward", "up", "right"), strict=False))
 
 
 def _base(batch: Batch) -> list[str]:

@@ -22,6 +22,8 @@ from dynakin.recordings import Recording
 Array = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]
 
+_WORK, _SEEING = 1000, 850  # of a progress bar: nearly all of the time goes into the kinematics
+
 
 @dataclass(frozen=True, eq=False)
 class Identified:
@@ -50,19 +52,17 @@ def identify_subject(
     """Identify a subject on one or several trials with force plates.
 
     Args:
-        estimator: model and noise (`presets.default()` or another that has a smoother); planar models.
+        estimator: model and noise (`presets.default()` or another that has a smoother), in the plane or in space.
         static: the same person and markers standing; else the first trial.
-        progress: called with (trials and folds done, in all).
+        progress: called with (work done, in all).
 
     Raises:
         ModelError, RecordingError: model, markers, plates and trials do not fit. ConfigError: noise without smoother.
     """
-    folds = len(recordings) if len(recordings) > 2 else 2 * len(recordings)
-    total = len(recordings) + folds
     report = progress or (lambda done, of: None)
     common = Common.measure(estimator, recordings[0], static)
-    trials = measure_all(common, recordings, lambda done, _: report(done, total))
-    decision = decide(common, trials, lambda done, _: report(len(recordings) + done, total))
+    trials = measure_all(common, recordings, lambda done, of: report(round(_SEEING * done / of), _WORK))
+    decision = decide(common, trials, lambda done, of: report(round(_SEEING + (_WORK - _SEEING) * done / of), _WORK))
     bodies = estimate(common, trials, "bodies")
     batch = _batch(estimator, bodies)
     subject = IdentifiedSubject(
@@ -81,12 +81,14 @@ def _batch(estimator: Estimator, bodies: Posterior) -> Batch:
     base = base_of(measured)
     names = bodies.unknowns.bodies.names
     order = [base.over.index(name) for name in names]
-    J = bodies.unknowns.bodies.jacobian(np.zeros(len(names))) * bodies.unknowns.bodies.sd
+    unknowns = bodies.unknowns
+    start = np.zeros(len(unknowns.bodies.sd))
+    prior = unknowns.bodies.covariance(start, np.diag(unknowns.bodies.sd**2))
     return Batch(
         names=names,
         values=tuple(bodies.phi.tolist()),
         covariance=_rows(bodies.phi_covariance()),
-        prior_covariance=_rows(J @ J.T),
+        prior_covariance=_rows(prior),
         base_names=base.names,
         base_words=tuple(base_words(base, measured.initial.spec)),
         K=_rows(base.K[:, order]),

@@ -8,12 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin import _core
-from dynakin.identification.bodies import BodyPriors, PlanarBodies
+from dynakin.identification.bodies import Bodies, bodies_of
+from dynakin.identification.body_priors import BodyPriors
 from dynakin.identification.trials import Common
 
 Array = npt.NDArray[np.float64]
 
-NUISANCE = 4  # a trial: slow error of fx, fy, mz, and the plates' delay
+SCALED_M = 0.4  # of a segment that a dimensionless factor of an OpenSim model scales
 
 
 @dataclass(frozen=True)
@@ -42,19 +43,20 @@ class GeometryPriors:
 class Unknowns:
     """theta (U,) = [u of the bodies; lengths (m); zeros (rad)], deviations from the start, and which are free.
 
-    A zero is added to its angle at every frame; a length to its own. What is not free stays 0.
+    A zero is added to its angle at every frame; a length to its own. What is not free stays 0. A floating body's own
+    turn in the room is no zero: markers on every segment see it.
 
     Attributes:
         names: (U,). sd: (U,) prior standard deviations. bodies: u -> phi.
         lengths, rotations, inertia: their columns in a state of the core's model.
         considered_sd: (U,) what each may be wrong by while it is held.
-        nuisance_sd: (4,) of a trial's plates: fx, fy (N), mz (N m), delay (s).
+        nuisance_sd: (r + 1,) of a trial's plates: each component of `Common.rows` (N, N m), delay (s).
         free: (U,) bool.
     """
 
     names: tuple[str, ...]
     sd: Array
-    bodies: PlanarBodies
+    bodies: Bodies
     lengths: Array
     rotations: Array
     inertia: Array
@@ -72,28 +74,33 @@ class Unknowns:
         body_priors: BodyPriors | None = None,
         priors: GeometryPriors | None = None,
     ) -> Unknowns:
-        """All of a measured planar model's; ``inertia`` and ``geometry`` say what is free.
+        """All of a measured model's; ``inertia`` and ``geometry`` say what is free.
 
         Raises:
-            ModelError: the model is not planar.
+            ModelError: the model does not estimate what can be identified.
         """
         priors = priors or GeometryPriors()
-        bodies = PlanarBodies.of(common.initial, body_priors)
+        bodies = bodies_of(common.initial, body_priors)
         names = list(common.core.layout.names)
-        kinds = {axis.coordinate: axis.kind for segment in common.initial.spec.segments for axis in segment.axes}
-        rotations = [k for k in _range(common.columns("coordinates")) if kinds[names[k]] == "rotation"]
+        turning = {
+            axis.coordinate
+            for segment in common.initial.spec.segments
+            for axis in segment.axes
+            if axis.kind == "rotation" and not (common.floating and segment.parent == "ground")
+        }
+        rotations = [k for k in _range(common.columns("coordinates")) if names[k] in turning]
         lengths = list(_range(common.columns("lengths")))
-        parts = ("a", "cx", "cy", "k")
-        words = [f"body/{segment}/{part}" for segment in bodies.segments for part in parts]
-        words += [names[k] for k in lengths] + [f"zero/{names[k]}" for k in rotations]
+        words = [*bodies.unknowns] + [names[k] for k in lengths] + [f"zero/{names[k]}" for k in rotations]
+        metres = np.array([SCALED_M if names[k] in common.initial.dimensionless else 1.0 for k in lengths])
         sd, considered = (
-            np.concatenate([bodies.sd, np.full(len(lengths), length), np.full(len(rotations), np.deg2rad(zero))])
+            np.concatenate([bodies.sd, length / metres, np.full(len(rotations), np.deg2rad(zero))])
             for length, zero in (
                 (priors.length_m, priors.zero_deg),
                 (priors.considered_length_m, priors.considered_zero_deg),
             )
         )
-        plates = [priors.plate_force_n] * 2 + [priors.plate_moment_nm, priors.plate_delay_s]
+        slow = np.where(common.rows < 3, priors.plate_force_n, priors.plate_moment_nm)
+        plates = np.append(slow, priors.plate_delay_s)
         free = np.array([inertia] * len(bodies.sd) + [geometry] * (len(lengths) + len(rotations)))
         columns = np.array([names.index(name) for name in bodies.names])
         return cls(
@@ -104,7 +111,7 @@ class Unknowns:
             np.array(rotations),
             columns,
             considered,
-            np.array(plates),
+            plates,
             free,
         )
 
