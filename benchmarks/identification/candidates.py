@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 
 import numpy as np
 
 from dynakin import _core
 from dynakin.comparison.freeze import final_values
-from dynakin.errors import DynakinError
+from dynakin.errors import DynakinError, RecordingError
 from dynakin.filter import Estimator, presets
 from dynakin.identification import Common, MeasuredTrial, Posterior, Unknowns, about, at_start, identify_batch
 from dynakin.identification.batch import FIRST_SIGMA
@@ -109,7 +110,8 @@ def all_candidates(
         phi = filtered(common, recordings, preset)
         if phi is not None:
             found[f"filter, {preset}"] = (phi, None)
-    found["least squares, free"] = (free(common, trials), None)
+    with suppress(RecordingError):  # fewer frames than parameters
+        found["least squares, free"] = (free(common, trials), None)
     found["base parameters, prior"] = (base_estimate(common, trials, inertia), None)
     found["bodies"] = (inertia.phi, None)
     found["geometry"] = (geometry.phi, geometry)

@@ -26,7 +26,7 @@ TASKS = {"sagittal7": ("squat", "sit-to-stand", "sway"), "fullbody": ("squat", "
 TASKS["squat7"] = TASKS["sagittal7"]
 SUBJECT = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
 MARKERS = {"sagittal7": "opencap", "squat7": "plug-in-gait", "fullbody": "opencap"}
-STANDING = {"sagittal7": ("sway", 3.0), "squat7": ("sway", 3.0), "fullbody": ("squat", 4.0)}
+STANDING = {"sagittal7": ("sway", 3.0), "squat7": ("sway", 3.0), "fullbody": ("squat", 5.0)}
 SKIPPED_S = {"gait": 0.3}
 SKIPPED_ELSE_S = 2.0
 DURATION_S = {"gait": 4.0}

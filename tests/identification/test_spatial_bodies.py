@@ -65,7 +65,7 @@ def test_left_is_the_mirror_image_of_right_but_for_the_table() -> None:
     assert left.mass == pytest.approx(right.mass)
     np.testing.assert_allclose(left.centre - _CENTRE[2], _MIRROR @ (right.centre - _CENTRE[1]), atol=1e-12)
     np.testing.assert_allclose(deviations(left), _MIRROR @ deviations(right) @ _MIRROR, atol=1e-12)
-    assert [name for name in BODIES.unknowns if "thigh" in name][0] == "body/thigh/a"
+    assert next(name for name in BODIES.unknowns if "thigh" in name) == "body/thigh/a"
 
 
 def test_jacobian_is_the_central_difference() -> None:

@@ -73,19 +73,75 @@ def test_change_between_two_sessions(identified: Identified) -> None:
     assert "trunk first moment" in " ".join(change_in_words(changes, (70.0, 70.0)))
 
 
-def test_command_line(case: Case, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    folder = case.sims[0].save(tmp_path / "trial")
-    trial = next(folder.glob("*.trc"))
-    forces = folder / "forces.mot"
+OPTIONS = ["--model", "sagittal7", "--markers", "opencap", "--mass", "70", "--sex", "male"]
+
+
+@pytest.fixture(scope="module")
+def files(case: Case, tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """Markers of two trials, their forces beside them."""
+    root = tmp_path_factory.mktemp("trials")
+    return [str(next(sim.save(root / sim.recording.name).glob("*.trc"))) for sim in case.sims]
+
+
+def test_command_line(files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "subject.toml"
-    options = ["--model", "sagittal7", "--markers", "opencap", "--mass", "70", "--sex", "male"]
-    assert main(["identify", str(trial), "--forces", str(forces), *options, "-o", str(file)]) == 0
-    assert "base parameters" in capsys.readouterr().out
+    assert main(["identify", *files, *OPTIONS, "-o", str(file)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    for words in ("held-out gain", "70.00 kg in all", "base parameters", "simulated_squat_3/markers, first half"):
+        assert words in said
+    assert [path.name for path in tmp_path.iterdir()] == ["subject.toml"]
     assert main(["identify", "--compare", str(file), str(file)]) == 0
     assert "None of 22 base parameters changed" in " ".join(capsys.readouterr().out.split())
     out = tmp_path / "out"
-    run = ["run", str(trial), "--forces", str(forces), *options, "--parameters", str(file), "-o", str(out)]
-    assert main(run) == 0
+    assert main(["run", files[0], "--forces", files[0].replace("markers.trc", "forces.mot"), *OPTIONS,
+                 "--parameters", str(file), "-o", str(out)]) == 0  # fmt: skip
     assert 'use = "' in file.read_text() and (out / "config.toml").is_file()
-    assert main(["identify", str(trial), "--model", "sagittal7"]) == 2
-    assert "-o subject.toml" in capsys.readouterr().err
+
+
+def test_what_is_wrong_with_the_input_is_one_line_and_nothing_is_written(
+    files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "subject.toml"
+    alone = tmp_path / "alone.trc"
+    alone.write_bytes(Path(files[1]).read_bytes())
+    heavier = [*OPTIONS[:4], "--mass", "75", *OPTIONS[6:]]
+    no_mass = [*OPTIONS[:4], *OPTIONS[6:]]
+    cases = {
+        "expected at least two of the same subject": [files[0], *OPTIONS],
+        "is given twice": [files[0], files[0], *OPTIONS],
+        "no force plates": [files[0], str(alone), *OPTIONS],
+        "the subject weighs 75.0 kg (expected within 4 %)": [*files, *heavier],
+        "the body mass is not known": [*files, *no_mass],
+        "nowhere.trc": [files[0], str(tmp_path / "nowhere.trc"), *OPTIONS],
+        "1 force files for 2 trials": [*files, "--forces", "a.mot", *OPTIONS],
+        "expected TRIAL": [*files],
+    }
+    for expected, arguments in cases.items():
+        assert main(["identify", *arguments, "-o", str(file)]) == 2, expected
+        captured = capsys.readouterr()
+        assert expected in captured.err and captured.err.count("\n") == 1
+        assert not captured.out and not file.exists()
+    assert main(["identify", *files, *OPTIONS, "-o", str(tmp_path / "no" / "subject.toml")]) == 2
+    assert "in a folder that exists" in capsys.readouterr().err
+
+
+def test_a_file_that_does_not_fit_is_refused(
+    identified: Identified, files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    batch = identified.subject.batch
+    names = ("inertia/tail/mass", *batch.names[1:])
+    identified.subject.model_copy(update={"batch": batch.model_copy(update={"names": names})}).write(
+        tmp_path / "tail.toml"
+    )
+    with pytest.raises(ModelError, match="inertia/tail/mass"):
+        with_identified(identified.common.initial, read_identified(tmp_path / "tail.toml"))
+    short = batch.model_copy(update={"values": batch.values[1:]})
+    identified.subject.model_copy(update={"batch": short}).write(tmp_path / "short.toml")
+    with pytest.raises(ModelError, match="27 values for 28 names"):
+        read_identified(tmp_path / "short.toml")
+    identified.subject.write(tmp_path / "subject.toml")
+    other = ["--model", "fullbody", *OPTIONS[2:], "--parameters", str(tmp_path / "subject.toml")]
+    forces = files[0].replace("markers.trc", "forces.mot")
+    assert main(["run", files[0], "--forces", forces, *other, "-o", str(tmp_path / "out")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert not (tmp_path / "out").exists()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -24,9 +25,11 @@ def identify(
     ] = None,
     forces: Annotated[
         list[Path] | None,
-        typer.Option("--forces", help="Ground forces of the trials, in their order; not given: TRIAL_grf.mot beside."),
+        typer.Option("--forces", help="Ground forces of the trials, in their order; else TRIAL_grf.mot beside."),
     ] = None,
-    model: Annotated[str | None, typer.Option(help="Planar model: squat7, sagittal7 or a .toml file.")] = None,
+    model: Annotated[
+        str | None, typer.Option(help="Model: squat7, sagittal7, fullbody, a .toml or an .osim file.")
+    ] = None,
     markers: Markers = None,
     static: Static = None,
     mass: Mass = None,
@@ -47,9 +50,9 @@ def identify(
         return
     if not paths or model is None or output is None:
         raise ConfigError("identify: expected TRIAL..., --model NAME and -o subject.toml (or --compare A B)")
-    if output.suffix.casefold() != ".toml":
-        raise ConfigError(f"identify: -o {output}, expected a .toml file")
-    recordings = _read(paths, forces or [])
+    _check_trials(paths)
+    _check_output(output)
+    recordings, standing = _read(paths, forces or [], static)
     definition = load_model(model, Subject(mass_kg=mass, height_m=height, sex=sex), markers=markers or "auto")
     estimator = Estimator(
         definition,
@@ -58,9 +61,7 @@ def identify(
         forward=forward_direction(forward) or "auto",  # type: ignore[arg-type]
     )
     with progress_bar("identifying") as progress:
-        found = identify_subject(
-            estimator, recordings, static=None if static is None else read(static), progress=progress
-        )
+        found = identify_subject(estimator, recordings, static=standing, progress=progress)
     found.subject.write(output)
     console = out()
     for text in found.subject.report:
@@ -68,12 +69,50 @@ def identify(
     console.print(f"Subject  {output}", soft_wrap=True)
 
 
-def _read(paths: list[Path], forces: list[Path]) -> list[Recording]:
+def _check_trials(paths: list[Path]) -> None:
+    if len(paths) == 1:
+        raise ConfigError(
+            f"identify: one trial ({paths[0]}), expected at least two of the same subject: what is identified has to "
+            "foretell movements that it was not fitted to"
+        )
+    seen: set[Path] = set()
+    for path in paths:
+        if path.resolve() in seen:
+            raise ConfigError(f"identify: {path} is given twice, expected different trials: it would foretell itself")
+        seen.add(path.resolve())
+
+
+def _check_output(output: Path) -> None:
+    """Before anything that takes long."""
+    if output.suffix.casefold() != ".toml":
+        raise ConfigError(f"identify: -o {output}, expected a .toml file")
+    if output.is_dir() or not output.resolve().parent.is_dir():
+        raise ConfigError(f"identify: -o {output} cannot be written, expected a file in a folder that exists")
+
+
+def _read(paths: list[Path], forces: list[Path], static: Path | None) -> tuple[list[Recording], Recording | None]:
+    """The trials and the standing one, each with the ground forces given or found beside it."""
     if forces and len(forces) != len(paths):
         raise ConfigError(f"identify: {len(forces)} force files for {len(paths)} trials, expected one a trial or none")
-    beside = [path.with_name(f"{path.stem}_grf.mot") for path in paths]
-    found: list[Path | None] = [name if name.is_file() else None for name in beside]
-    return [read(path, force) for path, force in zip(paths, forces or found, strict=True)]
+    chosen: list[Path | None] = [*forces] or [_beside(path) for path in paths]
+    recordings = [read(path, force) for path, force in zip(paths, chosen, strict=True)]
+    names = [recording.name for recording in recordings]
+    recordings = [
+        recording if names.count(recording.name) == 1 else replace(recording, name=f"{path.parent.name}/{path.stem}")
+        for path, recording in zip(paths, recordings, strict=True)
+    ]
+    if static is None:
+        return recordings, None
+    same = [recording for path, recording in zip(paths, recordings, strict=True) if path.resolve() == static.resolve()]
+    return recordings, same[0] if same else read(static, _beside(static))
+
+
+def _beside(path: Path) -> Path | None:
+    """Ground forces that lie beside a trial: as recordings are often named, or as `dynakin simulate` names them."""
+    for name in (f"{path.stem}_grf.mot", *(["forces.mot"] if path.stem == "markers" else [])):
+        if path.with_name(name).is_file():
+            return path.with_name(name)
+    return None
 
 
 def _compare(paths: list[Path]) -> None:

@@ -107,10 +107,12 @@ def foretell(
 
 
 def rms_of(common: Common, trial: MeasuredTrial, predicted: Array) -> Array:
-    """(r,) RMS of a prediction (T, 6) against the plates, about the trial's reference point: the metric."""
+    """(r,) RMS of a prediction (T, 6) against the plates, about the trial's reference point: the metric. NaN where the
+    plates say nothing."""
     rows = common.rows
     error = about(trial.wrench, trial.reference)[:, rows] - about(predicted, trial.reference)[:, rows]
-    return np.asarray(np.sqrt(np.nanmean(error**2, axis=0)))
+    error = error[np.isfinite(error).all(axis=1)]
+    return np.sqrt((error**2).mean(axis=0)) if len(error) else np.full(len(rows), np.nan)
 
 
 def decide(common: Common, trials: Sequence[MeasuredTrial], progress: Progress | None = None) -> Decision:

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 import tomli_w
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from dynakin import _core
 from dynakin.errors import ModelError
@@ -33,6 +34,23 @@ class Batch(Strict):
     base_words: tuple[str, ...]
     K: tuple[tuple[float, ...], ...]
 
+    @model_validator(mode="after")
+    def _fits_together(self) -> Batch:
+        count, rank = len(self.names), len(self.base_names)
+        rows = {"covariance": count, "prior_covariance": count, "K": rank}
+        if len(self.values) != count:
+            raise ValueError(f"{len(self.values)} values for {count} names")
+        for key, expected in rows.items():
+            matrix = getattr(self, key)
+            if len(matrix) != expected or any(len(row) != count for row in matrix):
+                raise ValueError(f"{key} is no matrix of {expected} rows and {count} columns")
+        if len(self.base_words) != rank:
+            raise ValueError(f"{len(self.base_words)} base_words for {rank} base_names")
+        numbers = (self.values, *self.covariance, *self.prior_covariance, *self.K)
+        if not all(np.isfinite(row).all() for row in numbers):
+            raise ValueError("a number is not finite")
+        return self
+
 
 class IdentifiedSubject(Strict):
     """What was identified of one subject; ``use`` says whether cross-validation lets ``batch`` replace the table."""
@@ -51,9 +69,12 @@ class IdentifiedSubject(Strict):
         Raises:
             ModelError: the file cannot be written.
         """
+        beside = path.with_name(f".{path.name}.{os.getpid()}")  # so that a file is whole, or the one before
         try:
-            path.write_text(tomli_w.dumps(self.model_dump(mode="json")), encoding="utf-8")
+            beside.write_text(tomli_w.dumps(self.model_dump(mode="json")), encoding="utf-8")
+            beside.replace(path)
         except OSError as error:
+            beside.unlink(missing_ok=True)
             raise ModelError(f"{path}: cannot be written ({error.strerror})") from None
 
 
@@ -79,6 +100,12 @@ def with_identified(initial: InitialModel, subject: IdentifiedSubject) -> Initia
         raise ModelError(
             f"identified parameters: of somebody of {subject.mass_kg:.1f} kg, expected {initial.mass_kg:.1f} kg within "
             f"{100.0 * _MASS_APART:.0f} %; identify again, or give the mass"
+        )
+    strange = [name for name in subject.batch.names if name not in initial.names]
+    if strange:
+        raise ModelError(
+            f"identified parameters: {strange[0]} (and {len(strange) - 1} more) is not estimated by model "
+            f"{initial.spec.name}, expected parameters of this model: identify again"
         )
     if subject.use == "table":
         message = "Identified parameters: the table is kept, which predicts as well."
