@@ -94,7 +94,7 @@ def identify_batch(common: Common, trials: Sequence[MeasuredTrial], unknowns: Un
         theta[free] = x[:count]
         for k, (trial, frames) in enumerate(zip(trials, chosen, strict=True)):
             own = slice(count + own_count * k, count + own_count * (k + 1))
-            A, b = _rows(common, trial, frames, unknowns, theta)
+            A, b = wrench_rows(common, trial, frames, unknowns, theta)
             columns = np.zeros((len(frames), len(rows), size))
             columns[:, :, :count] = A[:, :, : len(free)][:, :, free]
             columns[:, :, own] = A[:, :, len(free) :]
@@ -125,7 +125,7 @@ def _known(trial: MeasuredTrial, rows: npt.NDArray[np.intp]) -> npt.NDArray[np.i
     return np.flatnonzero(np.isfinite(trial.wrench[:, rows]).all(axis=1))
 
 
-def _rows(
+def wrench_rows(
     common: Common, trial: MeasuredTrial, frames: npt.NDArray[np.intp], unknowns: Unknowns, theta: Array
 ) -> tuple[Array, Array]:
     """d wrench / d [theta; nuisance] (T, r, U + r + 1), and what is left of the measurement (T, r), about the trial's
