@@ -68,7 +68,8 @@ def gestures() -> list[Gesture]:
                 {"lumbar_extension": (-10.0, 10.0, 0.3, 0.0), "hips_x": (-0.04, 0.04, 0.3, 0.5)}),
         Gesture("the pelvis tilts forward and back", {"pelvis_tilt": (-5.0, 8.0, 0.5, 0.0)}),
         Gesture("the head nods and the trunk rests", {"neck_extension": (0.0, 25.0, 0.8, 0.0)}),
-        Gesture("knee bends, a third deep", {"hips_y": (-0.08, 0.08, 0.5, 0.25), "lumbar_extension": (-6.0, 6.0, 0.5, 0.25)}),
+        Gesture("knee bends, a third deep",
+                {"hips_y": (-0.08, 0.08, 0.5, 0.25), "lumbar_extension": (-6.0, 6.0, 0.5, 0.25)}),
         Gesture("the weight shifts from foot to foot", {"hips_z": (0.0, 0.06, 0.4, 0.0)}),
         Gesture("rises and sinks quickly in the knees", {"hips_y": (-0.04, 0.03, 1.2, 0.0)}),
     ]  # fmt: skip

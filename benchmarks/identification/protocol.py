@@ -4,9 +4,9 @@
 
 Gestures of ten seconds (`gestures.py`) are chosen one after the other, each time the one after which the bodies'
 posterior has the smallest volume, by the information of the regressor: the trial's slow plate errors and delay are
-eliminated, and what geometry is held wrong by is counted. Weights are those that an identification finds on a simulated
-squat. ``--verify`` simulates the protocol with sensor noise and soft tissue, identifies on it, and foretells a squat and
-a gait.
+eliminated, and what geometry is held wrong by is counted. Weights are those that an identification finds on a
+simulated squat. ``--verify`` simulates the protocol with sensor noise and soft tissue, identifies on it, and foretells
+a squat and a gait.
 """
 
 from __future__ import annotations

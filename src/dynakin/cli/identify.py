@@ -8,12 +8,13 @@ from typing import Annotated
 
 import typer
 
-from dynakin.cli.console import out, progress_bar
+from dynakin.cli.console import out, progress_bar, table
 from dynakin.cli.options import Forward, Height, Markers, Mass, Sex, Side, Static, Vertical
 from dynakin.cli.run import forward_direction
 from dynakin.errors import ConfigError
 from dynakin.filter import Estimator
-from dynakin.identification import change_between, change_in_words, identify_subject
+from dynakin.identification import Identified, change_between, change_in_words, identify_subject
+from dynakin.identification.report import base_in_words, segment_rows
 from dynakin.model import Subject, load_model
 from dynakin.model.identified import read_identified
 from dynakin.recordings import Recording, read
@@ -63,10 +64,26 @@ def identify(
     with progress_bar("identifying") as progress:
         found = identify_subject(estimator, recordings, static=standing, progress=progress)
     found.subject.write(output)
+    _print(found)
+    out().print(f"Subject  {output}", soft_wrap=True)
+
+
+def _print(found: Identified) -> None:
+    """What the decision was, what moved, how sure."""
     console = out()
-    for text in found.subject.report:
+    for text in found.decision.in_words():
         console.print(f"- {text}")
-    console.print(f"Subject  {output}", soft_wrap=True)
+    used = "used" if found.subject.use == "bodies" else "not used: the table is kept"
+    total = found.posterior.unknowns.bodies.total
+    shown = table(
+        "segment", "mass, kg", "table's", "sd", "centre of mass moved", numbers=(1, 2, 3),
+        title=f"Identified bodies ({used}), {total:.2f} kg in all",
+    )  # fmt: skip
+    for row in segment_rows(found.posterior):
+        shown.add_row(row.segment, f"{row.mass:.2f}", f"{row.table:.2f}", f"{row.sd:.2f}", row.moved)
+    console.print(shown)
+    for text in base_in_words(found.subject.batch):
+        console.print(f"- {text}")
 
 
 def _check_trials(paths: list[Path]) -> None:

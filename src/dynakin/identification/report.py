@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import numpy.typing as npt
 
@@ -18,7 +20,7 @@ _CENTRE_M = 0.005  # of a centre of mass, from which on it is said to have moved
 
 def in_words(decision: Decision, posterior: Posterior, batch: Batch) -> list[str]:
     """Sentences, in the order in which they are asked for."""
-    return [*decision.in_words(), *_moved(posterior), *_base(batch)]
+    return [*decision.in_words(), *_moved(posterior), *base_in_words(batch)]
 
 
 def base_of_batch(batch: Batch) -> tuple[Array, Array, Array]:
@@ -31,31 +33,47 @@ def base_of_batch(batch: Batch) -> tuple[Array, Array, Array]:
     return K @ np.array(batch.values), sd, prior
 
 
-def _moved(posterior: Posterior) -> list[str]:
+@dataclass(frozen=True)
+class SegmentRow:
+    """A segment: mass, the table's and the standard deviation (kg); how far its centre of mass left the table's (2,) or
+    (3,) m, along the segment's axes."""
+
+    segment: str
+    mass: float
+    table: float
+    sd: float
+    centre: Array
+
+    @property
+    def moved(self) -> str:
+        """In words; nothing where it stayed."""
+        if np.abs(self.centre).max() < _CENTRE_M:
+            return ""
+        ways = ("forward", "up", "right")
+        return ", ".join(f"{1e3 * x:+.0f} mm {way}" for x, way in zip(self.centre, ways, strict=False))
+
+
+def segment_rows(posterior: Posterior) -> list[SegmentRow]:
+    """One row a segment."""
     bodies = posterior.unknowns.bodies
     u = posterior.unknowns.split(posterior.theta)[0]
     mass = bodies.masses(u)
-    each = len(bodies.names) // len(mass)
-    sd = np.sqrt(np.diag(posterior.phi_covariance()))[::each]
-    masses = [
-        f"{words(segment)} {m:.2f} kg (table {t:.2f}, sd {s:.2f})"
-        for segment, m, t, s in zip(bodies.segments, mass, bodies.masses(0.0 * u), sd, strict=True)
-    ]
-    centres = [
-        f"{words(segment)} {_directions(move)}"
-        for segment, move in zip(bodies.segments, bodies.centre_moves(u), strict=True)
-        if np.abs(move).max() >= _CENTRE_M
-    ]
+    sd = np.sqrt(np.diag(posterior.phi_covariance()))[:: len(bodies.names) // len(mass)]
+    columns = zip(bodies.segments, mass, bodies.masses(0.0 * u), sd, bodies.centre_moves(u), strict=True)
+    return [SegmentRow(words(segment), float(m), float(t), float(s), move) for segment, m, t, s, move in columns]
+
+
+def _moved(posterior: Posterior) -> list[str]:
+    rows = segment_rows(posterior)
+    masses = [f"{row.segment} {row.mass:.2f} kg (table {row.table:.2f}, sd {row.sd:.2f})" for row in rows]
+    centres = [f"{row.segment} {row.moved}" for row in rows if row.moved]
     moved = listed(centres, 40) if centres else f"none by {1e3 * _CENTRE_M:.0f} mm"
-    return [f"Masses, {bodies.total:.2f} kg in all: {listed(masses, 40)}.", f"Centres of mass that moved: {moved}."]
+    total = posterior.unknowns.bodies.total
+    return [f"Masses, {total:.2f} kg in all: {listed(masses, 40)}.", f"Centres of mass that moved: {moved}."]
 
 
-def _directions(move: Array) -> str:
-    """Of a segment's own axes (2,) or (3,), m."""
-    return ", ".join(f"{1e3 * x:+.0f} mm {way}" for x, way in zip(move, ("forward", "up", "right"), strict=False))
-
-
-def _base(batch: Batch) -> list[str]:
+def base_in_words(batch: Batch) -> list[str]:
+    """How sure: what is known of the sums that plates can tell, and of which the data say nothing."""
     values, sd, prior = base_of_batch(batch)
     share = np.divide(sd, prior, out=np.ones_like(sd), where=prior > 0.0)
     verdicts = [judged(float(s)) for s in share]
@@ -73,5 +91,5 @@ def _base(batch: Batch) -> list[str]:
     said.append(f"Best known: {'; '.join(known)}.")
     none = [batch.base_names[k].removeprefix("inertia/") for k in range(len(share)) if verdicts[k] == "nothing"]
     if none:
-        said.append(f"The data say nothing of the sums named after {listed(none, 30)}: these stay the table's.")
+        said.append(f"The data say nothing of the sums named after {listed(none, 30)}: these lean on the table.")
     return said
