@@ -2,11 +2,11 @@
 
     python benchmarks/identification/protocol.py [--minutes 2] [--verify 1 3]
 
-Gestures of ten seconds (`gestures.py`) are chosen one after the other, each time the one after which the bodies'
-posterior has the smallest volume, by the information of the regressor: the trial's slow plate errors and delay are
-eliminated, and what geometry is held wrong by is counted. Weights are those that an identification finds on a
+Gestures of ten seconds (`gestures.py`) and squats are chosen one after the other, each time the one after which the
+bodies' posterior has the smallest volume, by the information of the regressor: the trial's slow plate errors and delay
+are eliminated, and what geometry is held wrong by is counted. Weights are those that an identification finds on a
 simulated squat. ``--verify`` simulates the protocol with sensor noise and soft tissue, identifies on it, and foretells
-a squat and a gait.
+a gait.
 """
 
 from __future__ import annotations
@@ -15,8 +15,9 @@ import argparse
 from dataclasses import replace
 
 import numpy as np
+from candidates import predicted
 from gestures import GESTURE_S, Gesture, gestures, movement_of, possible
-from simulated import DURATION_S, MARKERS, SKIPPED_ELSE_S, SKIPPED_S, SUBJECT, judged
+from simulated import DURATION_S, MARKERS, SKIPPED_S, SUBJECT, judged
 
 import dynakin
 from dynakin.identifiability.base import base_of
@@ -30,6 +31,7 @@ from dynakin.simulation.streams import Streams
 
 Array = np.ndarray
 RATE_HZ = 25.0
+SQUATS = "squats, thighs level"
 PLACES = {"markers": MARKERS["fullbody"]}
 
 
@@ -127,47 +129,46 @@ def promised(common: Common, H: Array, unknowns: Unknowns, title: str) -> None:
             print(f"  {segment:12s} {sd[10 * k]:8.2f} {table[10 * k]:8.2f}        {c}   {1e3 * own[k, 1]:5.1f}")
 
 
-def verify(seed: int, chosen: list[Gesture], errors: list[Array], rows: dict[tuple[str, str], list[Array]]) -> None:
-    """Identify a drawn person on the protocol and on a squat; foretell a squat and a gait."""
+def verify(
+    seed: int, chosen: list[Gesture], squats: int, errors: list[Array], rows: dict[tuple[str, str], list[Array]]
+) -> None:
+    """Identify a drawn person on the protocol (``squats`` parts are squats), and on one squat; foretell a gait."""
     common, squat = common_of(seed, Spread())
-    movement = movement_of(person(seed, Spread()), chosen)
-    sim = simulate("fullbody", movement, seed, GESTURE_S * len(chosen), **PLACES)
-    protocol = measure_all(common, [sim.recording])[0]
+    recordings = []
+    if chosen:
+        movement = movement_of(person(seed, Spread()), chosen)
+        recordings.append(simulate("fullbody", movement, seed, GESTURE_S * len(chosen), **PLACES).recording)
+    if squats:
+        recordings.append(simulate("fullbody", "squat", seed, GESTURE_S * squats, **PLACES).recording)
+    walking = simulate("fullbody", "gait", seed, DURATION_S["gait"], **PLACES)
     unknowns = Unknowns.of(common, geometry=False)
-    found = {
-        "protocol": identify_batch(common, [protocol], unknowns),
-        "squat": identify_batch(common, [squat], unknowns),
+    bodies, start = unknowns.bodies, np.zeros(len(unknowns.bodies.sd))
+    protocol = identify_batch(common, measure_all(common, recordings), unknowns)
+    phi = {
+        "table": bodies.phi(start),
+        "protocol": protocol.phi,
+        "squat, 10 s": identify_batch(common, [squat], unknowns).phi,
+        "true bodies": np.array([walking.truth.parameters[name] for name in bodies.names]),
     }
-    names = unknowns.bodies.names
-    true = np.array([sim.truth.parameters[name] for name in names])
     K = base_of(MeasuredModel.of(common.estimator)).K
-    for name, estimate in found.items():
-        sd = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", K, estimate.phi_covariance(), K), 0.0))
-        if name == "protocol":
-            keep = sd > 1e-6 * sd.max()
-            errors.append((np.abs(K @ (estimate.phi - true)) / np.where(keep, sd, 1.0))[keep])
-    table, prior = unknowns.bodies.phi(0.0 * unknowns.bodies.sd), unknowns.bodies
-    P = prior.covariance(0.0 * prior.sd, np.diag(prior.sd**2))
-    known = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", K, P, K), 0.0))
-    keep = known > 1e-9 * known.max()
-    for name, phi in {"table": table} | {n: e.phi for n, e in found.items()}.items():
-        off = (K @ (phi - true))[keep] / known[keep]
-        rows.setdefault(("base parameters, table's deviations from truth", name), []).append(
-            np.array([np.sqrt(np.mean(off**2))])
+    after, before = (
+        np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", K, P, K), 0.0))
+        for P in (protocol.phi_covariance(), bodies.covariance(start, np.diag(bodies.sd**2)))
+    )
+    told = before > 1e-9 * before.max()
+    told &= after > 1e-6 * before  # all but the total mass
+    errors.append((np.abs(K @ (protocol.phi - phi["true bodies"])) / np.where(told, after, 1.0))[told])
+    seen = common.see(walking.recording)
+    raw = common.with_plates(seen, walking.recording, as_measured=True)
+    for name, values in phi.items():
+        off = (K @ (values - phi["true bodies"]) / np.where(told, before, 1.0))[told]
+        rows.setdefault(("base parameters from truth, prior sds, RMS:", name), []).append(
+            np.sqrt(np.mean(off**2, keepdims=True))
         )
-    for task in ("squat", "gait"):
-        other = simulate("fullbody", task, seed, DURATION_S.get(task, 12.0), **PLACES).recording
-        seen = common.see(other)
-        raw = common.with_plates(seen, other, as_measured=True)
-        start = unknowns.wrench(common.core, seen.states, 0.0 * unknowns.sd)
-        moved = {"table": start} | {name: e.wrench(common, seen.states) for name, e in found.items()}
-        exact = unknowns.states(seen.states, 0.0 * unknowns.sd)
-        exact[:, unknowns.inertia] = true
-        moved["true bodies"] = np.array([dynakin._core.wrench(common.core, x) for x in exact])
-        for name, wrench in moved.items():
-            if (task, name) != ("squat", "squat"):
-                rms = judged(common, raw, wrench, SKIPPED_S.get(task, SKIPPED_ELSE_S))
-                rows.setdefault((task, name), []).append(rms)
+        wrench = predicted(common, seen.states, values)
+        rows.setdefault(("gait foretold, RMS fx to mz:", name), []).append(
+            judged(common, raw, wrench, SKIPPED_S["gait"])
+        )
 
 
 def main() -> None:
@@ -185,22 +186,23 @@ def main() -> None:
     left = [g.words for g in gestures() if g.words not in can]
     print(f"{len(can)} gestures are possible; not: {', '.join(left) or 'none'}")
     tried = {w: information(common, as_trial(common, body, g, squat), unknowns, weight) for w, g in can.items()}
+    squats = information(common, squat, unknowns, weight) * (GESTURE_S / float(np.ptp(squat.movement.time)))
+    tried[SQUATS] = squats
     print("\nlog volume (prior over posterior), gesture")
     chosen = choose(tried, unknowns, round(60.0 * args.minutes / GESTURE_S))
     promised(common, sum(tried[name] for name in chosen), unknowns, "Protocol")
-    squats = information(common, squat, unknowns, weight) * (60.0 * args.minutes / float(np.ptp(squat.movement.time)))
-    promised(common, squats, unknowns, "Squats for the same time")
+    promised(common, squats * (60.0 * args.minutes / GESTURE_S), unknowns, "Squats for the same time")
     if args.verify:
         errors: list[Array] = []
         rows: dict[tuple[str, str], list[Array]] = {}
         for seed in range(args.verify[0], args.verify[1] + 1):
-            verify(seed, [can[name] for name in chosen], errors, rows)
+            verify(seed, [can[name] for name in chosen if name != SQUATS], chosen.count(SQUATS), errors, rows)
             print(f"seed {seed} done", flush=True)
         every = np.concatenate(errors)
         within = ", ".join(f"{n} sd {(every < n).mean():.0%}" for n in (1, 2, 3))
         print(f"\nSimulated with noise and soft tissue: base parameters, errors over deviations: within {within}")
         for (task, name), values in rows.items():
-            print(f"  {task:10s} {name:12s} {np.mean(values, axis=0).round(2)}")
+            print(f"  {task} {name:12s} {np.mean(values, axis=0).round(2)}")
 
 
 if __name__ == "__main__":

@@ -26,7 +26,9 @@ def exact(case: Case, theta: np.ndarray) -> list[MeasuredTrial]:
     ]
 
 
-def test_exact_plates_give_back_the_wrench_of_the_truth(case: Case) -> None:
+def test_exact_plates_give_back_the_wrench_of_the_truth(case: Case, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where no error is held to last, so that the data outweigh the prior."""
+    monkeypatch.setattr("dynakin.identification.batch.LEAST_TAU_S", 0.0)
     unknowns = Unknowns.of(case.common, geometry=False)
     theta = np.where(unknowns.free, unknowns.sd, 0.0) * np.random.default_rng(5).normal(size=len(unknowns.sd))
     trials = exact(case, theta)
@@ -66,6 +68,12 @@ def test_frames_without_plates_are_left_out(case: Case) -> None:
     assert np.isfinite(found.theta).all()
     residual = (trial.wrench - found.wrench(case.common, trial.movement.states))[:, PLANE]
     assert np.sqrt(np.nanmean(residual[:, 2] ** 2)) < 10.0
+
+
+def test_no_error_is_taken_for_short(case: Case) -> None:
+    """Errors of geometry come back with each repetition, so more frames do not average them out."""
+    found = identify_batch(case.common, case.trials, Unknowns.of(case.common, geometry=False))
+    assert (found.tau_s >= 1.0 - 1e-9).all()
 
 
 def test_autocorrelation_of_a_first_order_process() -> None:
