@@ -3,8 +3,8 @@
 The cost is sum over trials and frames of r' W r + theta' P^-1 theta, r = measured - predicted wrench. W is not the
 plates' noise: r is the model's own error, which lasts for many frames, so each component weighs 1 / (s^2 tau): s is its
 RMS over the trial and tau the frames that its error lasts, measured on the residuals of the pass before, tau not below
-a second. The covariance counts what is held as uncertain too (Schmidt 1966, "consider" parameters): a length that is
-wrong shows as a mass that is wrong, however many frames there are.
+a quarter of a second. The covariance counts what is held as uncertain too (Schmidt 1966, "consider" parameters): a
+length that is wrong shows as a mass that is wrong, however many frames there are.
 """
 
 from __future__ import annotations
@@ -27,10 +27,10 @@ PASSES = 4  # linearised anew, and weights measured anew, at each
 FIRST_SIGMA = np.array([10.0, 20.0, 10.0, 10.0, 10.0, 10.0])
 """N, N m (fx ... mz): size of a model's error before anything is known of it (DESIGN section 3)."""
 LEAST_SIGMA = 1.0  # N or N m: a residual that was fitted is smaller than the error
-LEAST_TAU_S = 1.0
-"""An error is taken to last as long at least, and at first. Errors of geometry and skin follow the posture: they come
-back with each repetition, with both signs, and look short; so however many frames there are, they do not average out.
-Chosen on simulated subjects apart from those of docs/identification.md, of 0 to 2 s."""
+LEAST_TAU_S = 0.25
+"""An error is taken to last as long at least, and at first: so long does it on real squats (0.16 to 0.27 s). Errors of
+geometry and skin follow the posture: they come back with each repetition, with both signs, and look shorter than they
+are; without a floor long trials are believed too much (docs/identification.md)."""
 
 
 @dataclass(frozen=True, eq=False)
