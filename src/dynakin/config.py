@@ -17,7 +17,7 @@ from dynakin.model.validation import Strict, nearest, read_toml, validate
 from dynakin.recordings import PlateLoad
 
 # Keys that name files: relative to the configuration file that they stand in.
-_PATHS = ("trial", "forces", "static", "output")
+_PATHS = ("trial", "forces", "static", "parameters", "output")
 
 
 class RunConfig(Strict):
@@ -34,6 +34,8 @@ class RunConfig(Strict):
     """Ground forces, where the recording does not hold them: .mot, .sto or .csv."""
     static: Path | None = Field(default=None, examples=["standing.c3d"])
     """Recording of the same person and markers standing, from which lengths and marker places are taken."""
+    parameters: Path | None = Field(default=None, examples=["subject.toml"])
+    """Identified subject that `dynakin identify` wrote: the filter starts from its values and deviations."""
     markers: str = "auto"
     """Marker set: auto (by the names in the recording), a built-in one, or a .toml file of your own."""
     table: str = "dumas"

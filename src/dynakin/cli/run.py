@@ -34,6 +34,7 @@ from dynakin.errors import DynakinError
 from dynakin.filter import Estimator, presets
 from dynakin.filter.zero import standing_zero
 from dynakin.identifiability import Identifiability, identifiability
+from dynakin.model.identified import read_identified
 from dynakin.recordings import read, without_plate_loads
 from dynakin.report import read_sensitivity, save_figures
 from dynakin.results import Estimate, check_output_writable
@@ -51,6 +52,9 @@ def run(
     ] = None,
     markers: Markers = None,
     static: Static = None,
+    parameters: Annotated[
+        Path | None, typer.Option(help="Subject that dynakin identify wrote: start from its parameters.")
+    ] = None,
     mass: Mass = None,
     height: Height = None,
     sex: Sex = None,
@@ -79,6 +83,7 @@ def run(
         "model": model,
         "markers": markers,
         "static": static,
+        "parameters": parameters,
         "mass_kg": mass,
         "height_m": height,
         "sex": sex,
@@ -148,6 +153,7 @@ def estimate_from(
         estimate=config.estimate,
         plates=config.plates,
         loads=config.loads,
+        parameters=None if config.parameters is None else read_identified(config.parameters),
     )
     estimate = estimator.run(recording, static=static, smooth=config.smooth, progress=progress)
     if (config.zero, config.signs) != ("model", "opensim"):

@@ -21,6 +21,7 @@ from dynakin.filter.samples import Sample, foreign_load, recording_arrays, sampl
 from dynakin.filter.smoothing import check_can_smooth, smoothed
 from dynakin.filter.total_wrench import foot_wrenches, foreign_total, leave_out_unknown
 from dynakin.model import Bounds, CarriedLoad, Definition, InitialModel, Priors, initialise, with_loads
+from dynakin.model.identified import IdentifiedSubject, with_identified
 from dynakin.model.validation import nearest
 from dynakin.recordings import Recording, check_plates
 from dynakin.recordings.foot_loads import FootLoads, foot_loads
@@ -44,6 +45,7 @@ class Estimator:
             as they are at the start (displacements of skin are then noise of the markers).
         plates: plate -> "right" or "left", where a floating model's own assignment of plates to feet is wrong.
         loads: known bodies that the person carries; the subject's mass is then needed, without them.
+        parameters: an identified subject (`model.identified`), whose values and deviations the filter starts from.
         lag: frames by which `delayed` lies behind `step`, for smoothing while it is measured; 0: none.
     """
 
@@ -61,6 +63,7 @@ class Estimator:
         plates: Mapping[str, str] | None = None,
         lag: int = 0,
         loads: Sequence[CarriedLoad] = (),
+        parameters: IdentifiedSubject | None = None,
     ) -> None:
         for kind in estimate:
             if kind not in QUANTITIES:
@@ -72,6 +75,7 @@ class Estimator:
             raise ConfigError("loads: the plates carry them too, expected the person's own mass beside them (mass_kg)")
         self.model = model
         self.loads = tuple(loads)
+        self.parameters = parameters
         self.noise = noise or presets.default()
         self.priors = priors or Priors()
         self.bounds = bounds or Bounds()
@@ -229,6 +233,8 @@ class Estimator:
             priors=self.priors,
             bounds=self.bounds,
         )
+        if self.parameters is not None:
+            initial = with_identified(initial, self.parameters)
         return with_loads(initial, self.loads)
 
     def again(self) -> Estimator:
@@ -244,6 +250,7 @@ class Estimator:
             estimate=self.estimate,
             plates=self.plates,
             loads=self.loads,
+            parameters=self.parameters,
         )
 
     def start_from(self, initial: InitialModel) -> InitialModel:
@@ -369,6 +376,7 @@ class Estimator:
             "model": str(self.model.path if self.model.path.parent.name != "builtin" else self.model.name),
             "side": self.side,
             "loads": [load.model_dump(mode="json") for load in self.loads],
+            "identified": None if self.parameters is None else self.parameters.use,
             "vertical": self.vertical,
             "forward": self.forward if isinstance(self.forward, str) else list(self.forward),
             "estimate": list(self.estimate),

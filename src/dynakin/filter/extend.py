@@ -102,6 +102,11 @@ def _added_sd(spec: _core.ModelSpec, noise: Noise, soft_tissue: Array) -> dict[s
 def initial_covariance(initial: InitialModel, noise: Noise) -> Array:
     """P0 (n, n): the priors, and with `total_mass_use` "prior" the total mass as one piece of information on it."""
     covariance = np.diag(initial.sd0**2)
+    if initial.together is not None:
+        place = {name: k for k, name in enumerate(initial.names)}
+        known = [k for k, name in enumerate(initial.together.names) if name in place]
+        at = [place[initial.together.names[k]] for k in known]
+        covariance[np.ix_(at, at)] = initial.together.covariance[np.ix_(known, known)]
     if noise.total_mass_use == "frame":
         return covariance
     masses = np.array([float(name.startswith("inertia/") and name.endswith("/mass")) for name in initial.names])

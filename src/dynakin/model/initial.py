@@ -20,6 +20,14 @@ Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
+class Together:
+    """Prior covariance (k, k) of elements of the state that are known together, by name."""
+
+    names: tuple[str, ...]
+    covariance: Array
+
+
+@dataclass(frozen=True, eq=False)
 class InitialModel:
     """A model measured on one person, and the state from which the filter starts; order of n: the core's
     layout.
@@ -47,6 +55,7 @@ class InitialModel:
             added to the noise of the cameras.
         dimensionless: geometry parameters that are factors, not lengths.
         carried_kg: mass of the known loads (`model.loads`), not in ``mass_kg``.
+        together: prior covariance of elements that were identified before; the others are independent.
     """
 
     spec: _core.ModelSpec
@@ -71,6 +80,7 @@ class InitialModel:
     unmodelled_m: Array | float = 0.0
     dimensionless: frozenset[str] = frozenset()
     carried_kg: float = 0.0
+    together: Together | None = None
 
     @property
     def weighed_kg(self) -> float:

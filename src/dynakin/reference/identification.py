@@ -73,7 +73,7 @@ def identify(
     """
     problem = condense(chain, plan, kinematics, wrench, mass_kg=mass_kg, sigma=sigma)
     base = base_parameters(problem)
-    free = problem.full(_free(problem, base.rank))
+    free = free_parameters(problem, base.rank)
     bounded, at_bound = _bounded(problem, plan, bounds or Bounds())
     bodies = bodies_of(chain, free)
     impossible = tuple(name for name, body in bodies.items() if body.mass != 0.0 and not body.possible_in_plane())
@@ -82,13 +82,14 @@ def identify(
     )  # fmt: skip
 
 
-def _free(problem: Condensed, rank: int) -> Array:
-    """x (e,): the solution nearest to the table, in units of the parameters' sizes; ``rank`` directions move."""
+def free_parameters(problem: Condensed, rank: int) -> Array:
+    """phi (p,) without bounds: the solution nearest to the table, in units of the parameters' sizes, of which ``rank``
+    directions move."""
     start = problem.table[problem.estimated] / problem.scale[problem.estimated]
     seen = np.linalg.svd(problem.A)[2][:rank]  # (r, e): the directions that the wrench depends on
     A, b = problem.with_mass()
     moved, *_ = np.linalg.lstsq(A @ seen.T, b - A @ start, rcond=None)
-    return np.asarray(start + seen.T @ moved)
+    return problem.full(start + seen.T @ moved)
 
 
 def _bounded(problem: Condensed, plan: ModelPlan, bounds: Bounds) -> tuple[Array, tuple[str, ...]]:

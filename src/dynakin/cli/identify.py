@@ -1,0 +1,140 @@
+"""`dynakin identify`: inertial parameters and geometry of a subject from several trials, kept where they predict."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from dynakin.cli.console import out, progress_bar, table
+from dynakin.cli.options import Forward, Height, Markers, Mass, Sex, Side, Static, Vertical
+from dynakin.cli.run import forward_direction
+from dynakin.errors import ConfigError
+from dynakin.filter import Estimator
+from dynakin.identification import Identified, change_between, change_in_words, identify_subject
+from dynakin.identification.report import base_in_words, segment_rows
+from dynakin.model import Subject, load_model
+from dynakin.model.identified import read_identified
+from dynakin.recordings import Recording, read
+
+
+def identify(
+    trials: Annotated[
+        list[Path] | None, typer.Argument(help="Recordings of one subject with force plates (.c3d, .trc, .csv).")
+    ] = None,
+    forces: Annotated[
+        list[Path] | None,
+        typer.Option("--forces", help="Ground forces of the trials, in their order; else TRIAL_grf.mot beside."),
+    ] = None,
+    model: Annotated[
+        str | None, typer.Option(help="Model: squat7, sagittal7, fullbody, a .toml or an .osim file.")
+    ] = None,
+    markers: Markers = None,
+    static: Static = None,
+    mass: Mass = None,
+    height: Height = None,
+    sex: Sex = None,
+    side: Side = None,
+    vertical: Vertical = None,
+    forward: Forward = None,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="Subject file (.toml) to write.")] = None,
+    compare: Annotated[
+        bool, typer.Option("--compare", help="Arguments are two subject files: what changed between the sessions.")
+    ] = False,
+) -> None:
+    """Identify a subject, and keep what predicts trials that it was not fitted to better than the table does."""
+    paths = trials or []
+    if compare:
+        _compare(paths)
+        return
+    if not paths or model is None or output is None:
+        raise ConfigError("identify: expected TRIAL..., --model NAME and -o subject.toml (or --compare A B)")
+    _check_trials(paths)
+    _check_output(output)
+    recordings, standing = _read(paths, forces or [], static)
+    definition = load_model(model, Subject(mass_kg=mass, height_m=height, sex=sex), markers=markers or "auto")
+    estimator = Estimator(
+        definition,
+        side=side or "auto",
+        vertical=vertical or "auto",
+        forward=forward_direction(forward) or "auto",  # type: ignore[arg-type]
+    )
+    with progress_bar("identifying") as progress:
+        found = identify_subject(estimator, recordings, static=standing, progress=progress)
+    found.subject.write(output)
+    _print(found)
+    out().print(f"Subject  {output}", soft_wrap=True)
+
+
+def _print(found: Identified) -> None:
+    """What the decision was, what moved, how sure."""
+    console = out()
+    for text in found.decision.in_words():
+        console.print(f"- {text}")
+    used = "used" if found.subject.use == "bodies" else "not used: the table is kept"
+    total = found.posterior.unknowns.bodies.total
+    shown = table(
+        "segment", "mass, kg", "table's", "sd", "centre of mass moved", numbers=(1, 2, 3),
+        title=f"Identified bodies ({used}), {total:.2f} kg in all",
+    )  # fmt: skip
+    for row in segment_rows(found.posterior):
+        shown.add_row(row.segment, f"{row.mass:.2f}", f"{row.table:.2f}", f"{row.sd:.2f}", row.moved)
+    console.print(shown)
+    for text in base_in_words(found.subject.batch):
+        console.print(f"- {text}")
+
+
+def _check_trials(paths: list[Path]) -> None:
+    if len(paths) == 1:
+        raise ConfigError(
+            f"identify: one trial ({paths[0]}), expected at least two of the same subject: what is identified has to "
+            "foretell movements that it was not fitted to"
+        )
+    seen: set[Path] = set()
+    for path in paths:
+        if path.resolve() in seen:
+            raise ConfigError(f"identify: {path} is given twice, expected different trials: it would foretell itself")
+        seen.add(path.resolve())
+
+
+def _check_output(output: Path) -> None:
+    """Before anything that takes long."""
+    if output.suffix.casefold() != ".toml":
+        raise ConfigError(f"identify: -o {output}, expected a .toml file")
+    if output.is_dir() or not output.resolve().parent.is_dir():
+        raise ConfigError(f"identify: -o {output} cannot be written, expected a file in a folder that exists")
+
+
+def _read(paths: list[Path], forces: list[Path], static: Path | None) -> tuple[list[Recording], Recording | None]:
+    """The trials and the standing one, each with the ground forces given or found beside it."""
+    if forces and len(forces) != len(paths):
+        raise ConfigError(f"identify: {len(forces)} force files for {len(paths)} trials, expected one a trial or none")
+    chosen: list[Path | None] = [*forces] or [_beside(path) for path in paths]
+    recordings = [read(path, force) for path, force in zip(paths, chosen, strict=True)]
+    names = [recording.name for recording in recordings]
+    recordings = [
+        recording if names.count(recording.name) == 1 else replace(recording, name=f"{path.parent.name}/{path.stem}")
+        for path, recording in zip(paths, recordings, strict=True)
+    ]
+    if static is None:
+        return recordings, None
+    same = [recording for path, recording in zip(paths, recordings, strict=True) if path.resolve() == static.resolve()]
+    return recordings, same[0] if same else read(static, _beside(static))
+
+
+def _beside(path: Path) -> Path | None:
+    """Ground forces that lie beside a trial: as recordings are often named, or as `dynakin simulate` names them."""
+    for name in (f"{path.stem}_grf.mot", *(["forces.mot"] if path.stem == "markers" else [])):
+        if path.with_name(name).is_file():
+            return path.with_name(name)
+    return None
+
+
+def _compare(paths: list[Path]) -> None:
+    if len(paths) != 2:
+        raise ConfigError(f"identify --compare: {len(paths)} files, expected two subject files (before, after)")
+    before, after = (read_identified(path) for path in paths)
+    for text in change_in_words(change_between(before, after), (before.mass_kg, after.mass_kg)):
+        out().print(f"- {text}")

@@ -1,0 +1,145 @@
+"""Batch identification: all trials of a subject at once, by Gauss-Newton from priors about the table.
+
+The cost is sum over trials and frames of r' W r + theta' P^-1 theta, r = measured - predicted wrench. W is not the
+plates' noise: r is the model's own error, which lasts for many frames, so each component weighs 1 / (s^2 tau): s is its
+RMS over the trial and tau the frames that its error lasts, measured on the residuals of the pass before, tau not below
+a quarter of a second. The covariance counts what is held as uncertain too (Schmidt 1966, "consider" parameters): a
+length that is wrong shows as a mass that is wrong, however many frames there are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.linalg import cho_factor, cho_solve
+
+from dynakin.errors import RecordingError
+from dynakin.identification.coloured import integrated_autocorrelation
+from dynakin.identification.trials import Common, MeasuredTrial, about
+from dynakin.identification.unknowns import Unknowns
+
+Array = npt.NDArray[np.float64]
+
+PASSES = 4  # linearised anew, and weights measured anew, at each
+FIRST_SIGMA = np.array([10.0, 20.0, 10.0, 10.0, 10.0, 10.0])
+"""N, N m (fx ... mz): size of a model's error before anything is known of it (DESIGN section 3)."""
+LEAST_SIGMA = 1.0  # N or N m: a residual that was fitted is smaller than the error
+LEAST_TAU_S = 0.25
+"""An error is taken to last as long at least, and at first: so long does it on real squats (0.16 to 0.27 s). Errors of
+geometry and skin follow the posture: they come back with each repetition, with both signs, and look shorter than they
+are; without a floor long trials are believed too much (docs/identification.md)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """What the trials say.
+
+    Attributes:
+        unknowns: what was asked. theta: (U,) deviations from the start. covariance: (U, U), 0 for those held.
+        sigma: (N, r) RMS residual by trial and component of `Common.rows`, N and N m. tau_s: (N, r) seconds that a
+            residual lasts. nuisance: (N, r + 1) each trial's slow error of each component, and its delay.
+    """
+
+    unknowns: Unknowns
+    theta: Array
+    covariance: Array
+    sigma: Array
+    tau_s: Array
+    nuisance: Array
+
+    @property
+    def phi(self) -> Array:
+        """(e,) inertial parameters, by ``unknowns.bodies.names``."""
+        return self.unknowns.bodies.phi(self.unknowns.split(self.theta)[0])
+
+    def phi_covariance(self) -> Array:
+        """(e, e) of ``phi``, to first order."""
+        u = self.unknowns.split(self.theta)[0]
+        return self.unknowns.bodies.covariance(u, self.covariance[: len(u), : len(u)])
+
+    def wrench(self, common: Common, states: Array) -> Array:
+        """Predicted (T, 6) of a movement's states."""
+        return self.unknowns.wrench(common.core, states, self.theta)
+
+
+def at_start(unknowns: Unknowns) -> Posterior:
+    """The table and the geometry as measured, with the prior."""
+    own = len(unknowns.nuisance_sd)
+    nothing = np.zeros((0, own - 1))
+    covariance = np.diag(np.where(unknowns.free, unknowns.sd, 0.0) ** 2)
+    return Posterior(unknowns, np.zeros(len(unknowns.sd)), covariance, nothing, nothing, np.zeros((0, own)))
+
+
+def identify_batch(common: Common, trials: Sequence[MeasuredTrial], unknowns: Unknowns) -> Posterior:
+    """Fit what is free in ``unknowns`` to all trials.
+
+    Raises:
+        RecordingError: no trial has a second of frames with the wrench.
+    """
+    rows, own_count = common.rows, len(unknowns.nuisance_sd)
+    chosen = [_known(trial, rows) for trial in trials]
+    step = [float(np.median(np.diff(trial.movement.time))) for trial in trials]
+    if not any(len(frames) * dt >= 1.0 for frames, dt in zip(chosen, step, strict=True)):
+        raise RecordingError("identification: no trial has a second of frames with the plates' wrench, expected one")
+    sigma = np.tile(FIRST_SIGMA[rows], (len(trials), 1))
+    least = [max(1.0, LEAST_TAU_S / dt) for dt in step]
+    tau = np.array([[frames] * len(rows) for frames in least])
+    free, count = unknowns.free, int(unknowns.free.sum())
+    theta = np.zeros(len(unknowns.sd))
+    size = count + own_count * len(trials)
+    prior = np.concatenate([unknowns.sd[free], np.tile(unknowns.nuisance_sd, len(trials))])
+    x = np.zeros(size)
+    for _ in range(PASSES):
+        H, g, stacked = np.diag(prior**-2.0), np.zeros(size), []
+        C = np.zeros((size, int((~free).sum())))
+        theta[free] = x[:count]
+        for k, (trial, frames) in enumerate(zip(trials, chosen, strict=True)):
+            own = slice(count + own_count * k, count + own_count * (k + 1))
+            A, b = wrench_rows(common, trial, frames, unknowns, theta)
+            columns = np.zeros((len(frames), len(rows), size))
+            columns[:, :, :count] = A[:, :, : len(free)][:, :, free]
+            columns[:, :, own] = A[:, :, len(free) :]
+            target = b + columns @ np.concatenate([x[:count], np.zeros(size - count)])
+            weight = 1.0 / (sigma[k] ** 2 * tau[k])
+            H += np.einsum("tki,k,tkj->ij", columns, weight, columns, optimize=True)
+            g += np.einsum("tki,k,tk->i", columns, weight, target, optimize=True)
+            held = A[:, :, : len(free)][:, :, ~free]
+            C += np.einsum("tki,k,tkj->ij", columns, weight, held, optimize=True)
+            stacked.append((columns, target))
+        factor = cho_factor(H)
+        x = cho_solve(factor, g)
+        for k, (columns, target) in enumerate(stacked):
+            left = target - columns @ x
+            if len(left):
+                sigma[k] = np.maximum(np.sqrt((left**2).mean(axis=0)), LEAST_SIGMA)
+                tau[k] = [max(least[k], integrated_autocorrelation(left[:, c])) for c in range(len(rows))]
+    theta[free] = x[:count]
+    covariance = np.zeros((len(theta), len(theta)))
+    through = cho_solve(factor, C) * unknowns.considered_sd[~free]  # errors of what is held, on what is free
+    spread = cho_solve(factor, np.eye(size)) + through @ through.T
+    covariance[np.ix_(free, free)] = spread[:count, :count]
+    seconds = tau * np.array(step)[:, None]
+    return Posterior(unknowns, theta, covariance, sigma, seconds, x[count:].reshape(-1, own_count))
+
+
+def _known(trial: MeasuredTrial, rows: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:
+    return np.flatnonzero(np.isfinite(trial.wrench[:, rows]).all(axis=1))
+
+
+def wrench_rows(
+    common: Common, trial: MeasuredTrial, frames: npt.NDArray[np.intp], unknowns: Unknowns, theta: Array
+) -> tuple[Array, Array]:
+    """d wrench / d [theta; nuisance] (T, r, U + r + 1), and what is left of the measurement (T, r), about the trial's
+    reference point."""
+    states, rows = trial.movement.states, common.rows
+    if len(frames) == 0:
+        return np.zeros((0, len(rows), len(theta) + len(rows) + 1)), np.zeros((0, len(rows)))
+    predicted = about(unknowns.wrench(common.core, states, theta), trial.reference)[:, rows]
+    slope = np.gradient(predicted, trial.movement.time, axis=0)[frames]
+    J = unknowns.jacobian(common.core, states[frames], theta)
+    J = about(J.swapaxes(1, 2), trial.reference).swapaxes(1, 2)[:, rows]
+    own = np.concatenate([np.tile(np.eye(len(rows)), (len(frames), 1, 1)), -slope[:, :, None]], axis=2)
+    return np.concatenate([J, own], axis=2), about(trial.wrench[frames], trial.reference)[:, rows] - predicted[frames]

@@ -1,0 +1,139 @@
+"""Whether identified parameters earn their place: each trial predicted from its markers by the others.
+
+Of fewer than three trials halves are left out instead: with two, a standing trial would have to foretell a squat all by
+itself. A fold leaves out a whole trial or half, never single frames: the model's error is alike from frame to frame, so
+single frames would judge themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.identification.batch import Posterior, at_start, identify_batch
+from dynakin.identification.trials import Common, MeasuredTrial, Movement, about, middle_of
+from dynakin.identification.unknowns import Unknowns
+from dynakin.results import COMPONENTS
+
+Array = npt.NDArray[np.float64]
+Progress = Callable[[int, int], None]
+Use = Literal["table", "bodies"]
+USES: tuple[Use, ...] = get_args(Use)
+
+GAIN = 0.97
+"""Mean RMS over the table's from which on the table is left: 3 % is within what two halves of a trial differ by."""
+WORST = 1.10
+"""And the worst trial must not lose more than this."""
+
+
+@dataclass(frozen=True, eq=False)
+class Decision:
+    """What cross-validation found.
+
+    Attributes:
+        use: the winner. folds: names of what was left out. rms: (folds, r) of what was left out, predicted from its
+            markers, by candidate. components: (r,) of them, fx, fy, fz (N), mx, my, mz (N m).
+    """
+
+    use: Use
+    folds: tuple[str, ...]
+    rms: dict[Use, Array]
+    components: tuple[str, ...] = ("fx", "fy", "mz")
+
+    def ratios(self, use: Use) -> Array:
+        """(folds,) RMS over the table's, mean over the components."""
+        return np.asarray((self.rms[use] / self.rms["table"]).mean(axis=1))
+
+    def in_words(self) -> list[str]:
+        """Sentences."""
+        found = {use: np.sqrt((self.rms[use] ** 2).mean(axis=0)) for use in USES}
+        said = [
+            "Each left out in turn and predicted from its markers alone by what the others say: "
+            f"{', '.join(self.folds)}."
+        ]
+        for use, values in found.items():
+            each = [
+                f"{name.upper()} {value:.1f} {'N' if name.startswith('f') else 'N m'}"
+                for name, value in zip(self.components, values, strict=True)
+            ]
+            said.append(f"{use.capitalize()}: {', '.join(each)}.")
+        gain = 100.0 * (1.0 - self.ratios("bodies").mean())
+        worst = 100.0 * (self.ratios("bodies").max() - 1.0)
+        verdict = f"held-out gain {gain:.0f} % (mean over components and parts; at the worst part {-worst:+.0f} %)"
+        if self.use == "table":
+            return [
+                *said,
+                f"The table is kept: {verdict}; expected a gain of {100.0 * (1.0 - GAIN):.0f} % and no loss of more "
+                f"than {100.0 * (WORST - 1.0):.0f} %.",
+            ]
+        return [*said, f"The identified bodies are used: {verdict}."]
+
+
+def parts_of(trials: Sequence[MeasuredTrial]) -> list[MeasuredTrial]:
+    """What is left out in turn: the trials, or the halves of fewer than three."""
+    if len(trials) > 2:
+        return list(trials)
+    middles = [middle_of(len(trial.movement.time)) for trial in trials]
+    return [
+        trial.part(half)
+        for trial, middle in zip(trials, middles, strict=True)
+        for half in (slice(None, middle), slice(middle, None))
+    ]
+
+
+def estimate(common: Common, trials: Sequence[MeasuredTrial], use: Use) -> Posterior:
+    """The table, or the batch estimate of the bodies.
+
+    Geometry stays as measured: lengths and zeros of angles predict as well in this batch, but a filter that follows its
+    markers undoes them (docs/identification.md).
+    """
+    unknowns = Unknowns.of(common, inertia=use == "bodies", geometry=False)
+    return at_start(unknowns) if use == "table" else identify_batch(common, trials, unknowns)
+
+
+def foretell(
+    common: Common, others: Sequence[MeasuredTrial], left_out: Movement, uses: Sequence[Use] = USES
+) -> dict[Use, Array]:
+    """(T, 6) by candidate: what the other trials say of a movement. Its plates are not in here: a `Movement` has none.
+
+    Raises:
+        RecordingError: the others have too few frames with the plates' wrench.
+    """
+    return {use: estimate(common, others, use).wrench(common, left_out.states) for use in uses}
+
+
+def rms_of(common: Common, trial: MeasuredTrial, predicted: Array) -> Array:
+    """(r,) RMS of a prediction (T, 6) against the plates, about the trial's reference point: the metric. NaN where the
+    plates say nothing."""
+    rows = common.rows
+    error = about(trial.wrench, trial.reference)[:, rows] - about(predicted, trial.reference)[:, rows]
+    error = error[np.isfinite(error).all(axis=1)]
+    return np.sqrt((error**2).mean(axis=0)) if len(error) else np.full(len(rows), np.nan)
+
+
+def decide(common: Common, trials: Sequence[MeasuredTrial], progress: Progress | None = None) -> Decision:
+    """Cross-validation over the identification trials.
+
+    Raises:
+        RecordingError: too few frames with the plates' wrench.
+    """
+    halves = (", first half", ", second half") * len(trials) if len(trials) <= 2 else ("",) * len(trials)
+    parts = parts_of(trials)
+    names, found = [], []
+    for k, (left_out, half) in enumerate(zip(parts, halves, strict=True)):
+        others = [part for j, part in enumerate(parts) if j != k]
+        if np.isfinite(left_out.wrench[:, common.rows]).all(axis=1).any():  # else there is nothing to judge by
+            predicted = foretell(common, others, left_out.movement)
+            found.append({use: rms_of(common, left_out, wrench) for use, wrench in predicted.items()})
+            names.append(left_out.movement.recording.name + half)
+        if progress is not None:
+            progress(k + 1, len(parts))
+    rms: dict[Use, Array] = {use: np.array([each[use] for each in found]) for use in USES}
+    components = tuple(COMPONENTS[k] for k in common.rows)
+    ratios = Decision("bodies", tuple(names), rms, components).ratios("bodies")
+    use: Use = "bodies" if ratios.mean() <= GAIN and ratios.max() <= WORST else "table"
+    return Decision(use, tuple(names), rms, components)

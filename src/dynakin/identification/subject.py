@@ -1,0 +1,99 @@
+"""From trials of one subject to its identified parameters: estimate, decide, and say what was learned."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.filter import Estimator
+from dynakin.identifiability.base import base_of
+from dynakin.identifiability.element_words import base_words
+from dynakin.identifiability.measured import MeasuredModel
+from dynakin.identification.batch import Posterior
+from dynakin.identification.decision import Decision, decide, estimate
+from dynakin.identification.report import in_words
+from dynakin.identification.trials import Common, MeasuredTrial, measure_all
+from dynakin.model.identified import Batch, IdentifiedSubject
+from dynakin.recordings import Recording
+
+Array = npt.NDArray[np.float64]
+Progress = Callable[[int, int], None]
+
+_WORK, _SEEING = 1000, 850  # of a progress bar: nearly all of the time goes into the kinematics
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """Everything about one identification.
+
+    Attributes:
+        subject: what is written to the file. common, trials: what it was made of.
+        posterior: the batch estimate of the bodies, used or not.
+        decision: of cross-validation.
+    """
+
+    subject: IdentifiedSubject
+    common: Common
+    trials: tuple[MeasuredTrial, ...]
+    posterior: Posterior
+    decision: Decision
+
+
+def identify_subject(
+    estimator: Estimator,
+    recordings: Sequence[Recording],
+    *,
+    static: Recording | None = None,
+    progress: Progress | None = None,
+) -> Identified:
+    """Identify a subject on one or several trials with force plates.
+
+    Args:
+        estimator: model and noise (`presets.default()` or another that has a smoother), in the plane or in space.
+        static: the same person and markers standing; else the first trial.
+        progress: called with (work done, in all).
+
+    Raises:
+        ModelError, RecordingError: model, markers, plates and trials do not fit. ConfigError: noise without smoother.
+    """
+    report = progress or (lambda done, of: None)
+    common = Common.measure(estimator, recordings[0], static)
+    trials = measure_all(common, recordings, lambda done, of: report(round(_SEEING * done / of), _WORK))
+    decision = decide(common, trials, lambda done, of: report(round(_SEEING + (_WORK - _SEEING) * done / of), _WORK))
+    bodies = estimate(common, trials, "bodies")
+    batch = _batch(estimator, bodies)
+    subject = IdentifiedSubject(
+        model=common.initial.spec.name,
+        mass_kg=common.initial.mass_kg,
+        use=decision.use,
+        trials=tuple(recording.name for recording in recordings),
+        report=tuple(in_words(decision, bodies, batch)),
+        batch=batch,
+    )
+    return Identified(subject, common, tuple(trials), bodies, decision)
+
+
+def _batch(estimator: Estimator, bodies: Posterior) -> Batch:
+    measured = MeasuredModel.of(estimator)
+    base = base_of(measured)
+    names = bodies.unknowns.bodies.names
+    order = [base.over.index(name) for name in names]
+    unknowns = bodies.unknowns
+    start = np.zeros(len(unknowns.bodies.sd))
+    prior = unknowns.bodies.covariance(start, np.diag(unknowns.bodies.sd**2))
+    return Batch(
+        names=names,
+        values=tuple(bodies.phi.tolist()),
+        covariance=_rows(bodies.phi_covariance()),
+        prior_covariance=_rows(prior),
+        base_names=base.names,
+        base_words=tuple(base_words(base, measured.initial.spec)),
+        K=_rows(base.K[:, order]),
+    )
+
+
+def _rows(matrix: Array) -> tuple[tuple[float, ...], ...]:
+    return tuple(tuple(row) for row in matrix.tolist())

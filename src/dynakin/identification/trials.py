@@ -1,0 +1,269 @@
+"""Trials of one subject as the identification takes them: kinematics from markers alone, on one common geometry."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin import _core
+from dynakin.comparison.freeze import freeze, initial_values
+from dynakin.comparison.held_out import marker_paths, measured_wrench
+from dynakin.errors import ModelError, RecordingError
+from dynakin.filter import Estimator
+from dynakin.filter.total_wrench import leave_out_unknown
+from dynakin.model import InitialModel, OpenSimDefinition, initialise
+from dynakin.recordings import GroundFrame, Recording, check_plates
+from dynakin.recordings.foot_loads import LOADED_N, foot_loads
+from dynakin.recordings.smoothing import CUTOFF_HZ, smooth
+from dynakin.units import GRAVITY_M_S2
+
+Array = npt.NDArray[np.float64]
+Progress = Callable[[int, int], None]
+
+RATE_HZ = 25.0
+"""Frames a second that are kept: the model's error is alike for 0.15 to 0.3 s, so more say nothing new."""
+
+LOAD_APART = 0.04
+"""Part by which the mean load of a trial's plates may miss the body mass: a second of walking ends as fast as it began
+within 0.2 m/s, 2 % of gravity; other plates or another person miss by more."""
+
+
+@dataclass(frozen=True, eq=False)
+class Movement:
+    """A trial without its plates: what can be predicted is in here, what it is judged by is not.
+
+    Attributes:
+        recording: as read, its plates taken away. time: (T,) s. states: (T, n) of `Common.core`, with the constants
+            of the start. start: the trial's own coordinates and ground frame.
+    """
+
+    recording: Recording
+    time: Array
+    states: Array
+    start: InitialModel
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredTrial:
+    """A movement and the wrench measured with it.
+
+    Attributes:
+        wrench: (T, 6) N and N m about the ground origin; NaN: not known. floating: whether the body is fixed nowhere.
+    """
+
+    movement: Movement
+    wrench: Array
+    floating: bool = False
+
+    @property
+    def reference(self) -> Array:
+        """(3,) m: errors are weighed and judged about this point. A floating body's is its mean centre of pressure: an
+        origin that is far from the person would turn an error of a force into one of a moment."""
+        return mean_centre_of_pressure(self.wrench) if self.floating else np.zeros(3)
+
+    def part(self, frames: slice) -> MeasuredTrial:
+        """Some of its frames."""
+        kept = replace(self.movement, time=self.movement.time[frames], states=self.movement.states[frames])
+        return MeasuredTrial(kept, self.wrench[frames], self.floating)
+
+
+@dataclass(frozen=True, eq=False)
+class Common:
+    """The model as measured on the subject's first trial, which all trials share.
+
+    Attributes:
+        estimator: how trials are filtered. initial: as measured. static: the standing trial, or the first one.
+        core: with lengths and inertia among its states.
+    """
+
+    estimator: Estimator
+    initial: InitialModel
+    static: Recording
+    core: _core.Model
+
+    @classmethod
+    def measure(cls, estimator: Estimator, first: Recording, static: Recording | None = None) -> Common:
+        """Measure the model on the markers of the first trial; only a standing trial's plates may tell the mass.
+
+        Args:
+            estimator: model and noise; preset default or another one that has a smoother.
+
+        Raises:
+            ModelError, RecordingError: as `Estimator.start`.
+        """
+        weighed = static is not None and bool(static.plates)
+        if estimator.model.subject.mass_kg is None and not weighed and not _brings_mass(estimator):
+            raise ModelError(
+                "identification: the body mass is not known; expected it (--mass), or a standing trial with plates "
+                "(--static): the plates of a trial that is left out and foretold must not tell it"
+            )
+        initial = estimator.start(replace(first, plates=()), static=static)
+        return cls(estimator, initial, static or first, _core.Model(initial.spec))
+
+    @property
+    def rows(self) -> npt.NDArray[np.intp]:
+        """Components of the wrench that the model predicts: fx, fy, mz in the plane, all six in space."""
+        return np.flatnonzero(self.initial.spec.wrench_measured)
+
+    @property
+    def floating(self) -> bool:
+        """Whether the body is fixed nowhere."""
+        return bool(self.initial.feet)
+
+    def columns(self, block: str) -> slice:
+        """Where a block stands in a state of ``core``."""
+        offset, size = self.core.layout.blocks[block]
+        return slice(offset, offset + size)
+
+    def see(
+        self, recording: Recording, ground: GroundFrame | None = None, progress: Progress | None = None
+    ) -> Movement:
+        """Smoothed kinematics from the markers alone, lengths and inertia held at the start. Plates are not looked at.
+
+        Without plates the smoother's accelerations carry 12 N of noise above 6 Hz, so the coordinates are low-passed.
+
+        Args:
+            ground: directions of the laboratory where the trial is a part of another.
+
+        Raises:
+            ModelError, RecordingError: the trial does not fit. DivergenceError: from the filter.
+        """
+        recording = replace(recording, plates=())
+        start = self._start(recording, ground)
+        markers = marker_paths(recording, self.initial, start.ground)
+        other = self.estimator.again()
+        coordinates = {c.name: float(c.value) for c in start.spec.coordinates}
+        frozen = freeze(self.initial, initial_values(self.initial), coordinates)
+        other.start_from(frozen)
+        arrays = other.run_smoothed_arrays(
+            recording.time, markers, np.full((recording.n_frames, 6), np.nan), progress
+        )  # fmt: skip
+        every = max(1, round(1.0 / (RATE_HZ * float(np.median(np.diff(recording.time))))))
+        states = np.tile(self.initial.x0, (recording.n_frames, 1))
+        columns = [self.columns(block) for block in ("coordinates", "speeds", "accelerations")]
+        quiet = smooth(recording.time, arrays["state"][:, columns[0]], CUTOFF_HZ)
+        for at, values in zip(columns, (quiet.values, quiet.rates, quiet.seconds), strict=True):
+            states[:, at] = values
+        return Movement(recording, recording.time[::every], states[::every], start)
+
+    def with_plates(self, movement: Movement, recording: Recording, *, as_measured: bool = False) -> MeasuredTrial:
+        """The movement with the plates of its recording.
+
+        Args:
+            as_measured: without the low-pass that the kinematics have: for judging.
+
+        Raises:
+            RecordingError: it has none, or they are refused.
+        """
+        wrench = self._known_wrench(recording, movement.start)
+        if not as_measured:
+            first_of_second = movement.time[middle_of(len(movement.time))]
+            wrench = _low_passed(recording.time, wrench, int(np.searchsorted(recording.time, first_of_second - 1e-9)))
+        every = np.searchsorted(recording.time, movement.time - 1e-9)
+        return MeasuredTrial(movement, wrench[every], self.floating)
+
+    def check(self, recording: Recording) -> None:
+        """Whether a trial can be identified on: before anything that takes long.
+
+        Raises:
+            ModelError, RecordingError: its markers do not fit, it has no plates, they are refused, or they carry
+                somebody of another mass.
+        """
+        where = recording.path or recording.name
+        if not recording.plates:
+            raise RecordingError(f"{where}: no force plates, expected at least one; give its ground forces (--forces)")
+        push = self._known_wrench(recording, self._start(replace(recording, plates=()), None))[:, 1]
+        if not np.isfinite(push).any():
+            raise RecordingError(f"{where}: in no frame do the plates tell the whole wrench, expected a second of them")
+        load, weighed = float(np.nanmean(push)) / GRAVITY_M_S2, self.initial.weighed_kg
+        if abs(load - weighed) > LOAD_APART * weighed:
+            raise RecordingError(
+                f"{where}: its plates carry {load:.1f} kg on average, the subject weighs {weighed:.1f} kg (expected "
+                f"within {100.0 * LOAD_APART:.0f} %): another person, other plates, or a foot beside them"
+            )
+
+    def measured(self, recording: Recording, progress: Progress | None = None) -> MeasuredTrial:
+        """A trial to identify on."""
+        return self.with_plates(self.see(recording, progress=progress), recording)
+
+    def _known_wrench(self, recording: Recording, start: InitialModel) -> Array:
+        """(T, 6) about the ground origin, NaN where the plates do not tell all of it."""
+        wrench = measured_wrench(recording, start)
+        check = check_plates(recording, start.ground, None if self.floating else self.initial.weighed_kg)
+        if check.refusal:
+            raise RecordingError(f"{recording.path or recording.name}: {check.refusal}")
+        if self.floating:
+            leave_out_unknown(foot_loads(recording, start.ground, assigned=self.estimator.plates), wrench)
+        return wrench
+
+    def _start(self, recording: Recording, ground: GroundFrame | None) -> InitialModel:
+        estimator, initial = self.estimator, self.initial
+        known = {"mass_kg": initial.mass_kg, "height_m": initial.height_m}
+        definition = replace(estimator.model, subject=estimator.model.subject.model_copy(update=known))
+        return initialise(
+            definition,
+            recording,
+            ground,
+            static=self.static,
+            side=initial.side,
+            vertical=initial.ground.vertical,
+            forward=estimator.forward,
+            priors=estimator.priors,
+            bounds=estimator.bounds,
+        )
+
+
+def middle_of(count: int) -> int:
+    """Where a trial of ``count`` kept frames is halved."""
+    return count // 2
+
+
+def mean_centre_of_pressure(wrench: Array) -> Array:
+    """(3,) m on the ground, of a wrench (T, 6) about its origin; the origin where no frame is known."""
+    known = wrench[np.isfinite(wrench).all(axis=1)]
+    if not len(known) or known[:, 1].mean() < LOADED_N:
+        return np.zeros(3)
+    force = known.mean(axis=0)
+    return np.asarray(np.array([force[5], 0.0, -force[3]]) / force[1])
+
+
+def about(wrench: Array, point: Array) -> Array:
+    """Wrenches (..., 6) about the ground origin, their moments about ``point`` instead."""
+    return np.concatenate([wrench[..., :3], wrench[..., 3:] - np.cross(point, wrench[..., :3])], axis=-1)
+
+
+def _low_passed(time: Array, wrench: Array, middle: int) -> Array:
+    """Like the kinematics; each half on its own, for one half may have to foretell the other. What is unknown stays
+    unknown."""
+    halves = [smooth(time[part], wrench[part], CUTOFF_HZ).values for part in (slice(middle), slice(middle, None))]
+    return np.where(np.isfinite(wrench), np.concatenate(halves), np.nan)
+
+
+def _brings_mass(estimator: Estimator) -> bool:
+    return isinstance(estimator.model, OpenSimDefinition)
+
+
+def measure_all(
+    common: Common, recordings: Sequence[Recording], progress: Progress | None = None
+) -> list[MeasuredTrial]:
+    """All trials to identify on; ``progress`` counts frames.
+
+    Raises:
+        ModelError, RecordingError: as `Common.check`, before anything that takes long.
+        DivergenceError: from the filter.
+    """
+    for recording in recordings:
+        common.check(recording)
+    found, total, before = [], sum(recording.n_frames for recording in recordings), 0
+    for recording in recordings:
+
+        def advance(done: int, of: int, before: int = before, frames: int = recording.n_frames) -> None:
+            if progress is not None:
+                progress(before + round(frames * done / max(of, 1)), total)
+
+        found.append(common.measured(recording, advance))
+        before += recording.n_frames
+    return found

@@ -1,0 +1,144 @@
+"""A subject's identified parameters: the file that `dynakin identify` writes and `dynakin run --parameters` reads."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import tomli_w
+from pydantic import Field, model_validator
+
+from dynakin import _core
+from dynakin.errors import ModelError
+from dynakin.model.inertia import INERTIA_NAMES
+from dynakin.model.initial import InitialModel, Together
+from dynakin.model.validation import Strict, read_toml, validate
+
+_WIDE = 3.0  # standard deviations that bounds leave on both sides
+_MASS_APART = 0.05
+_TOTAL_SD_KG = 0.5  # of the total mass, whose sum the batch holds exactly: a filter's covariance must not be singular
+
+
+class Batch(Strict):
+    """The batch estimate of the inertial parameters (SI, by their names in the state), whether it is used or not: two
+    sessions are compared by it. Base parameters are K values."""
+
+    names: tuple[str, ...]
+    values: tuple[float, ...]
+    covariance: tuple[tuple[float, ...], ...]
+    prior_covariance: tuple[tuple[float, ...], ...]
+    base_names: tuple[str, ...]
+    base_words: tuple[str, ...]
+    K: tuple[tuple[float, ...], ...]
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Batch:
+        count, rank = len(self.names), len(self.base_names)
+        rows = {"covariance": count, "prior_covariance": count, "K": rank}
+        if len(self.values) != count:
+            raise ValueError(f"{len(self.values)} values for {count} names")
+        for key, expected in rows.items():
+            matrix = getattr(self, key)
+            if len(matrix) != expected or any(len(row) != count for row in matrix):
+                raise ValueError(f"{key} is no matrix of {expected} rows and {count} columns")
+        if len(self.base_words) != rank:
+            raise ValueError(f"{len(self.base_words)} base_words for {rank} base_names")
+        numbers = (self.values, *self.covariance, *self.prior_covariance, *self.K)
+        if not all(np.isfinite(row).all() for row in numbers):
+            raise ValueError("a number is not finite")
+        return self
+
+
+class IdentifiedSubject(Strict):
+    """What was identified of one subject; ``use`` says whether cross-validation lets ``batch`` replace the table."""
+
+    schema_version: Literal[1] = 1
+    model: str
+    mass_kg: float = Field(gt=0.0)
+    use: Literal["table", "bodies"]
+    trials: tuple[str, ...]
+    report: tuple[str, ...] = ()
+    batch: Batch
+
+    def write(self, path: Path) -> None:
+        """As TOML.
+
+        Raises:
+            ModelError: the file cannot be written.
+        """
+        beside = path.with_name(f".{path.name}.{os.getpid()}")  # so that a file is whole, or the one before
+        try:
+            beside.write_text(tomli_w.dumps(self.model_dump(mode="json")), encoding="utf-8")
+            beside.replace(path)
+        except OSError as error:
+            beside.unlink(missing_ok=True)
+            raise ModelError(f"{path}: cannot be written ({error.strerror})") from None
+
+
+def read_identified(path: Path) -> IdentifiedSubject:
+    """The subject of a file.
+
+    Raises:
+        ModelError: it cannot be read, or holds something else; the key is named.
+    """
+    return validate(IdentifiedSubject, read_toml(path), str(path))
+
+
+def with_identified(initial: InitialModel, subject: IdentifiedSubject) -> InitialModel:
+    """The same model with the subject's inertia, and its covariance, where the filter starts; bounds are moved where
+    they would cut it off. A subject whose table is kept changes nothing.
+
+    Raises:
+        ModelError: another model, or a body mass that is more than 5 % apart.
+    """
+    if subject.model != initial.spec.name:
+        raise ModelError(f"identified parameters: they are of model {subject.model}, expected {initial.spec.name}")
+    if abs(subject.mass_kg - initial.mass_kg) > _MASS_APART * initial.mass_kg:
+        raise ModelError(
+            f"identified parameters: of somebody of {subject.mass_kg:.1f} kg, expected {initial.mass_kg:.1f} kg within "
+            f"{100.0 * _MASS_APART:.0f} %; identify again, or give the mass"
+        )
+    strange = [name for name in subject.batch.names if name not in initial.names]
+    if strange:
+        raise ModelError(
+            f"identified parameters: {strange[0]} (and {len(strange) - 1} more) is not estimated by model "
+            f"{initial.spec.name}, expected parameters of this model: identify again"
+        )
+    if subject.use == "table":
+        message = "Identified parameters: the table is kept, which predicts as well."
+        return replace(initial, messages=(*initial.messages, message))
+    scale = initial.mass_kg / subject.mass_kg  # the same body, weighed anew
+    values = scale * np.array(subject.batch.values)
+    covariance = scale**2 * np.array(subject.batch.covariance)
+    covariance += (_TOTAL_SD_KG / initial.mass_kg) ** 2 * np.outer(values, values)  # all of it, a little
+    known = dict(zip(subject.batch.names, zip(values, np.sqrt(np.diag(covariance)), strict=True), strict=True))
+    x0, sd0, lower, upper = (v.copy() for v in (initial.x0, initial.sd0, initial.lower, initial.upper))
+    for k, name in enumerate(initial.names):
+        if name in known:
+            x0[k], sd0[k] = known[name]
+            lower[k] = min(lower[k], x0[k] - _WIDE * sd0[k])
+            upper[k] = max(upper[k], x0[k] + _WIDE * sd0[k])
+    spec = _core.Model(initial.spec).spec  # a copy; what is not estimated is held there
+    segments = spec.segments
+    for segment in segments:
+        segment.inertia = np.array(
+            [
+                known.get(f"inertia/{segment.name}/{name}", (float(value),))[0]
+                for name, value in zip(INERTIA_NAMES, segment.inertia, strict=True)
+            ]
+        )
+    spec.segments = segments
+    message = f"Identified inertial parameters are used, from {', '.join(subject.trials)}."
+    return replace(
+        initial,
+        spec=spec,
+        x0=x0,
+        sd0=sd0,
+        lower=lower,
+        upper=upper,
+        together=Together(subject.batch.names, covariance),
+        messages=(*initial.messages, message),
+    )

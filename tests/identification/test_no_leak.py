@@ -1,0 +1,77 @@
+"""A judging trial's plates are read by the metric alone: other plates, the same prediction to the last bit."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dynakin.errors import ModelError
+from dynakin.identification import Common, MeasuredTrial, foretell, measure_all, rms_of
+from dynakin.identification.decision import parts_of
+from dynakin.recordings import Recording
+from identification.conftest import Case, estimator
+
+
+def other_plates(recording: Recording, frames: slice) -> Recording:
+    """The same markers on plates that say something else, and in places nothing, in these frames."""
+    rng = np.random.default_rng(1)
+    plates = []
+    for plate in recording.plates:
+        force, moment = plate.force.copy(), plate.moment.copy()
+        force[frames] += rng.normal(0.0, 30.0, force[frames].shape)
+        moment[frames] *= -1.0
+        force[frames][::7] = np.nan
+        moment[frames][::7] = np.nan
+        plates.append(replace(plate, force=force, moment=moment))
+    return recording.with_plates(tuple(plates))
+
+
+def foretold(case: Case, recordings: list[Recording]) -> tuple[list[MeasuredTrial], list[np.ndarray]]:
+    """Parts and what the others say of each, from the recordings on: model, kinematics, plates, estimate."""
+    common = Common.measure(estimator(), recordings[0], case.common.static)
+    parts = parts_of(measure_all(common, recordings))
+    return parts, [
+        foretell(common, [p for j, p in enumerate(parts) if j != k], part.movement)["bodies"]
+        for k, part in enumerate(parts)
+    ]
+
+
+@pytest.mark.parametrize("judging", [0, 1, 2, 3])
+def test_a_half_is_foretold_without_its_plates(case: Case, judging: int) -> None:
+    recordings = [sim.recording for sim in case.sims]
+    parts, before = foretold(case, recordings)
+    start = parts[judging].movement.time[0]
+    end = parts[judging].movement.time[-1]
+    trial = judging // 2
+    time = recordings[trial].time
+    first = int(np.searchsorted(time, start - 1e-9))
+    last = len(time) if judging % 2 else int(np.searchsorted(time, end + 1e-9))
+    recordings[trial] = other_plates(recordings[trial], slice(first, last))
+    changed, after = foretold(case, recordings)
+    np.testing.assert_array_equal(after[judging], before[judging])
+    assert any(not np.array_equal(after[k], before[k]) for k in range(4) if k != judging)
+    assert not np.array_equal(
+        rms_of(case.common, changed[judging], after[judging]), rms_of(case.common, parts[judging], before[judging])
+    )
+
+
+def test_a_trial_is_foretold_without_its_plates(case: Case) -> None:
+    common, trials = case.common, list(case.trials)
+    judged = replace(trials[1], wrench=np.full_like(trials[1].wrench, np.nan))
+    before = foretell(common, [trials[0]], trials[1].movement)
+    after = foretell(common, [trials[0]], judged.movement)
+    for use in before:
+        np.testing.assert_array_equal(before[use], after[use])
+    assert not trials[1].movement.recording.plates
+    assert np.isnan(rms_of(common, judged, after["bodies"])).all()
+
+
+def test_plates_of_a_judged_trial_do_not_tell_the_mass(case: Case) -> None:
+    unweighed = estimator()
+    unweighed.model = replace(unweighed.model, subject=unweighed.model.subject.model_copy(update={"mass_kg": None}))
+    with pytest.raises(ModelError, match="body mass is not known; expected it"):
+        Common.measure(unweighed, case.sims[0].recording)
+    common = Common.measure(unweighed, case.sims[0].recording, case.common.static)
+    assert common.initial.mass_kg == pytest.approx(70.0, rel=0.02)

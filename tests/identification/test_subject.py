@@ -1,0 +1,147 @@
+"""From trials to a subject file and back into the filter."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dynakin.cli import main
+from dynakin.errors import ModelError
+from dynakin.filter.extend import initial_covariance
+from dynakin.identification import Decision, Identified, change_between, change_in_words
+from dynakin.identification.decision import parts_of
+from dynakin.model.identified import read_identified, with_identified
+from identification.conftest import Case, estimator
+
+
+def test_a_subject_is_possible_weighs_the_same_and_survives_its_file(identified: Identified, tmp_path: Path) -> None:
+    subject = identified.subject
+    m, mx, my, izz = np.array(subject.batch.values).reshape(-1, 4).T
+    assert (m > 0.0).all() and (m * izz > mx**2 + my**2).all()
+    assert m.sum() == pytest.approx(70.0, rel=1e-9)
+    subject.write(tmp_path / "subject.toml")
+    assert read_identified(tmp_path / "subject.toml") == subject
+
+
+def test_the_table_is_kept_where_bodies_do_not_predict_better(identified: Identified) -> None:
+    ratios = identified.decision.ratios("bodies")
+    assert (identified.decision.use == "bodies") == bool(ratios.mean() <= 0.97 and ratios.max() <= 1.10)
+    rms = {"table": np.ones((2, 3)), "bodies": np.full((2, 3), 1.01)}
+    said = Decision("table", ("a", "b"), rms).in_words()  # type: ignore[arg-type]
+    assert said[-1].startswith("The table is kept: held-out gain -1 %")
+
+
+def test_the_filter_starts_from_an_identified_subject(identified: Identified, case: Case) -> None:
+    subject = identified.subject.model_copy(update={"use": "bodies"})
+    plain, other = estimator(), estimator()
+    other.parameters = subject
+    before, after = (e.start(case.sims[0].recording, static=case.common.static) for e in (plain, other))
+    at = [after.names.index(name) for name in subject.batch.names]
+    np.testing.assert_allclose(after.x0[at], subject.batch.values, rtol=1e-9)
+    P = initial_covariance(after, other.noise)
+    assert np.linalg.eigvalsh(P / np.sqrt(np.outer(np.diag(P), np.diag(P)))).min() > 0.0
+    masses = [after.names.index(n) for n in subject.batch.names if n.endswith("mass")]
+    assert np.sqrt(P[np.ix_(masses, masses)].sum()) < 0.5
+    assert (after.lower <= after.x0).all() and (after.x0 <= after.upper).all()
+    kept = with_identified(before, identified.subject.model_copy(update={"use": "table"}))
+    np.testing.assert_array_equal(kept.x0, before.x0)
+
+
+def test_another_model_or_another_person_is_refused(identified: Identified, case: Case) -> None:
+    start = case.common.initial
+    with pytest.raises(ModelError, match="of model squat7, expected sagittal7"):
+        with_identified(start, identified.subject.model_copy(update={"model": "squat7"}))
+    with pytest.raises(ModelError, match=r"of somebody of 60\.0 kg, expected 70\.0 kg"):
+        with_identified(start, identified.subject.model_copy(update={"mass_kg": 60.0}))
+
+
+def test_few_trials_are_halved_and_many_are_not(case: Case) -> None:
+    assert len(parts_of(case.trials)) == 4
+    assert len(parts_of([*case.trials, case.trials[0]])) == 3
+
+
+def test_change_between_two_sessions(identified: Identified) -> None:
+    before = identified.subject
+    assert not any(change.clear for change in change_between(before, before))
+    values = np.array(before.batch.values)
+    values[before.batch.names.index("inertia/trunk/my")] += 5.0
+    batch = before.batch.model_copy(update={"values": tuple(values.tolist())})
+    changes = change_between(before, before.model_copy(update={"batch": batch}))
+    assert changes[0].clear and changes[0].difference == pytest.approx(5.0, rel=1e-6)
+    assert "trunk first moment" in " ".join(change_in_words(changes, (70.0, 70.0)))
+
+
+OPTIONS = ["--model", "sagittal7", "--markers", "opencap", "--mass", "70", "--sex", "male"]
+
+
+@pytest.fixture(scope="module")
+def files(case: Case, tmp_path_factory: pytest.TempPathFactory) -> list[str]:
+    """Markers of two trials, their forces beside them."""
+    root = tmp_path_factory.mktemp("trials")
+    return [str(next(sim.save(root / sim.recording.name).glob("*.trc"))) for sim in case.sims]
+
+
+def test_command_line(files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    file = tmp_path / "subject.toml"
+    assert main(["identify", *files, *OPTIONS, "-o", str(file)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    for words in ("held-out gain", "70.00 kg in all", "base parameters", "simulated_squat_3/markers, first half"):
+        assert words in said
+    assert [path.name for path in tmp_path.iterdir()] == ["subject.toml"]
+    assert main(["identify", "--compare", str(file), str(file)]) == 0
+    assert "None of 22 base parameters changed" in " ".join(capsys.readouterr().out.split())
+    out = tmp_path / "out"
+    assert main(["run", files[0], "--forces", files[0].replace("markers.trc", "forces.mot"), *OPTIONS,
+                 "--parameters", str(file), "-o", str(out)]) == 0  # fmt: skip
+    assert 'use = "' in file.read_text() and (out / "config.toml").is_file()
+
+
+def test_what_is_wrong_with_the_input_is_one_line_and_nothing_is_written(
+    files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file = tmp_path / "subject.toml"
+    alone = tmp_path / "alone.trc"
+    alone.write_bytes(Path(files[1]).read_bytes())
+    heavier = [*OPTIONS[:4], "--mass", "75", *OPTIONS[6:]]
+    no_mass = [*OPTIONS[:4], *OPTIONS[6:]]
+    cases = {
+        "expected at least two of the same subject": [files[0], *OPTIONS],
+        "is given twice": [files[0], files[0], *OPTIONS],
+        "no force plates": [files[0], str(alone), *OPTIONS],
+        "the subject weighs 75.0 kg (expected within 4 %)": [*files, *heavier],
+        "the body mass is not known": [*files, *no_mass],
+        "nowhere.trc": [files[0], str(tmp_path / "nowhere.trc"), *OPTIONS],
+        "1 force files for 2 trials": [*files, "--forces", "a.mot", *OPTIONS],
+        "expected TRIAL": [*files],
+    }
+    for expected, arguments in cases.items():
+        assert main(["identify", *arguments, "-o", str(file)]) == 2, expected
+        captured = capsys.readouterr()
+        assert expected in captured.err and captured.err.count("\n") == 1
+        assert not captured.out and not file.exists()
+    assert main(["identify", *files, *OPTIONS, "-o", str(tmp_path / "no" / "subject.toml")]) == 2
+    assert "in a folder that exists" in capsys.readouterr().err
+
+
+def test_a_file_that_does_not_fit_is_refused(
+    identified: Identified, files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    batch = identified.subject.batch
+    names = ("inertia/tail/mass", *batch.names[1:])
+    identified.subject.model_copy(update={"batch": batch.model_copy(update={"names": names})}).write(
+        tmp_path / "tail.toml"
+    )
+    with pytest.raises(ModelError, match="inertia/tail/mass"):
+        with_identified(identified.common.initial, read_identified(tmp_path / "tail.toml"))
+    short = batch.model_copy(update={"values": batch.values[1:]})
+    identified.subject.model_copy(update={"batch": short}).write(tmp_path / "short.toml")
+    with pytest.raises(ModelError, match="27 values for 28 names"):
+        read_identified(tmp_path / "short.toml")
+    identified.subject.write(tmp_path / "subject.toml")
+    other = ["--model", "fullbody", *OPTIONS[2:], "--parameters", str(tmp_path / "subject.toml")]
+    forces = files[0].replace("markers.trc", "forces.mot")
+    assert main(["run", files[0], "--forces", forces, *other, "-o", str(tmp_path / "out")]) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert not (tmp_path / "out").exists()
