@@ -14,6 +14,7 @@ from dynakin.cli.check import check
 from dynakin.cli.compare import compare
 from dynakin.cli.console import print_error
 from dynakin.cli.demo import demo
+from dynakin.cli.live import live
 from dynakin.cli.model import model
 from dynakin.cli.print_config import print_config
 from dynakin.cli.run import run
@@ -31,7 +32,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (run, demo, compare, simulate, check, model):
+for command in (run, live, demo, compare, simulate, check, model):
     app.command()(command)
 app.command("print-config")(print_config)
 

@@ -1,0 +1,138 @@
+"""A session from a replayed recording to published estimates."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import dynakin
+from dynakin.errors import ModelError, StreamError
+from dynakin.recordings import Recording
+from dynakin.simulation import simulate_squat
+from dynakin.stream import Callback, Live, LiveFrame, Packet, Replay, Streams
+
+
+@pytest.fixture(scope="module")
+def squat() -> Recording:
+    return simulate_squat(seed=1, duration_s=8.0).recording
+
+
+def estimator(lag: int = 0) -> dynakin.Estimator:
+    subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
+    return dynakin.Estimator(dynakin.load_model("sagittal7", subject=subject, markers="opencap"), lag=lag)
+
+
+def run(source: object, lag: int = 0, **options: object) -> tuple[list[LiveFrame], list[str], Live]:
+    frames: list[LiveFrame] = []
+    said: list[str] = []
+    live = Live(estimator(lag), [source], [Callback(frames.append)], say=said.append, **options)  # type: ignore[list-item,arg-type]
+    live.run()
+    return frames, said, live
+
+
+def test_live_equals_offline_on_the_same_samples(squat: Recording) -> None:
+    frames, said, _ = run(Replay(squat, speed=0.0))
+    assert "Ready: move." in said and any(text.startswith("Stand still") for text in said)
+    first = frames[0].estimate.time_s
+    offline = estimator()
+    initial = offline.start(squat.window(first - 2.01 - 1e-6, first - 0.005))
+    begin = int(np.searchsorted(squat.time, first - 1e-6))
+    assert len(frames) == squat.n_frames - begin  # no frame is lost
+    time_, markers = (
+        squat.time[begin:],
+        initial.ground.points_to_ground(
+            np.stack([squat.marker(name)[begin:] for name in initial.recorded_markers], axis=1)
+        ),
+    )
+    wrench = initial.ground.wrench_to_ground(squat.total_wrench())[begin:]
+    arrays = offline.run_arrays(time_, markers, wrench)
+    np.testing.assert_allclose(np.stack([f.state for f in frames]), arrays["state"], atol=1e-9)
+
+
+def test_a_lag_is_shown_as_its_delay(squat: Recording) -> None:
+    frames, _, _ = run(Replay(squat, speed=0.0, duration_s=4.0), lag=20)
+    last = frames[-1]
+    assert last.smoothed is not None
+    assert last.status.delay_s == pytest.approx(0.2, abs=1e-6) == last.estimate.time_s - last.smoothed.time_s
+
+
+def test_wrong_labels_list_what_came_and_what_was_expected(squat: Recording) -> None:
+    strange = replace(squat, marker_names=tuple(f"ball{k}" for k in range(len(squat.marker_names))))
+    with pytest.raises(ModelError, match=r"0 of \d+ found; came: ball0, ball1.*expected those of opencap: "):
+        run(Replay(strange, speed=0.0))
+
+
+def test_half_of_the_markers_gone_for_three_seconds(squat: Recording) -> None:
+    markers = squat.markers.copy()
+    gone = (squat.time > 3.0) & (squat.time < 6.0)
+    markers[np.ix_(gone, range(0, markers.shape[1], 2))] = np.nan
+    whole, _, _ = run(Replay(squat, speed=0.0))
+    frames, _, _ = run(Replay(replace(squat, markers=markers), speed=0.0))
+    assert len(frames) == len(whole) and frames[200].status.missing
+    last = np.rad2deg(frames[-1].estimate.coordinates - whole[-1].estimate.coordinates)
+    assert np.abs(last).max() < 3.0  # once they are back; in between a segment without markers is only guessed
+    assert all(np.isfinite(f.estimate.coordinates).all() for f in frames)
+
+
+class Breaking:
+    """A replay whose connection breaks once, for half a second, and that then begins at time 0 again."""
+
+    def __init__(self, recording: Recording, at_s: float) -> None:
+        self.replay, self.at_s, self.broken = Replay(recording, speed=1.0), at_s, 0.0
+
+    def open(self, timeout_s: float) -> Streams:
+        if self.broken and time.monotonic() - self.broken < 0.6:
+            raise StreamError("nobody answers")
+        return self.replay.open(timeout_s)
+
+    def read(self, timeout_s: float) -> list[Packet] | None:
+        packets = self.replay.read(timeout_s)
+        if not self.broken and packets and float(np.max(packets[-1].time_s)) > self.at_s:
+            self.broken = time.monotonic()
+            raise StreamError("connection reset")
+        return packets
+
+    def close(self) -> None:
+        self.replay.close()
+
+
+def test_a_source_that_is_killed_and_comes_back(squat: Recording) -> None:
+    frames, said, live = run(Breaking(squat.window(0.0, 4.0), at_s=3.0))
+    words = " ".join(said)
+    assert "is lost (connection reset)" in words and "The source is back." in words and "set back" in words
+    times = np.array([f.estimate.time_s for f in frames])
+    assert (np.diff(times) > 0).all() and times[-1] > 6.0 and live.fusion.clock_restarts == 1
+    assert frames[-1].status.tracking in ("following", "found", "restarted")
+
+
+def test_restart_and_recalibrate_without_stopping(squat: Recording) -> None:
+    frames: list[LiveFrame] = []
+    said: list[str] = []
+    live = Live(estimator(), [Replay(squat, speed=0.0)], [], say=said.append, standing_wait_s=2.0)
+
+    def on_frame(frame: LiveFrame) -> None:
+        frames.append(frame)
+        if len(frames) == 100:
+            live.restart()
+        if len(frames) == 200:
+            live.recalibrate()
+
+    live.sinks.append(Callback(on_frame))
+    live.run()
+    assert "The estimate begins anew." in said
+    assert said.count("Ready: move.") == 2 and len(frames) > 300
+
+
+def test_constants_go_on_from_an_earlier_session(squat: Recording) -> None:
+    frames, _, live = run(Replay(squat, speed=0.0, duration_s=4.0))
+    initial = live.estimator.initial
+    assert initial is not None
+    known = {name: (float(frames[-1].state[k]), 0.001) for k, name in enumerate(initial.names)}
+    again, said, other = run(Replay(squat, speed=0.0, duration_s=4.0), known=known)
+    assert any("go on from" in text for text in said) and other.estimator.initial is not None
+    k = initial.names.index(next(name for name in initial.names if name.startswith("length/")))
+    assert other.estimator.initial.x0[k] == pytest.approx(frames[-1].state[k])
+    assert len(again) == len(frames)
