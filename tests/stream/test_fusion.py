@@ -8,6 +8,7 @@ import pytest
 from dynakin.errors import StreamError
 from dynakin.recordings import resample
 from dynakin.stream import Fusion, MarkerPacket, PlatePacket, StreamInfo
+
 from .made import MARKERS, PLATES, block, frame, play, times
 
 

@@ -11,15 +11,13 @@ from dynakin.cli.console import busy, out
 from dynakin.cli.options import Estimated, Height, Markers, Mass, Preset, Sex, Side, TableName
 from dynakin.cli.run import estimated, forward_direction
 from dynakin.cli.summary import print_summary
-from dynakin.config import make_config
 from dynakin.errors import ConfigError
-from dynakin.filter import Estimator
-from dynakin.model import load_model
 from dynakin.recordings import read
 from dynakin.recordings.read import FORCE_READERS
 from dynakin.stream import SINKS, SOURCES, Live, Sink, plugin
 from dynakin.stream.fusion import DELAY_S
 from dynakin.stream.recorder import Recorder, finish
+from dynakin.stream.settings import estimator_of
 from dynakin.stream.start import read_known
 
 _REPLAY_STANDING_S, _LIVE_STANDING_S = 3.0, 20.0
@@ -112,27 +110,6 @@ def live(
         out().print(f"Recorded in {record}; results from it: dynakin live --finish {record} -o OUT", soft_wrap=True)
 
 
-def estimator_of(settings: dict[str, Any], lag: int = 0) -> Estimator:
-    """An estimator from the keys of a configuration (`dynakin.config`) that don't name files.
-
-    Raises:
-        DynakinError: a key or value that is wrong.
-    """
-    config = make_config(settings | {"trial": Path("live"), "output": Path("live")}, "live")
-    return Estimator(
-        load_model(config.model, config.subject(), markers=config.markers, table=config.table),
-        config.noise_settings(),
-        priors=config.priors,
-        bounds=config.bounds,
-        side=config.side,
-        vertical=config.vertical,
-        forward=config.forward,
-        estimate=config.estimate,
-        plates=config.plates,
-        lag=lag,
-    )
-
-
 def _sources(source: str, forces: str | None) -> list[Any]:
     if forces is None:
         return [plugin(SOURCES, source)]
@@ -155,6 +132,8 @@ def _sinks(
         try:
             from dynakin.stream.viewer import Viewer
         except ImportError as error:
-            raise ConfigError(f"--view needs a package that is not here ({error}); pip install 'dynakin[live]'") from None
+            raise ConfigError(
+                f"--view needs a package that is not here ({error}); pip install 'dynakin[live]'"
+            ) from None
         sinks.append(Viewer(host, port))
     return sinks
