@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -96,6 +97,7 @@ def live(
             standing_wait_s=wait if standing_wait is None else standing_wait,
             static=None if static is None else read(static),
             known=None if parameters is None else read_known(parameters),
+            record=lambda: Recorder(Path(f"live-{datetime.now():%Y%m%d-%H%M%S}"), settings),
             say=lambda text: out().print(text, soft_wrap=True),
         )
     except BaseException:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from dynakin.errors import DivergenceError, ModelError, StreamError
+from dynakin.errors import DivergenceError, DynakinError, ModelError, StreamError
 from dynakin.filter import Estimator, Sample
 from dynakin.recordings import Recording
 from dynakin.stream.fusion import DELAY_S, Fused, Fusion
@@ -35,6 +35,7 @@ class Live:
         standing_wait_s: after so long without, the last ``standing_s`` are taken as they are.
         static, known: see `begin`.
         wait_s: how long to wait for the sources.
+        record: makes a recorder, for the viewer's button; pressed again it ends.
         say: called with each sentence for the user.
     """
 
@@ -50,12 +51,14 @@ class Live:
         static: Recording | None = None,
         known: Mapping[str, tuple[float, float]] | None = None,
         wait_s: float = 30.0,
+        record: Callable[[], Sink] | None = None,
         say: Callable[[str], None] = print,
     ) -> None:
         self.estimator, self.sinks = estimator, list(sinks)
         self.delay_s, self.standing_s, self.standing_wait_s = delay_s, standing_s, standing_wait_s
         self.static, self.known = static, known
-        self._say = say
+        self._say, self._record = say, record
+        self._recording: Sink | None = None
         self._reader = Reader(sources, wait_s)
         self._fusion: Fusion | None = None
         self._window: deque[Fused] = deque()
@@ -147,6 +150,25 @@ class Live:
         for wish in [wish for sink in self.sinks for wish in sink.asked()]:
             if wish in ("restart", "recalibrate", "stop"):
                 getattr(self, wish)()
+            elif wish == "record" and self._record is not None:
+                self._switch_recorder(self._record)
+
+    def _switch_recorder(self, record: Callable[[], Sink]) -> None:
+        """Begin to record, or end it."""
+        if self._recording is not None:
+            self.sinks.remove(self._recording)
+            self._recording.close()
+            self._recording = None
+            self.say("The recording has ended.")
+            return
+        try:
+            self._recording = record()
+        except DynakinError as error:
+            self.say(error.message)
+            return
+        self._recording.opened(self.fusion.markers, self.fusion.plates)
+        self.sinks.append(self._recording)
+        self.say("Recording.")
 
     def _take(self, now_s: float) -> None:
         for fused in self.fusion.poll(now_s):
