@@ -42,7 +42,7 @@ class Picture:
             "bones": [[parents[j], j] for j in range(len(segments)) if parents[j] >= 0],
             "ends": self._ends(segments, parents),
             "coordinates": [c.name for c in spec.coordinates],
-            "rotation": self._rotations(),
+            "rotation": rotations(spec),
             "locked": [c.locked for c in spec.coordinates],
             "constants": [self.initial.names[k] for k in self._constants],
             "begin": [float(self.initial.x0[k]) for k in self._constants],
@@ -86,12 +86,14 @@ class Picture:
                 found.append([joint, own[int(np.argmax(far))]])
         return found
 
-    def _rotations(self) -> list[bool]:
-        kinds: dict[str, set[str]] = {}
-        for segment in self.initial.spec.segments:
-            for axis in segment.axes:
-                kinds.setdefault(axis.coordinate, set()).add(axis.kind)
-        return [kinds.get(c.name) != {"translation"} for c in self.initial.spec.coordinates]
+
+def rotations(spec: _core.ModelSpec) -> list[bool]:
+    """Of each coordinate whether it turns: unless every axis that it moves is a translation."""
+    kinds: dict[str, set[str]] = {}
+    for segment in spec.segments:
+        for axis in segment.axes:
+            kinds.setdefault(axis.coordinate, set()).add(axis.kind)
+    return [kinds.get(c.name) != {"translation"} for c in spec.coordinates]
 
 
 BLOCKS = (

@@ -32,7 +32,6 @@ class Page:
         self.server = viser.ViserServer(host=host, port=port, label="dynakin live", verbose=False)
         self.server.scene.set_up_direction("+y")
         self.server.gui.configure_theme(show_logo=False, show_share_button=False)
-        self.server.gui.main_panel.dock_right()
         self.server.scene.add_grid("/floor", 4.0, 4.0, plane="xz", cell_size=0.25, section_size=1.0)
         self.server.initial_camera.position = (2.4, 1.5, 2.6)
         self.server.initial_camera.look_at = (0.0, 0.85, 0.0)
