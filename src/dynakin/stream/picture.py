@@ -31,8 +31,8 @@ class Picture:
         segments = [segment.name for segment in spec.segments]
         self._constants = [k for k, name in enumerate(self.initial.names) if name.split("/")[0] in _SHOWN]
         self._constants = [k for k in self._constants if self.initial.names[k].split("/")[-1] not in _SMALL]
-        sizes = (1, 3 * len(segments), 3 * len(spec.markers), 3 * len(spec.markers), 6 * (plates + 1))
-        sizes += (len(spec.coordinates),) * 3 + (len(self._constants),)
+        markers, axes = 3 * len(spec.markers), len(spec.coordinates)
+        sizes = (1, 3 * len(segments), markers, markers, 6 * (plates + 1), axes, axes, axes, len(self._constants))
         self.sizes = dict(zip(BLOCKS, sizes, strict=True))
         self._moment_sd = np.full(len(spec.coordinates), np.nan)
         parents = [segments.index(s.parent) if s.parent in segments else -1 for s in spec.segments]

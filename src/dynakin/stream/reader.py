@@ -63,7 +63,7 @@ class Reader:
         for thread in self._threads:
             thread.start()
         notes = tuple(note for streams in told for note in streams.notes)
-        return (markers or [None])[0], (plates or [None])[0], notes
+        return markers[0] if markers else None, plates[0] if plates else None, notes
 
     def get(self, timeout_s: float) -> Packet | Notice | None:
         """The next packet or notice, None where nothing came in time."""

@@ -11,6 +11,7 @@ import numpy as np
 from dynakin.errors import DivergenceError, DynakinError, ModelError, StreamError
 from dynakin.filter import Estimator, Sample
 from dynakin.recordings import Recording
+from dynakin.stream.feet import LiveFeet
 from dynakin.stream.fusion import DELAY_S, Fused, Fusion
 from dynakin.stream.monitor import Monitor
 from dynakin.stream.packets import Source
@@ -66,6 +67,7 @@ class Live:
         self._looked = self._asked = self._told_sd = -np.inf
         self._monitor: Monitor | None = None
         self._use_plates = True
+        self._feet: LiveFeet | None = None
         self._running = False
         self._labels_checked = False
         self._stopped = False
@@ -194,8 +196,9 @@ class Live:
             return
         plates = self.fusion.plates.names if self.fusion.plates else ()
         if not self._labels_checked:
-            seen = np.isfinite(np.stack([one.positions for one in self._window])).all(axis=2).any(axis=0)
-            self.say(check_labels(self.estimator.model, info.names, seen.tolist()))
+            positions = np.stack([one.positions for one in self._window])
+            seen = [bool(np.isfinite(positions[:, k]).all(axis=1).any()) for k in range(len(info.names))]
+            self.say(check_labels(self.estimator.model, info.names, seen))
             self._labels_checked = True
         recording = recording_of(list(self._window), info.names, plates)
         waited = t - self._standing_since > self.standing_wait_s
@@ -220,6 +223,10 @@ class Live:
         assert initial is not None
         plates = self.fusion.plates is not None
         self._monitor = Monitor(initial, self.fusion.markers.rate_hz, plates, plates and self._use_plates)
+        self._feet = None
+        if initial.feet and self.fusion.plates is not None:
+            names = self.fusion.plates.names
+            self._feet = LiveFeet(initial, self.estimator.noise, names, self.estimator.plates)
         self._running = True
         self._window.clear()
         started = Started(initial, model, self.fusion.markers.rate_hz)
@@ -239,6 +246,9 @@ class Live:
             return
         smoothed = self.estimator.delayed() if self.estimator.lag else None
         state = self.estimator.state
+        if self._feet is not None:
+            wrenches = fused.wrenches if self._use_plates else None
+            estimate = self._feet.moments(self.estimator.core_model, state, estimate, wrenches)
         deviations = None
         if not 0.0 <= sample.time_s - self._told_sd < _DEVIATIONS_S and self._reader.backlog < 4:
             self._told_sd = sample.time_s

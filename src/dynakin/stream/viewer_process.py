@@ -33,7 +33,7 @@ class Page:
         self.server.scene.set_up_direction("+y")
         self.server.gui.configure_theme(show_logo=False, show_share_button=False)
         self.server.scene.add_grid("/floor", 4.0, 4.0, plane="xz", cell_size=0.25, section_size=1.0)
-        self.server.initial_camera.position = (2.4, 1.5, 2.6)
+        self.server.initial_camera.position = (1.5, 1.2, 2.0)
         self.server.initial_camera.look_at = (0.0, 0.85, 0.0)
         gui = self.server.gui
         self.words = gui.add_markdown("**dynakin live**: waiting")
@@ -77,7 +77,8 @@ class Page:
         self.plots["angle"] = gui.add_uplot(
             (empty, none),
             (uplot.Series(label="s"), uplot.Series(label="angle, deg (m)", stroke="#2166ac", width=2)),
-            title="Angle, deg",
+            title="Angle, deg (m)",
+            legend=uplot.Legend(show=False),
             scales={"x": uplot.Scale(time=False)},
             aspect=2.2,
         )
@@ -90,7 +91,8 @@ class Page:
                 uplot.Series(label="+ 2 sd", stroke="#e3a3a9", width=1),
             ),
             bands=(uplot.Band(series=(3, 2), fill="rgba(178,24,43,0.15)"),),
-            title="Moment, N m, with two standard deviations",
+            title="Moment, N m (N), with two standard deviations",
+            legend=uplot.Legend(show=False),
             scales={"x": uplot.Scale(time=False)},
             aspect=2.2,
         )
@@ -101,6 +103,7 @@ class Page:
                 (empty, none),
                 (uplot.Series(label="s"), uplot.Series(label="m or kg", stroke="#4d7d3b", width=2)),
                 title="Constant, m or kg",
+                legend=uplot.Legend(show=False),
                 scales={"x": uplot.Scale(time=False)},
                 aspect=2.2,
             )
