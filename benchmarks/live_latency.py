@@ -57,7 +57,7 @@ def measure(name: str, seconds: float, view: bool) -> None:
     ms = 1e3 * np.array(latency[200:])  # the first second catches up with what came while the model was measured
     grown = (memory[-1] - memory[0]) / 1024 if len(memory) > 1 else float("nan")
     print(
-        f"{name:9s} {estimator.covariance.shape[0]:4d} states  view {'yes' if view else 'no ':3s}  {len(ms):6d} frames  "
+        f"{name:9s} {len(estimator.state):4d} states  view {'yes' if view else 'no ':3s}  {len(ms):6d} frames  "
         f"median {np.median(ms):6.2f} ms  p99 {np.percentile(ms, 99):7.2f} ms  max {ms.max():7.2f} ms  "
         f"lost {live.fusion.marker_counts.lost}  memory {grown:+.1f} MB  load {os.getloadavg()[0]:.1f}",
         flush=True,

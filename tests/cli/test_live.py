@@ -1,0 +1,52 @@
+"""`dynakin live` as a user calls it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from dynakin.cli import main
+from dynakin.recordings import Recording
+from dynakin.simulation import simulate_squat
+
+Said = pytest.CaptureFixture[str]
+PERSON = ["--model", "sagittal7", "--markers", "opencap", "--mass", "70", "--height", "1.75", "--sex", "male"]
+
+
+def written(folder: Path) -> Path:
+    """A recording as a file."""
+    recording: Recording = simulate_squat(seed=1, duration_s=5.0).recording
+    columns = ["time"] + [f"{name}_{axis}" for name in recording.marker_names for axis in "xyz"]
+    rows = [",".join(columns)]
+    for k, t in enumerate(recording.time):
+        rows.append(",".join([f"{t:.4f}", *(f"{value:.6f}" for value in recording.markers[k].ravel())]))
+    path = folder / "squat.csv"
+    path.write_text("\n".join(rows).replace("nan", "") + "\n")
+    return path
+
+
+def test_live_estimates_records_and_finishes(tmp_path: Path, capsys: Said) -> None:
+    source = f"replay:{written(tmp_path)},speed=0"
+    assert main(["live", "--source", source, *PERSON, "--record", str(tmp_path / "r")]) == 0
+    said = capsys.readouterr().out
+    assert "Stand still" in said and "Ready: move." in said and "--finish" in said
+    assert (tmp_path / "r" / "stream.dkr").stat().st_size > 100_000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--source", "nowhere:x"], "expected one of lsl:..., replay:..."),
+        (["--source", "replay:none.c3d"], "none.c3d"),
+        (["--source", "replay:x.trc,sped=2"], "unknown option 'sped'"),
+        (["--source", "lsl:a", "--forces", "b.mot"], "goes with replay:FILE only"),
+        ([], "--source is missing"),
+        (["--finish", "nothing", "-o", "out"], "cannot be read"),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line(arguments: list[str], words: str, tmp_path: Path, capsys: Said) -> None:
+    finish = [str(tmp_path / "o") if a == "out" else a for a in arguments]
+    assert main(["live", *finish]) == 2
+    said = capsys.readouterr().err
+    assert words in said and said.count("\n") == 1
