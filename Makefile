@@ -78,6 +78,7 @@ bench: $(VENV)/.dev
 peers: $(VENV)/.dev
 	$(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[dev,peers]"
 	$(BIN)/python -m pytest -m peers
+	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/peers.py
 
 clean:
 	rm -rf build out $(VENV)

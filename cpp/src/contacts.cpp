@@ -6,8 +6,6 @@
 #include <limits>
 #include <stdexcept>
 
-#include "dynakin/output_sd.hpp"
-
 namespace dynakin {
 namespace {
 
@@ -27,7 +25,8 @@ ContactMoments::ContactMoments(const Model& model, std::vector<int> feet)
       remainder_(Vector6::Zero()),
       source_(model.coordinates().size(), MomentSource::measured),
       external_(model.segments().size()),
-      work_(model) {
+      work_(model),
+      variances_(static_cast<Eigen::Index>(model.coordinates().size()), model.state_size()) {
   const int n_segments = static_cast<int>(model.segments().size());
   for (std::size_t i = 0; i < feet_.size(); ++i) {
     if (feet_[i] < 0 || feet_[i] >= n_segments)
@@ -44,7 +43,6 @@ ContactMoments::ContactMoments(const Model& model, std::vector<int> feet)
   wrench_J_.setZero(6, model.state_size());
   wrench_JP_ = wrench_J_;
   J_.setZero(nc, model.state_size());
-  JP_ = J_;
 }
 
 bool ContactMoments::distribute(const DynamicState& dynamics, const std::vector<FootLoad>& loads) {
@@ -135,7 +133,7 @@ void ContactMoments::jacobian(const StateRef& x, const KinematicState& state, co
 void ContactMoments::deviations(const StateRef& x, const KinematicState& state, const DynamicState& dynamics,
                                 const Eigen::MatrixXd& P, double* moments_sd, double* wrench_sd) {
   jacobian(x, state, dynamics, J_);
-  row_variances(J_, P, JP_, moments_sd);
+  variances_(J_, P, moments_sd);
   for (std::size_t c = 0; c < source_.size(); ++c) {
     const auto row = static_cast<Eigen::Index>(c);
     for (std::size_t i = 0; i < feet_.size(); ++i) {

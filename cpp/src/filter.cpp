@@ -1,5 +1,6 @@
 #include "dynakin/filter.hpp"
 
+#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -60,7 +61,7 @@ void Filter::reset(const Eigen::VectorXd& x, const Eigen::MatrixXd& P) {
   const Eigen::MatrixXd correlation = scale.asDiagonal() * P * scale.asDiagonal();
   if (correlation.llt().info() != Eigen::Success) throw std::invalid_argument("P0: not positive definite");
   projection_.forget();
-  x_ = x0_ = x_before_ = x;
+  x_ = x0_ = x_before_ = x_ahead_ = x;
   P_ = P0_ = P_before_ = P;
   unbelieved_s_ = 0.0;
   last_ = StepReport{};
@@ -120,13 +121,24 @@ void Filter::leave_out_refused() {
     measurement_.leave_out(static_cast<int>(verdicts.size()) - 1);
 }
 
+// Largest standard deviation of the coordinates that move a marker of this frame: of others it tells nothing, however
+// often it is linearised.
+double Filter::uncertainty_seen() const {
+  double most = 0.0;
+  for (std::size_t m = 0; m < model_.markers().size(); ++m) {
+    const RowBlock& block = measurement_.blocks()[m];
+    if (block.rows == 0) continue;
+    for (const int c : *block.columns)
+      if (c < model_.n_free()) most = std::max(most, P_(c, c));
+  }
+  return std::sqrt(most);
+}
+
 // P is corrected and dx_ is what the state has still to take. A state that is known badly is linearised again where the
 // measurements have it.
 UpdateSums Filter::correct(const MarkerRef& markers, const Vector6& wrench) {
   constexpr int most_iterations = 8;
-  const double known =
-      P_.diagonal().head(model_.n_free()).size() == 0 ? 0.0 : std::sqrt(P_.diagonal().head(model_.n_free()).maxCoeff());
-  if (known > settings_.iterate_beyond) return iterate(markers, wrench, most_iterations);
+  if (uncertainty_seen() > settings_.iterate_beyond) return iterate(markers, wrench, most_iterations);
   leave_out_refused();
   return update_.apply(measurement_.blocks(), P_, dx_);
 }
@@ -205,6 +217,13 @@ void Filter::restore(const Checkpoint& checkpoint) {
 
 const Measurement& Filter::evaluate() {
   measurement_.evaluate(x_);
+  return measurement_;
+}
+
+const Measurement& Filter::foresee(double dt) {
+  x_ahead_ = x_;
+  predict_mean(model_, settings_, dt, x_ahead_);
+  measurement_.evaluate(x_ahead_);
   return measurement_;
 }
 

@@ -24,14 +24,38 @@ double deviation(const Row& row, const std::vector<int>& columns, const Eigen::M
 
 }  // namespace
 
-void row_variances(const Eigen::MatrixXd& J, const Eigen::MatrixXd& P, Eigen::MatrixXd& JP, double* out) {
-  JP.setZero();
-  for (Eigen::Index c = 0; c < P.cols(); ++c)
-    if (!J.col(c).isZero(0.0)) JP.noalias() += J.col(c) * P.col(c).transpose();
-  for (Eigen::Index k = 0; k < J.rows(); ++k) out[k] = JP.row(k).dot(J.row(k));
+RowVariances::RowVariances(Eigen::Index rows, Eigen::Index states) : columns_(states) {
+  J_.setZero(rows, states);
+  JP_ = J_;
+  P_.setZero(states, states);
 }
 
-OutputDeviation::OutputDeviation(const Model& model) : model_(model), work_(model) {
+void RowVariances::operator()(const Eigen::MatrixXd& J, const Eigen::MatrixXd& P, double* out) {
+  Eigen::Index used = 0;
+  for (Eigen::Index c = 0; c < J.cols(); ++c)
+    if (!J.col(c).isZero(0.0)) columns_[used++] = c;
+  auto Ju = J_.leftCols(used);
+  auto Pu = P_.topLeftCorner(used, used);
+  for (Eigen::Index k = 0; k < used; ++k) {
+    Ju.col(k) = J.col(columns_[k]);
+    const double* column = P.col(columns_[k]).data();
+    for (Eigen::Index r = 0; r < used; ++r) Pu(r, k) = column[columns_[r]];
+  }
+  auto JPu = JP_.leftCols(used);
+  JPu.setZero();
+  constexpr Eigen::Index depth = 32, width = 128;  // what Eigen packs of such a product stays on the stack
+  for (Eigen::Index c = 0; c < used; c += width)
+    for (Eigen::Index k = 0; k < used; k += depth) {
+      const Eigen::Index nc = std::min(width, used - c), nk = std::min(depth, used - k);
+      JPu.middleCols(c, nc).noalias() += Ju.middleCols(k, nk) * Pu.block(k, c, nk, nc);
+    }
+  for (Eigen::Index r = 0; r < J.rows(); ++r) out[r] = JPu.row(r).dot(Ju.row(r));
+}
+
+OutputDeviation::OutputDeviation(const Model& model)
+    : model_(model),
+      work_(model),
+      moment_variances_(static_cast<Eigen::Index>(model.coordinates().size()), model.state_size()) {
   std::size_t widest = 0;
   for (std::size_t m = 0; m < model.markers().size(); ++m) {
     const auto& columns = model.marker_columns(static_cast<int>(m));
@@ -42,7 +66,6 @@ OutputDeviation::OutputDeviation(const Model& model) : model_(model), work_(mode
   marker_J_.setZero(3, static_cast<Eigen::Index>(widest));
   wrench_J_.setZero(6, model.state_size());
   moment_J_.setZero(static_cast<Eigen::Index>(model.coordinates().size()), model.state_size());
-  moment_JP_ = moment_J_;
 }
 
 void OutputDeviation::markers(const KinematicState& state, const Eigen::MatrixXd& P, double* out) {
@@ -63,7 +86,7 @@ void OutputDeviation::wrench(const KinematicState& state, const DynamicState& dy
 void OutputDeviation::moments(const StateRef& x, const KinematicState& state, const DynamicState& dynamics,
                               const Eigen::MatrixXd& P, double* out) {
   moment_jacobian(model_, x, state, dynamics, nullptr, work_, moment_J_);
-  row_variances(moment_J_, P, moment_JP_, out);
+  moment_variances_(moment_J_, P, out);
   for (Eigen::Index k = 0; k < moment_J_.rows(); ++k) out[k] = std::sqrt(std::max(out[k], 0.0));
 }
 

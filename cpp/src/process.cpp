@@ -30,7 +30,20 @@ double decayed_noise(double density, double rate, double dt) {
   return rate == 0.0 ? density * dt : -density * std::expm1(-2.0 * rate * dt) / (2.0 * rate);
 }
 
+// The coordinates and speeds of x; what decays is not moved.
+void move_chain(int n, double dt, Eigen::VectorXd& x) {
+  x.segment(0, n) += dt * x.segment(n, n) + 0.5 * dt * dt * x.segment(2 * n, n);
+  x.segment(n, n) += dt * x.segment(2 * n, n);
+}
+
 }  // namespace
+
+void predict_mean(const Model& model, const FilterSettings& settings, double dt, Eigen::VectorXd& x) {
+  const int n = model.n_free();
+  move_chain(n, dt, x);
+  for (int i = 3 * n; i < model.state_size(); ++i)
+    if (settings.decay_rate(i) != 0.0) x(i) *= std::exp(-settings.decay_rate(i) * dt);
+}
 
 void predict(const Model& model, const FilterSettings& settings, double dt, Eigen::VectorXd& scratch,
              Eigen::VectorXd& x, Eigen::MatrixXd& P) {
@@ -38,8 +51,7 @@ void predict(const Model& model, const FilterSettings& settings, double dt, Eige
   const int rest = size - 3 * n;
   const double half = 0.5 * dt * dt;
 
-  x.segment(0, n) += dt * x.segment(n, n) + half * x.segment(2 * n, n);
-  x.segment(n, n) += dt * x.segment(2 * n, n);
+  move_chain(n, dt, x);
 
   // P F', then F (P F') on the 3n rows that it changes; the lower triangle is the truth, mirrored.
   P.middleCols(0, n) += dt * P.middleCols(n, n) + half * P.middleCols(2 * n, n);

@@ -536,6 +536,11 @@ class Filter:
         run, then backwards over the same frames: the arrays of run, and smoothed_state, _markers, _wrench and _moments, each also with _sd, and backward_us. The filter then stands where run would have left it; after an interruption it stands anywhere. progress counts both ways: total is twice the frames. Memory beside the arrays: T / stretch checkpoints and stretch frames; 0: sqrt(T). Raises ValueError where bounds are kept by constraint 'gain' or 'sigmoid'.
         """
 
+    def score(self, time: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], markers: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], wrench: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], first: int, end: int, ahead: int = 0, lost_m: float = float('inf'), trace: bool = False) -> dict:
+        """
+        run for its figures alone, over frames 0 to end - 1, of which those from first on count: sums of squares and counts a channel (3M + 6: markers, then the body's own wrench) of the estimate (estimated_), of the expectation before the frame (predicted_) and of that so many frames earlier (ahead_); sums of nis, log_likelihood, n_rows, refused sensors; frames counted and done; divergence, a word where the filter diverged or the markers were further off than lost_m for ten frames, which ends the run. With trace also state (T, n) and moments (T, C).
+        """
+
 class FixedLag:
     """
     Steps a Filter and smooths the frame that lies `lag` frames back, from all frames until now.

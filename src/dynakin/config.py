@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal, Self
 
@@ -47,7 +48,7 @@ class RunConfig(Strict):
     """male or female, for the table. Not given: the mean of both."""
 
     preset: str = "default"
-    """Noise settings to start from; [noise] changes single ones."""
+    """Noise settings to start from (default, paper, or a .toml file that `tune` wrote); [noise] changes single ones."""
     smooth: bool = False
     """Estimate each frame from all frames, those after it too. Not given: as it would be live."""
     side: Literal["auto", "right", "left", "both"] = "auto"
@@ -83,6 +84,8 @@ class RunConfig(Strict):
     """Standard deviations at the first frame."""
     bounds: Bounds = Bounds()
     """Half widths of the bounds of equation (9)."""
+    grid: dict[str, tuple[float, float, int]] | None = Field(default=None, examples=[{"jerk": [1.0, 1e4, 5]}])
+    """Settings that `tune grid` varies: NAME = [from, to, steps], logarithmic. `run` does not read it."""
 
     ground: dict[str, Any] = Field(default_factory=dict)
     """Written into an output's config.toml for the record: the ground frame that was found. Not read."""
@@ -124,15 +127,20 @@ class RunConfig(Strict):
 
     def as_used(self) -> dict[str, Any]:
         """Plain data for an output's config.toml: every path absolute, so that the file works from where it lies."""
-        plain = self.model_dump(mode="json", exclude={"ground", "versions"})
+        plain = self.model_dump(mode="json", exclude={"ground", "versions", "grid"})
+        if presets.is_file(self.preset):
+            plain["preset"] = str(Path(self.preset).absolute())
         for key in _PATHS:
             path = getattr(self, key)
             plain[key] = None if path is None else str(path.absolute())
         return plain
 
 
-def read_config(path: Path) -> dict[str, Any]:
+def read_config(path: Path, paths: Sequence[str] = _PATHS) -> dict[str, Any]:
     """The keys of a configuration file, its relative paths made relative to where the file lies.
+
+    Args:
+        paths: keys that name files.
 
     Raises:
         ConfigError: no such file, or not TOML (with the line).
@@ -143,10 +151,10 @@ def read_config(path: Path) -> dict[str, Any]:
         raise ConfigError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
     except tomllib.TOMLDecodeError as error:
         raise ConfigError(f"{path}: not a TOML file: {error}") from None
-    for key in _PATHS:
+    for key in paths:
         if isinstance(content.get(key), str):
             content[key] = str(path.parent / content[key])
-    for key in ("model", "markers", "table"):  # a name, or a file beside the configuration
+    for key in ("model", "markers", "table", "preset"):  # a name, or a file beside the configuration
         value = content.get(key)
         if isinstance(value, str) and (path.parent / value).is_file():
             content[key] = str(path.parent / value)

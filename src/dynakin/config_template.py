@@ -69,7 +69,7 @@ def _comment(text: str) -> str:
 
 def _line(key: str, value: Any) -> str:
     if isinstance(value, dict):
-        inner = ", ".join(tomli_w.dumps({name: item}).strip() for name, item in value.items())
+        inner = ", ".join(_line(name, item).strip() for name, item in value.items())
         return f"{key} = {{{inner}}}\n"
     if isinstance(value, list | tuple):
         return f"{key} = [{', '.join(repr(item) for item in value)}]\n"

@@ -180,3 +180,26 @@ def test_a_state_that_is_known_is_not_iterated(spec):
     g.update(markers, wrench)
     np.testing.assert_array_equal(f.state, g.state)
     np.testing.assert_array_equal(f.covariance, g.covariance)
+
+
+@each_spec
+def test_what_no_marker_sees_is_not_linearised_for(spec):
+    """A coordinate may be as unsure as it likes where it moves none of the frame's markers: the update is plain."""
+    layout, data = Layout(spec), trial(spec, 3, 1, gaps=False)
+    leaf = spec.segments[-1]
+    own = {a.coordinate for a in leaf.axes} - {a.coordinate for s in spec.segments[:-1] for a in s.axes}
+    free = [c.name for c in spec.coordinates if not c.locked]
+    unsure = [k for k, name in enumerate(free) if name in own]
+    P0 = data.P0.copy()
+    P0[unsure, unsure] += 4.0
+    assert unsure and np.sqrt(np.delete(np.diag(P0)[: len(free)], unsure).max()) < 1.0
+    markers = data.markers[0].copy()
+
+    def updated(**changes):
+        f = filter_of(spec, continuous(spec, 3) | changes, data.x0, P0)
+        f.update(markers, data.wrench[0])
+        return f.state[layout.block("coordinates")]
+
+    assert not np.array_equal(updated(iterate_beyond=1.0), updated())
+    markers[[m.segment == leaf.name for m in spec.markers]] = np.nan
+    np.testing.assert_array_equal(updated(iterate_beyond=1.0), updated())

@@ -147,3 +147,31 @@ def test_squat7_initialises_on_its_own_simulation(side: str) -> None:
         assert np.degrees(named[name] - float(truth.sel(coordinate=name))) == pytest.approx(0.0, abs=9.0), name
     for name in ("foot", "shank", "thigh"):
         assert named[f"length/{name}"] == pytest.approx(trial.truth.parameters[f"length/{name}"], abs=0.005), name
+
+
+def test_fullbody_measured_on_exact_markers_is_the_true_body() -> None:
+    """Where the marker set tells the joint centres (hips, knees), the built-in model at the true angles carries every
+    marker of pelvis, thighs and shanks where it was recorded, in a deep squat too."""
+    trial = simulate("fullbody", "squat", 3, 6.0, noise=PERFECT)
+    recording, data = trial.recording, trial.truth.data
+    subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
+    estimator = dynakin.Estimator(dynakin.load_model("fullbody", subject=subject, markers="opencap"))
+    initial = estimator.start(recording)
+    for name in ("pelvis", "thigh", "shank"):
+        assert initial.x0[initial.names.index(f"length/{name}")] == pytest.approx(
+            trial.truth.parameters[f"length/{name}"], abs=1e-4
+        )
+    model, x = _core.Model(initial.spec), np.array(initial.x0)
+    lowest = int(np.argmax(data["coordinates"].sel(coordinate="knee_angle_r").values))
+    known = ("pelvis", "hip", "knee")
+    for k, name in enumerate(initial.names):
+        if name in data["coordinate"].values and name.split("_")[0] in known:
+            x[k] = data["coordinates"].sel(coordinate=name).values[lowest]
+    found = _core.marker_positions(model, x)
+    checked = 0
+    for marker, place in zip(initial.spec.markers, found, strict=True):
+        if marker.segment.split("_")[0] in ("pelvis", "thigh", "shank"):
+            site = next(s.name for s in trial.truth.sites if s.name.casefold() == marker.name.casefold())
+            np.testing.assert_allclose(place, recording.marker(site)[lowest], atol=2e-4)
+            checked += 1
+    assert checked >= 18

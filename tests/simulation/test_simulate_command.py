@@ -40,7 +40,7 @@ def test_a_motion_from_its_own_truth(tmp_path: Path) -> None:
             ["--motion", "jump"],
             "motion is 'jump', expected squat, sit-to-stand, sway or a .mot or .sto file that exists",
         ),
-        (["--model", "full"], "model is 'full', expected sagittal7 or squat7"),
+        (["--model", "chain"], "model is 'chain', expected sagittal7 or squat7 or fullbody"),
         (["--sensor", "plate_lag_s"], "--sensor: found 'plate_lag_s', expected KEY=NUMBER"),
         (["--sensor", "plate_lag_s=soon"], "--sensor: found 'plate_lag_s=soon'"),
         (["--spread", "-1"], "the factor is -1, expected 0 or more"),

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "dynakin/moment_derivatives.hpp"
+#include "dynakin/output_sd.hpp"
 
 namespace dynakin {
 
@@ -77,7 +78,8 @@ class ContactMoments {
   std::vector<Lever> lever_;  // G_i: d (power of foot i's wrench) / d speed of each coordinate
   Lever common_;              // D = sum of G_i A_i
   Eigen::Matrix<double, 6, Eigen::Dynamic> wrench_J_, wrench_JP_;
-  Eigen::MatrixXd J_, JP_;
+  Eigen::MatrixXd J_;
+  RowVariances variances_;
 };
 
 }  // namespace dynakin

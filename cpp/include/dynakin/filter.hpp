@@ -84,11 +84,14 @@ class Filter {
   const std::vector<Verdict>& verdicts() const { return gate_.verdicts(); }
   // Kinematics and dynamics at the present state, for what is reported of it.
   const Measurement& evaluate();
+  // The same at the state that is expected in dt seconds; the filter stays where it is.
+  const Measurement& foresee(double dt);
 
  private:
   using MarkerRef = Eigen::Ref<const MarkerMatrix>;
   Tracking believe(const MarkerRef& markers);
   void leave_out_refused();
+  double uncertainty_seen() const;
   UpdateSums correct(const MarkerRef& markers, const Vector6& wrench);
   UpdateSums iterate(const MarkerRef& markers, const Vector6& wrench, int most);
   void constrain(double nis, StepReport& report);
@@ -103,7 +106,7 @@ class Filter {
 
   const Model model_;  // copies: a filter stands alone
   const FilterSettings settings_;
-  Eigen::VectorXd x_, dx_, step_, predicted_, x0_, x_before_;
+  Eigen::VectorXd x_, dx_, step_, predicted_, x0_, x_before_, x_ahead_;
   Eigen::MatrixXd P_, P0_, P_before_;
   Measurement measurement_;
   Gate gate_;

@@ -8,8 +8,16 @@
 
 namespace dynakin {
 
-// out[k] = (J P J')_kk. Most columns of J (rows, n) are zero, and cost nothing. JP: of J's size, to work in.
-void row_variances(const Eigen::MatrixXd& J, const Eigen::MatrixXd& P, Eigen::MatrixXd& JP, double* out);
+// out[k] = (J P J')_kk. Most columns of J (rows, n) are zero, and cost nothing: the others are gathered.
+class RowVariances {
+ public:
+  RowVariances(Eigen::Index rows, Eigen::Index states);
+  void operator()(const Eigen::MatrixXd& J, const Eigen::MatrixXd& P, double* out);
+
+ private:
+  std::vector<Eigen::Index> columns_;  // of J, those that are not zero
+  Eigen::MatrixXd J_, P_, JP_;         // over these
+};
 
 // Allocated once for a model. x, kinematics and dynamics belong together; P is the covariance of x.
 class OutputDeviation {
@@ -30,7 +38,8 @@ class OutputDeviation {
   Eigen::Matrix<double, 3, Eigen::Dynamic> marker_J_;
   Eigen::Matrix<double, 6, Eigen::Dynamic> wrench_J_;
   MomentWorkspace work_;
-  Eigen::MatrixXd moment_J_, moment_JP_;
+  Eigen::MatrixXd moment_J_;
+  RowVariances moment_variances_;
 };
 
 }  // namespace dynakin

@@ -133,4 +133,5 @@ void bind_filter(nb::module_& m) {
           },
           nb::arg("dt"), nb::arg("markers"), nb::arg("wrench"), "predict(dt), then update(markers, wrench).");
   bind_run(filter);
+  bind_score(filter);
 }

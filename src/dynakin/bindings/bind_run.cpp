@@ -8,24 +8,11 @@
 #include "dynakin/smoother.hpp"
 #include "feet.hpp"
 #include "module.hpp"
+#include "trial.hpp"
 
 using namespace dynakin;
 
 namespace {
-
-struct Trial {
-  Trial(const Filter& filter, const Array1& time, const Array3& markers, const Array2& wrench)
-      : time(time.data()), markers(markers.data()), wrench(wrench.data()), frames(time.shape(0)) {
-    const std::size_t n_markers = filter.model().markers().size();
-    if (markers.shape(0) != frames || markers.shape(1) != n_markers || markers.shape(2) != 3)
-      throw std::invalid_argument("markers: expected (" + std::to_string(frames) + ", " + std::to_string(n_markers) +
-                                  ", 3)");
-    if (wrench.shape(0) != frames || wrench.shape(1) != 6)
-      throw std::invalid_argument("wrench: expected (" + std::to_string(frames) + ", 6)");
-  }
-  const double *time, *markers, *wrench;
-  std::size_t frames;
-};
 
 constexpr std::size_t k_stretch = 256;  // frames between two looks at the interpreter: progress, Ctrl-C
 

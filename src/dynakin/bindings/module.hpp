@@ -15,4 +15,5 @@ void bind_mechanics(nb::module_& m);
 void bind_contacts(nb::module_& m);
 void bind_filter(nb::module_& m);
 void bind_run(nb::class_<dynakin::Filter>& filter);
+void bind_score(nb::class_<dynakin::Filter>& filter);
 void bind_fixed_lag(nb::module_& m);

@@ -10,6 +10,7 @@ from typing import Annotated
 import typer
 
 import dynakin
+from dynakin.cli.batch import batch
 from dynakin.cli.check import check
 from dynakin.cli.compare import compare
 from dynakin.cli.console import print_error
@@ -19,6 +20,7 @@ from dynakin.cli.model import model
 from dynakin.cli.print_config import print_config
 from dynakin.cli.run import run
 from dynakin.cli.simulate import simulate
+from dynakin.cli.tune import tune
 from dynakin.errors import DynakinError
 
 # Typer carries its own copy of click or uses click's, depending on its version; its own name leads to either.
@@ -32,9 +34,10 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (run, live, demo, compare, simulate, check, model):
+for command in (run, live, demo, compare, batch, simulate, check, model):
     app.command()(command)
 app.command("print-config")(print_config)
+app.add_typer(tune, name="tune")
 
 
 def _version(asked: bool) -> None:

@@ -11,7 +11,7 @@ import typer
 from rich.console import Console
 from rich.padding import Padding
 
-from dynakin.cli.compare_inputs import Case, cases_of, chosen_trials, halves_of
+from dynakin.cli.compare_inputs import cases_of, chosen_trials, halves_of
 from dynakin.cli.console import as_table, busy, out, progress_bar
 from dynakin.cli.options import (
     ForceThreshold,
@@ -43,6 +43,7 @@ from dynakin.comparison import (
     unseen,
     unseen_figures,
 )
+from dynakin.comparison.case import Case
 from dynakin.reference import CUTOFF_HZ
 from dynakin.report import render_comparison
 from dynakin.report.text_tables import angle_text, moment_text, table2_text, unseen_text
@@ -56,7 +57,9 @@ def compare(
         list[Path] | None, typer.Argument(metavar="TRIAL...", help="Recordings, or a configuration (.toml) for each.")
     ] = None,
     forces: Annotated[list[Path] | None, typer.Option("--forces", help="Ground forces, one a trial, in order.")] = None,
-    model: Annotated[str | None, typer.Option(help="Model: squat7, sagittal7 or a .toml file.")] = None,
+    model: Annotated[
+        str | None, typer.Option(help="Model: fullbody, squat7, sagittal7, a .toml or .osim file.")
+    ] = None,
     markers: Markers = None,
     static: Static = None,
     mass: Mass = None,

@@ -1,27 +1,16 @@
-"""What `compare` is given, one case a trial: the recording and how it is worked on."""
+"""What `compare` and `tune` are given, one case a trial: the recording and how it is worked on."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from dynakin.comparison import Setup, halves
-from dynakin.config import RunConfig, make_config, read_config
+from dynakin.comparison import halves
+from dynakin.comparison.case import Case, case_of
+from dynakin.config import make_config, read_config
 from dynakin.errors import ConfigError
-from dynakin.model import load_model
-from dynakin.recordings import Recording, read
-
-
-@dataclass(frozen=True, eq=False)
-class Case:
-    """A trial as read, with its subject's setup."""
-
-    recording: Recording
-    static: Recording | None
-    setup: Setup
-    config: RunConfig
 
 
 def chosen_trials(
@@ -51,51 +40,43 @@ def halves_of(case: Case) -> tuple[Case, Case]:
 
 
 def cases_of(
-    trials: Sequence[Path], forces: Sequence[Path], presets: Sequence[str], cutoff_hz: float, given: dict[str, Any]
+    trials: Sequence[Path],
+    forces: Sequence[Path],
+    presets: Sequence[str],
+    cutoff_hz: float,
+    given: dict[str, Any],
+    command: str = "compare",
 ) -> list[Case]:
     """One case a trial; a trial may be a configuration (.toml) of its own, over which the command line wins.
 
     Args:
         forces: none, or one a trial in the same order. presets: by name; none: the configuration's own.
-        given: the other keys of `RunConfig` that the command line gives.
+        given: the other keys of `RunConfig` that the command line gives. command: opens messages.
 
     Raises:
         DynakinError: anything wrong with the input, in one line.
     """
     if not trials:
-        raise ConfigError("compare: no trial was given, expected TRIAL..., or --identify-on A --test-on B")
+        pair = ", or --identify-on A --test-on B" if command == "compare" else ""
+        raise ConfigError(f"{command}: no trial was given, expected TRIAL...{pair}")
     if forces and len(forces) != len(trials):
         raise ConfigError(
-            f"compare: --forces was given {_times(len(forces))} for {len(trials)} trials, expected one for each, "
+            f"{command}: --forces was given {_times(len(forces))} for {len(trials)} trials, expected one for each, "
             "in the same order, or none"
         )
     return [
-        _case(trial, {**given, "forces": forces[k] if forces else None}, presets, cutoff_hz)
+        _case(trial, {**given, "forces": forces[k] if forces else None}, presets, cutoff_hz, command)
         for k, trial in enumerate(trials)
     ]
 
 
-def _case(trial: Path, given: dict[str, Any], presets: Sequence[str], cutoff_hz: float) -> Case:
+def _case(trial: Path, given: dict[str, Any], presets: Sequence[str], cutoff_hz: float, command: str) -> Case:
     options = {key: value for key, value in given.items() if value is not None}
     is_config = trial.suffix.casefold() == ".toml"
     content = read_config(trial) if is_config else {"trial": trial}
     # a configuration's own output is not where a comparison goes
-    config = make_config(content | options | {"output": Path()}, str(trial) if is_config else "compare")
-    noise = {name: config.model_copy(update={"preset": name}).noise_settings() for name in (presets or [config.preset])}
-    setup = Setup(
-        load_model(config.model, config.subject(), markers=config.markers, table=config.table),
-        noise,
-        cutoff_hz,
-        config.priors,
-        config.bounds,
-        config.side,
-        config.vertical,
-        config.forward,
-    )
-    recording = read(
-        config.trial, config.forces, plate_filter_hz=config.plate_filter_hz, force_threshold_n=config.force_threshold_n
-    )
-    return Case(recording, None if config.static is None else read(config.static), setup, config)
+    config = make_config(content | options | {"output": Path()}, str(trial) if is_config else command)
+    return case_of(config, presets, cutoff_hz)
 
 
 def _times(n: int) -> str:

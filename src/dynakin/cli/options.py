@@ -13,7 +13,7 @@ Static = Annotated[Path | None, typer.Option(help="Recording of the same person 
 Mass = Annotated[float | None, typer.Option("--mass", help="Body mass, kg; else from the plates.")]
 Height = Annotated[float | None, typer.Option("--height", help="Body height, m; else from the markers.")]
 Sex = Annotated[str | None, typer.Option("--sex", help="male or female, for the table; else the mean of both.")]
-Preset = Annotated[str | None, typer.Option(help="Noise settings: default, paper.")]
+Preset = Annotated[str | None, typer.Option(help="Noise settings: default, paper or a .toml file.")]
 Side = Annotated[str | None, typer.Option(help="Markers of a one-legged model: auto, right, left, both.")]
 Vertical = Annotated[str | None, typer.Option(help="Laboratory axis that points up: auto, +Y, +Z, ...")]
 Forward = Annotated[str | None, typer.Option(help="Facing direction: auto, an axis or three numbers (0,1,0).")]
@@ -25,3 +25,6 @@ PlateFilter = Annotated[float | None, typer.Option("--plate-filter-hz", help="Lo
 ForceThreshold = Annotated[
     float | None, typer.Option("--force-threshold-n", help="Load below which a plate counts as empty, N.")
 ]
+Backend = Annotated[str, typer.Option(help="Who works: processes or threads of this machine, or dask.")]
+Jobs = Annotated[int | None, typer.Option(help="Workers at a time on this machine; else one a core.")]
+Scheduler = Annotated[str | None, typer.Option(help="Address of the Dask cluster's scheduler, tcp://HOST:PORT.")]

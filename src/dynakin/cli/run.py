@@ -30,7 +30,7 @@ from dynakin.cli.summary import print_summary
 from dynakin.comparison import Trial, trial_of
 from dynakin.config import RunConfig, make_config, read_config
 from dynakin.errors import DynakinError
-from dynakin.filter import Estimator
+from dynakin.filter import Estimator, presets
 from dynakin.filter.zero import standing_zero
 from dynakin.identifiability import Identifiability, identifiability
 from dynakin.model import load_model
@@ -156,7 +156,7 @@ def estimate_from(
     estimate = replace(estimate, config=config.as_used() | estimate.config)
     assert estimator.initial is not None
     n_states = len(estimator.initial.names)
-    comparison = trial_of({config.preset: estimate}, estimator.initial, model, whatever=True)
+    comparison = trial_of({presets.title(config.preset): estimate}, estimator.initial, model, whatever=True)
     if n_states > LARGEST_BENCH:
         note = (
             f"What the recording tells of the constants is left out: with {n_states} states it takes many minutes; "

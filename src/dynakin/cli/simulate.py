@@ -14,6 +14,7 @@ from dynakin.errors import ConfigError
 from dynakin.simulation import (
     BODIES,
     MOTIONS,
+    MOTIONS_IN_SPACE,
     SimulatedTrial,
     Spread,
     check_trial_folder,
@@ -22,13 +23,15 @@ from dynakin.simulation import (
 from dynakin.simulation import simulate as simulate_trial
 from dynakin.simulation.motion_file import CUTOFF_HZ
 
+_MOTIONS = f"{', '.join(MOTIONS)} (fullbody: {', '.join(MOTIONS_IN_SPACE)})"
+
 
 def simulate(
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the trial.")],
     model: Annotated[str, typer.Option(help=f"Model whose coordinates move: {' or '.join(BODIES)}.")] = "sagittal7",
-    motion: Annotated[str, typer.Option(help=f"{', '.join(MOTIONS)}, or a coordinates file (.mot, .sto).")] = "squat",
+    motion: Annotated[str, typer.Option(help=f"{_MOTIONS}, or a coordinates file (.mot, .sto).")] = "squat",
     seed: Annotated[int, typer.Option(help="Of everything that is drawn at random, from 0.")] = 1,
-    duration: Annotated[float | None, typer.Option(help="Length, s; else 20 s, or all of a file.")] = None,
+    duration: Annotated[float | None, typer.Option(help="Length, s; else 20 s (gait: 4 s), or all of a file.")] = None,
     rate: Annotated[float, typer.Option("--rate", help="Frames per second.")] = 100.0,
     mass: Annotated[float, typer.Option("--mass", help="Body mass, kg.")] = 70.0,
     height: Annotated[float, typer.Option("--height", help="Body height, m.")] = 1.75,
@@ -39,6 +42,7 @@ def simulate(
     motion_cutoff: Annotated[
         float, typer.Option("--motion-cutoff-hz", help="Low-pass on a coordinates file, Hz.")
     ] = CUTOFF_HZ,
+    markers: Annotated[str | None, typer.Option(help="Set that fullbody wears: opencap or plug-in-gait.")] = None,
 ) -> None:
     """Simulate a trial whose truth is known, and write recording and truth."""
     check_trial_folder(output)
@@ -56,6 +60,7 @@ def simulate(
             noise=noise,
             spread=Spread().times(spread),
             motion_cutoff_hz=motion_cutoff,
+            markers=markers,
         )
         folder = trial.save(output)
     console = out()

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from dynakin.errors import ConfigError
 from dynakin.filter import Estimator, Noise, presets
 from dynakin.filter.extend import QUANTITIES, Quantity
-from dynakin.model import Bounds, Definition, Priors
+from dynakin.model import Bounds, CarriedLoad, Definition, Priors
 from dynakin.reference import CUTOFF_HZ
 
 
@@ -20,7 +20,7 @@ class Setup:
         definition: what `load_model` returns.
         noise: settings of each filter that is compared, by the name of its preset.
         cutoff_hz: of the reference methods' zero-lag low-pass, Hz.
-        priors, bounds, side, vertical, forward, estimate: as `Estimator` takes them.
+        priors, bounds, side, vertical, forward, estimate, plates, loads: as `Estimator` takes them.
     """
 
     definition: Definition
@@ -32,6 +32,8 @@ class Setup:
     vertical: str = "auto"
     forward: str | tuple[float, float, float] = "auto"
     estimate: tuple[Quantity, ...] = QUANTITIES
+    plates: Mapping[str, str] | None = None
+    loads: tuple[CarriedLoad, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.noise:
@@ -50,4 +52,6 @@ class Setup:
             vertical=self.vertical,
             forward=self.forward,
             estimate=self.estimate,
+            plates=self.plates,
+            loads=self.loads,
         )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -86,10 +86,15 @@ def trial_fits(trial: Trial) -> dict[tuple[str, str], SignalFit]:
 
 def table2(trials: Sequence[Trial]) -> list[Row]:
     """Rows by quantity, then method: all markers, the wrench, then each marker; over one or many trials."""
-    fits = [trial_fits(trial) for trial in trials]
+    return table2_of([trial_fits(trial) for trial in trials])
+
+
+def table2_of(fits: Sequence[Mapping[tuple[str, str], SignalFit]]) -> list[Row]:
+    """`table2` of what `trial_fits` gave for each trial."""
     keys = dict.fromkeys(key for fit in fits for key in fit)
-    markers = dict.fromkeys(name for trial in trials for name in trial.marker_names)
-    quantities = [name for name in (MARKERS, *COMPONENTS, *markers) if any(key[0] == name for key in keys)]
+    first = (MARKERS, *COMPONENTS)
+    quantities = [name for name in first if any(key[0] == name for key in keys)]
+    quantities += [name for name in dict.fromkeys(key[0] for key in keys) if name not in first]
     methods = list(dict.fromkeys(method for _, method in keys))
     return [
         _row(quantity, method, [fit[quantity, method] for fit in fits if (quantity, method) in fit])

@@ -12,10 +12,11 @@ from dynakin.errors import ConfigError, DivergenceError, RecordingError
 from dynakin.filter import presets
 from dynakin.filter.alignment import PASSES, delay_of, in_step, in_words, is_late
 from dynakin.filter.assemble import assemble
-from dynakin.filter.extend import QUANTITIES, Quantity, continuous_noise, extended, initial_covariance
+from dynakin.filter.core_filter import core_filter, filter_settings
+from dynakin.filter.extend import QUANTITIES, Quantity, initial_covariance
 from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.filter.live import StepEstimate, deviations_of, step_estimate
-from dynakin.filter.noise import Noise, gate_limits
+from dynakin.filter.noise import Noise
 from dynakin.filter.samples import Sample, foreign_load, recording_arrays, sample_arrays
 from dynakin.filter.smoothing import check_can_smooth, smoothed
 from dynakin.filter.total_wrench import foot_wrenches, foreign_total, leave_out_unknown
@@ -114,18 +115,15 @@ class Estimator:
             check_can_smooth(self.noise)
         initial = self.start(recording, static=static)
         assert self._core_model is not None
-        markers, wrench = recording_arrays(recording, initial, gaps=self.noise.recover)
-        loads = None
-        if initial.feet and recording.plates:
-            loads = foot_loads(recording, initial.ground, assigned=self.plates)
-        notes, foreign = self._judge_plates(recording, initial, wrench, loads)
+        markers, wrench, notes, loads = self._measured(recording, initial)
+        foreign = bool(np.isnan(wrench).all())
         on_feet = None
         if feet is not None and not foreign:
             on_feet = feet(initial)
         elif loads is not None and not foreign:
             on_feet = foot_wrenches(loads, initial, self.noise)
         try:
-            arrays, shift, clock = self._in_step(initial, recording.time, markers, wrench, on_feet, progress)
+            arrays, shift, clock = self.run_in_step(initial, recording.time, markers, wrench, progress, on_feet)
             wrench = in_step(recording.time, wrench, shift) if shift else wrench
             on_feet = on_feet and on_feet.in_step(recording.time, shift)
             if smooth:
@@ -142,17 +140,13 @@ class Estimator:
 
     def _judge_plates(
         self, recording: Recording, initial: InitialModel, wrench: Array, loads: FootLoads | None
-    ) -> tuple[list[str], str | None]:
-        """Leaves out (NaN, in place) what is not the whole wrench (T, 6).
-
-        Returns:
-            Sentences, and why the plates are not used at all where that is so.
-        """
+    ) -> list[str]:
+        """Leaves out (NaN, in place) what is not the whole wrench (T, 6), and says so in sentences."""
         notes: list[str] = []
         if initial.feet:
             if loads is None:
                 text = "No force plates: the total wrench is left out; inertial parameters stay as the table has them."
-                return [text], text
+                return [text]
             notes += leave_out_unknown(loads, wrench)
         check = check_plates(recording, initial.ground, None if initial.feet else initial.weighed_kg)
         if check.refusal:
@@ -165,16 +159,35 @@ class Estimator:
         if foreign:
             wrench[:] = np.nan
             notes.append(foreign)
-        return notes, foreign
+        return notes
 
-    def _in_step(
+    def _measured(
+        self, recording: Recording, initial: InitialModel
+    ) -> tuple[Array, Array, list[str], FootLoads | None]:
+        markers, wrench = recording_arrays(recording, initial, gaps=self.noise.recover)
+        loads = None
+        if initial.feet and recording.plates:
+            loads = foot_loads(recording, initial.ground, assigned=self.plates)
+        notes = self._judge_plates(recording, initial, wrench, loads)
+        return markers, wrench, notes, loads
+
+    def measured(self, recording: Recording, initial: InitialModel) -> tuple[Array, Array, list[str]]:
+        """What the filter takes of a recording: markers (T, M, 3) m, wrench (T, 6), NaN where it is not known (all of
+        it where the plates carry something that the model does not have), and what there is to say of the plates.
+
+        Raises:
+            RecordingError: markers or plates do not fit the model.
+        """
+        return self._measured(recording, initial)[:3]
+
+    def run_in_step(
         self,
         initial: InitialModel,
         time: Array,
         markers: Array,
         wrench: Array,
-        feet: FootWrenches | None,
-        progress: Progress | None,
+        progress: Progress | None = None,
+        feet: FootWrenches | None = None,
     ) -> tuple[dict[str, Array], float, list[str]]:
         """`run_arrays`, again with the plates brought into step where they turn out to lag.
 
@@ -198,6 +211,14 @@ class Estimator:
         Raises:
             ModelError, RecordingError: as in `run`.
         """
+        return self.start_from(self.measure(recording, static=static))
+
+    def measure(self, recording: Recording, *, static: Recording | None = None) -> InitialModel:
+        """The model as measured on a recording, before any states are added that the noise asks for.
+
+        Raises:
+            ModelError, RecordingError: as in `run`.
+        """
         initial = initialise(
             self.model,
             recording,
@@ -208,7 +229,7 @@ class Estimator:
             priors=self.priors,
             bounds=self.bounds,
         )
-        return self.start_from(with_loads(initial, self.loads))
+        return with_loads(initial, self.loads)
 
     def again(self) -> Estimator:
         """Another one with the same model and settings, not started."""
@@ -227,11 +248,7 @@ class Estimator:
 
     def start_from(self, initial: InitialModel) -> InitialModel:
         """Make the filter ready to step from a model that was measured before, or changed since."""
-        initial = extended(initial, self.noise, self.estimate)
-        self._core_model = _core.Model(initial.spec)
-        self._filter = _core.Filter(
-            self._core_model, self.filter_settings(initial), initial.x0, initial_covariance(initial, self.noise)
-        )
+        initial, self._core_model, self._filter = core_filter(initial, self.noise, self.estimate)
         if self.lag:
             check_can_smooth(self.noise)
         self._lag = _core.FixedLag(self._filter, self.lag) if self.lag else None
@@ -390,38 +407,4 @@ class Estimator:
     def filter_settings(self, initial: InitialModel) -> _core.FilterSettings:
         """The core's settings for a measured model: this noise, the marker set's variances, the bounds of (9)."""
         assert self._core_model is not None
-        unknown = set(self.noise.marker) - set(initial.recorded_markers)
-        if unknown:
-            raise ConfigError(
-                f"noise.marker: {', '.join(sorted(unknown))} not among the markers used; expected some of "
-                f"{', '.join(initial.recorded_markers)}"
-            )
-        noise, layout = self.noise, self._core_model.layout
-        point = noise.reference_point_m
-        unseen = np.inf if noise.unseen_sd is None else noise.unseen_sd
-        recovery = _core.RecoverySettings(blind_s=noise.blind_s, unseen_sd=unseen) if noise.recover else None
-        density, decay = continuous_noise(initial, noise, layout)
-        return _core.FilterSettings(
-            process_variance=noise.process_variance(layout),
-            process_density=density,
-            decay_rate=decay,
-            marker_variance=noise.marker_variance(
-                initial.recorded_markers,
-                initial.marker_variance,
-                initial.soft_tissue_m,
-                initial.unmodelled_m,
-                "soft_tissue" in self.estimate,
-            ),
-            wrench_covariance=noise.wrench_covariance(),
-            reference_point=initial.plate_centre if point == "auto" else np.array(point, dtype=float),
-            total_mass=initial.weighed_kg if noise.total_mass_use == "frame" else None,
-            total_mass_variance=noise.total_mass,
-            lower=initial.lower,
-            upper=initial.upper,
-            constraint=noise.constraint,
-            marker_gate=gate_limits(noise.marker_gate),
-            wrench_gate=gate_limits(noise.wrench_gate),
-            wrench_needs_markers=noise.recover,
-            iterate_beyond=np.inf if noise.iterate_beyond is None else noise.iterate_beyond,
-            recovery=recovery,
-        )
+        return filter_settings(initial, self.noise, self._core_model.layout, self.estimate)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from copy import copy
 from dataclasses import replace
 from typing import Literal, get_args
 
@@ -22,12 +23,13 @@ QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
 def extended(initial: InitialModel, noise: Noise, estimate: Collection[Quantity] = QUANTITIES) -> InitialModel:
     """The same model with the states that these noise settings ask for; places, bounds and priors follow their names.
 
-    Displacements of soft tissue and errors of the plates start at 0 with the standard deviations declared.
+    Displacements of soft tissue and errors of the plates start at 0 with the standard deviations declared. Of places
+    that are held, what is not known of them is noise of their markers.
 
     Args:
         estimate: kinds of parameters to estimate; the others stay where the model has them.
     """
-    spec = initial.spec
+    spec = copy(initial.spec)  # the same measured model serves other settings, in other threads
     sd = noise.soft_tissue_sd(initial.soft_tissue_m) * ("soft_tissue" in estimate)
     markers = spec.markers
     for marker, value in zip(markers, sd, strict=True):
@@ -47,9 +49,11 @@ def extended(initial: InitialModel, noise: Noise, estimate: Collection[Quantity]
     def carried(values: Array, otherwise: float) -> Array:
         return np.array([values[first[name]] if name in first else otherwise for name in names])
 
+    unknown = np.zeros(len(markers)) if "markers" in estimate else _place_sd(initial, first)
     return replace(
         initial,
         spec=spec,
+        unmodelled_m=np.hypot(initial.unmodelled_m, unknown),
         names=tuple(names),
         x0=carried(initial.x0, 0.0),
         sd0=np.array([initial.sd0[first[name]] if name in first else added[name] for name in names]),
@@ -57,6 +61,16 @@ def extended(initial: InitialModel, noise: Noise, estimate: Collection[Quantity]
         upper=carried(initial.upper, np.inf),
         table=carried(initial.table, np.nan),
     )
+
+
+def _place_sd(initial: InitialModel, first: dict[str, int]) -> Array:
+    """Prior standard deviation (M,) m of each marker's place, the mean over its axes; 0 where it is no state."""
+    found = np.zeros(len(initial.spec.markers))
+    for k, marker in enumerate(initial.spec.markers):
+        places = [first[name] for axis in "xyz" if (name := f"marker/{marker.name}/{axis}") in first]
+        if places:
+            found[k] = np.sqrt(np.mean(initial.sd0[places] ** 2))
+    return found
 
 
 def _hold(spec: _core.ModelSpec, estimate: Collection[Quantity]) -> None:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 from dynakin.errors import ConfigError
 from dynakin.filter.noise import Noise
+from dynakin.filter.preset_file import read_preset
 
 
 def default() -> Noise:
@@ -55,11 +58,23 @@ PRESETS = {"default": default, "paper": paper}
 
 
 def preset(name: str) -> Noise:
-    """The preset of that name.
+    """The preset of that name, or the settings of a file whose name ends in .toml.
 
     Raises:
-        ConfigError: there is none; the message lists those that there are.
+        ConfigError: there is none; the message lists those that there are. As `read_preset`.
     """
+    if is_file(name):
+        return read_preset(Path(name), preset)
     if name not in PRESETS:
-        raise ConfigError(f"preset {name!r} is unknown; expected {', '.join(PRESETS)}")
+        raise ConfigError(f"preset {name!r} is unknown; expected {', '.join(PRESETS)} or a .toml file")
     return PRESETS[name]()
+
+
+def is_file(name: str) -> bool:
+    """Whether a preset is a file of the user's."""
+    return name.casefold().endswith(".toml")
+
+
+def title(name: str) -> str:
+    """What a preset is called in tables: a file by its name without folder and ending."""
+    return Path(name).stem if is_file(name) else name

@@ -5,7 +5,7 @@ other file.
 """
 
 from dynakin.report.comparison_page import render_comparison
-from dynakin.report.figures import save_figures, save_sensitivity_figure
+from dynakin.report.figures import save_figures, save_sensitivity_figure, save_sensitivity_figures
 from dynakin.report.page import render_report, write_report
 from dynakin.report.sensitivity import Sensitivity, read_sensitivity
 
@@ -16,5 +16,6 @@ __all__ = [
     "render_report",
     "save_figures",
     "save_sensitivity_figure",
+    "save_sensitivity_figures",
     "write_report",
 ]

@@ -20,6 +20,17 @@ _KNOWN = {
 _FURTHER = ("#aa4499", "#b38f2a", "#4d4d4d", "#7a5195", "#00798c", "#a44a3f", "#6b8e23", "#5b6ee1")
 _SIDES = ("_right", "_left", "_r", "_l")
 
+# Okabe and Ito's blue and vermilion, told apart by people with any kind of colour vision.
+SIDE_COLOURS = {"right": "#0072B2", "left": "#D55E00", "": "#4d5661"}
+"""Right, left and what is in the middle, in every figure of a body with two sides."""
+
+
+def side_of(name: str) -> str:
+    """ "right", "left" or "" of a segment or coordinate, by its name."""
+    if name.endswith(("_right", "_r")) or name.startswith("right_"):
+        return "right"
+    return "left" if name.endswith(("_left", "_l")) or name.startswith("left_") else ""
+
 
 def segment_colours(segments: Sequence[str]) -> dict[str, str]:
     """Colour of each segment: by its name without a side where it is a common one, else by its place in the list."""

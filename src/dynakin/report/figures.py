@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 import matplotlib as mpl
@@ -81,6 +82,17 @@ def save_sensitivity_figure(path: str | Path, folder: str | Path, formats: Seque
     """
     grid = read_sensitivity(path)
     return _write({SENSITIVITY_FIGURE: lambda: sensitivity_figure(grid)}, Path(folder), formats)
+
+
+def save_sensitivity_figures(
+    grids: Mapping[str, Sensitivity], folder: str | Path, formats: Sequence[str] = FORMATS
+) -> list[Path]:
+    """Write one such figure a criterion, by the names of their files.
+
+    Raises:
+        ConfigError: an unknown format. OutputError: the folder cannot be written.
+    """
+    return _write({name: partial(sensitivity_figure, grid) for name, grid in grids.items()}, Path(folder), formats)
 
 
 def _write(draws: dict[str, Callable[[], Figure | None]], folder: Path, formats: Sequence[str]) -> list[Path]:

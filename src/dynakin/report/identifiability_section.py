@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from dynakin.report.labels import number, parameter_label, sentence, short_marker_names, words
+from dynakin.report.labels import is_planar, number, parameter_label, sentence, short_marker_names, words
 from dynakin.report.panels import Panel
 from dynakin.report.plot import ESTIMATED, GRID, INK, MEASURED, QUIET, new_axes, to_svg
 from dynakin.report.section import Section
@@ -42,6 +42,9 @@ def identifiability_section(estimate: Estimate, metrics: Mapping[str, Any]) -> S
         return Section("identifiability", "What the recording tells", "")
     left = {title: groups[title] for title in groups if title in ("Lengths", "Masses", "First moments")}
     left |= {title: groups[title] for title in groups if title == "Moments of inertia"}
+    if not is_planar(estimate):  # in space there are nine numbers a segment, too many to look at one by one
+        left = {title: rows for title, rows in groups.items() if title in ("Lengths", "Masses")}
+        groups = left | {title: rows for title, rows in groups.items() if title == "Marker places"}
     right = {title: rows for title, rows in groups.items() if title not in left}
     parts = [
         Section(f"identifiability-{anchor}", title, text, notes=tuple(sentence(note) for note in notes))

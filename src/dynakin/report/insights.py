@@ -315,7 +315,8 @@ def _gated(estimate: Estimate) -> Insight | None:
     gated = [event for event in estimate.events if event.kind in ("gated", "reset")]
     if not gated:
         return None
-    return Insight("warning", "Left out or reset", f"{listed([event.message for event in gated], 4)}.")
+    told = [e.message if not e.subject or e.subject in e.message else f"{e.subject} {e.message}" for e in gated]
+    return Insight("warning", "Left out or reset", f"{listed(told, 4)}.")
 
 
 def _locked(estimate: Estimate) -> Insight | None:
@@ -329,9 +330,12 @@ def _locked(estimate: Estimate) -> Insight | None:
 
 def _step_time(estimate: Estimate) -> Insight:
     timing = estimate.timing
+    factor, unit = (1e-3, "ms") if timing.median_us >= 1000.0 else (1.0, "µs")
+    times = number(timing.realtime_factor, digits=2)
+    speed = f"{times} times faster than" if timing.realtime_factor >= 1.0 else f"only {times} times as fast as"
     return Insight(
         "note",
         "Time of a step",
-        f"A step took {number(timing.median_us, 'µs')} (median; 99 of 100 within {number(timing.p99_us, 'µs')}), "
-        f"{number(timing.realtime_factor, digits=2)} times faster than the recording went.",
+        f"A step took {number(factor * timing.median_us, unit)} (median; 99 of 100 within "
+        f"{number(factor * timing.p99_us, unit)}), {speed} the recording went.",
     )

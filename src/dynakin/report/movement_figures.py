@@ -11,10 +11,12 @@ from matplotlib.figure import Figure
 from dynakin.comparison import Trial, angle_differences, moment_differences
 from dynakin.comparison.methods import AT, CLASSICAL, Method
 from dynakin.report.body import chain_of, colours_of, floor_height, marker_segments
-from dynakin.report.labels import COMPONENT_LABELS, moment_note, number, sentence, words
+from dynakin.report.colours import SIDE_COLOURS, side_of
+from dynakin.report.labels import COMPONENT_LABELS, is_planar, moment_note, number, sentence, words
 from dynakin.report.method_styles import LineStyle, method_styles
 from dynakin.report.panels import band_is_too_wide
 from dynakin.report.plot import ESTIMATED, INK, MEASURED, QUIET
+from dynakin.report.sides import joints_of
 from dynakin.results import COMPONENTS, Estimate, evaluation_window, repetitions_of
 from dynakin.results.fit import signal_fit
 
@@ -25,7 +27,10 @@ def markers_figure(estimate: Estimate, comparison: Trial | None = None) -> Figur
     """Figure 4: the stick figure and the markers, measured (hollow) and estimated (filled), over one cycle."""
     cycle = middle_cycle(estimate)
     frames = np.linspace(cycle.start, cycle.stop - 1, _PICTURES).astype(int)
-    chain, colours, carriers = chain_of(estimate), colours_of(estimate), marker_segments(estimate)
+    chain, carriers = chain_of(estimate), marker_segments(estimate)
+    segments = dict.fromkeys([*(b.segment for b in chain.bones), *carriers.values()])
+    planar = is_planar(estimate)
+    colours = colours_of(estimate) if planar else {name: SIDE_COLOURS[side_of(name)] for name in segments}
     measured = estimate.data["markers_measured"].values[:, :, :2]
     estimated = estimate.data["markers_estimated"].values[:, :, :2]
     paint = [colours.get(carriers.get(name, ""), INK) for name in estimate.marker_names]
@@ -52,10 +57,14 @@ def markers_figure(estimate: Estimate, comparison: Trial | None = None) -> Figur
     axes.set_xlim(span)
     axes.set_ylim(floor - 0.42, float(np.nanmax(shown[:, :, 1])) + 0.08)
     axes.axis("off")
-    axes.set_title("Markers over one cycle: measured (hollow) and estimated (filled, in the segment’s colour)")
+    whose = "segment" if planar else "side"
+    axes.set_title(f"Markers over one cycle: measured (hollow) and estimated (filled, in the {whose}’s colour)")
     names = dict.fromkeys(b.segment for b in chain.bones)
+    if not planar:  # thirty segments in six colours tell nothing, three colours do
+        colours = {side or "middle": colour for side, colour in SIDE_COLOURS.items()}
+        names = dict.fromkeys(colours)
     letters = sum(len(name) + 4 for name in names)
-    at, step = span[0] + 1.0, (span[1] - span[0] - 1.0) / max(letters, 1)
+    at, step = span[0] + 1.0, (span[1] - span[0] - 1.0) / max(letters, 1 if planar else 60)
     for name in names:
         axes.text(at, floor - 0.32, words(name), color=colours[name], va="center", weight="bold")
         at += (len(name) + 4) * step
@@ -69,6 +78,8 @@ def angles_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure
     ]
     if not free:
         return None
+    if not is_planar(estimate):
+        return _paired_angles_figure(estimate)
     classical = _reference(comparison, CLASSICAL)
     differences = {row.coordinate: row for row in angle_differences([] if comparison is None else [comparison])}
     columns = min(4, len(free))
@@ -99,6 +110,35 @@ def angles_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure
         axes.set_visible(False)
     figure.supxlabel("time, s", fontsize=8, color=QUIET)
     _key(figure, every[0], band=True, other=classical)
+    return figure
+
+
+def _paired_angles_figure(estimate: Estimate) -> Figure:
+    """Figure 5 in space: right and left over each other, with their bands."""
+    joints = joints_of(estimate)
+    columns = min(4, len(joints))
+    rows = -(-len(joints) // columns)
+    figure = Figure(figsize=(7.2, 0.5 + 1.55 * rows), layout="constrained")
+    every = figure.subplots(rows, columns, squeeze=False).ravel()
+    values, sd = _by_coordinate(estimate, "coordinates"), _by_coordinate(estimate, "coordinates_sd")
+    for axes, joint in zip(every, joints, strict=False):
+        factor, unit = (180.0 / np.pi, "deg") if joint.rotation else (1000.0, "mm")
+        for side, k in joint.columns.items():
+            colour = SIDE_COLOURS[side]
+            axes.plot(estimate.time, factor * values[:, k], color=colour, linewidth=1.1)
+            if not band_is_too_wide(factor * values[:, k], factor * sd[:, k]):
+                low, high = (factor * (values[:, k] + sign * sd[:, k]) for sign in (-2.0, 2.0))
+                axes.fill_between(estimate.time, low, high, color=colour, alpha=0.18, linewidth=0)
+        axes.set_title(f"{joint.title}, {unit}")
+        axes.set_xlim(float(estimate.time[0]), float(estimate.time[-1]))
+    for axes in every[len(joints) :]:
+        axes.set_visible(False)
+    figure.supxlabel("time, s", fontsize=8, color=QUIET)
+    handles: list[Artist] = []
+    for side in dict.fromkeys(side for joint in joints for side in joint.columns):
+        handles += every[0].plot([], [], color=SIDE_COLOURS[side], linewidth=1.4, label=side or "middle")
+    handles.append(every[0].fill_between([], [], [], color=QUIET, alpha=0.18, label="± 2 standard deviations"))
+    figure.legend(handles=handles, loc="outside upper left", ncols=4, borderaxespad=0.2, columnspacing=1.8)
     return figure
 
 
@@ -134,6 +174,9 @@ def wrench_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure
 def knee_moment_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
     """Figure 7: the moment about each knee, estimated, and from the table and classical angles ("AT")."""
     names = [name for name in estimate.coordinate_names if "knee" in name]
+    if not is_planar(estimate):
+        moved = {k for joint in joints_of(estimate) for k in joint.columns.values()}
+        names = [name for name in names if estimate.coordinate_names.index(name) in moved]
     if not names:
         return None
     figure = Figure(figsize=(4.6, 0.5 + 2.3 * len(names)), layout="constrained")

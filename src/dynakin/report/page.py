@@ -9,8 +9,9 @@ import jinja2
 import tomli_w
 
 from dynakin.report.insights import in_short, insights, what_was_run
-from dynakin.report.labels import listed, number, parameter_label, short_marker_names
+from dynakin.report.labels import is_planar, listed, number, parameter_label, short_marker_names
 from dynakin.report.playback import playback
+from dynakin.report.playback_spatial import spatial_playback
 from dynakin.report.sections import sections
 from dynakin.results import Estimate, compute_metrics
 from dynakin.results.config_file import plain
@@ -47,7 +48,7 @@ def render_report(estimate: Estimate, *, metrics: dict[str, Any] | None = None, 
     """
     metrics = metrics or compute_metrics(estimate)
     found = insights(estimate, metrics)
-    preset = estimate.config.get("preset")
+    preset, planar = estimate.config.get("preset"), is_planar(estimate)
     return render_page(
         "report.html.j2",
         eyebrow="dynakin report",
@@ -62,11 +63,12 @@ def render_report(estimate: Estimate, *, metrics: dict[str, Any] | None = None, 
         insights=found,
         in_short=in_short(found),
         warnings=sum(insight.level == "warning" for insight in found),
-        player=playback(estimate),
+        player=playback(estimate) if planar else spatial_playback(estimate),
+        player_template="player.html.j2" if planar else "player_spatial.html.j2",
         sections=sections(estimate, metrics, comparison),
         messages=estimate.messages,
         events=[event for event in estimate.events if event.kind != "missing"],
-        parameters=_parameter_rows(estimate),
+        parameters=_parameter_groups(estimate),
         configuration=tomli_w.dumps(plain(estimate.config)),
     )
 
@@ -95,8 +97,25 @@ def _headline(estimate: Estimate, metrics: dict[str, Any]) -> list[dict[str, str
         value = " / ".join(number(moment, digits=2) for moment in moments)
         tiles.append({"value": value, "unit": "N m", "label": f"ground moment {names}, RMS"})
     tiles.append({"value": f"{len(stuck)} of {len(free)}", "unit": "", "label": "parameters on a bound"})
-    tiles.append({"value": number(estimate.timing.median_us, digits=2), "unit": "µs", "label": "a step, median"})
+    slow = estimate.timing.median_us >= 1000.0
+    step = number(estimate.timing.median_us * (1e-3 if slow else 1.0), digits=2)
+    tiles.append({"value": step, "unit": "ms" if slow else "µs", "label": "a step, median"})
     return tiles
+
+
+_KINDS = {"length": "lengths", "marker": "marker places", "inertia": "masses and inertias", "plates": "plates"}
+
+
+def _parameter_groups(estimate: Estimate) -> list[dict[str, Any]]:
+    """One table, or, where it would be too long to find anything in, one a kind."""
+    rows = _parameter_rows(estimate)
+    if is_planar(estimate):
+        return [{"title": "Every parameter", "rows": rows}]
+    kinds = dict.fromkeys(row["kind"] for row in rows)
+    return [
+        {"title": f"Parameters: {_KINDS.get(kind, kind)}", "rows": [row for row in rows if row["kind"] == kind]}
+        for kind in kinds
+    ]
 
 
 def _parameter_rows(estimate: Estimate) -> list[dict[str, Any]]:

@@ -114,10 +114,11 @@ def rms_bars(key: str, rms: dict[str, float | None]) -> Panel:
     values = [value for value in rms.values() if value is not None]
     figure, axes = new_axes(4.3, 0.42 + 0.2 * len(names), fitted=True)
     places = np.arange(len(names))[::-1]
+    decimals = 1 if max(values, default=1.0) >= 1.0 else 2
     axes.barh(places, values, color=ESTIMATED, height=0.62)
     for place, value in zip(places, values, strict=True):
         axes.annotate(
-            f"{value:.1f} mm",
+            f"{value:.{decimals}f} mm",
             (value, place),
             xytext=(4, 0),
             textcoords="offset points",
@@ -126,7 +127,7 @@ def rms_bars(key: str, rms: dict[str, float | None]) -> Panel:
             fontsize=8,
         )
     axes.set_yticks(places, names, color=INK)
-    axes.set_xlim(0.0, 1.18 * max(values, default=1.0))
+    axes.set_xlim(0.0, 1.18 * max(values, default=1.0) or 1.0)
     axes.set_ylim(-0.6, len(names) - 0.4)
     axes.grid(False)
     axes.set_xticks([])

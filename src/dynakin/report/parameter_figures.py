@@ -14,7 +14,7 @@ from dynakin.report.plot import LIMIT, QUIET, thin
 from dynakin.results import Estimate, Parameter
 
 _PANEL_IN = 2.35
-_INERTIAS = {f"i{a}{b}": f"{a}{b}" for a, b in ("xx", "yy", "zz", "xy", "xz", "yz")}
+_INERTIAS = {f"i{a}{b}": f"{a}{b}" for a, b in ("xx", "yy", "zz")}
 
 
 def lengths_and_masses_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
@@ -27,7 +27,10 @@ def lengths_and_masses_figure(estimate: Estimate, comparison: Trial | None = Non
 
 
 def inertias_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
-    """Figure 9: change of each estimated moment of inertia, about the segment's origin, in per cent."""
+    """Figure 9: change of each estimated moment of inertia, about the segment's origin, in per cent.
+
+    Products of inertia start close to zero: a change in per cent of them says nothing, so they are left out.
+    """
     groups = {
         f"Moments of inertia {label}": [p for p in _inertial(estimate) if p.name.endswith(f"/{key}")]
         for key, label in _INERTIAS.items()

@@ -60,7 +60,7 @@ def playback(estimate: Estimate) -> Playback:
         "angles": angles,
         "moments": moments,
     }
-    frames = _frames(estimate, sum(array.shape[1] for array in arrays.values()))
+    frames = frames_shown(estimate, sum(array.shape[1] for array in arrays.values()))
     view, followed = _view([points, measured, estimated, arrows], floor)
     carriers, names = marker_segments(estimate), short_marker_names(estimate.marker_names)
     content: dict[str, Any] = {
@@ -69,9 +69,9 @@ def playback(estimate: Estimate) -> Playback:
         "units": [["deg", "N m"] if rotation else ["mm", "N"] for rotation in estimate.is_rotation()],
         "follow": followed,
         "view": view,
-        **{name: _packed(array[frames]) for name, array in arrays.items()},
+        **{name: packed(array[frames]) for name, array in arrays.items()},
     }
-    curve, curve_label = _curve(estimate, angles)
+    curve, curve_label = curve_of(estimate, angles)
     left, right = _extent([points, measured, estimated], 0)
     half = 500.0
     return Playback(
@@ -121,7 +121,7 @@ def _arrows(estimate: Estimate, floor: float, height_mm: float) -> tuple[np.ndar
     return np.hstack(parts), sizes
 
 
-def _frames(estimate: Estimate, columns: int) -> np.ndarray:
+def frames_shown(estimate: Estimate, columns: int) -> np.ndarray:
     """Frames that are shown: thirty a second, fewer where the page would become heavy."""
     frames = len(estimate.time)
     bytes_in_all = frames * columns * 2 * 4 / 3
@@ -129,7 +129,7 @@ def _frames(estimate: Estimate, columns: int) -> np.ndarray:
     return np.arange(0, frames, step)
 
 
-def _packed(values: np.ndarray) -> dict[str, Any]:
+def packed(values: np.ndarray) -> dict[str, Any]:
     """(N, C) as little-endian 16-bit numbers in base64: value = scale x number, -32768 missing."""
     finite = values[np.isfinite(values)]
     scale = float(np.max(np.abs(finite), initial=0.0)) / 32000.0 or 1.0
@@ -163,7 +163,7 @@ def _view(planes: list[np.ndarray], floor: float) -> tuple[tuple[float, float, f
     return (round(left), round(top), round(right - left), round(bottom - top)), followed
 
 
-def _curve(estimate: Estimate, angles: np.ndarray) -> tuple[str, str]:
+def curve_of(estimate: Estimate, angles: np.ndarray) -> tuple[str, str]:
     """The coordinate that moves most as an SVG path in a box of 1000 x 100, above the slider, and its label."""
     rotations = np.flatnonzero(estimate.is_rotation())
     if not len(rotations):

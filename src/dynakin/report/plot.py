@@ -78,12 +78,13 @@ def new_axes(width_in: float = 3.6, height_in: float = 2.0, *, fitted: bool = Fa
     return figure, axes
 
 
-def thin(time: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """At most about 700 points of a line: the smallest and the largest of each stretch, so that no peak gets lost."""
-    if len(time) <= _MOST_POINTS:
+def thin(time: np.ndarray, values: np.ndarray, most: int = _MOST_POINTS) -> tuple[np.ndarray, np.ndarray]:
+    """At most about ``most`` points of a line: the smallest and the largest of each stretch, so that no peak gets
+    lost."""
+    if len(time) <= most:
         return time, values
     kept: list[int] = []
-    for part in np.array_split(np.arange(len(time)), _MOST_POINTS // 2):
+    for part in np.array_split(np.arange(len(time)), most // 2):
         finite = part[np.isfinite(values[part])]
         if not len(finite):
             kept.append(int(part[0]))  # a gap stays a gap

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from dynakin.report import panels as charts
+from dynakin.report.chart import Bound, Line, chart
 from dynakin.report.identifiability_section import identifiability_section
 from dynakin.report.labels import (
     COMPONENT_LABELS,
@@ -20,9 +22,29 @@ from dynakin.report.labels import (
 )
 from dynakin.report.method_sections import methods_section
 from dynakin.report.panels import Panel
+from dynakin.report.plot import ESTIMATED
 from dynakin.report.repetition_sections import repetition_section
 from dynakin.report.section import Section
-from dynakin.results import AXES, COMPONENTS, Estimate, Parameter, estimate_curves, repetitions_of
+from dynakin.report.spatial_repetitions import spatial_repetition_section
+from dynakin.report.spatial_sections import (
+    foot_section,
+    mass_centre_section,
+    spatial_angle_section,
+    spatial_marker_section,
+    spatial_moment_section,
+    spatial_wrench_section,
+)
+from dynakin.report.work_sections import asymmetry_section, power_section
+from dynakin.results import (
+    AXES,
+    COMPONENTS,
+    Estimate,
+    Found,
+    MeanCurve,
+    Parameter,
+    estimate_curves,
+    repetitions_of,
+)
 
 if TYPE_CHECKING:
     from dynakin.comparison import Trial
@@ -36,6 +58,9 @@ def sections(estimate: Estimate, metrics: dict[str, Any], comparison: Trial | No
     """
     found = repetitions_of(estimate) if comparison is None else comparison.repetitions
     curves = estimate_curves(estimate) if comparison is None else comparison.curves()
+    if not is_planar(estimate):
+        every = spatial_sections(estimate, metrics, found, curves, comparison)
+        return [section for section in every if not section.empty]
     every = [
         marker_section(estimate, metrics),
         wrench_section(estimate, metrics),
@@ -48,6 +73,31 @@ def sections(estimate: Estimate, metrics: dict[str, Any], comparison: Trial | No
         identifiability_section(estimate, metrics),
     ]
     return [section for section in every if not section.empty]
+
+
+def spatial_sections(
+    estimate: Estimate,
+    metrics: dict[str, Any],
+    found: Found,
+    curves: Sequence[MeanCurve],
+    comparison: Trial | None = None,
+) -> list[Section]:
+    """Sections of a body in space: what is read most first."""
+    return [
+        spatial_angle_section(estimate),
+        spatial_moment_section(estimate),
+        foot_section(estimate, metrics),
+        power_section(estimate, metrics),
+        asymmetry_section(estimate, metrics),
+        mass_centre_section(estimate),
+        spatial_marker_section(estimate, metrics),
+        spatial_wrench_section(estimate, metrics),
+        spatial_repetition_section(estimate, found, curves),
+        *([] if comparison is None else [methods_section(comparison)]),
+        length_section(estimate),
+        mass_section(estimate),
+        identifiability_section(estimate, metrics),
+    ]
 
 
 def marker_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
@@ -208,6 +258,14 @@ def _parameter_panel(estimate: Estimate, p: Parameter, title: str, factor: float
         note += f" ({signed_percent(change)})"
     if p.at_bound:
         note += ", on its bound"
+    if not is_planar(estimate):
+        levels = [(p.lower, "lower bound"), (p.upper, "upper bound")]
+        # bounds far from the path are left out: they would press it flat
+        reach = 3.0 * float(np.ptp(element)) + 2.0 * float(np.nanmax(sd))
+        middle = float(np.median(element))
+        bounds = [Bound(factor * v, word) for v, word in levels if v is not None and abs(v - middle) <= reach]
+        line = Line(factor * element, ESTIMATED, 1.3, factor * sd)
+        return chart(title, unit, estimate.time, [line], note=note, bounds=bounds)
     return charts.parameter_path(
         p.name,
         title,

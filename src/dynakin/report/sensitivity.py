@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import itertools
+import textwrap
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -10,6 +12,8 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
+from matplotlib.axes import Axes
+from matplotlib.collections import QuadMesh
 from matplotlib.colors import LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
@@ -24,30 +28,31 @@ GAINS = ("log10_coordinate", "log10_speed", "log10_acceleration")
 CRITERION = "criterion"
 LABEL, UNIT = "sum of RMS differences", "mm + N + N m"
 """The paper's criterion: markers and wrench together."""
-_NAMES = ("coordinates", "speeds", "accelerations")
-_UNITS = ("rad²", "(rad/s)²", "(rad/s²)²")
+GAIN_NAMES = ("gain of coordinates", "gain of speeds", "gain of accelerations")
+GAIN_UNITS = ("rad²", "(rad/s)²", "(rad/s²)²")
 # A criterion that spans more than this many times its least value is coloured on a logarithmic scale.
 _LOG_FROM = 20.0
 
 
 @dataclass(frozen=True, eq=False)
 class Sensitivity:
-    """A criterion on a grid of gains.
+    """A criterion on a grid of settings: the filter's three gains, or others.
 
-    gains: three sorted arrays, log10 of the process variances of coordinates, speeds and accelerations (SI squared, a
-    step). criterion: (A, B, C), NaN where the filter diverged or nothing was computed; in ``unit``.
+    gains: sorted arrays, log10 of each setting. criterion: a dimension a setting, NaN where the filter diverged or
+    nothing was computed; in ``unit``. names, units: of the settings.
     """
 
-    gains: tuple[Array, Array, Array]
+    gains: tuple[Array, ...]
     criterion: Array
     label: str = LABEL
     unit: str = UNIT
+    names: tuple[str, ...] = GAIN_NAMES
+    units: tuple[str, ...] = GAIN_UNITS
 
     @property
-    def optimum(self) -> tuple[int, int, int]:
+    def optimum(self) -> tuple[int, ...]:
         """Place of the least value in the grid."""
-        a, b, c = np.unravel_index(int(np.nanargmin(self.criterion)), self.criterion.shape)
-        return int(a), int(b), int(c)
+        return tuple(int(k) for k in np.unravel_index(int(np.nanargmin(self.criterion)), self.criterion.shape))
 
 
 def read_sensitivity(path: str | Path) -> Sensitivity:
@@ -71,51 +76,82 @@ def read_sensitivity(path: str | Path) -> Sensitivity:
 
 
 def sensitivity_figure(grid: Sensitivity) -> Figure:
-    """Three slices through the optimum, each over two of the gains."""
+    """Slices through the optimum, each over two of the settings; over one setting a line."""
     best = grid.optimum
     values = grid.criterion[np.isfinite(grid.criterion)]
     low, high = float(values.min()), float(values.max())
-    norm: Normalize = (
-        LogNorm(low, high) if 0.0 < low * _LOG_FROM < high else Normalize(low, high if high > low else low + 1.0)
-    )
-    figure = Figure(figsize=(7.2, 2.7), layout="constrained")
-    every = figure.subplots(1, 3)
-    mesh = None
-    for axes, (x, y) in zip(every, ((0, 1), (0, 2), (1, 2)), strict=True):
-        held = 3 - x - y
-        plane = np.take(grid.criterion, best[held], axis=held).T  # rows: y
-        axes.set_facecolor("white")
-        axes.patch.set(hatch="////", edgecolor="#c9d0d6", linewidth=0.0)
-        mesh = axes.pcolormesh(
-            _edges(grid.gains[x]), _edges(grid.gains[y]), np.ma.masked_invalid(plane), cmap="cividis", norm=norm
-        )
-        point = (grid.gains[x][best[x]], grid.gains[y][best[y]])
-        axes.plot(*point, "o", markersize=8, markerfacecolor="none", markeredgecolor="white", markeredgewidth=3.2)
-        axes.plot(*point, "o", markersize=8, markerfacecolor="none", markeredgecolor="#D55E00", markeredgewidth=1.6)
-        axes.set_xlabel(_axis_label(x))
-        axes.set_ylabel(_axis_label(y))
-        at = f"{grid.gains[held][best[held]]:g}"
-        axes.set_title(f"{_NAMES[held]} at $10^{{{at}}}$ {_UNITS[held]}", fontsize=8, weight="normal")
-        for axis in (axes.xaxis, axes.yaxis):
-            axis.set_major_locator(MaxNLocator(7, integer=True, steps=[1, 2, 3, 5, 10]))
-        axes.grid(False)
-        axes.set_box_aspect(1)
-    assert mesh is not None
-    bar = figure.colorbar(mesh, ax=list(every), location="right", shrink=0.82, pad=0.02)
-    bar.set_label(f"{grid.label}, {grid.unit}", color=QUIET)
-    bar.outline.set_visible(False)
-    figure.suptitle(
-        f"Slices through the optimum (○: {number(low)}, in {grid.unit}); hatched: the filter diverged",
-        x=0.01,
-        ha="left",
-        fontsize=8.5,
-        color=INK,
-    )
+    pairs = list(itertools.combinations(range(len(grid.gains)), 2))
+    columns, rows = max(1, min(3, len(pairs))), max(1, -(-len(pairs) // 3))
+    width = 7.2 if columns == 3 else 1.2 + 2.6 * columns
+    figure = Figure(figsize=(width, 0.5 + 2.2 * rows), layout="constrained")
+    every = list(figure.subplots(rows, columns, squeeze=False).ravel())
+    if not pairs:
+        _line(every[0], grid)
+    else:
+        norm = _norm(low, high)
+        for axes, pair in zip(every, pairs, strict=False):
+            mesh = _slice(axes, grid, pair, norm)
+        for axes in every[len(pairs) :]:
+            axes.set_visible(False)
+        bar = figure.colorbar(mesh, ax=every, location="right", shrink=0.82, pad=0.02)
+        bar.set_label("\n".join(textwrap.wrap(_in_unit(grid), 38)), color=QUIET)
+        bar.outline.set_visible(False)
+    at = ", ".join(f"{gains[k]:.3g}" for gains, k in zip(grid.gains, best, strict=True))
+    what = "Slices through the optimum" if pairs else "Optimum"
+    unit = "" if grid.unit == "1" else f", in {grid.unit}"
+    lost = "; hatched: the filter diverged" if not np.isfinite(grid.criterion).all() else ""
+    figure.suptitle(f"{what} (○: {number(low)}{unit}, at 10^({at})){lost}", x=0.01, ha="left", fontsize=8.5, color=INK)
     return figure
 
 
-def _axis_label(gain: int) -> str:
-    return f"gain of {_NAMES[gain]}\nlog₁₀ of Q in {_UNITS[gain]}"
+def _norm(low: float, high: float) -> Normalize:
+    if 0.0 < low * _LOG_FROM < high:
+        return LogNorm(low, high)
+    return Normalize(low, high if high > low else low + 1.0)
+
+
+def _slice(axes: Axes, grid: Sensitivity, pair: tuple[int, int], norm: Normalize) -> QuadMesh:
+    x, y = pair
+    best = grid.optimum
+    held = [k for k in range(len(best)) if k not in pair]
+    plane = grid.criterion[tuple(slice(None) if k in pair else best[k] for k in range(len(best)))].T  # rows: y
+    axes.set_facecolor("white")
+    axes.patch.set(hatch="////", edgecolor="#c9d0d6", linewidth=0.0)
+    mesh = axes.pcolormesh(
+        _edges(grid.gains[x]), _edges(grid.gains[y]), np.ma.masked_invalid(plane), cmap="cividis", norm=norm
+    )
+    point = (grid.gains[x][best[x]], grid.gains[y][best[y]])
+    axes.plot(*point, "o", markersize=8, markerfacecolor="none", markeredgecolor="white", markeredgewidth=3.2)
+    axes.plot(*point, "o", markersize=8, markerfacecolor="none", markeredgecolor="#D55E00", markeredgewidth=1.6)
+    axes.set_xlabel(_axis_label(grid, x))
+    axes.set_ylabel(_axis_label(grid, y))
+    title = ", ".join(
+        f"{grid.names[k].removeprefix('gain of ')} at $10^{{{grid.gains[k][best[k]]:.3g}}}$ {grid.units[k]}"
+        for k in held
+    )
+    axes.set_title(title, fontsize=8, weight="normal")
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_locator(MaxNLocator(7, integer=True, steps=[1, 2, 3, 5, 10]))
+    axes.grid(False)
+    axes.set_box_aspect(1)
+    return mesh
+
+
+def _line(axes: Axes, grid: Sensitivity) -> None:
+    axes.plot(grid.gains[0], grid.criterion, "-o", markersize=3, color="#0072B2")
+    k = grid.optimum[0]
+    axes.plot(grid.gains[0][k], grid.criterion[k], "o", markersize=8, markerfacecolor="none", markeredgecolor="#D55E00")
+    axes.set_xlabel(_axis_label(grid, 0))
+    axes.set_ylabel(_in_unit(grid))
+
+
+def _in_unit(grid: Sensitivity) -> str:
+    return grid.label if grid.unit == "1" else f"{grid.label}, {grid.unit}"
+
+
+def _axis_label(grid: Sensitivity, k: int) -> str:
+    which = "Q in " if grid.names[k] in GAIN_NAMES else ""
+    return f"{grid.names[k]}\nlog₁₀ of {which or 'it in '}{grid.units[k]}"
 
 
 def _edges(centres: Array) -> Array:

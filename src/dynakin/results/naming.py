@@ -19,7 +19,10 @@ INERTIA_WORDS = {
 
 
 def words(name: str) -> str:
-    """`upper_arm` -> `upper arm`."""
+    """`upper_arm` -> `upper arm`, `hip_flexion_r` -> `right hip flexion`."""
+    for suffix, side in (("_r", "right"), ("_l", "left")):
+        if len(name) > 2 and name.endswith(suffix):
+            return f"{side} {name[:-2]}".replace("_", " ")
     return name.replace("_", " ")
 
 

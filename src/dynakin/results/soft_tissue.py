@@ -10,6 +10,7 @@ import numpy as np
 
 from dynakin.recordings.landmarks import plain_name
 from dynakin.results.estimate import AXES, Estimate
+from dynakin.results.naming import words
 from dynakin.results.soft_tissue_sizes import published_amplitude_mm
 
 # Published sizes are means over people at full squat; twice the size, measured from the marker's mean place, is more
@@ -105,7 +106,7 @@ def excess_in_words(markers: Mapping[str, Mapping[str, Any]], limit: int = 3) ->
         return ""
     worst = sorted(excess, key=lambda entry: entry[1] - entry[2], reverse=True)
     parts = [
-        f"{name} moves {largest:.0f} mm on the {segment.replace('_', ' ')} (declared {declared:.0f} mm)"
+        f"{name} moves {largest:.0f} mm on the {words(segment)} (declared {declared:.0f} mm)"
         for name, largest, declared, segment in worst[:limit]
     ]
     more = f" and {len(worst) - limit} more" if len(worst) > limit else ""

@@ -6,7 +6,7 @@ from dynakin.simulation.body import Contact, SimulatedBody
 from dynakin.simulation.faults import Fault
 from dynakin.simulation.markers import Site
 from dynakin.simulation.mechanics import Axis, Motion, Segment
-from dynakin.simulation.motions import MOTIONS
+from dynakin.simulation.motions import MOTIONS, MOTIONS_IN_SPACE
 from dynakin.simulation.movement import Movement, Repetition
 from dynakin.simulation.output import TRIAL_FILES, check_trial_folder, save_trial
 from dynakin.simulation.sensors import SensorNoise, load_sensors
@@ -17,6 +17,7 @@ from dynakin.simulation.truth import Truth
 __all__ = [
     "BODIES",
     "MOTIONS",
+    "MOTIONS_IN_SPACE",
     "TRIAL_FILES",
     "Axis",
     "Contact",

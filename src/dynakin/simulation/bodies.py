@@ -8,14 +8,16 @@ from collections.abc import Callable
 import numpy as np
 
 from dynakin.errors import ConfigError
-from dynakin.simulation import sagittal, squat_chain
+from dynakin.simulation import sagittal, squat_chain, whole_body
 from dynakin.simulation.body import SimulatedBody
 from dynakin.simulation.streams import Streams
 from dynakin.simulation.subject import SimulatedSubject, Spread, draw_subject
+from dynakin.simulation.whole_body_markers import SETS
 
 BODIES: dict[str, Callable[[SimulatedSubject, np.random.Generator], SimulatedBody]] = {
     "sagittal7": sagittal.build_body,
     "squat7": squat_chain.build_body,
+    "fullbody": whole_body.build_body,
 }
 """Bodies by the name of the model whose coordinates they have: built of a subject, markers put on with the
 generator."""
@@ -28,12 +30,19 @@ def choose_body(
     height_m: float,
     sex: str | None,
     spread: Spread,
+    markers: str | None = None,
 ) -> SimulatedBody:
-    """The body of that name, drawn around the table; one of a user's own is checked and taken as it is.
+    """The body of that name, drawn around the table, with the markers of that set (None: its own); one of a user's
+    own is checked and taken as it is.
 
     Raises:
-        ConfigError: no such body, a subject that cannot be, or a tree that does not hang together.
+        ConfigError: no such body or marker set, a subject that cannot be, or a tree that does not hang together.
     """
+    if markers is not None and (model != "fullbody" or markers not in SETS):
+        raise ConfigError(
+            f"simulation: markers is {markers!r} for {model if isinstance(model, str) else model.name!r}, expected "
+            f"{' or '.join(SETS)} for fullbody, nothing for the others, which have one set each"
+        )
     if isinstance(model, SimulatedBody):
         _check(model)
         return model
@@ -42,6 +51,8 @@ def choose_body(
         hint = f" (did you mean {near[0]!r}?)" if near else ""
         raise ConfigError(f"simulation: model is {str(model)!r}{hint}, expected {' or '.join(BODIES)}")
     subject = draw_subject(streams["subject"], mass_kg, height_m, sex, spread)
+    if markers is not None:
+        return whole_body.build_body(subject, streams["sites"], markers)
     return BODIES[model](subject, streams["sites"])
 
 

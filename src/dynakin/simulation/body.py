@@ -50,6 +50,7 @@ class SimulatedBody:
         full_change: coordinate -> change (rad) that moves the soft tissue by its full size (a full squat).
         hips: virtual hip centres, None where the recording has none.
         floor_m: y of the floor in the ground frame.
+        in_space: nothing is fixed in the ground, so the ground is the laboratory's, and motions are those in space.
     """
 
     name: str
@@ -63,6 +64,7 @@ class SimulatedBody:
     full_change: Mapping[str, float] = field(default_factory=dict)
     hips: HipCentres | None = None
     floor_m: float = 0.0
+    in_space: bool = False
 
     @property
     def coordinates(self) -> tuple[str, ...]:

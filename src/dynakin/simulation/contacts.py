@@ -12,6 +12,7 @@ from dynakin.errors import ConfigError
 from dynakin.simulation.body import Contact, SimulatedBody
 from dynakin.simulation.mechanics import Dynamics, Motion, TreeMotion, dynamics, kinematics
 from dynakin.simulation.movement import Movement, Seat
+from dynakin.simulation.support import pressed, split_between
 
 Array = NDArray[np.float64]
 
@@ -21,12 +22,14 @@ SIDEWAYS_SHARE = 0.06  # of the vertical force: the feet stand apart and push ou
 @dataclass(frozen=True)
 class MechanicalState:
     """All that is true of the body over time: its motion, the forces, and what each contact carries of them, (T, 6)
-    about the ground origin by the contact's name."""
+    about the ground origin by the contact's name; plates: the contacts below which they lie, and what presses on
+    each."""
 
     motion: Motion
     moving: TreeMotion
     forces: Dynamics
     carried: dict[str, Array]
+    plates: tuple[tuple[Contact, Array], ...]
 
 
 def mechanical_state(body: SimulatedBody, movement: Movement, time: Array) -> MechanicalState:
@@ -45,14 +48,23 @@ def mechanical_state(body: SimulatedBody, movement: Movement, time: Array) -> Me
     moving = kinematics(body.tree, motion)
     forces = dynamics(body.tree, motion, moving)
     contacts = contacts_of(body, movement.seat)
-    carried = share_wrench(forces.wrench, body.feet, movement.seat)
+    if movement.support is None:
+        carried = share_wrench(forces.wrench, body.feet, movement.seat)
+    else:
+        carried = list(split_between(forces.wrench, movement.support(time)))
     outside: dict[str, Array] = {}
     for contact, wrench in zip(contacts, carried, strict=True):
         if contact.segment is not None:
             outside[contact.segment] = outside.get(contact.segment, np.zeros_like(wrench)) + wrench
     if outside:
         forces = replace(dynamics(body.tree, motion, moving, outside), wrench=forces.wrench)
-    return MechanicalState(motion, moving, forces, {c.name: w for c, w in zip(contacts, carried, strict=True)})
+    by_name = {c.name: w for c, w in zip(contacts, carried, strict=True)}
+    plates = tuple(zip(contacts, carried, strict=True))
+    if movement.support is not None:
+        plates = tuple(
+            (Contact(f.plate, f.plate, None, f.centre), pressed(by_name, time, f)) for f in movement.footings
+        )
+    return MechanicalState(motion, moving, forces, by_name, plates)
 
 
 def contacts_of(body: SimulatedBody, seat: Seat | None) -> tuple[Contact, ...]:

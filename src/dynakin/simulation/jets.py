@@ -67,6 +67,16 @@ def step(time: Array, start_s: float, duration_s: float) -> Jet:
     return Jet(value, rate / duration_s, second / duration_s**2)
 
 
+def swift_step(time: Array, start_s: float, duration_s: float) -> Jet:
+    """A step from 0 to 1 with two continuous derivatives: 10 s^3 - 15 s^4 + 6 s^5, s in [0, 1]; less steep in the
+    middle than `step`."""
+    s = np.clip((time - start_s) / duration_s, 0.0, 1.0)
+    value = s**3 * (10.0 - 15.0 * s + 6.0 * s**2)
+    rate = 30.0 * (s * (1.0 - s)) ** 2
+    second = 60.0 * s * (1.0 - s) * (1.0 - 2.0 * s)
+    return Jet(value, rate / duration_s, second / duration_s**2)
+
+
 def sinusoids(time: Array, amplitudes: Array, frequencies_hz: Array, phases: Array) -> Jet:
     """A sum of sinusoids: a smooth signal of limited bandwidth. The three arrays have one entry per
     sinusoid."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -123,11 +123,13 @@ def marker_positions(sites: Sequence[Site], moving: TreeMotion, displacement: Ar
 @dataclass(frozen=True)
 class HipCentres:
     """Virtual hip centres: the pelvis markers that they rest on (right and left ASIS, right and left PSIS), their
-    names (right, left) and their true distance from the midline, m."""
+    names (right, left), their true distance from the midline, m, and the middle between them (3,) m in the pelvis'
+    frame."""
 
     pelvis: tuple[str, str, str, str]
     names: tuple[str, str]
     half_width_m: float
+    middle: Array = field(default_factory=lambda: np.zeros(3))
 
 
 def hip_centres(hips: HipCentres, sites: Sequence[Site], markers: Array, error: Array) -> Array:
@@ -144,7 +146,7 @@ def hip_centres(hips: HipCentres, sites: Sequence[Site], markers: Array, error: 
     R_GL, o_G = _pelvis_frame(*(markers[:, names.index(n)] for n in hips.pelvis))
     result = []
     for off, sign in zip(error, (1.0, -1.0), strict=True):
-        centre_P = np.array([0.0, 0.0, sign * hips.half_width_m])
+        centre_P = hips.middle + np.array([0.0, 0.0, sign * hips.half_width_m])
         p_L = R_PL[0].T @ (centre_P - o_P[0]) + off
         result.append(o_G + R_GL @ p_L)
     return np.stack(result, axis=1)

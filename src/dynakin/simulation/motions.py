@@ -11,11 +11,13 @@ from numpy.typing import NDArray
 
 from dynakin.errors import ConfigError
 from dynakin.simulation.body import SimulatedBody
+from dynakin.simulation.gait import gait_movement
 from dynakin.simulation.mechanics import Motion
 from dynakin.simulation.motion_file import file_movement
 from dynakin.simulation.movement import Movement
 from dynakin.simulation.sit_to_stand import sit_to_stand_movement
 from dynakin.simulation.squat import squat_movement
+from dynakin.simulation.squat_in_space import squat_in_space
 from dynakin.simulation.sway import sway_movement
 
 Array = NDArray[np.float64]
@@ -25,7 +27,12 @@ MOTIONS: dict[str, Callable[[np.random.Generator, SimulatedBody, float], Movemen
     "sit-to-stand": sit_to_stand_movement,
     "sway": sway_movement,
 }
-"""Motions by name: drawn for a body and a duration (s)."""
+"""Motions of the planar chains by name: drawn for a body and a duration (s)."""
+MOTIONS_IN_SPACE: dict[str, Callable[[np.random.Generator, SimulatedBody, float], Movement]] = {
+    "squat": squat_in_space,
+    "gait": gait_movement,
+}
+"""Those of the whole body in space."""
 
 
 def choose_movement(
@@ -44,21 +51,22 @@ def choose_movement(
         return _checked(motion, body)
     if callable(motion):
         return _checked(Movement("motion", motion, "a motion given as a function of time"), body)
-    if str(motion) in MOTIONS:
-        if str(motion) not in body.paths:
-            known = ", ".join(body.paths) or "none of them"
+    if str(motion) in {**MOTIONS, **MOTIONS_IN_SPACE}:
+        if str(motion) not in (MOTIONS_IN_SPACE if body.in_space else body.paths):
+            known = ", ".join(MOTIONS_IN_SPACE if body.in_space else body.paths) or "none of them"
             raise ConfigError(
                 f"simulation: motion is {str(motion)!r}, but {body.name} knows {known}; expected one of them, a file "
                 "or a function of time"
             )
-        return MOTIONS[str(motion)](rng, body, duration_s)
+        return (MOTIONS_IN_SPACE if body.in_space else MOTIONS)[str(motion)](rng, body, duration_s)
     path = Path(motion)
     if path.suffix.casefold() in (".mot", ".sto") and path.is_file():
         return file_movement(path, body, cutoff_hz)
-    near = difflib.get_close_matches(str(motion), MOTIONS, n=1)
+    every = tuple(MOTIONS_IN_SPACE if body.in_space else MOTIONS)
+    near = difflib.get_close_matches(str(motion), every, n=1)
     hint = f" (did you mean {near[0]!r}?)" if near else ""
     raise ConfigError(
-        f"simulation: motion is {str(motion)!r}{hint}, expected {', '.join(MOTIONS)} or a .mot or .sto file that exists"
+        f"simulation: motion is {str(motion)!r}{hint}, expected {', '.join(every)} or a .mot or .sto file that exists"
     )
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from dynakin.simulation.jets import Jet
 from dynakin.simulation.mechanics import Motion
+from dynakin.simulation.support import Footing, Support
 
 Array = NDArray[np.float64]
 
@@ -52,6 +53,8 @@ class Movement:
         repetitions: where they are known.
         seat: what else than the feet carries the person.
         end_s: last time at which it is known, None where it has no end.
+        support: times (T,) s -> how the feet stand; None: as the body's contacts tell.
+        footings: the plates below them, where ``support`` is given.
     """
 
     name: str
@@ -60,6 +63,8 @@ class Movement:
     repetitions: tuple[Repetition, ...] = ()
     seat: Seat | None = None
     end_s: float | None = None
+    support: Callable[[Array], Support] | None = None
+    footings: tuple[Footing, ...] = ()
 
 
 def in_order(names: Sequence[str], jets: Mapping[str, Jet]) -> Motion:

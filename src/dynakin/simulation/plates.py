@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,18 +35,17 @@ def draw_plate_errors(gains: np.random.Generator, drifts: np.random.Generator, n
 
 def sense_plates(
     streams: Streams,
-    contacts: Sequence[Contact],
-    carried: Mapping[str, Array],
+    loads: Sequence[tuple[Contact, Array]],
     time: Array,
     origin_L: Array,
     noise: SensorNoise,
 ) -> tuple[tuple[Plate, ...], dict[str, PlateErrors]]:
-    """A plate below each contact, and what is wrong with it, by the plate's name."""
+    """A plate below each contact, which presses with a wrench (T, 6); and what is wrong with it, by the plate's
+    name."""
     plates, errors = [], {}
-    for contact in contacts:
+    for contact, wrench in loads:
         own = draw_plate_errors(streams["plate_gain"], streams["plate_drift"], noise)
         centre_L = contact.centre + origin_L
-        wrench = carried[contact.name]
         plates.append(
             measure(streams["plate_noise"], time, wrench, contact.plate, centre_L, origin_L, own, noise),
         )

@@ -14,7 +14,7 @@ from dynakin.errors import ConfigError
 from dynakin.recordings import Recording
 from dynakin.simulation.bodies import choose_body
 from dynakin.simulation.body import SimulatedBody
-from dynakin.simulation.contacts import contacts_of, mechanical_state
+from dynakin.simulation.contacts import mechanical_state
 from dynakin.simulation.mechanics import Motion
 from dynakin.simulation.motion_file import CUTOFF_HZ
 from dynakin.simulation.motions import choose_movement
@@ -31,6 +31,7 @@ Array = NDArray[np.float64]
 
 GROUND_IN_LABORATORY = (-0.12, -0.60)  # x and z (m) of the ground origin; the floor is y = 0
 SYNTHETIC_S = 20.0  # duration of a motion that has no end of its own
+GAIT_S = 4.0  # of walking across a laboratory
 LONGEST_FRAMES = 2_000_000
 
 
@@ -60,6 +61,7 @@ def simulate(
     noise: SensorNoise | None = None,
     spread: Spread | None = None,
     motion_cutoff_hz: float = CUTOFF_HZ,
+    markers: str | None = None,
 ) -> SimulatedTrial:
     """A trial of a subject who does not exist, so that all that is to be estimated is known.
 
@@ -67,35 +69,37 @@ def simulate(
     own: to switch one sensor's noise off leaves the rest of the trial as it is.
 
     Args:
-        model: "sagittal7" or "squat7", drawn around the table; or a body of your own, planar or spatial, whose
-            subject then stands for mass, height, sex and spread.
-        motion: "squat", "sit-to-stand" or "sway"; a coordinates file (.mot, .sto) with the model's coordinate
-            names; or a function of times (T,) s that gives a `Motion`.
+        model: "sagittal7", "squat7" or "fullbody", drawn around the table; or a body of your own, planar or spatial,
+            whose subject then stands for mass, height, sex and spread.
+        motion: "squat", "sit-to-stand" or "sway", of "fullbody" "squat" or "gait"; a coordinates file (.mot, .sto)
+            with the model's coordinate names; or a function of times (T,) s that gives a `Motion`.
         seed: of everything that is drawn.
         duration_s, rate_hz: length and frame rate; the first frame is at 0 s. None: 20 s, or all of a file.
         mass_kg, height_m, sex: "male", "female" or None (mean of both), as for `dynakin.Subject`.
         noise: of the sensors; None: `SensorNoise()`, ``SensorNoise.none()`` for perfect ones.
         spread: of the subject around the anthropometric table; None: `Spread()`.
         motion_cutoff_hz: of the low-pass on a coordinates file.
+        markers: set that "fullbody" carries, "opencap" (where None) or "plug-in-gait"; the others have one each.
 
     Raises:
         ConfigError: a value that makes no trial; the message names the argument.
     """
-    asked_s = SYNTHETIC_S if duration_s is None else duration_s
+    asked_s = (GAIT_S if motion == "gait" else SYNTHETIC_S) if duration_s is None else duration_s
     for key, value in (("rate_hz", rate_hz), ("duration_s", asked_s)):
         if not 0.0 < value < np.inf:
             raise ConfigError(f"simulation: {key} is {value:g}, expected a positive number")
     _frames(asked_s, rate_hz)  # refuses too many before a motion of that length is drawn
     noise, spread = noise or SensorNoise(), spread or Spread()
     streams = Streams(seed)
-    body = choose_body(model, streams, mass_kg, height_m, sex, spread)
+    body = choose_body(model, streams, mass_kg, height_m, sex, spread, markers)
     movement = choose_movement(motion, body, streams["motion"], asked_s, motion_cutoff_hz)
-    time = _frames(_length(duration_s, movement), rate_hz)
+    time = _frames(_length(duration_s, movement, asked_s), rate_hz)
     state = mechanical_state(body, movement, time)
     seen = sense_markers(streams, body, time, state.motion, state.moving, noise)
-    origin_L = np.array([GROUND_IN_LABORATORY[0], -body.floor_m, GROUND_IN_LABORATORY[1]])
+    x, z = (0.0, 0.0) if body.in_space else GROUND_IN_LABORATORY
+    origin_L = np.array([x, -body.floor_m, z])
     late = state if noise.plate_lag_s == 0.0 else mechanical_state(body, movement, time - noise.plate_lag_s)
-    plates, errors = sense_plates(streams, contacts_of(body, movement.seat), late.carried, time, origin_L, noise)
+    plates, errors = sense_plates(streams, late.plates, time, origin_L, noise)
     recording = Recording(
         name=f"simulated_{movement.name.replace('-', '_')}_{seed}",
         path=None,
@@ -148,9 +152,9 @@ def simulate_squat(
     return simulate("sagittal7", "squat", seed, duration_s, rate_hz, mass_kg, height_m, sex, noise=noise, spread=spread)
 
 
-def _length(duration_s: float | None, movement: Movement) -> float:
+def _length(duration_s: float | None, movement: Movement, otherwise_s: float) -> float:
     if duration_s is None:
-        return SYNTHETIC_S if movement.end_s is None else movement.end_s
+        return otherwise_s if movement.end_s is None else movement.end_s
     if movement.end_s is not None and duration_s > movement.end_s + 1e-9:
         raise ConfigError(
             f"simulation: duration_s is {duration_s:g}, expected at most the {movement.end_s:g} s of {movement.name!r}"

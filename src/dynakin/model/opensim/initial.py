@@ -122,9 +122,16 @@ def lay_on(
         messages=tuple(messages),
         plan=None,
         feet=feet_of(source),
-        unmodelled_m=np.hypot(_MODEL_M, 0.0 if moves else _SKIN_SHARE * skin[:, 1]),
+        unmodelled_m=_unmodelled(skin[:, 1], options.estimate, known.marker_m),
         dimensionless=frozenset(lengths),
     )
+
+
+def _unmodelled(declared_m: Array, estimate: tuple[str, ...], place_m: float) -> Array:
+    """(M,) m: what is not estimated, of skin and of the markers' places, is noise beside the skeleton's errors."""
+    skin = 0.0 if "soft_tissue" in estimate else _SKIN_SHARE
+    place = 0.0 if "markers" in estimate else place_m
+    return np.sqrt(_MODEL_M**2 + place**2 + (skin * declared_m) ** 2)
 
 
 def limits_of(source: OpenSimModel) -> dict[str, Interval]:

@@ -94,10 +94,7 @@ def to_spec(
             )
             for name, segment in placed.items()
         ],
-        markers=[
-            _core.MarkerSpec(m.name, m.body, np.array(m.location), AXES, [estimate_places and not m.fixed] * 3)
-            for m in sites
-        ],
+        markers=[_core.MarkerSpec(m.name, m.body, np.array(m.location), AXES, [estimate_places] * 3) for m in sites],
         gravity=np.array(model.gravity),
     )
 

@@ -2,20 +2,7 @@
   "use strict";
   var root = document.getElementById("player");
   var data = JSON.parse(document.getElementById("player-data").textContent);
-  var stage = root.querySelector(".stage"), slider = root.querySelector("input"), button = root.querySelector("button");
-  var speed = root.querySelector("select"), clock = root.querySelector("output"), cursor = root.querySelector(".cursor");
-  var still = window.matchMedia("(prefers-reduced-motion: reduce)");
-  var times = data.time, last = times.length - 1, frame = 0, playing = false, from = 0, since = 0;
-
-  function unpack(packed) {
-    var text = atob(packed.values), bytes = new Uint8Array(text.length), view, k;
-    for (k = 0; k < text.length; k++) { bytes[k] = text.charCodeAt(k); }
-    view = new DataView(bytes.buffer);
-    return function (row, column) {
-      var value = view.getInt16(2 * (row * packed.columns + column), true);
-      return value === -32768 ? NaN : value * packed.scale;
-    };
-  }
+  var stage = root.querySelector(".stage"), unpack = dynakinPlayer.unpack, text = dynakinPlayer.text;
   var points = unpack(data.points), arrows = unpack(data.arrows), forces = unpack(data.forces);
   var angles = unpack(data.angles), moments = unpack(data.moments);
   var kinds = [["measured", unpack(data.measured)], ["estimated", unpack(data.estimated)]];
@@ -36,14 +23,7 @@
     element.style.display = seen ? "" : "none";
     if (seen) { element.setAttribute("cx", x); element.setAttribute("cy", y); }
   }
-  function text(value, digits, unit) {
-    if (!isFinite(value)) { return "–"; }
-    var rounded = value.toFixed(digits);
-    if (Number(rounded) === 0) { rounded = (0).toFixed(digits); }
-    return rounded.replace("-", "−") + " " + unit;
-  }
-  function show(k) {
-    frame = Math.max(0, Math.min(last, k));
+  dynakinPlayer.run(root, data.time, function (frame) {
     bones.forEach(function (bone, i) {
       var a = data.bones[i][0], b = data.bones[i][1];
       line(bone, points(frame, 2 * a), points(frame, 2 * a + 1), points(frame, 2 * b), points(frame, 2 * b + 1));
@@ -69,44 +49,5 @@
       row.cells[2].textContent = text(moments(frame, i), 1, unit[1]);
     });
     sizes.forEach(function (cell, i) { cell.textContent = text(forces(frame, i), 0, "N"); });
-    var now = times[frame].toFixed(2) + " s";
-    clock.textContent = now;
-    slider.value = frame;
-    slider.setAttribute("aria-valuetext", now);
-    if (cursor) {
-      var share = 1000 * (times[frame] - times[0]) / Math.max(times[last] - times[0], 1e-9);
-      cursor.setAttribute("x1", share); cursor.setAttribute("x2", share);
-    }
-  }
-  function at(time) {
-    var low = 0, high = last;
-    while (low < high) {
-      var half = (low + high + 1) >> 1;
-      if (times[half] <= time) { low = half; } else { high = half - 1; }
-    }
-    return low;
-  }
-  function play(on) {
-    playing = on;
-    root.classList.toggle("playing", on);
-    button.lastChild.textContent = on ? "Pause" : "Play";
-    if (!on) { return; }
-    if (frame === last) { show(0); }
-    from = times[frame]; since = performance.now();
-    var drawn = since;
-    requestAnimationFrame(function step(instant) {
-      if (!playing) { return; }
-      var reached = at(from + Number(speed.value) * Math.max(0, instant - since) / 1000);
-      // Who asked for less motion gets a still picture every second instead of a film.
-      if (reached !== frame && (!still.matches || instant - drawn > 1000 || reached === last)) {
-        show(reached); drawn = instant;
-      }
-      if (reached === last) { play(false); } else { requestAnimationFrame(step); }
-    });
-  }
-  button.addEventListener("click", function () { play(!playing); });
-  slider.addEventListener("input", function () { play(false); show(Number(slider.value)); });
-  speed.addEventListener("change", function () { from = times[frame]; since = performance.now(); });
-  root.classList.add("ready");
-  show(Number(root.getAttribute("data-start")) || 0);
+  });
 }());

@@ -1,0 +1,84 @@
+"""Time a frame of each program on `squats1`, in turns, so that a busy machine is as busy for all of them."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+from biorbd_peer import kalman
+from numpy.typing import NDArray
+from opensim_peer import inverse_kinematics, load, without_patellae
+
+import dynakin
+from dynakin.filter.samples import recording_arrays
+from dynakin.model import Subject, load_opensim
+
+Array = NDArray[np.float64]
+ROUNDS = 3
+
+
+def steps(file: Path, data: Path, mass: float, kinds: tuple[str, ...], plates: bool) -> tuple[str, Array]:
+    """Of the filter: what it holds, and microseconds a step."""
+    recording = dynakin.read(data / "squats1.trc", data / "squats1_grf.mot")
+    noise = dynakin.presets.default()
+    if not plates:
+        noise = noise.model_copy(update={"plate_force": 0.0, "plate_moment": 0.0, "plate_delay_s": 0.0})
+    estimator = dynakin.Estimator(load_opensim(file, Subject(mass_kg=mass), estimate=kinds), noise)
+    initial = estimator.start(recording)
+    markers, wrench = recording_arrays(recording, initial, gaps=True)
+    if not plates:
+        wrench[:] = np.nan
+    found = []
+    for _ in range(2):
+        estimator.start_from(initial)
+        found.append(estimator.run_arrays(recording.time, markers, wrench)["step_us"])
+    return f"{len(initial.names)} states", np.concatenate(found)
+
+
+def biorbd_frames(file: Path, data: Path, mass: float) -> tuple[str, Array]:
+    recording = dynakin.read(data / "squats1.trc").window(0.0, 10.0)
+    initial = dynakin.Estimator(load_opensim(file, Subject(mass_kg=mass), estimate=())).start(recording)
+    markers = np.stack([recording.marker(name) for name in initial.recorded_markers], axis=1)
+    n, spent, places = kalman(initial.spec, markers, 100.0)
+    gap = 1000.0 * np.sqrt(np.nanmean(((places - markers) ** 2).sum(axis=2)))
+    return f"{3 * n} states, markers {gap:.1f} mm", 1e6 * spent
+
+
+def times(file: Path, data: Path, mass: float) -> None:
+    everything = ("lengths", "markers", "soft_tissue", "inertia")
+    programs = {
+        "dynakin, kinematics only, no soft tissue": lambda: steps(file, data, mass, (), False),
+        "dynakin, all but soft tissue": lambda: steps(file, data, mass, ("lengths", "markers", "inertia"), True),
+        "dynakin, everything estimated": lambda: steps(file, data, mass, everything, True),
+        "biorbd, Kalman filter, kinematics": lambda: biorbd_frames(file, data, mass),
+        "OpenSim IK, no muscles, no patella couplers": lambda: opensim_frames(file, data, False),
+        "OpenSim IK, as shipped": lambda: opensim_frames(file, data, True),
+    }
+    found: dict[str, list[tuple[str, Array]]] = {name: [] for name in programs}
+    loads = []
+    for _ in range(ROUNDS):
+        for name, program in programs.items():
+            loads.append(os.getloadavg()[0])
+            found[name].append(program())
+    print(
+        f"\n### Time a frame, the quietest of {ROUNDS} rounds; load {min(loads):.0f} to {max(loads):.0f} on "
+        f"{os.cpu_count()} cores\n\n| program | holds | frames | median, us | p99, us | beside kinematics only |\n"
+        "|---|---|---|---|---|---|"
+    )
+    base = 0.0
+    for name, rounds in found.items():
+        holds, best = min(rounds, key=lambda entry: float(np.median(entry[1])))
+        median = float(np.median(best))
+        base = base or median
+        print(
+            f"| {name} | {holds} | {len(best)} | {median:.0f} | {np.percentile(best, 99):.0f} | {median / base:.1f} |"
+        )
+
+
+def opensim_frames(file: Path, data: Path, as_shipped: bool) -> tuple[str, Array]:
+    model = load(file, as_shipped=as_shipped)
+    if not as_shipped:
+        model = without_patellae(model)
+    spent = inverse_kinematics(model, data / "squats1.trc", 60 if as_shipped else 300).step_s
+    return "one frame at a time", 1e6 * spent[1:]

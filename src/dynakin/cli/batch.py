@@ -1,0 +1,59 @@
+"""`dynakin batch`: all trials of a study."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from dynakin.batch import read_dataset, run_batch
+from dynakin.batch.output import write_batch
+from dynakin.batch.process import Options, belongs_to
+from dynakin.cli.console import as_table, busy, out, progress_bar
+from dynakin.cli.options import Backend, Jobs, Scheduler
+from dynakin.engine import Journal, open_pool
+from dynakin.engine.folder import ROWS, open_folder
+from dynakin.errors import ConfigError, DynakinError
+from dynakin.reference import CUTOFF_HZ
+from dynakin.report.text_tables import table2_text
+
+
+def batch(
+    dataset: Annotated[Path, typer.Argument(help="DATASET.toml: subjects, trials, and what holds for all.")],
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder, instead of the dataset's.")] = None,
+    preset: Annotated[list[str] | None, typer.Option(help="Noise settings beside each other. May be repeated.")] = None,
+    cutoff: Annotated[float, typer.Option("--cutoff-hz", help="Low-pass of AT and classical, Hz.")] = CUTOFF_HZ,
+    tables_only: Annotated[bool, typer.Option("--tables-only", help="Write no results of single trials.")] = False,
+    backend: Backend = "processes",
+    jobs: Jobs = None,
+    scheduler: Scheduler = None,
+) -> None:
+    """Work on all trials of all subjects, each by itself: Table II over them, and those that failed by name.
+
+    The exit code is 1 where some failed. A batch that was stopped goes on where it was; those that failed are tried
+    again.
+    """
+    if backend == "threads":
+        raise ConfigError("batch: --backend threads, expected processes or dask: a crash would take all trials with it")
+    found = read_dataset(dataset, output)
+    options = Options(tuple(preset or found.presets), cutoff, not tables_only)
+    subjects = sorted({session.subject for session in found.sessions})
+    folder = open_folder(found.output, ("table2", "batch.", "trials.", *subjects))
+    journal = Journal(folder / ROWS, belongs_to(found, options))
+    with progress_bar("batch") as progress, open_pool(backend, jobs, scheduler) as pool:
+        result = run_batch(found, options, pool, journal=journal, progress=progress)
+    console = out()
+    if result.rows:
+        people = len({name.split("/")[0] for name in result.rows})
+        title = f"{len(result.rows)} trials of {people} subjects, mean ± standard deviation over trials"
+        console.print(as_table(table2_text(result.table2(), title)))
+    with busy("writing tables"):
+        write_batch(folder, result)
+    console.print(f"Tables  {folder}/table2.csv, table2_subjects.csv, trials.csv, batch.json", soft_wrap=True)
+    for name, failure in result.failures.items():
+        console.print(f"Failed  {name}: {failure.message}", soft_wrap=True)
+    if not result.rows:
+        raise DynakinError(f"{dataset}: none of {len(found.sessions)} trials could be worked on")
+    if result.failures:
+        raise typer.Exit(1)

@@ -1,0 +1,243 @@
+"""`dynakin tune`: noise settings chosen by the paper's grid, or fitted."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from rich.padding import Padding
+
+from dynakin.cli.compare_inputs import cases_of
+from dynakin.cli.console import as_table, busy, out, progress_bar
+from dynakin.cli.options import (
+    Backend,
+    ForceThreshold,
+    Forward,
+    Height,
+    Jobs,
+    Markers,
+    Mass,
+    PlateFilter,
+    Preset,
+    Scheduler,
+    Sex,
+    Side,
+    Static,
+    TableName,
+    Vertical,
+)
+from dynakin.cli.run import forward_direction
+from dynakin.comparison.case import Case
+from dynakin.engine import Journal, open_pool
+from dynakin.engine.folder import ROWS, open_folder
+from dynakin.errors import ConfigError
+from dynakin.filter import presets
+from dynakin.reference import CUTOFF_HZ
+from dynakin.report import Sensitivity, save_sensitivity_figures
+from dynakin.report.sensitivity import GAIN_NAMES, GAIN_UNITS
+from dynakin.report.tuning_tables import criteria_text, figures_text, grid_text, settings_text
+from dynakin.tuning import CRITERIA, Axis, Grid, Shared, axis, belongs_to, paper_axes, prepare, run_grid
+from dynakin.tuning.advice import recommendation
+from dynakin.tuning.fit import Fitter, belongs_to_fit, usual_names
+from dynakin.tuning.output import write_fit, write_grid
+from dynakin.tuning.settings import UNITS
+
+tune = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Choose noise settings by measurement.")
+
+Trials = Annotated[
+    list[Path] | None, typer.Argument(metavar="TRIAL...", help="Recordings, or a configuration (.toml) for each.")
+]
+Forces = Annotated[list[Path] | None, typer.Option("--forces", help="Ground forces, one a trial, in order.")]
+ModelName = Annotated[str | None, typer.Option(help="Model: squat7, sagittal7 or a .toml file.")]
+Output = Annotated[Path, typer.Option("-o", "--output", help="Folder for table, figures and presets.")]
+
+_GAINS = ("coordinate", "speed", "acceleration")
+
+
+@tune.command()
+def grid(
+    output: Output,
+    trials: Trials = None,
+    forces: Forces = None,
+    model: ModelName = None,
+    markers: Markers = None,
+    static: Static = None,
+    mass: Mass = None,
+    height: Height = None,
+    sex: Sex = None,
+    preset: Preset = None,
+    side: Side = None,
+    vertical: Vertical = None,
+    forward: Forward = None,
+    table: TableName = None,
+    plate_filter: PlateFilter = None,
+    force_threshold: ForceThreshold = None,
+    vary: Annotated[
+        list[str] | None,
+        typer.Option(help="NAME=FROM:TO:STEPS, logarithmic; may be repeated. Else [grid], else the paper's gains."),
+    ] = None,
+    left_out: Annotated[
+        bool, typer.Option("--left-out", help="Also leave each marker out in turn: so many runs more.")
+    ] = False,
+    backend: Backend = "processes",
+    jobs: Jobs = None,
+    scheduler: Scheduler = None,
+) -> None:
+    """Try all combinations of some settings, as the paper did (13 x 13 x 13 of its gains), by several criteria.
+
+    A run that was stopped goes on where it was when it is started again with the same folder.
+    """
+    given = given_keys(
+        model, markers, static, mass, height, sex, side, vertical, forward, table, plate_filter, force_threshold
+    )
+    cases = cases_of(trials or [], forces or [], [], CUTOFF_HZ, given, "tune grid")
+    axes = axes_of(vary or [], cases)
+    base = preset or ("paper" if not vary and cases[0].config.grid is None else cases[0].config.preset)
+    shared = shared_of(cases, base, left_out)
+    folder = open_folder(output, ("grid.", "preset_", "figure3_"))
+    journal = Journal(folder / ROWS, belongs_to(shared, axes))
+    with progress_bar("grid") as progress, open_pool(backend, jobs, scheduler) as pool:
+        found = run_grid(shared, axes, pool, journal=journal, progress=progress)
+    with busy("drawing figures"):
+        write_grid(folder, found, presets.title(base))
+        save_sensitivity_figures(figures_of(found), folder, ("svg", "png"))
+    console = out()
+    console.print(as_table(grid_text(found)))
+    for line in criteria_text(found):
+        console.print(Padding(line, (0, 0, 0, 2)), style="dim")
+    lost = sum(cell["diverged"] > 0 for cell in found.cells)
+    console.print(f"{len(found.cells)} combinations, the filter diverged in {lost}.")
+    console.print(f"Table    {folder / 'grid.csv'}", soft_wrap=True)
+    console.print(f"Figures  {folder}/figure3_*.png, .svg", soft_wrap=True)
+    console.print(f"Presets  {folder}/preset_*.toml (dynakin run ... --preset FILE)", soft_wrap=True)
+
+
+@tune.command()
+def fit(
+    output: Output,
+    trials: Trials = None,
+    forces: Forces = None,
+    model: ModelName = None,
+    markers: Markers = None,
+    static: Static = None,
+    mass: Mass = None,
+    height: Height = None,
+    sex: Sex = None,
+    preset: Preset = None,
+    side: Side = None,
+    vertical: Vertical = None,
+    forward: Forward = None,
+    table: TableName = None,
+    plate_filter: PlateFilter = None,
+    force_threshold: ForceThreshold = None,
+    vary: Annotated[
+        list[str] | None, typer.Option(help="Setting to fit; may be repeated. Else those that the preset uses.")
+    ] = None,
+    criterion: Annotated[str, typer.Option(help="nll (likelihood), or ahead, sigma, paper, nis instead.")] = "nll",
+    backend: Backend = "processes",
+    jobs: Jobs = None,
+    scheduler: Scheduler = None,
+) -> None:
+    """Fit noise settings to recordings by maximum likelihood, with cross-validation over trials or halves.
+
+    A run that was stopped goes on where it was when it is started again with the same folder.
+    """
+    given = given_keys(
+        model, markers, static, mass, height, sex, side, vertical, forward, table, plate_filter, force_threshold
+    )
+    cases = cases_of(trials or [], forces or [], [], CUTOFF_HZ, given, "tune fit")
+    base = preset or cases[0].config.preset
+    shared = shared_of(cases, base)
+    names = tuple(vary) if vary else usual_names(shared.base)
+    folder = open_folder(output, ("fit.", "preset_"))
+    journal = Journal(folder / ROWS, belongs_to_fit(shared))
+    others = {name: make() for name, make in presets.PRESETS.items() if make() != shared.base}
+    with progress_bar("fitting") as progress, open_pool(backend, jobs, scheduler) as pool:
+        found = Fitter(shared, names, pool, journal, criterion, others, progress).run()
+    advice = recommendation(found)
+    write_fit(folder, found, presets.title(base), advice)
+    console = out()
+    for text in (settings_text(found), *figures_text(found)):
+        console.print(as_table(text))
+    for sentence in advice:
+        console.print(sentence)
+    console.print(f"\nPreset  {folder / 'preset_fit.toml'} (dynakin run ... --preset FILE)", soft_wrap=True)
+    console.print(f"Tables  {folder / 'fit.csv'}, {folder / 'fit.json'}", soft_wrap=True)
+
+
+def given_keys(
+    model: str | None,
+    markers: str | None,
+    static: Path | None,
+    mass: float | None,
+    height: float | None,
+    sex: str | None,
+    side: str | None,
+    vertical: str | None,
+    forward: str | None,
+    table: str | None,
+    plate_filter: float | None,
+    force_threshold: float | None,
+) -> dict[str, Any]:
+    """The command line's options by the keys of a configuration."""
+    return {
+        "model": model,
+        "markers": markers,
+        "static": static,
+        "mass_kg": mass,
+        "height_m": height,
+        "sex": sex,
+        "side": side,
+        "vertical": vertical,
+        "forward": forward_direction(forward),
+        "table": table,
+        "plate_filter_hz": plate_filter,
+        "force_threshold_n": force_threshold,
+    }
+
+
+def axes_of(vary: Sequence[str], cases: Sequence[Case]) -> tuple[Axis, ...]:
+    """The settings to vary: of the command line, else of the first configuration's [grid], else the paper's gains."""
+    if vary:
+        return tuple(_axis(text) for text in vary)
+    told = cases[0].config.grid
+    return paper_axes() if told is None else tuple(axis(name, *values) for name, values in told.items())
+
+
+def _axis(text: str) -> Axis:
+    name, _, span = text.partition("=")
+    try:
+        low, high, steps = span.split(":")
+        return axis(name.strip(), float(low), float(high), int(steps))
+    except ValueError:
+        raise ConfigError(f"--vary: found {text!r}, expected NAME=FROM:TO:STEPS such as jerk=1:1e4:5") from None
+
+
+def shared_of(cases: Sequence[Case], base: str, left_out: bool = False) -> Shared:
+    """Trials made ready with the settings of a preset; changes in [noise] of the first configuration hold for all."""
+    noise = cases[0].config.model_copy(update={"preset": base}).noise_settings()
+    ready = []
+    for case in cases:
+        with busy(f"reading {case.recording.name}"):
+            estimator = replace(case.setup, noise={base: noise}).estimator(base)
+            ready.append(prepare(case.recording, estimator, static=case.static))
+    return Shared(tuple(ready), noise, left_out)
+
+
+def figures_of(found: Grid) -> dict[str, Sensitivity]:
+    """Figure 3 by each criterion."""
+    exponents = tuple(np.log10(axis.values) for axis in found.axes)
+    names = tuple(_label(axis.name) for axis in found.axes)
+    units = tuple(GAIN_UNITS[_GAINS.index(a.name)] if a.name in _GAINS else UNITS[a.name] for a in found.axes)
+    return {
+        f"figure3_{name}": Sensitivity(exponents, found.criterion(name), *CRITERIA[name], names, units)
+        for name in found.criteria()
+    }
+
+
+def _label(name: str) -> str:
+    return GAIN_NAMES[_GAINS.index(name)] if name in _GAINS else name

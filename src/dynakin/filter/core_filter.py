@@ -1,0 +1,74 @@
+"""From a measured model and noise settings to the core's filter, ready for its first frame."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+
+import numpy as np
+
+from dynakin import _core
+from dynakin.errors import ConfigError
+from dynakin.filter.extend import QUANTITIES, Quantity, continuous_noise, extended, initial_covariance
+from dynakin.filter.noise import Noise, gate_limits
+from dynakin.model import InitialModel
+
+
+def core_filter(
+    initial: InitialModel, noise: Noise, estimate: Collection[Quantity] = QUANTITIES
+) -> tuple[InitialModel, _core.Model, _core.Filter]:
+    """The model with the states that these settings ask for, compiled, and a filter that starts from it.
+
+    Args:
+        estimate: kinds of parameters to estimate.
+
+    Raises:
+        ConfigError: the settings name a marker that the model does not use.
+    """
+    initial = extended(initial, noise, estimate)
+    model = _core.Model(initial.spec)
+    settings = filter_settings(initial, noise, model.layout, estimate)
+    return initial, model, _core.Filter(model, settings, initial.x0, initial_covariance(initial, noise))
+
+
+def filter_settings(
+    initial: InitialModel, noise: Noise, layout: _core.StateLayout, estimate: Collection[Quantity] = QUANTITIES
+) -> _core.FilterSettings:
+    """The core's settings for a measured model: this noise, the marker set's variances, the bounds of (9).
+
+    Raises:
+        ConfigError: as `core_filter`.
+    """
+    unknown = set(noise.marker) - set(initial.recorded_markers)
+    if unknown:
+        raise ConfigError(
+            f"noise.marker: {', '.join(sorted(unknown))} not among the markers used; expected some of "
+            f"{', '.join(initial.recorded_markers)}"
+        )
+    point = noise.reference_point_m
+    unseen = np.inf if noise.unseen_sd is None else noise.unseen_sd
+    recovery = _core.RecoverySettings(blind_s=noise.blind_s, unseen_sd=unseen) if noise.recover else None
+    density, decay = continuous_noise(initial, noise, layout)
+    return _core.FilterSettings(
+        process_variance=noise.process_variance(layout),
+        process_density=density,
+        decay_rate=decay,
+        marker_variance=noise.marker_variance(
+            initial.recorded_markers,
+            initial.marker_variance,
+            initial.soft_tissue_m,
+            initial.unmodelled_m,
+            "soft_tissue" in estimate,
+        ),
+        wrench_covariance=noise.wrench_covariance(),
+        reference_point=initial.plate_centre if point == "auto" else np.array(point, dtype=float),
+        total_mass=initial.weighed_kg if noise.total_mass_use == "frame" else None,
+        total_mass_variance=noise.total_mass,
+        lower=initial.lower,
+        upper=initial.upper,
+        constraint=noise.constraint,
+        marker_gate=gate_limits(noise.marker_gate),
+        wrench_gate=gate_limits(noise.wrench_gate),
+        wrench_needs_markers=noise.recover,
+        iterate_beyond=np.inf if noise.iterate_beyond is None else noise.iterate_beyond,
+        recovery=recovery,
+    )

@@ -1,0 +1,191 @@
+"""Small panels over time, written as SVG by hand: a whole body has two hundred of them, and a plotting library takes
+50 ms and 20 kB for each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from html import escape
+
+import numpy as np
+import numpy.typing as npt
+from matplotlib.ticker import MaxNLocator
+
+from dynakin.report.panels import Panel
+from dynakin.report.plot import GRID, LIMIT, thin
+
+Array = npt.NDArray[np.float64]
+Place = Callable[[Array], Array]
+
+# The picture in tenths of a point, so that whole numbers place a point to a quarter of a screen's pixel.
+_WIDTH, _HEIGHT = 2592, 1440
+_LEFT, _RIGHT, _TOP, _BOTTOM = 400, 2560, 70, 1140
+_MARGIN = 0.08
+_MOST_POINTS = 240
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """values (T,), NaN where there is nothing to draw; ``sd`` (T,) adds a band of two standard deviations.
+
+    dashed: (T,) bool, where the line is drawn dashed instead of solid. width in points.
+    """
+
+    values: Array
+    colour: str
+    width: float = 1.2
+    sd: Array | None = None
+    dashed: npt.NDArray[np.bool_] | None = None
+
+
+@dataclass(frozen=True)
+class Bound:
+    """A level that is drawn across the panel, with what it is."""
+
+    value: float
+    word: str
+
+
+def chart(
+    title: str,
+    unit: str,
+    time: Array,
+    lines: Sequence[Line],
+    *,
+    note: str = "",
+    bounds: Sequence[Bound] = (),
+    least_range: float = 0.0,
+    x_label: str = "time, s",
+) -> Panel:
+    """Lines over time (T,) in one panel, the first at the bottom.
+
+    Args:
+        least_range: in ``unit``; less than this is not blown up to fill the panel.
+    """
+    low, high = _range(lines, [bound.value for bound in bounds], least_range)
+    start, end = float(time[0]), float(time[-1])
+    if end <= start:
+        end = start + 1.0
+
+    def x(at: Array) -> Array:
+        return np.asarray(np.round(_LEFT + (_RIGHT - _LEFT) * (at - start) / (end - start)))
+
+    def y(value: Array) -> Array:
+        return np.asarray(np.round(_BOTTOM - (_BOTTOM - _TOP) * (value - low) / (high - low)))
+
+    parts = [_axes(low, high, start, end, x, y, unit, x_label)]
+    for line in lines:
+        if line.sd is not None:
+            parts.append(_band(time, line, low, high, x, y))
+    for bound in bounds:
+        level = int(y(np.array(bound.value)))
+        text = f"{bound.word} {bound.value:.3g}".replace("-", "−")
+        parts.append(
+            f'<path d="M{_LEFT} {level}H{_RIGHT}" stroke="{LIMIT}" stroke-width="10" stroke-dasharray="50 30"/>'
+            f'<text x="{_RIGHT}" y="{level - 18}" text-anchor="end" style="fill:{LIMIT}">{escape(text)}</text>'
+        )
+    for line in lines:
+        dashed = np.zeros(len(time), dtype=bool) if line.dashed is None else line.dashed
+        for part, more in ((~dashed, ""), (dashed, ' stroke-dasharray="36 26"')):
+            own = np.where(_with_next(part), line.values, np.nan)
+            if path := _path(*thin(time, own, _MOST_POINTS), x, y):
+                parts.append(f'<path d="{path}" stroke="{line.colour}" stroke-width="{10 * line.width:.0f}"{more}/>')
+    label = escape(f"{title} in {unit} over time", quote=True)
+    svg = f'<svg class="chart" viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img" aria-label="{label}">{"".join(parts)}</svg>'
+    return Panel(title, note, svg)
+
+
+def _with_next(part: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
+    """A stretch with the frame after it, so that solid and dashed stretches meet."""
+    grown = part.copy()
+    grown[1:] |= part[:-1]
+    return grown
+
+
+def _range(lines: Sequence[Line], levels: Sequence[float], least: float) -> tuple[float, float]:
+    every = [line.values[np.isfinite(line.values)] for line in lines]
+    values = np.concatenate([*every, np.asarray(levels, dtype=float)])
+    if not len(values):
+        return -1.0, 1.0
+    low, high = float(values.min()), float(values.max())
+    least = max(least, 1e-9 * max(1.0, abs(low), abs(high)))
+    if high - low < least:
+        low, high = 0.5 * (low + high - least), 0.5 * (low + high + least)
+    # a band may reach out of the lines' own range by half of it, beyond that it is cut
+    spread = high - low
+    for line in lines:
+        if line.sd is not None and np.isfinite(line.sd).any():
+            band = 2.0 * line.sd
+            low = max(min(low, float(np.nanmin(line.values - band))), low - 0.25 * spread)
+            high = min(max(high, float(np.nanmax(line.values + band))), high + 0.25 * spread)
+    more = (0.2 if levels else _MARGIN) * (high - low)
+    return low - more, high + more
+
+
+def _axes(low: float, high: float, start: float, end: float, x: Place, y: Place, unit: str, x_label: str) -> str:
+    parts = []
+    ticks = np.asarray(MaxNLocator(5).tick_values(low, high))
+    ticks = ticks[(ticks >= low) & (ticks <= high)]
+    levels = "".join(f"M{_LEFT} {int(y(np.array(tick)))}H{_RIGHT}" for tick in ticks)
+    parts.append(f'<path d="{levels}" stroke="{GRID}" stroke-width="7"/>')
+    parts += [
+        f'<text x="{_LEFT - 30}" y="{int(y(np.array(tick))) + 28}" text-anchor="end">{text}</text>'
+        for tick, text in zip(ticks, _labels(ticks), strict=True)
+    ]
+    moments = np.asarray(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]).tick_values(start, end))
+    moments = moments[(moments >= start - 1e-9) & (moments <= end + 1e-9)]
+    marks = "".join(f"M{int(x(np.array(at)))} {_BOTTOM}v30" for at in moments)
+    parts.append(f'<path d="M{_LEFT} {_BOTTOM}H{_RIGHT}{marks}" stroke="#b8c0c8" stroke-width="7"/>')
+    parts += [
+        f'<text x="{int(x(np.array(at)))}" y="{_BOTTOM + 115}" text-anchor="middle">{text}</text>'
+        for at, text in zip(moments, _labels(moments), strict=True)
+    ]
+    middle = (_TOP + _BOTTOM) // 2
+    parts.append(f'<text x="{(_LEFT + _RIGHT) // 2}" y="{_HEIGHT - 70}" text-anchor="middle">{escape(x_label)}</text>')
+    parts.append(f'<text transform="translate(65 {middle}) rotate(-90)" text-anchor="middle">{escape(unit)}</text>')
+    return "".join(parts)
+
+
+def _labels(ticks: Array) -> list[str]:
+    """With as many decimals as the step between them asks for."""
+    step = float(np.min(np.diff(ticks))) if len(ticks) > 1 else abs(float(ticks[0])) if len(ticks) else 1.0
+    decimals = 0
+    while decimals < 6 and abs(step * 10**decimals - round(step * 10**decimals)) > 1e-6 * 10**decimals:
+        decimals += 1
+    return [f"{tick + 0.0:.{decimals}f}".replace("-", "−") for tick in ticks]
+
+
+def _path(at: Array, values: Array, x: Place, y: Place) -> str:
+    """Stretches between gaps, as moves and relative steps of whole numbers; a stretch of one point is not seen."""
+    known = np.isfinite(values)
+    if not known.any():
+        return ""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(int)))
+    parts = []
+    for first, last in edges.reshape(-1, 2):
+        if last - first > 1:
+            parts.append(_run(x(at[first:last]), y(values[first:last])))
+    return "".join(parts)
+
+
+def _run(across: Array, down: Array) -> str:
+    steps = np.diff(np.column_stack([across, down]), axis=0).astype(int)
+    moved = "".join(f"{dx}{' ' if dy >= 0 else ''}{dy} " for dx, dy in steps.tolist())
+    return f"M{int(across[0])} {int(down[0])}l{moved.rstrip()}"
+
+
+def _band(time: Array, line: Line, low: float, high: float, x: Place, y: Place) -> str:
+    """The band of a line, drawn from few points: it only says how wide the doubt is."""
+    assert line.sd is not None
+    kept = np.unique(np.linspace(0, len(time) - 1, _MOST_POINTS // 2).astype(int))
+    values, half = line.values[kept], 2.0 * line.sd[kept]
+    known = np.isfinite(values) & np.isfinite(half)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(int)))
+    parts = []
+    for first, last in edges.reshape(-1, 2):
+        own = slice(first, last)
+        across = x(time[kept][own])
+        above = y(np.clip(values[own] + half[own], low, high))
+        below = y(np.clip(values[own] - half[own], low, high))
+        parts.append(_run(np.concatenate([across, across[::-1]]), np.concatenate([above, below[::-1]])) + "z")
+    return f'<path d="{"".join(parts)}" class="spread" fill="{line.colour}"/>' if parts else ""

@@ -1,0 +1,316 @@
+"""The report's sections of a whole body in space: right and left over each other, each foot on its own."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.report.body import marker_segments
+from dynakin.report.chart import Line, chart
+from dynakin.report.colours import SIDE_COLOURS
+from dynakin.report.labels import COMPONENT_LABELS, number, sentence, short_marker_names, words
+from dynakin.report.method_styles import LineStyle
+from dynakin.report.panels import Panel, band_is_too_wide, rms_bars
+from dynakin.report.plot import ESTIMATED, MEASURED
+from dynakin.report.section import Section
+from dynakin.report.sides import REGIONS, Joint, joints_of
+from dynakin.report.text_tables import TextTable
+from dynakin.results import AXES, COMPONENTS, Estimate
+from dynakin.results.angles import convention_of
+from dynakin.results.feet import MEASURED as CONTACT_MEASURED
+from dynakin.results.power import root_coordinates
+from dynakin.results.pressure import centre_of_pressure
+
+Array = npt.NDArray[np.float64]
+
+SIDE_LINES = tuple(LineStyle(side, SIDE_COLOURS[side], 1.4) for side in ("right", "left"))
+_DERIVED = LineStyle("derived from the motion", "#5c6773", 1.2, "dashed")
+_DIRECTIONS = {"x": "forward", "y": "up", "z": "to the right"}
+_AXIS_COLOURS = {"x": "#0072B2", "y": "#009E73", "z": "#CC79A7"}
+_SOURCE_DERIVED, _SOURCE_UNKNOWN = 1, 2
+
+
+def spatial_marker_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
+    """RMS a marker, and how far each is from where it was measured, over time."""
+    names = short_marker_names(estimate.marker_names)
+    difference = 1000.0 * (_of(estimate, "markers_estimated", "marker") - _of(estimate, "markers_measured", "marker"))
+    rms = {names[name]: value for name, value in metrics["markers"]["rms_mm"].items()}
+    folded = [
+        chart(
+            names[name],
+            "mm",
+            estimate.time,
+            [Line(difference[:, k, i], _AXIS_COLOURS[axis], 0.9) for i, axis in enumerate(AXES)],
+            note="RMS " + number(rms[names[name]], "mm"),
+            least_range=10.0,
+        )
+        for k, name in enumerate(estimate.marker_names)
+    ]
+    window = metrics["window"]
+    order = sorted(rms, key=lambda name: -(rms[name] or 0.0))
+    halves = [order[: -(-len(order) // 2)], order[-(-len(order) // 2) :]]
+    bars = [rms_bars(f"rms-{k}", {name: rms[name] for name in half}) for k, half in enumerate(halves) if half]
+    titled = [Panel("RMS distance, largest first", b.note, b.svg) if k == 0 else b for k, b in enumerate(bars)]
+    titled[1:] = [Panel("RMS distance, continued", b.note, b.svg) for b in titled[1:]]
+    return Section(
+        "markers",
+        "Markers",
+        f"Root mean square distance in space between {window['start_s']:.4g} and {window['end_s']:.4g} s. Where soft "
+        "tissue is estimated, an estimated marker holds its displacement: how far each moves on its segment says how "
+        "well a rigid body fits.",
+        tables=[_displacements(estimate, metrics)] if metrics["soft_tissue"]["markers"] else [],
+        wide=titled,
+        folded=folded,
+        folded_title="Every marker over time: estimated less measured",
+        lines=tuple(LineStyle(_DIRECTIONS[axis], _AXIS_COLOURS[axis], 1.2) for axis in AXES),
+    )
+
+
+def _displacements(estimate: Estimate, metrics: dict[str, Any]) -> TextTable:
+    names, carriers = short_marker_names(estimate.marker_names), marker_segments(estimate)
+    found = metrics["soft_tissue"]["markers"]
+    order = sorted(found, key=lambda name: -(found[name]["max_mm"] or 0.0))
+    rows: list[tuple[str, ...]] = [
+        (
+            names.get(name, name),
+            words(carriers.get(name, "")),
+            number(found[name]["rms_mm"], digits=2),
+            number(found[name]["max_mm"], digits=2),
+            number(found[name]["declared_mm"], digits=2),
+        )
+        for name in order
+    ]
+    headings = ("marker", "segment", "RMS, mm", "largest, mm", "declared, mm")
+    return TextTable("Movement of each marker on its segment", headings, rows, (2, 3, 4), folded=True)
+
+
+def spatial_wrench_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
+    """The total of all plates, measured and estimated."""
+    measured, estimated = _of(estimate, "wrench_measured", "component"), _of(estimate, "wrench_estimated", "component")
+    panels = []
+    for k, component in enumerate(COMPONENTS):
+        if not np.isfinite(measured[:, k]).any():
+            continue
+        title, unit = COMPONENT_LABELS[component]
+        rms = metrics["wrench"]["rms"].get(component)
+        note = f"{component}, RMS difference {number(rms, unit)}" if rms is not None else component
+        lines = [Line(measured[:, k], MEASURED, 2.6), Line(estimated[:, k], ESTIMATED, 1.0)]
+        panels.append(chart(title, unit, estimate.time, lines, note=note))
+    return Section(
+        "wrench",
+        "Ground reaction",
+        "What the ground does to the person in all, in forces and the moment about the ground’s origin. Where a foot "
+        "stands off the plates the total is not measured.",
+        panels,
+        key=("measured", "estimated"),
+    )
+
+
+def foot_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
+    """Each foot's wrench as measured and as adjusted, and how large the adjustment is."""
+    if not estimate.foot_names or metrics["feet"] is None:
+        return Section("feet", "Feet", "")
+    parts = [_foot_part(estimate, foot) for foot in estimate.foot_names]
+    return Section(
+        "feet",
+        "Feet",
+        metrics["feet"]["verdict"],
+        key=("measured",),
+        lines=(*SIDE_LINES,),
+        tables=[adjustment for adjustment in (_adjustments(metrics["feet"]),) if adjustment.rows],
+        parts=[part for part in parts if part.panels],
+    )
+
+
+def _adjustments(figures: dict[str, Any]) -> TextTable:
+    rows = []
+    for foot, rms in figures["adjustment_rms"].items():
+        cells = tuple("–" if rms is None else number(rms[name], digits=2) for name in COMPONENTS)
+        rows.append((f"{sentence(foot)} foot, adjustment", *cells))
+    if figures["remainder_rms"] is not None:
+        cells = tuple(number(figures["remainder_rms"][name], digits=2) for name in COMPONENTS)
+        rows.append((f"In flight, left over ({figures['flight_frames']} frames)", *cells))
+    headings = ("RMS", *(f"{name}, {COMPONENT_LABELS[name][1]}" for name in COMPONENTS))
+    return TextTable("What was changed, in place of a residual", headings, rows, tuple(range(1, 7)))
+
+
+def _foot_part(estimate: Estimate, foot: str) -> Section:
+    colour = SIDE_COLOURS.get(foot, ESTIMATED)
+    wrenches = {
+        kind: estimate.data[name].sel(foot=foot).transpose("time", "component").values
+        for kind, name in (("measured", "foot_wrench_measured"), ("adjusted", "foot_wrench"))
+    }
+    contact = estimate.data["foot_contact"].sel(foot=foot).values
+    derived = contact > CONTACT_MEASURED
+    panels = []
+
+    def add(title: str, unit: str, measured: Array, adjusted: Array, note: str = "", least: float = 0.0) -> None:
+        if np.isfinite(adjusted).any():
+            lines = [Line(measured, MEASURED, 2.6), Line(adjusted, colour, 1.1, dashed=derived)]
+            panels.append(chart(title, unit, estimate.time, lines, note=note, least_range=least))
+
+    for k, component in enumerate(COMPONENTS[:3]):
+        title, unit = COMPONENT_LABELS[component]
+        peak = np.nanmax(np.abs(wrenches["adjusted"][:, k]), initial=0.0)
+        per_kg = f", {number(peak / estimate.mass_kg, 'N/kg')}" if estimate.mass_kg else ""
+        add(title, unit, wrenches["measured"][:, k], wrenches["adjusted"][:, k], f"peak {number(peak, unit)}{per_kg}")
+    pressed = {kind: centre_of_pressure(wrench, estimate.floor_height_m) for kind, wrench in wrenches.items()}
+    for axis, k in (("forward", 0), ("to the right", 2)):
+        each = {kind: 1000.0 * point[:, k] for kind, (point, _) in pressed.items()}
+        add(f"Centre of pressure, {axis}", "mm", each["measured"], each["adjusted"], least=20.0)
+    add("Free moment about the vertical", "N m", pressed["measured"][1], pressed["adjusted"][1], least=2.0)
+    shares = [
+        f"{share} in {number(100.0 * float(np.mean(contact == code)), '%', digits=2)} of the frames"
+        for code, share in ((0, "In the air"), (1, "measured"), (2, "on the ground but not measured"))
+        if (contact == code).any()
+    ]
+    return Section(f"foot-{foot}", f"{sentence(foot)} foot", sentence(", ".join(shares)) + ".", panels)
+
+
+def mass_centre_section(estimate: Estimate) -> Section:
+    """The whole body's centre of mass and its velocity."""
+    if "mass_centre" not in estimate.data:
+        return Section("mass-centre", "Centre of mass", "")
+    panels = []
+    for variable, factor, unit, words_ in (
+        ("mass_centre", 1000.0, "mm", "Place"),
+        ("mass_centre_velocity", 1.0, "m/s", "Velocity"),
+    ):
+        values = factor * estimate.data[variable].transpose("time", "axis").values
+        for k, axis in enumerate(AXES):
+            if np.isfinite(values[:, k]).any():
+                moved = f"over {number(float(np.ptp(values[np.isfinite(values[:, k]), k])), unit)}"
+                lines = [Line(values[:, k], ESTIMATED)]
+                title = f"{words_} {_DIRECTIONS[axis]}"
+                panels.append(chart(title, unit, estimate.time, lines, note=moved, least_range=0.01 * factor))
+    return Section("mass-centre", "Centre of mass", "Of the whole body, in the ground frame.", panels)
+
+
+def spatial_angle_section(estimate: Estimate) -> Section:
+    """Coordinates, right and left in one panel, with their bands of uncertainty."""
+    values, sd = _of(estimate, "coordinates", "coordinate"), _of(estimate, "coordinates_sd", "coordinate")
+    offset, clinical = np.zeros(values.shape[1]), False
+    about = "Each in the direction in which the model counts, from the model’s zero."
+    if "zero_offset" in estimate.data:
+        offset = estimate.data["zero_offset"].values
+        clinical = estimate.data.attrs["angle_signs"] == "clinical"
+        zero = "from the standing zero" if np.any(offset) else "from the model’s zero"
+        about = f"As in angles.sto: {zero}, {'clinical' if clinical else 'OpenSim’s'} signs."
+
+    def draw(joint: Joint) -> Panel:
+        factor, unit = (180.0 / np.pi, "deg") if joint.rotation else (1000.0, "mm")
+        name = estimate.coordinate_names[next(iter(joint.columns.values()))]
+        found = convention_of(name) if joint.rotation else None
+        sign = found[0].sign if clinical and found else 1
+        ranges, lines = [], []
+        for side, k in joint.columns.items():
+            own = sign * factor * (values[:, k] - offset[k])
+            wide = band_is_too_wide(own, factor * sd[:, k])
+            lines.append(Line(own, SIDE_COLOURS[side], 1.2, None if wide else factor * sd[:, k]))
+            ranges.append(f"{f'{side} ' if side else ''}{number(np.nanmin(own))} to {number(np.nanmax(own))}")
+            if wide:
+                ranges[-1] += f" (2 sd {number(2.0 * factor * float(np.median(sd[:, k])), digits=2)})"
+        title = joint.title
+        if found:
+            way = found[0].positive if sign == found[0].sign else found[0].negative
+            title = f"{title} (+ {way})"
+        least = 2.0 if joint.rotation else 10.0
+        return chart(title, unit, estimate.time, lines[::-1], note="; ".join(ranges), least_range=least)
+
+    return Section(
+        "angles",
+        "Joint angles",
+        f"{about} The band is two standard deviations wide on either side, as the filter itself believes; one that "
+        "would hide the line is not drawn, its size stands above the panel.",
+        lines=SIDE_LINES,
+        band="± 2 standard deviations",
+        parts=_by_region("angles", joints_of(estimate), draw),
+    )
+
+
+def spatial_moment_section(estimate: Estimate) -> Section:
+    """Moments over the body mass, right and left in one panel; what is derived is dashed, what is unknown left out."""
+    mass = estimate.mass_kg
+    moments = _of(estimate, "moments", "coordinate") / (mass or 1.0)
+    sd = _of(estimate, "moments_sd", "coordinate") / (mass or 1.0) if "moments_sd" in estimate.data else None
+    source = _of(estimate, "moment_source", "coordinate") if "moment_source" in estimate.data else 0.0 * moments
+
+    def draw(joint: Joint) -> Panel | None:
+        unit = ("N m" if joint.rotation else "N") + ("/kg" if mass else "")
+        notes, lines = [], []
+        for side, k in joint.columns.items():
+            if not np.isfinite(moments[:, k]).any():
+                continue
+            own_sd = None if sd is None else sd[:, k]
+            wide = own_sd is not None and band_is_too_wide(moments[:, k], np.nan_to_num(own_sd))
+            derived = source[:, k] == _SOURCE_DERIVED
+            lines.append(Line(moments[:, k], SIDE_COLOURS[side], 1.2, None if wide else own_sd, derived))
+            low, high = (_two_digits(float(edge(moments[:, k]))) for edge in (np.nanmin, np.nanmax))
+            notes.append(f"{f'{side} ' if side else ''}{low} to {high}")
+        return (
+            chart(joint.title, unit, estimate.time, lines[::-1], note="; ".join(notes), least_range=0.02)
+            if lines
+            else None
+        )
+
+    root = root_coordinates(estimate)
+    joints = [joint for joint in joints_of(estimate) if joint.region != "Whole body"]
+    left_over = [
+        float(np.nanmax(np.abs(_of(estimate, "moments", "coordinate")[:, k]), initial=0.0))
+        for k, name in enumerate(estimate.coordinate_names)
+        if name in root
+    ]
+    shares = [
+        f"{what} in {number(100.0 * share, '%', digits=2)} of the frames ({who})"
+        for code, what in ((_SOURCE_DERIVED, "derived from the motion"), (_SOURCE_UNKNOWN, "not known"))
+        if (share := float((source == code).any(axis=1).mean())) > 0.0
+        for who in (_sides_with(estimate, source == code),)
+    ]
+    text = "What muscles and ligaments do about each joint, in the direction in which its coordinate grows"
+    text += ", over the body mass." if mass else "."
+    if left_over:
+        text += f" At the root at most {number(max(left_over), 'N or N m', digits=2)} is left."
+    if shares:
+        text += f" Where a contact is not measured, moments that hang on it are {', or '.join(shares)}."
+    return Section(
+        "moments",
+        "Joint moments",
+        text,
+        lines=(*SIDE_LINES, *((_DERIVED,) if (source == _SOURCE_DERIVED).any() else ())),
+        band="" if sd is None else "± 2 standard deviations",
+        parts=_by_region("moments", joints, draw),
+    )
+
+
+def _two_digits(value: float) -> str:
+    return f"{round(value, 2) + 0.0:.2f}".replace("-", "−")
+
+
+def _sides_with(estimate: Estimate, marked: npt.NDArray[np.bool_]) -> str:
+    """Which coordinates a mark touches, in a few words."""
+    touched = [joint for joint in joints_of(estimate) if any(marked[:, k].any() for k in joint.columns.values())]
+    regions = [region for region in REGIONS[:-1] if any(joint.region == region for joint in touched)]
+    return " and ".join(region.lower() for region in regions) or "joints that are held still"
+
+
+def _by_region(key: str, joints: list[Joint], draw: Callable[[Joint], Panel | None]) -> list[Section]:
+    """Legs open, the rest folded: a page of twenty-five panels hides what is asked for most."""
+    parts = []
+    for region in REGIONS:
+        panels = [panel for joint in joints if joint.region == region and (panel := draw(joint)) is not None]
+        if not panels:
+            continue
+        anchor = f"{key}-{region.split()[0].lower()}"
+        if region == "Legs":
+            parts.append(Section(anchor, region, "", panels))
+        else:
+            parts.append(Section(anchor, "", "", folded=panels, folded_title=region))
+    return parts
+
+
+def _of(estimate: Estimate, name: str, second: str) -> Array:
+    dims = ("time", second, "axis") if second == "marker" else ("time", second)
+    return np.asarray(estimate.data[name].transpose(*dims).values, dtype=float)

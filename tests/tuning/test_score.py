@@ -1,0 +1,90 @@
+"""One trial and one setting: the figures, and what does not change them."""
+
+from __future__ import annotations
+
+import pickle
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from dynakin.errors import ConfigError
+from dynakin.filter import Estimator, presets
+from dynakin.recordings import Recording
+from dynakin.results import marker_rms_mm, signal_fit
+from dynakin.tuning import Shared, prepare
+from dynakin.tuning.score import score_task
+from dynakin.tuning.settings import changed, check_setting, value_of
+
+
+def test_the_papers_criterion_is_the_sum_of_what_run_reports(paper: Shared, definition, recording: Recording) -> None:
+    found = score_task(paper, (0, {}))
+    metrics = Estimator(definition, presets.paper()).run(recording).metrics()
+    markers = [rms / 1000.0 for rms in metrics["markers"]["rms_mm"].values() if rms is not None]
+    assert found["paper"] == pytest.approx(sum(markers) + sum(metrics["wrench"]["rms"].values()), rel=1e-9)
+    assert found["markers_mm"] == pytest.approx(metrics["markers"]["mean_rms_mm"], rel=1e-9)
+    assert found["nis_per_row"] == pytest.approx(metrics["consistency"]["mean_nis_per_dof"], rel=1e-9)
+    assert {name: found[name] for name in ("fx", "fy", "mz")} == pytest.approx(metrics["wrench"]["rms"], rel=1e-9)
+
+
+def test_tasks_and_trials_pickle_and_leave_each_other_alone(default: Shared) -> None:
+    """A setting that adds or takes states must not change the model that the next one starts from."""
+    alone = score_task(default, (0, {}))
+    copy = pickle.loads(pickle.dumps(default))
+    score_task(default, (0, {"soft_tissue": 0.01, "plate_force": 1e-3, "plate_delay_s": 0.0}))
+    assert score_task(default, (0, {})) == alone == score_task(copy, (0, {}))
+
+
+def test_ahead_is_one_for_a_filter_that_only_holds_the_last_value(default: Shared) -> None:
+    """By its definition: errors 100 ms ahead over the change in 100 ms, each channel by itself."""
+    trial = default.trials[0]
+    change = trial.persistence()
+    then = np.arange(trial.first, trial.end)
+    axes = np.array([True, True, False])
+    moved = marker_rms_mm(trial.markers[then, 0], trial.markers[then - trial.ahead, 0], axes)
+    assert 1000.0 * np.hypot(*change[:2]) == pytest.approx(moved, rel=1e-9)
+    fy = signal_fit(trial.wrench[then, 1], trial.wrench[then - trial.ahead, 1]).rms
+    assert change[-5] == pytest.approx(fy, rel=1e-9)
+
+
+def test_a_declared_sigma_is_not_the_one_that_is_tried(paper: Shared) -> None:
+    small, large = (score_task(paper, (0, {"marker_scale": s, "force": s})) for s in (1.0, 100.0))
+    assert large["sigma"] > small["sigma"]  # in units of what is tried it would be the other way round
+
+
+def test_what_the_starting_gates_refuse_is_taken_out_once(definition, recording: Recording) -> None:
+    markers = recording.markers.copy()
+    markers[180:185, 4] += 0.3  # flies away
+    trial = prepare(replace(recording, markers=markers), Estimator(definition, presets.default()))
+    assert trial.taken_out >= 5
+    assert np.isnan(trial.markers[180:185]).any(axis=2).sum() >= 5
+    assert score_task(Shared((trial,), presets.default()), (0, {}))["markers_mm"] < 5.0
+
+
+def test_halves_share_the_trial_and_add_up(default: Shared) -> None:
+    whole = score_task(default, (0, {}))
+    parts = Shared(default.trials[0].halves(), default.base)
+    first, second = (score_task(parts, (k, {})) for k in range(2))
+    assert first["n_rows"] + second["n_rows"] == whole["n_rows"]
+    assert first["log_likelihood"] + second["log_likelihood"] == pytest.approx(whole["log_likelihood"], rel=1e-12)
+    assert first["done"] < second["done"] == whole["done"]
+
+
+def test_a_filter_that_loses_the_person_has_no_figures(paper: Shared) -> None:
+    found = score_task(paper, (0, {"coordinate": 1e-6, "speed": 1e-6, "acceleration": 1e-6}))
+    assert found["divergence"] and found["done"] < len(paper.trials[0].time)
+    assert found["paper"] is None and found["nll"] is None
+
+
+def test_the_marker_that_is_left_out_is_worse_than_all_that_are_seen(default: Shared) -> None:
+    found = score_task(replace(default, left_out=True), (0, {}))
+    assert found["left_out"] > 2.0 * found["markers_mm"]
+
+
+def test_settings_are_checked() -> None:
+    with pytest.raises(ConfigError, match=r"'jerks' cannot be varied \(did you mean 'jerk'\?\)"):
+        check_setting("jerks")
+    with pytest.raises(ConfigError, match="'jerk' is 0 in these settings"):
+        value_of(presets.paper(), "jerk")
+    with pytest.raises(ConfigError, match="force"):
+        changed(presets.paper(), {"force": -1.0})
