@@ -39,7 +39,7 @@ def test_an_arrow_stands_where_the_wrench_acts() -> None:
 
 @pytest.fixture(scope="module")
 def squat() -> Recording:
-    return simulate_squat(seed=1, duration_s=4.0).recording
+    return simulate_squat(seed=1, duration_s=5.0).recording
 
 
 def session(squat: Recording, sinks: list[object], speed: float = 0.0) -> Live:
