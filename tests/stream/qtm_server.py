@@ -151,10 +151,7 @@ class QtmServer:
         )
         plates = ""
         for k, corner in enumerate(self.corners[: len(self.recording.plates)]):
-            place = "".join(
-                f"<Corner{c + 1}>{''.join(f'<{a}>{1000.0 * x:.3f}</{a}>' for a, x in zip('XYZ', p, strict=True))}</Corner{c + 1}>"
-                for c, p in enumerate(corner)
-            )
+            place = "".join(f"<Corner{c}>{xyz(point)}</Corner{c}>" for c, point in enumerate(corner, 1))
             plates += (
                 f"<Plate><Plate_ID>{k + 1}</Plate_ID><Frequency>{self.plate_hz:g}</Frequency><Type>AMTI</Type>"
                 f"<Name>AMTI</Name><Location>{place}</Location></Plate>"
@@ -178,6 +175,10 @@ def plate_axes(corners: np.ndarray) -> np.ndarray:
     axes = np.column_stack([x, y, np.cross(x, y)])
     assert axes[:, 2] @ UP < -0.99
     return axes
+
+
+def xyz(point: np.ndarray) -> str:
+    return "".join(f"<{axis}>{1000.0 * x:.3f}</{axis}>" for axis, x in zip("XYZ", point, strict=True))
 
 
 def component(kind: int, body: bytes) -> bytes:

@@ -19,7 +19,7 @@ from .offline import offline_states
 from .qtm_server import QtmServer
 
 pytest.importorskip("qtm_rt")
-from dynakin.stream.qtm_source import QtmSource  # noqa: E402
+from dynakin.stream.qtm_source import QtmSource
 
 
 @pytest.fixture(scope="module")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -12,7 +13,7 @@ import dynakin
 from dynakin.errors import ModelError, StreamError
 from dynakin.recordings import Recording
 from dynakin.simulation import simulate_squat
-from dynakin.stream import Callback, Live, LiveFrame, Packet, Replay, Streams
+from dynakin.stream import Callback, Live, LiveFrame, MarkerPacket, Packet, PlatePacket, Replay, Streams
 
 
 @pytest.fixture(scope="module")
@@ -75,6 +76,56 @@ def test_half_of_the_markers_gone_for_three_seconds(squat: Recording) -> None:
     last = np.rad2deg(frames[-1].estimate.coordinates - whole[-1].estimate.coordinates)
     assert np.abs(last).max() < 3.0  # once they are back; in between a segment without markers is only guessed
     assert all(np.isfinite(f.estimate.coordinates).all() for f in frames)
+
+
+class Edited(Replay):
+    """A replay whose packets are changed on the way, at the recording's own pace by the times of arrival."""
+
+    def __init__(self, recording: Recording, edit: Callable[[Packet], list[Packet]]) -> None:
+        super().__init__(recording, speed=0.0)
+        self.edit = edit
+
+    def read(self, timeout_s: float) -> list[Packet] | None:
+        packets = super().read(timeout_s)
+        if packets is None:
+            return None
+        arrived = [replace(p, arrived_s=1000.0 + float(np.max(p.time_s)) + 0.001) for p in packets]
+        return [one for packet in arrived for one in self.edit(packet)]
+
+
+def test_silent_plates_are_told_and_the_estimate_goes_on(squat: Recording) -> None:
+    def silent(packet: Packet) -> list[Packet]:
+        at = float(np.max(packet.time_s))
+        return [] if isinstance(packet, PlatePacket) and 4.0 < at < 6.0 else [packet]
+
+    frames, said, _ = run(Edited(squat, silent))
+    words = " ".join(said)
+    assert "The plates are silent; going on with markers alone." in words and "The plates are back." in words
+    by_time = {round(f.estimate.time_s, 2): f.status.plates for f in frames}
+    assert (by_time[3.5], by_time[5.0], by_time[7.0]) == ("used", "silent", "used")
+    assert frames[-1].estimate.time_s == pytest.approx(squat.time[-1])
+
+
+def test_late_packets_and_steps_of_zero_or_backwards_leave_the_estimate_as_it_is(squat: Recording) -> None:
+    past: list[Packet] = []
+
+    def disturb(packet: Packet) -> list[Packet]:
+        if not isinstance(packet, MarkerPacket):
+            return [packet]
+        past.append(packet)
+        at = packet.time_s
+        found: list[Packet] = [packet]
+        if round(at, 2) == 5.5:  # 500 at once, all long past
+            found += [replace(one, arrived_s=packet.arrived_s) for one in past[:500]]
+        if round(100 * at) % 50 == 20:
+            found += [packet, replace(packet, time_s=at - 0.02), replace(packet, time_s=float("nan"))]
+        return found
+
+    whole, _, _ = run(Replay(squat, speed=0.0))
+    frames, _, live = run(Edited(squat, disturb))
+    assert live.fusion.marker_counts.late >= 500 and live.fusion.marker_counts.duplicate >= 10
+    np.testing.assert_array_equal([f.estimate.time_s for f in frames], [f.estimate.time_s for f in whole])
+    np.testing.assert_array_equal(frames[-1].state, whole[-1].state)
 
 
 class Breaking:

@@ -59,11 +59,11 @@ class Fusion:
         self.markers, self.plates, self.delay_s = markers, plates, delay_s
         self.period_s = 1.0 / markers.rate_hz
         self._clocks = {info.clock: Clock() for info in (markers, plates) if info is not None}
-        self._frames: InOrder[MarkerPacket] = InOrder(self.period_s, delay_s)
+        self._frames: InOrder[MarkerPacket] = InOrder(self.period_s, delay_s, ordered=markers.ordered)
         self._blocks: InOrder[PlatePacket] | None = None
         self._resampled: PlateSamples | None = None
         if plates is not None:
-            self._blocks = InOrder(1.0 / plates.rate_hz, delay_s, most=4096)
+            self._blocks = InOrder(1.0 / plates.rate_hz, delay_s, 4096, plates.ordered)
             self._resampled = PlateSamples(plates.rate_hz, markers.rate_hz, len(plates.names))
         self._offset_s: float | None = None if len(self._clocks) > 1 else 0.0  # of the plates' clock
         self._early: list[PlatePacket] = []  # plates that came before the offset was known
@@ -154,7 +154,7 @@ class Fusion:
         assert self._blocks is not None and self._resampled is not None and self._offset_s is not None
         time = packet.time_s + self._offset_s
         placed = PlatePacket(time, packet.wrenches, packet.arrived_s)
-        self._blocks.push(float(time[0]), float(time[-1]), packet.arrived_s, placed)
+        self._blocks.push(float(time[0]), float(time[-1]), packet.arrived_s, placed, len(time))
 
     def poll(self, now_s: float) -> list[Fused]:
         """All samples that are ready, oldest first; at ``now_s`` infinite all that are left."""

@@ -8,6 +8,8 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
+from dynakin.stream.pace import Pace
+
 T = TypeVar("T")
 
 _SAME = 0.01  # part of a period within which two stamps are the same
@@ -32,36 +34,39 @@ class InOrder(Generic[T]):
         period_s: nominal time between two samples.
         delay_s: longest wait for a packet that is missing, by the stamps and by the clock of arrival.
         most: packets kept at most; the oldest is given before there are more.
+        ordered: packets come in their order, so that none is waited for.
     """
 
-    def __init__(self, period_s: float, delay_s: float, most: int = 256) -> None:
-        self.period_s, self.delay_s, self.most = period_s, delay_s, most
+    def __init__(self, period_s: float, delay_s: float, most: int = 256, ordered: bool = False) -> None:
+        self.period_s, self.delay_s, self.most, self.ordered = period_s, delay_s, most, ordered
+        self._pace = Pace(period_s)
         self.counts = Counts()
         self.last_s: float | None = None  # stamp of the last sample given
-        self._heap: list[tuple[float, int, float, float, T]] = []
+        self._heap: list[tuple[float, int, float, float, T, int]] = []
         self._pushed = 0
         self._newest = -np.inf
 
-    def push(self, start_s: float, end_s: float, arrived_s: float, item: T) -> None:
-        """A packet with samples from ``start_s`` to ``end_s``; one that is too late or there already is left out."""
+    def push(self, start_s: float, end_s: float, arrived_s: float, item: T, count: int = 1) -> None:
+        """A packet with ``count`` samples; left out where it is too late or there already."""
         if not (np.isfinite(start_s) and np.isfinite(end_s)) or end_s < start_s:
             self.counts.invalid += 1
             return
         if self._refused(start_s, end_s):
             return
         self._pushed += 1
-        heapq.heappush(self._heap, (start_s, self._pushed, end_s, arrived_s, item))
+        heapq.heappush(self._heap, (start_s, self._pushed, end_s, arrived_s, item, count))
         self._newest = max(self._newest, end_s)
 
     def pop(self, now_s: float) -> T | None:
         """The next packet, None where there is none or it still waits for one before it."""
         while self._heap:
-            start, _, end, arrived, item = self._heap[0]
+            start, _, end, arrived, item, count = self._heap[0]
             if self._refused(start, end):
                 heapq.heappop(self._heap)
                 continue
             due = (
-                self.last_s is None
+                self.ordered
+                or self.last_s is None
                 or start <= self.last_s + 1.5 * self.period_s
                 or self._newest - start >= self.delay_s
                 or now_s - arrived >= self.delay_s
@@ -70,8 +75,7 @@ class InOrder(Generic[T]):
             if not due:
                 return None
             heapq.heappop(self._heap)
-            if self.last_s is not None:
-                self.counts.lost += max(round((start - self.last_s) / self.period_s) - 1, 0)
+            self.counts.lost += self._pace.missing(start, end, count)
             self.last_s = end
             return item
         return None
@@ -79,11 +83,13 @@ class InOrder(Generic[T]):
     def skip_to(self, time_s: float) -> None:
         """Take what lies before ``time_s`` as given."""
         self.last_s = time_s if self.last_s is None else max(self.last_s, time_s)
+        self._pace.go_on_from(self.last_s)
 
     def clear(self) -> None:
         """Forget the order, keep the counts."""
         self._heap.clear()
         self.last_s, self._newest = None, -np.inf
+        self._pace.go_on_from(None)
 
     def _refused(self, start_s: float, end_s: float) -> bool:
         if self.last_s is None or start_s > self.last_s + _SAME * self.period_s:

@@ -80,7 +80,7 @@ class LslSource:
         self._factors = np.array(
             [_factor(units[k], labels[k], self._plates, self.name) if k in used else 1.0 for k in range(len(labels))]
         )
-        told = StreamInfo(names, rate, self._clock)
+        told = StreamInfo(names, rate, self._clock, ordered=True)
         notes = (f"lsl:{self.name}: the sender's clock is {self._correction:+.4f} s away.",)
         return Streams(None, told, notes) if self._plates else Streams(told, None, notes)
 

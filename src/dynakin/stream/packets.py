@@ -20,11 +20,13 @@ class StreamInfo:
         rate_hz: nominal rate.
         clock: name of the clock of its time stamps. Streams with the same clock share one time; the offset between
             two clocks is estimated from when packets arrive.
+        ordered: whether the transport keeps the order (TCP, a file): then nobody waits for a sample that is missing.
     """
 
     names: tuple[str, ...]
     rate_hz: float
     clock: str
+    ordered: bool = False
 
 
 @dataclass(frozen=True)

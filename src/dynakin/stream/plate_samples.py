@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.recordings.resampling import CausalLowPass, latest_before, low_pass_for
+from dynakin.stream.pace import Pace
 
 Array = npt.NDArray[np.float64]
 
@@ -26,6 +27,7 @@ class PlateSamples:
         self._time = np.zeros(0)
         self._values = np.zeros((0, 6 * count))
         self._last: tuple[float, Array] | None = None
+        self._pace = Pace(1.0 / rate_hz)
         self._from = -np.inf  # nothing is known before: a gap ends here
 
     @property
@@ -42,15 +44,16 @@ class PlateSamples:
             return
         if self._last is not None:
             gap = time[0] - self._last[0]
-            missing = round(gap * self.rate_hz) - 1
             if gap > _FILLED_S + 1.5 / self.rate_hz:
                 self._filter, self._from = None, float(time[0])
-            elif missing > 0:
+                self._pace.go_on_from(None)
+            if missing := self._pace.missing(float(time[0]), float(time[-1]), len(time)):
                 part = (np.arange(missing) + 1.0)[:, None] / (missing + 1.0)
                 values = np.vstack([self._last[1] + part * (values[0] - self._last[1]), values])
                 time = np.concatenate([self._last[0] + part[:, 0] * gap, time])
         else:
             self._from = float(time[0])
+            self._pace.missing(float(time[0]), float(time[-1]), len(time))
         self._last = (float(time[-1]), values[-1].copy())
         if self._filter is None:
             self._filter = low_pass_for(self.rate_hz, self.marker_rate_hz)

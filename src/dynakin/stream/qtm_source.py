@@ -124,16 +124,17 @@ class QtmSource:
             )
         rate = 1.0 / float(np.median(np.diff(stamps)))
         notes = [f"{self._where}: {len(told.labels)} labels, up is {told.up or 'not told'}."]
+        markers = StreamInfo(told.labels, rate, "qtm", ordered=True)
         if not told.plates:
-            return Streams(StreamInfo(told.labels, rate, "qtm"), None, tuple(notes))
+            return Streams(markers, None, tuple(notes))
         counted = [packet.time_s[-1] for packet in self._packets if isinstance(packet, PlatePacket)]
         same = bool(counted) and abs(counted[-1] - stamps[-1]) < _SAME_CLOCK_S
         if not same:
             notes.append(f"{self._where}: plates count time from another moment; it is found from arrivals.")
         notes.append(f"{self._where}: forces are taken to be in the frame of the {self.frame} (forces=plate or lab).")
         names = tuple(plate.name for plate in told.plates)
-        plates = StreamInfo(names, told.plates[0].rate_hz, "qtm" if same else "qtm-plates")
-        return Streams(StreamInfo(told.labels, rate, "qtm"), plates, tuple(notes))
+        plates = StreamInfo(names, told.plates[0].rate_hz, "qtm" if same else "qtm-plates", ordered=True)
+        return Streams(markers, plates, tuple(notes))
 
     async def _wait(self, timeout_s: float) -> None:
         assert self._came is not None

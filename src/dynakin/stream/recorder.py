@@ -146,4 +146,4 @@ def finish(folder: str | Path, output: str | Path) -> Estimate:
 
 
 def _info(told: dict[str, Any]) -> StreamInfo:
-    return StreamInfo(tuple(told["names"]), float(told["rate_hz"]), str(told["clock"]))
+    return StreamInfo(tuple(told["names"]), float(told["rate_hz"]), str(told["clock"]), bool(told.get("ordered")))

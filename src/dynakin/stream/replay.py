@@ -59,8 +59,8 @@ class Replay:
         plates = None
         if self._plate_names:
             rate = 1.0 / float(np.median(np.diff(self._plate_time)))
-            plates = StreamInfo(self._plate_names, rate, clock)
-        return Streams(StreamInfo(recording.marker_names, recording.rate, clock), plates, recording.notes)
+            plates = StreamInfo(self._plate_names, rate, clock, ordered=True)
+        return Streams(StreamInfo(recording.marker_names, recording.rate, clock, ordered=True), plates, recording.notes)
 
     def read(self, timeout_s: float) -> list[Packet] | None:
         """The frames that are due."""
