@@ -15,19 +15,24 @@ from dynakin.cli.summary import print_summary
 from dynakin.errors import ConfigError
 from dynakin.recordings import read
 from dynakin.recordings.read import FORCE_READERS
-from dynakin.stream import SINKS, SOURCES, Live, Sink, plugin
+from dynakin.stream import SINKS, SOURCES, Live, Replay, Sink, plugin
 from dynakin.stream.fusion import DELAY_S
 from dynakin.stream.recorder import Recorder, finish
 from dynakin.stream.settings import estimator_of
 from dynakin.stream.start import read_known
 
-_REPLAY_STANDING_S, _LIVE_STANDING_S = 3.0, 20.0
+# Seconds of standing that are asked for, and how long they are waited for.
+_LIVE_STANDING_S, _REPLAY_STANDING_S, _SHORT_STANDING_S = (2.0, 20.0), (2.0, 3.0), (0.4, 0.4)
+_SHORT_S = 6.0
 
 
 def live(
     source: Annotated[
         str | None,
-        typer.Option(help="Where samples come from: replay:FILE[,speed=2][,loop], lsl:NAME, or a plug-in's KIND:..."),
+        typer.Option(
+            help="Where samples come from: simulate:squat, replay:FILE[,speed=2][,loop], lsl:NAME, qtm:HOST, or a "
+            "plug-in's KIND:..."
+        ),
     ] = None,
     forces: Annotated[str | None, typer.Option(help="Plates: another source, or a force file beside replay.")] = None,
     model: Annotated[str, typer.Option(help="Model: fullbody, squat7, sagittal7, a .toml or .osim file.")] = "fullbody",
@@ -71,7 +76,9 @@ def live(
         print_summary(found, output)
         return
     if source is None:
-        raise typer.BadParameter("--source is missing, expected replay:FILE, lsl:NAME or a plug-in's KIND:...")
+        raise typer.BadParameter(
+            "--source is missing, expected simulate:squat, replay:FILE, lsl:NAME, qtm:HOST or a plug-in's KIND:..."
+        )
     given = {
         "markers": markers,
         "mass_kg": mass,
@@ -85,15 +92,18 @@ def live(
         "table": table,
     }
     settings = {"model": model} | {key: value for key, value in given.items() if value is not None}
-    replayed = source.startswith("replay:")
+    sources = _sources(source, forces)
+    standing, wait = _LIVE_STANDING_S
+    if isinstance(sources[0], Replay):
+        standing, wait = _for_replay(sources[0], source, view and record is None)
     sinks = _sinks(settings, record, publish, view, host, port)
-    wait = _REPLAY_STANDING_S if replayed else _LIVE_STANDING_S
     try:
         session = Live(
             estimator_of(settings, lag),
-            _sources(source, forces),
+            sources,
             sinks,
             delay_s=delay,
+            standing_s=standing,
             standing_wait_s=wait if standing_wait is None else standing_wait,
             static=None if static is None else read(static),
             known=None if parameters is None else read_known(parameters),
@@ -110,6 +120,16 @@ def live(
         out().print("Stopped.")
     if record is not None:
         out().print(f"Recorded in {record}; results from it: dynakin live --finish {record} -o OUT", soft_wrap=True)
+
+
+def _for_replay(replay: Replay, told: str, again: bool) -> tuple[float, float]:
+    """Seconds of standing and of waiting for them: a recording does not follow requests. One that is watched is
+    played again and again, so that the page stays."""
+    if again and "loop" not in told and not replay.loop:
+        replay.loop = True
+        out().print("Played again and again until Ctrl-C (loop=no: once).")
+    length = replay.recording.time[-1] - replay.recording.time[0]
+    return _SHORT_STANDING_S if length < _SHORT_S else _REPLAY_STANDING_S
 
 
 def _sources(source: str, forces: str | None) -> list[Any]:

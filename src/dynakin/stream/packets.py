@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -31,11 +32,17 @@ class StreamInfo:
 
 @dataclass(frozen=True)
 class Streams:
-    """The streams of a source: markers, plates or both; ``notes`` are sentences for the user."""
+    """The streams of a source: markers, plates or both.
+
+    Attributes:
+        notes: sentences for the user.
+        subject: "mass_kg" and "height_m" where the source tells them.
+    """
 
     markers: StreamInfo | None = None
     plates: StreamInfo | None = None
     notes: tuple[str, ...] = ()
+    subject: Mapping[str, float] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from dynakin.errors import ConfigError, DynakinError, StreamError
-from dynakin.stream.packets import Packet, Source, StreamInfo, Streams
+from dynakin.stream.packets import Packet, Source, Streams
 
 _READ_S = 0.02
 _AGAIN_S = 0.5
@@ -38,8 +38,8 @@ class Reader:
         self._threads: list[threading.Thread] = []
         self._open = 0
 
-    def open(self) -> tuple[StreamInfo | None, StreamInfo | None, tuple[str, ...]]:
-        """Connect to all; gives the markers' stream, the plates' and notes.
+    def open(self) -> Streams:
+        """Connect to all; gives their streams together.
 
         Raises:
             StreamError: a source that cannot be reached in time, or two sources of the same kind.
@@ -63,7 +63,8 @@ class Reader:
         for thread in self._threads:
             thread.start()
         notes = tuple(note for streams in told for note in streams.notes)
-        return markers[0] if markers else None, plates[0] if plates else None, notes
+        subject = {key: value for streams in told for key, value in streams.subject.items()}
+        return Streams(markers[0] if markers else None, plates[0] if plates else None, notes, subject)
 
     def get(self, timeout_s: float) -> Packet | Notice | None:
         """The next packet or notice, None where nothing came in time."""

@@ -60,7 +60,12 @@ class Replay:
         if self._plate_names:
             rate = 1.0 / float(np.median(np.diff(self._plate_time)))
             plates = StreamInfo(self._plate_names, rate, clock, ordered=True)
-        return Streams(StreamInfo(recording.marker_names, recording.rate, clock, ordered=True), plates, recording.notes)
+        return Streams(
+            StreamInfo(recording.marker_names, recording.rate, clock, ordered=True),
+            plates,
+            recording.notes,
+            recording.subject,
+        )
 
     def read(self, timeout_s: float) -> list[Packet] | None:
         """The frames that are due."""

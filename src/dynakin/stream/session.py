@@ -17,11 +17,12 @@ from dynakin.stream.monitor import Monitor
 from dynakin.stream.packets import Source
 from dynakin.stream.reader import Notice, Reader
 from dynakin.stream.sinks import LiveFrame, Sink, Started, Status
-from dynakin.stream.start import begin, check_labels, recording_of, stands
+from dynakin.stream.start import begin, check_labels, recording_of, stands, unknown_mass
 
 _POLL_S = 0.005
 _ASK_S = 0.1  # how often sinks are asked for wishes, and the standing person is looked at
 _DEVIATIONS_S = 0.2
+_MASS_KG = 70.0  # of a person of whom nothing is told, so that at least the movement is seen
 
 
 class Live:
@@ -64,12 +65,14 @@ class Live:
         self._fusion: Fusion | None = None
         self._window: deque[Fused] = deque()
         self._standing_since: float | None = None
+        self._came_s = 0.0
         self._looked = self._asked = self._told_sd = -np.inf
         self._monitor: Monitor | None = None
         self._use_plates = True
         self._feet: LiveFeet | None = None
         self._running = False
         self._labels_checked = False
+        self._subject: dict[str, float] = {}
         self._stopped = False
 
     @property
@@ -87,13 +90,19 @@ class Live:
         """Until the sources end, or `stop` is called.
 
         Raises:
-            StreamError: a source cannot be reached. ModelError, RecordingError: what came does not fit the model.
+            StreamError: a source cannot be reached, or ended before anybody was measured. ModelError, RecordingError:
+                what came does not fit the model.
         """
         try:
             self._open()
             while not self._stopped and not self._reader.over:
                 self._turn()
             self._take(np.inf)
+            if self._reader.over and self.estimator.initial is None:
+                raise StreamError(
+                    f"the streams ended before the model was measured: {self._came_s:.1f} s came, expected "
+                    f"{self.standing_s:g} s of standing"
+                )
         finally:
             self._reader.close()
             for sink in self.sinks:
@@ -118,13 +127,21 @@ class Live:
 
     def _open(self) -> None:
         self.say("Waiting for the streams.")
-        markers, plates, notes = self._reader.open()
+        streams = self._reader.open()
+        markers, plates = streams.markers, streams.plates
         self._fusion = Fusion(markers, plates, delay_s=self.delay_s)
         assert markers is not None
         told = "no plates" if plates is None else f"{len(plates.names)} plates at {plates.rate_hz:g} Hz"
         self.say(f"Streams: {len(markers.names)} markers at {markers.rate_hz:g} Hz, {told}.")
-        for note in notes:
+        for note in streams.notes:
             self.say(note)
+        self._subject = dict(streams.subject)
+        if unknown_mass(self.estimator.model, self._subject, plates is not None):
+            self._subject["mass_kg"] = _MASS_KG
+            self.say(
+                f"Warning: nobody tells the mass and there are no plates; {_MASS_KG:g} kg are taken, so that moments "
+                "are right in shape only."
+            )
         for sink in self.sinks:
             sink.opened(markers, plates)
 
@@ -144,7 +161,7 @@ class Live:
         if now - self._asked > _ASK_S:
             self._asked = now
             self._wishes()
-            if self._monitor is not None and self._running:
+            if self._monitor is not None and self._running and not self._reader.over:
                 for text in self._monitor.changes(self.fusion, now):
                     self.say(text)
 
@@ -180,12 +197,13 @@ class Live:
                 self._stand(fused)
 
     def _stand(self, fused: Fused) -> None:
-        """Look for two seconds of standing; then measure the model."""
+        """Look for somebody who stands still; then measure the model."""
         info = self.fusion.markers
         t = fused.sample.time_s
         if self._standing_since is None:
             self._standing_since = t
             self.say(f"Stand still and upright for {self.standing_s:g} s, please.")
+        self._came_s = t - self._standing_since
         self._window.append(fused)
         while t - self._window[0].sample.time_s > self.standing_s + 0.5 / info.rate_hz:
             self._window.popleft()
@@ -200,7 +218,7 @@ class Live:
             seen = [bool(np.isfinite(positions[:, k]).all(axis=1).any()) for k in range(len(info.names))]
             self.say(check_labels(self.estimator.model, info.names, seen))
             self._labels_checked = True
-        recording = recording_of(list(self._window), info.names, plates)
+        recording = recording_of(list(self._window), info.names, plates, subject=self._subject)
         waited = t - self._standing_since > self.standing_wait_s
         if not stands(recording) and not waited:
             return

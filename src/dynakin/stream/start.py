@@ -24,6 +24,7 @@ from dynakin.recordings import (
     plate_from_wrench,
     standing_window,
 )
+from dynakin.recordings.plates import LOADED_N
 from dynakin.recordings.vertical import axis_vector, find_vertical
 from dynakin.stream.fusion import Fused
 
@@ -64,9 +65,16 @@ def check_labels(model: Definition, came: Sequence[str], seen: Iterable[bool]) -
 
 
 def recording_of(
-    fused: Sequence[Fused], markers: Sequence[str], plates: Sequence[str], name: str = "live"
+    fused: Sequence[Fused],
+    markers: Sequence[str],
+    plates: Sequence[str],
+    name: str = "live",
+    subject: Mapping[str, float] | None = None,
 ) -> Recording:
     """Samples as a recording, laboratory frame; plates as far as any of these samples has them.
+
+    Args:
+        subject: mass (kg) and height (m) as the source tells them.
 
     Raises:
         RecordingError: no samples, or no vertical axis to be found.
@@ -74,7 +82,8 @@ def recording_of(
     if not fused:
         raise RecordingError(f"{name}: no frames, expected some")
     time = np.array([one.sample.time_s for one in fused])
-    made = Recording(name, None, time, tuple(markers), np.stack([one.positions for one in fused]))
+    positions = np.stack([one.positions for one in fused])
+    made = Recording(name, None, time, tuple(markers), positions, subject=dict(subject or {}))
     if not plates or all(one.wrenches is None for one in fused):
         return made
     none = np.full((len(plates), 6), np.nan)
@@ -96,6 +105,11 @@ def _plate(name: str, wrench: np.ndarray, up: np.ndarray) -> Plate:
             threshold_n=DEFAULT_THRESHOLD_N,
             zero_unloaded=False,
         )
+
+
+def unknown_mass(model: Definition, told: Mapping[str, float], plates: bool) -> bool:
+    """Whether nobody tells the person's mass and nothing can weigh them."""
+    return isinstance(model, ModelDefinition) and model.subject.mass_kg is None and "mass_kg" not in told and not plates
 
 
 def stands(recording: Recording) -> bool:
@@ -130,6 +144,10 @@ def begin(
         said.append(f"Lengths, marker places and masses go on from {len(known)} saved values.")
     usable = True
     if standing.plates:
+        if not any(
+            np.abs(plate.force).max(initial=0.0, where=np.isfinite(plate.force)) > LOADED_N for plate in standing.plates
+        ):
+            return initial, [*said, "Nobody stands on the plates yet; they are not checked."], usable
         check = check_plates(standing, initial.ground, None if initial.feet else initial.weighed_kg)
         if check.refusal:
             raise RecordingError(f"plates: {check.refusal}")

@@ -23,6 +23,8 @@ _HISTORY_S = 10.0
 _M_PER_N = 1.0 / 1000.0
 _MEASURED, _ESTIMATED, _BONE = (222, 120, 31), (33, 102, 172), (60, 68, 82)
 _PLATE, _TOTAL = (34, 139, 84), (120, 90, 160)
+_NARROW = 0.9  # width over height
+_LEGEND = "Markers: orange measured, blue estimated. Arrows: green plates, violet estimated total, 1 m for 1000 N."
 
 
 class Page:
@@ -33,13 +35,15 @@ class Page:
         self.server.scene.set_up_direction("+y")
         self.server.gui.configure_theme(show_logo=False, show_share_button=False)
         self.server.scene.add_grid("/floor", 4.0, 4.0, plane="xz", cell_size=0.25, section_size=1.0)
-        self.server.initial_camera.position = (1.5, 1.2, 2.0)
-        self.server.initial_camera.look_at = (0.0, 0.85, 0.0)
+        self.server.initial_camera.position = (1.6, 1.3, 2.1)
+        self.server.initial_camera.look_at = (0.0, 0.9, 0.0)
+        self.server.on_client_connect(_place_camera)
         gui = self.server.gui
         self.words = gui.add_markdown("**dynakin live**: waiting")
         self.status = gui.add_markdown("")
         buttons = gui.add_button_group("Session", ("restart", "recalibrate", "record"))
         buttons.on_click(lambda event: print(event.target.value, flush=True))
+        gui.add_markdown(_LEGEND)
         self.said: deque[str] = deque(maxlen=3)
         self.setup: dict[str, Any] = {}
         self.latest: Latest | None = None
@@ -171,6 +175,20 @@ class Page:
         if status["delay_s"]:
             rows.append(("Smoothed", f"{1e3 * status['delay_s']:.0f} ms later"))
         self.status.content = "\n".join(["| | |", "|---|---|", *(f"| {a} | {b} |" for a, b in rows)])
+
+
+def _place_camera(client: viser.ClientHandle) -> None:
+    """On a narrow screen the words lie over the lower half: the person goes to the upper one."""
+    for _ in range(50):
+        try:
+            narrow = client.camera.aspect < _NARROW
+        except (AssertionError, AttributeError):  # the page has not told its camera yet
+            time.sleep(0.1)
+            continue
+        if narrow:
+            client.camera.position = (2.2, 0.9, 3.2)
+            client.camera.look_at = (0.0, 0.0, 0.0)
+        return
 
 
 def _shown(points: np.ndarray) -> np.ndarray:
