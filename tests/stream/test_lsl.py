@@ -143,7 +143,16 @@ def test_live_equals_offline_on_the_same_samples(data_dir: Path) -> None:
     estimator = dynakin.Estimator(dynakin.load_model("sagittal7", subject=subject, markers="opencap"))
     kept = Kept()
     sources = [LslSource(f"{name}-markers"), LslSource(f"{name}-plates", own_clock=True)]
-    live = Live(estimator, sources, [kept], say=lambda text: None, standing_s=1.5, standing_wait_s=1.6, delay_s=5.0)
+    live = Live(
+        estimator,
+        sources,
+        [kept],
+        say=lambda text: None,
+        standing_s=1.5,
+        standing_wait_s=1.6,
+        delay_s=5.0,
+        max_late_s=60.0,
+    )
 
     def wait() -> None:
         laboratory.thread.join(60.0)

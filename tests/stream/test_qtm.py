@@ -64,7 +64,9 @@ def session(server: QtmServer, until: float) -> tuple[list[LiveFrame], list[str]
 
     source = plugin(SOURCES, f"qtm:127.0.0.1,port={server.port}")
     # Nobody is late here: a long wait keeps a busy machine from changing the samples.
-    live = Live(estimator, [source], [Callback(on_frame)], say=said.append, standing_wait_s=2.0, delay_s=5.0)
+    live = Live(
+        estimator, [source], [Callback(on_frame)], say=said.append, standing_wait_s=2.0, delay_s=5.0, max_late_s=60.0
+    )
     live.run()
     return frames, said, live
 

@@ -18,6 +18,7 @@ Array = npt.NDArray[np.float64]
 
 _SETTLE_S = 5.0  # constants that moved by less than their own standard deviation in so long have settled
 _SOON_S = 1.0
+_SLOW_S = 10.0  # how often it is said that frames were left out
 
 
 class Monitor:
@@ -39,6 +40,9 @@ class Monitor:
         self._begun: float | None = None
         self._silent = {"markers": False, "plates": False}
         self._restarts = 0
+        self.left_out = self._told_left_out = 0
+        self._told_s = -np.inf
+        self.stepped_s = -np.inf  # time of the last step
 
     def status(
         self,
@@ -70,6 +74,7 @@ class Monitor:
             plates=on_plates,
             at_bound=tuple(self.initial.names[k] for k in at),
             tracking="" if report is None else report.tracking,
+            left_out=self.left_out,
             late=markers.late + blocks.late,
             lost=markers.lost + blocks.lost,
             duplicate=markers.duplicate + blocks.duplicate,
@@ -80,6 +85,7 @@ class Monitor:
 
     def published(self, time_s: float, latency_s: float) -> None:
         """An estimate went out, so long after its sample had arrived."""
+        self.stepped_s = time_s
         self._recent.append((time_s, latency_s))
         while time_s - self._recent[0][0] > _SOON_S:
             self._recent.popleft()
@@ -103,13 +109,19 @@ class Monitor:
         return [f"Lengths and masses have settled, {time_s - self._begun:.0f} s after the start."]
 
     def changes(self, fusion: Fusion, now_s: float) -> list[str]:
-        """Sentences on streams that fell silent or came back, and on clocks that were set back."""
+        """Sentences on frames left out, streams that fell silent or came back, and clocks that were set back."""
         said = []
         for kind, silent in (("markers", fusion.markers_silent(now_s)), ("plates", fusion.plates_silent(now_s))):
             if silent != self._silent[kind]:
                 self._silent[kind] = silent
                 goes_on = "going on with markers alone" if kind == "plates" else "the estimate waits for them"
                 said.append(f"The {kind} are silent; {goes_on}." if silent else f"The {kind} are back.")
+        if self.left_out > self._told_left_out and now_s - self._told_s > _SLOW_S:
+            said.append(
+                f"This computer is too slow for {self.rate_hz:g} Hz: {self.left_out - self._told_left_out} frames were "
+                "left out."
+            )
+            self._told_left_out, self._told_s = self.left_out, now_s
         if fusion.clock_restarts > self._restarts:
             self._restarts = fusion.clock_restarts
             said.append("A source's clock was set back; time goes on.")

@@ -36,6 +36,7 @@ class Streams:
 
     Attributes:
         notes: sentences for the user.
+        paced: whether samples come when they are measured; False: as fast as they are read.
         subject: "mass_kg" and "height_m" where the source tells them.
     """
 
@@ -43,6 +44,7 @@ class Streams:
     plates: StreamInfo | None = None
     notes: tuple[str, ...] = ()
     subject: Mapping[str, float] = field(default_factory=dict)
+    paced: bool = True
 
 
 @dataclass(frozen=True, eq=False)

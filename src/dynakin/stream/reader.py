@@ -64,7 +64,13 @@ class Reader:
             thread.start()
         notes = tuple(note for streams in told for note in streams.notes)
         subject = {key: value for streams in told for key, value in streams.subject.items()}
-        return Streams(markers[0] if markers else None, plates[0] if plates else None, notes, subject)
+        return Streams(
+            markers[0] if markers else None,
+            plates[0] if plates else None,
+            notes,
+            subject,
+            all(streams.paced for streams in told),
+        )
 
     def get(self, timeout_s: float) -> Packet | Notice | None:
         """The next packet or notice, None where nothing came in time."""

@@ -65,6 +65,7 @@ class Replay:
             plates,
             recording.notes,
             recording.subject,
+            paced=self.speed > 0.0,
         )
 
     def read(self, timeout_s: float) -> list[Packet] | None:

@@ -17,11 +17,12 @@ from dynakin.stream.monitor import Monitor
 from dynakin.stream.packets import Source
 from dynakin.stream.reader import Notice, Reader
 from dynakin.stream.sinks import LiveFrame, Sink, Started, Status
-from dynakin.stream.start import begin, check_labels, recording_of, stands, unknown_mass
+from dynakin.stream.start import begin, check_labels, quietest, recording_of, stands, unknown_mass
 
 _POLL_S = 0.005
 _ASK_S = 0.1  # how often sinks are asked for wishes, and the standing person is looked at
 _DEVIATIONS_S = 0.2
+_SPARSE_S = 0.05  # steps are never further apart than this because the computer is slow
 _MASS_KG = 70.0  # of a person of whom nothing is told, so that at least the movement is seen
 
 
@@ -34,7 +35,8 @@ class Live:
         sinks: where the estimates go.
         delay_s: longest wait for what is missing (`Fusion`).
         standing_s: how long the person stands still at the start.
-        standing_wait_s: after so long without, the last ``standing_s`` are taken as they are.
+        standing_wait_s: after so long without, the quietest moment since then is taken.
+        max_late_s: where the estimate is further behind what arrives, frames are left out; they are counted.
         static, known: see `begin`.
         wait_s: how long to wait for the sources.
         record: makes a recorder, for the viewer's button; pressed again it ends.
@@ -53,12 +55,14 @@ class Live:
         static: Recording | None = None,
         known: Mapping[str, tuple[float, float]] | None = None,
         wait_s: float = 30.0,
+        max_late_s: float = 0.25,
         record: Callable[[], Sink] | None = None,
         say: Callable[[str], None] = print,
     ) -> None:
         self.estimator, self.sinks = estimator, list(sinks)
         self.delay_s, self.standing_s, self.standing_wait_s = delay_s, standing_s, standing_wait_s
         self.static, self.known = static, known
+        self.max_late_s = max_late_s
         self._say, self._record = say, record
         self._recording: Sink | None = None
         self._reader = Reader(sources, wait_s)
@@ -135,6 +139,8 @@ class Live:
         self.say(f"Streams: {len(markers.names)} markers at {markers.rate_hz:g} Hz, {told}.")
         for note in streams.notes:
             self.say(note)
+        if not streams.paced:
+            self.max_late_s = np.inf
         self._subject = dict(streams.subject)
         if unknown_mass(self.estimator.model, self._subject, plates is not None):
             self._subject["mass_kg"] = _MASS_KG
@@ -192,9 +198,19 @@ class Live:
     def _take(self, now_s: float) -> None:
         for fused in self.fusion.poll(now_s):
             if self._running:
-                self._step(fused)
+                if not self._behind(fused):
+                    self._step(fused)
             else:
                 self._stand(fused)
+
+    def _behind(self, fused: Fused) -> bool:
+        """Whether to leave a frame out, so that what is shown is what happens now; some are always taken."""
+        assert self._monitor is not None
+        since = fused.sample.time_s - self._monitor.stepped_s
+        if time.monotonic() - fused.arrived_s <= self.max_late_s or not 0.0 <= since < _SPARSE_S:
+            return False
+        self._monitor.left_out += 1
+        return True
 
     def _stand(self, fused: Fused) -> None:
         """Look for somebody who stands still; then measure the model."""
@@ -205,7 +221,8 @@ class Live:
             self.say(f"Stand still and upright for {self.standing_s:g} s, please.")
         self._came_s = t - self._standing_since
         self._window.append(fused)
-        while t - self._window[0].sample.time_s > self.standing_s + 0.5 / info.rate_hz:
+        longest = max(self.standing_s, self.standing_wait_s) + 0.5 / info.rate_hz
+        while t - self._window[0].sample.time_s > longest:
             self._window.popleft()
         if t - self._looked < _ASK_S and t >= self._looked:
             return
@@ -218,14 +235,19 @@ class Live:
             seen = [bool(np.isfinite(positions[:, k]).all(axis=1).any()) for k in range(len(info.names))]
             self.say(check_labels(self.estimator.model, info.names, seen))
             self._labels_checked = True
-        recording = recording_of(list(self._window), info.names, plates, subject=self._subject)
+        since = t - self.standing_s - 0.5 / info.rate_hz
+        recent = [one for one in self._window if one.sample.time_s >= since]
+        recording, static = recording_of(recent, info.names, plates, subject=self._subject), self.static
         waited = t - self._standing_since > self.standing_wait_s
-        if not stands(recording) and not waited:
-            return
-        if waited:
-            self.say(f"Nobody stood still for {self.standing_wait_s:g} s: the last {self.standing_s:g} s are taken.")
+        if not stands(recording):
+            if not waited:
+                return
+            whole = recording_of(list(self._window), info.names, plates, subject=self._subject)
+            recording, quiet, text = quietest(whole, self.standing_s)
+            static = static or quiet
+            self.say(f"Nobody stood still for {self.standing_s:g} s: {text}")
         try:
-            _, said, self._use_plates = begin(self.estimator, recording, static=self.static, known=self.known)
+            _, said, self._use_plates = begin(self.estimator, recording, static=static, known=self.known)
         except ModelError as error:
             if waited:
                 raise

@@ -27,6 +27,7 @@ class Status:
         plates: "used", "refused", "silent", "left out" or "none".
         at_bound: constants that sit on a bound.
         tracking: the filter's own word ("following", "doubtful", "lost", ...).
+        left_out: frames so far for which the computer was too slow.
         late, lost, duplicate: packets so far.
         settled: whether lengths and masses have come to rest.
         delay_s: by which the smoothed estimate lies behind; 0 without.
@@ -41,6 +42,7 @@ class Status:
     plates: str = "none"
     at_bound: tuple[str, ...] = ()
     tracking: str = ""
+    left_out: int = 0
     late: int = 0
     lost: int = 0
     duplicate: int = 0

@@ -28,6 +28,7 @@ from dynakin.recordings.plates import LOADED_N
 from dynakin.recordings.vertical import axis_vector, find_vertical
 from dynakin.stream.fusion import Fused
 
+_NOW_S = 0.1  # the present posture, from a few frames
 _KINDS = ("length", "marker", "inertia")
 
 
@@ -118,6 +119,18 @@ def stands(recording: Recording) -> bool:
     return window is not None and window.stop - window.start >= 0.8 * recording.n_frames
 
 
+def quietest(recording: Recording, seconds: float) -> tuple[Recording, Recording | None, str]:
+    """What to begin with where nobody stands still for long: the present moment, half a second or more of standing
+    before it where there was any, and words for it."""
+    end = float(recording.time[-1])
+    window = standing_window(recording)
+    if window is None:
+        return recording.window(end - seconds, end), None, f"the last {seconds:g} s are taken as they are."
+    still = recording.time[window]
+    quiet = recording.window(float(still[0]), float(still[-1]))
+    return recording.window(end - _NOW_S, end), quiet, f"{still[-1] - still[0]:.1f} s of it are taken."
+
+
 def begin(
     estimator: Estimator,
     standing: Recording,
@@ -144,11 +157,13 @@ def begin(
         said.append(f"Lengths, marker places and masses go on from {len(known)} saved values.")
     usable = True
     if standing.plates:
-        if not any(
-            np.abs(plate.force).max(initial=0.0, where=np.isfinite(plate.force)) > LOADED_N for plate in standing.plates
-        ):
+        if max(np.nan_to_num(np.abs(plate.force)).max() for plate in standing.plates) < LOADED_N:
             return initial, [*said, "Nobody stands on the plates yet; they are not checked."], usable
-        check = check_plates(standing, initial.ground, None if initial.feet else initial.weighed_kg)
+        check = check_plates(
+            static if static is not None and static.plates else standing,
+            initial.ground,
+            None if initial.feet else initial.weighed_kg,
+        )
         if check.refusal:
             raise RecordingError(f"plates: {check.refusal}")
         said += [text for text in check.messages if text.startswith("Warning") or "kg" in text]

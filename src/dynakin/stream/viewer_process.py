@@ -35,15 +35,14 @@ class Page:
         self.server.scene.set_up_direction("+y")
         self.server.gui.configure_theme(show_logo=False, show_share_button=False)
         self.server.scene.add_grid("/floor", 4.0, 4.0, plane="xz", cell_size=0.25, section_size=1.0)
-        self.server.initial_camera.position = (1.6, 1.3, 2.1)
-        self.server.initial_camera.look_at = (0.0, 0.9, 0.0)
+        self.server.initial_camera.position = (1.35, 1.2, 1.7)
+        self.server.initial_camera.look_at = (0.2, 0.8, 0.0)
         self.server.on_client_connect(_place_camera)
         gui = self.server.gui
         self.words = gui.add_markdown("**dynakin live**: waiting")
         self.status = gui.add_markdown("")
         buttons = gui.add_button_group("Session", ("restart", "recalibrate", "record"))
         buttons.on_click(lambda event: print(event.target.value, flush=True))
-        gui.add_markdown(_LEGEND)
         self.said: deque[str] = deque(maxlen=3)
         self.setup: dict[str, Any] = {}
         self.latest: Latest | None = None
@@ -61,8 +60,8 @@ class Page:
         bones = len(setup["bones"]) + len(setup["ends"])
         self.bones = scene.add_line_segments("/bones", np.zeros((bones, 2, 3)), _BONE, thickness=0.022)
         empty = np.zeros((len(setup["markers"]), 3))
-        self.measured = scene.add_point_cloud("/measured", empty, _MEASURED, point_size=0.014, point_shape="circle")
-        self.estimated = scene.add_point_cloud("/estimated", empty, _ESTIMATED, point_size=0.010, point_shape="circle")
+        self.measured = scene.add_point_cloud("/measured", empty, _MEASURED, point_size=0.024, point_shape="circle")
+        self.estimated = scene.add_point_cloud("/estimated", empty, _ESTIMATED, point_size=0.018, point_shape="circle")
         arrows = setup["sizes"]["arrows"] // 6
         colours = np.array([_PLATE] * (arrows - 1) + [_TOTAL], dtype=np.uint8)
         self.arrows = scene.add_arrows(
@@ -100,6 +99,7 @@ class Page:
             scales={"x": uplot.Scale(time=False)},
             aspect=2.2,
         )
+        gui.add_markdown(_LEGEND)
         if setup["constants"]:
             masses = [name for name in setup["constants"] if name.startswith("length/")] or setup["constants"]
             self.constant = gui.add_dropdown("Constant", setup["constants"], initial_value=masses[0])
@@ -169,6 +169,7 @@ class Page:
             ("Plates", status["plates"]),
             ("Markers", f"{len(status['missing'])} missing, refused: {refused}"),
             ("Packets", f"late {status['late']}, lost {status['lost']}, twice {status['duplicate']}"),
+            ("Left out", f"{status['left_out']} frames (computer too slow)"),
             ("At a bound", bound),
             ("Constants", "settled" if status["settled"] else "settling"),
         ]
@@ -186,8 +187,8 @@ def _place_camera(client: viser.ClientHandle) -> None:
             time.sleep(0.1)
             continue
         if narrow:
-            client.camera.position = (2.2, 0.9, 3.2)
-            client.camera.look_at = (0.0, 0.0, 0.0)
+            client.camera.position = (2.2, 0.6, 2.8)
+            client.camera.look_at = (0.0, -0.9, 0.0)
         return
 
 
