@@ -34,12 +34,32 @@ def test_live_estimates_records_and_finishes(tmp_path: Path, capsys: Said) -> No
     assert (tmp_path / "r" / "stream.dkr").stat().st_size > 100_000
 
 
+def test_nothing_but_a_simulated_person_is_needed(capsys: Said) -> None:
+    assert main(["live", "--source", "simulate:squat,duration=5,speed=0"]) == 0
+    said = capsys.readouterr().out
+    assert "51 markers at 100 Hz, 2 plates" in said and "Ready: move." in said and "Warning" not in said
+
+
+def test_markers_alone_are_enough_to_see_a_person_move(tmp_path: Path, capsys: Said) -> None:
+    source = f"replay:{written(tmp_path)},speed=0"
+    assert main(["live", "--source", source, "--model", "sagittal7", "--markers", "opencap"]) == 0
+    said = capsys.readouterr().out
+    assert "70 kg are taken" in said and "Ready: move." in said
+
+
+def test_a_recording_that_is_too_short_is_told_so(tmp_path: Path, capsys: Said) -> None:
+    assert main(["live", "--source", f"replay:{written(tmp_path)},speed=0,duration=0.2", *PERSON]) == 2
+    assert "ended before the model was measured: 0.2 s came" in capsys.readouterr().err
+
+
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--source", "nowhere:x"], "expected one of lsl:..., replay:..."),
+        (["--source", "nowhere:x"], "expected one of lsl:..., qtm:..., replay:..., simulate:..."),
         (["--source", "replay:none.c3d"], "none.c3d"),
         (["--source", "replay:x.trc,sped=2"], "unknown option 'sped'"),
+        (["--source", "simulate:squat,sed=2"], "unknown option 'sed'"),
+        (["--source", "simulate:dance"], "dance"),
         (["--source", "lsl:a", "--forces", "b.mot"], "goes with replay:FILE only"),
         ([], "--source is missing"),
         (["--finish", "nothing", "-o", "out"], "cannot be read"),

@@ -128,6 +128,22 @@ def test_late_packets_and_steps_of_zero_or_backwards_leave_the_estimate_as_it_is
     np.testing.assert_array_equal(frames[-1].state, whole[-1].state)
 
 
+def test_a_computer_that_is_too_slow_leaves_frames_out_and_says_so(squat: Recording) -> None:
+    frames: list[LiveFrame] = []
+    said: list[str] = []
+
+    def slow(frame: LiveFrame) -> None:
+        frames.append(frame)
+        time.sleep(0.02)
+
+    source = Replay(squat.window(0.0, 6.0), speed=2.0)
+    live = Live(estimator(), [source], [Callback(slow)], say=said.append, standing_s=1.0, max_late_s=0.1)
+    live.run()
+    assert frames[-1].status.left_out > 20 and any("too slow" in text for text in said)
+    steps = np.diff([f.estimate.time_s for f in frames])
+    assert steps.max() < 0.07 and np.isfinite(frames[-1].estimate.coordinates).all()
+
+
 class Breaking:
     """A replay whose connection breaks once, for half a second, and that then begins at time 0 again."""
 
