@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import argparse
 import base64
+import io
 import json
 import shutil
 import subprocess
@@ -16,6 +17,7 @@ import time
 import urllib.request
 from pathlib import Path
 
+from PIL import Image
 from websockets.sync.client import connect  # comes with viser
 
 PORT = 9337
@@ -52,8 +54,8 @@ def picture(url: str, path: Path, width: int, height: int, wait_s: float) -> Non
             page.call("Runtime.evaluate", expression=DISMISS)
             time.sleep(1.5)
             data = base64.b64decode(page.call("Page.captureScreenshot", format="png")["data"])
-            path.write_bytes(data)
-            print(f"{path}: {width} x {height}, {len(data) / 1000:.0f} kB")
+            Image.open(io.BytesIO(data)).convert("RGB").quantize(128).save(path, optimize=True)
+            print(f"{path}: {width} x {height}, {path.stat().st_size / 1000:.0f} kB")
         finally:
             browser.terminate()
             browser.wait()

@@ -18,7 +18,7 @@ Array = npt.NDArray[np.float64]
 
 _SETTLE_S = 5.0  # constants that moved by less than their own standard deviation in so long have settled
 _SOON_S = 1.0
-_SLOW_S = 10.0  # how often it is said that frames were left out
+_SLOW_S = 60.0  # how often it is said that frames were left out
 
 
 class Monitor:

@@ -243,7 +243,7 @@ class Live:
             if not waited:
                 return
             whole = recording_of(list(self._window), info.names, plates, subject=self._subject)
-            recording, quiet, text = quietest(whole, self.standing_s)
+            recording, quiet, text = quietest(whole)
             static = static or quiet
             self.say(f"Nobody stood still for {self.standing_s:g} s: {text}")
         try:

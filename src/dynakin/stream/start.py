@@ -24,9 +24,10 @@ from dynakin.recordings import (
     plate_from_wrench,
     standing_window,
 )
-from dynakin.recordings.plates import LOADED_N
+from dynakin.recordings.plates import LOADED_N, MASS_REFUSED_KG
 from dynakin.recordings.vertical import axis_vector, find_vertical
 from dynakin.stream.fusion import Fused
+from dynakin.units import GRAVITY_M_S2
 
 _NOW_S = 0.1  # the present posture, from a few frames
 _KINDS = ("length", "marker", "inertia")
@@ -119,16 +120,28 @@ def stands(recording: Recording) -> bool:
     return window is not None and window.stop - window.start >= 0.8 * recording.n_frames
 
 
-def quietest(recording: Recording, seconds: float) -> tuple[Recording, Recording | None, str]:
+def quietest(recording: Recording) -> tuple[Recording, Recording | None, str]:
     """What to begin with where nobody stands still for long: the present moment, half a second or more of standing
     before it where there was any, and words for it."""
     end = float(recording.time[-1])
     window = standing_window(recording)
     if window is None:
-        return recording.window(end - seconds, end), None, f"the last {seconds:g} s are taken as they are."
+        present = _weighed(recording.window(end - _NOW_S, end), recording)
+        mass = present.subject.get("mass_kg")
+        told = f"; without another mass {mass:.1f} kg" if mass and mass != recording.subject.get("mass_kg") else ""
+        return present, None, f"the present posture is taken{told}."
     still = recording.time[window]
     quiet = recording.window(float(still[0]), float(still[-1]))
     return recording.window(end - _NOW_S, end), quiet, f"{still[-1] - still[0]:.1f} s of it are taken."
+
+
+def _weighed(present: Recording, whole: Recording) -> Recording:
+    """With the mass by the mean load of a movement, where nothing else tells it: a moment alone weighs nobody."""
+    if not whole.plates or "mass_kg" in present.subject:
+        return present
+    load = np.nanmean(np.sum([plate.force for plate in whole.plates], axis=0), axis=0)
+    mass = float(np.linalg.norm(load)) / GRAVITY_M_S2
+    return replace(present, subject={**present.subject, "mass_kg": mass}) if mass > MASS_REFUSED_KG[0] else present
 
 
 def begin(
@@ -166,7 +179,8 @@ def begin(
         )
         if check.refusal:
             raise RecordingError(f"plates: {check.refusal}")
-        said += [text for text in check.messages if text.startswith("Warning") or "kg" in text]
+        weighed = check.mass_kg_from_plates is not None
+        said += [text for text in check.messages if text.startswith("Warning") or (weighed and "kg" in text)]
         mass, tolerance = check.mass_kg_from_plates, estimator.noise.plate_load_tolerance
         if mass is not None and tolerance is not None and abs(mass - initial.weighed_kg) > tolerance * mass:
             usable = False

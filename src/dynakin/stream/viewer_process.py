@@ -60,8 +60,8 @@ class Page:
         bones = len(setup["bones"]) + len(setup["ends"])
         self.bones = scene.add_line_segments("/bones", np.zeros((bones, 2, 3)), _BONE, thickness=0.022)
         empty = np.zeros((len(setup["markers"]), 3))
-        self.measured = scene.add_point_cloud("/measured", empty, _MEASURED, point_size=0.024, point_shape="circle")
-        self.estimated = scene.add_point_cloud("/estimated", empty, _ESTIMATED, point_size=0.018, point_shape="circle")
+        self.measured = scene.add_point_cloud("/measured", empty, _MEASURED, point_size=0.019, point_shape="circle")
+        self.estimated = scene.add_point_cloud("/estimated", empty, _ESTIMATED, point_size=0.013, point_shape="circle")
         arrows = setup["sizes"]["arrows"] // 6
         colours = np.array([_PLATE] * (arrows - 1) + [_TOTAL], dtype=np.uint8)
         self.arrows = scene.add_arrows(
@@ -187,8 +187,8 @@ def _place_camera(client: viser.ClientHandle) -> None:
             time.sleep(0.1)
             continue
         if narrow:
-            client.camera.position = (2.2, 0.6, 2.8)
-            client.camera.look_at = (0.0, -0.9, 0.0)
+            client.camera.position = (2.6, 0.9, 3.3)
+            client.camera.look_at = (0.0, -0.6, 0.0)
         return
 
 
