@@ -1,8 +1,11 @@
 """Latency of a live session at 200 Hz: from a sample's arrival to its published estimate, with and without the viewer.
 
-    .venv/bin/python benchmarks/live_latency.py [--seconds 120] [--view] [--model planar|fullbody]
+    OMP_NUM_THREADS=1 .venv/bin/python benchmarks/live_latency.py [--seconds 120] [--model planar|fullbody] [--view yes|no]
 
-The whole body needs real recordings (../shared/data, or DYNAKIN_TEST_DATA); they are interpolated to 200 Hz.
+Prints a table. "Others" is the share of all cores that other processes took meanwhile: above a few percent the longest
+latencies are theirs. The whole body needs real recordings (../shared/data, or DYNAKIN_TEST_DATA), interpolated to
+200 Hz. With the viewer its process runs; no browser is open, because one that draws without a graphics card takes the
+machine.
 """
 
 from __future__ import annotations
@@ -23,45 +26,83 @@ from dynakin.simulation import simulate_squat
 from dynakin.stream import Callback, Live, LiveFrame, Replay, Sink
 
 RATE_HZ = 200.0
+SETTLED_S = 2.0  # after the start, frames that came while the model was measured are caught up
 
 
 def main() -> None:
     parser = argparse.ArgumentParser()
     parser.add_argument("--seconds", type=float, default=120.0)
-    parser.add_argument("--view", action="store_true")
+    parser.add_argument("--view", choices=["yes", "no"], action="append")
     parser.add_argument("--model", choices=["planar", "fullbody"], action="append")
     asked = parser.parse_args()
+    print("| model | states | viewer | frames | median ms | p99 ms | max ms | lost, left out | memory MB | others % |")
+    print("|---|---|---|---|---|---|---|---|---|---|", flush=True)
     for name in asked.model or ["planar", "fullbody"]:
-        measure(name, asked.seconds, asked.view)
+        for view in asked.view or ["no", "yes"]:
+            measure(name, asked.seconds, view == "yes")
 
 
 def measure(name: str, seconds: float, view: bool) -> None:
     """One session; prints a line."""
     recording, estimator = planar() if name == "planar" else fullbody()
-    latency: list[float] = []
+    # Kept as numbers, not as objects: the benchmark's own memory does not grow.
+    latency = np.full(int((seconds + 10.0) * RATE_HZ), np.nan)
     memory: list[int] = []
+    count = 0
 
     def on_frame(frame: LiveFrame) -> None:
-        latency.append(time.monotonic() - frame.fused.arrived_s)
-        if len(latency) % 1000 == 0:
+        nonlocal count
+        latency[count] = time.monotonic() - frame.fused.arrived_s
+        count += 1
+        if count % 1000 == 0:
             memory.append(resident_kb())
 
     sinks: list[Sink] = [Callback(on_frame)]
     if view:
         from dynakin.stream.viewer import Viewer
 
-        sinks.insert(0, Viewer(port=8137))
-    source = Replay(recording, loop=True, duration_s=seconds + 3.0)
+        with open(os.devnull, "w") as nowhere:
+            told, sys.stdout = sys.stdout, nowhere
+            try:
+                sinks.insert(0, Viewer(port=8137))
+            finally:
+                sys.stdout = told
+        time.sleep(5.0)  # the page loads its libraries
+    source = Replay(recording, loop=True, duration_s=seconds + 4.0)
     live = Live(estimator, [source], sinks, standing_wait_s=2.5, say=lambda text: None)
+    before = busy_s(), own_s(), time.monotonic()
     live.run()
-    ms = 1e3 * np.array(latency[200:])  # the first second catches up with what came while the model was measured
-    grown = (memory[-1] - memory[0]) / 1024 if len(memory) > 1 else float("nan")
+    after = busy_s(), own_s(), time.monotonic()
+    ms = 1e3 * latency[int(SETTLED_S * RATE_HZ) : count]
+    left_out = live.status.left_out
+    grown = (memory[-1] - memory[1]) / 1024 if len(memory) > 2 else float("nan")
+    cores = os.cpu_count() or 1
+    others = (after[0] - before[0]) - (after[1] - before[1])
+    share = 100.0 * others / ((after[2] - before[2]) * cores)
     print(
-        f"{name:9s} {len(estimator.state):4d} states  view {'yes' if view else 'no ':3s}  {len(ms):6d} frames  "
-        f"median {np.median(ms):6.2f} ms  p99 {np.percentile(ms, 99):7.2f} ms  max {ms.max():7.2f} ms  "
-        f"lost {live.fusion.marker_counts.lost}  memory {grown:+.1f} MB  load {os.getloadavg()[0]:.1f}",
+        f"| {name} | {len(estimator.state)} | {'yes' if view else 'no'} | {len(ms)} | {np.median(ms):.2f} | "
+        f"{np.percentile(ms, 99):.2f} | {ms.max():.1f} | {live.fusion.marker_counts.lost}, {left_out} | {grown:+.1f} | "
+        f"{share:.0f} |",
         flush=True,
     )
+
+
+def busy_s() -> float:
+    """Time that all cores have worked, of all processes; NaN where the system does not tell."""
+    stat = Path("/proc/stat")
+    if not stat.exists():
+        return float("nan")
+    user, nice, system, _idle, _wait, irq, softirq = map(int, stat.read_text().split()[1:8])
+    return float(user + nice + system + irq + softirq) / os.sysconf("SC_CLK_TCK")
+
+
+def own_s() -> float:
+    """Time that this process and those that it started have worked."""
+    took = 0.0
+    for who in (resource.RUSAGE_SELF, resource.RUSAGE_CHILDREN):
+        used = resource.getrusage(who)
+        took += used.ru_utime + used.ru_stime
+    return took
 
 
 def planar() -> tuple[Recording, dynakin.Estimator]:

@@ -90,6 +90,11 @@ class Live:
             raise StreamError("the session has not been opened")
         return self._fusion
 
+    @property
+    def status(self) -> Status:
+        """How it goes, as of the last step."""
+        return Status() if self._monitor is None else self._monitor.last
+
     def run(self) -> None:
         """Until the sources end, or `stop` is called.
 

@@ -169,10 +169,11 @@ class Page:
             ("Plates", status["plates"]),
             ("Markers", f"{len(status['missing'])} missing, refused: {refused}"),
             ("Packets", f"late {status['late']}, lost {status['lost']}, twice {status['duplicate']}"),
-            ("Left out", f"{status['left_out']} frames (computer too slow)"),
             ("At a bound", bound),
             ("Constants", "settled" if status["settled"] else "settling"),
         ]
+        if status["left_out"]:
+            rows.append(("Left out", f"{status['left_out']} frames: this computer is too slow"))
         if status["delay_s"]:
             rows.append(("Smoothed", f"{1e3 * status['delay_s']:.0f} ms later"))
         self.status.content = "\n".join(["| | |", "|---|---|", *(f"| {a} | {b} |" for a, b in rows)])
@@ -187,8 +188,8 @@ def _place_camera(client: viser.ClientHandle) -> None:
             time.sleep(0.1)
             continue
         if narrow:
-            client.camera.position = (2.6, 0.9, 3.3)
-            client.camera.look_at = (0.0, -0.6, 0.0)
+            client.camera.position = (2.8, 0.9, 3.6)
+            client.camera.look_at = (0.0, -0.95, 0.0)
         return
 
 
