@@ -1,8 +1,8 @@
 """Latency of a live session at 200 Hz: from a sample's arrival to its published estimate, with and without the viewer.
 
-    OMP_NUM_THREADS=1 .venv/bin/python benchmarks/live_latency.py [--seconds 120] [--model planar|fullbody] [--view yes|no]
+    OMP_NUM_THREADS=1 .venv/bin/python benchmarks/live_latency.py [--seconds 120] [--model fullbody] [--view yes]
 
-Prints a table. "Others" is the share of all cores that other processes took meanwhile: above a few percent the longest
+Prints a table. "CPU" is the time that the session's thread worked from one frame to the next, whoever else ran. "Others" is the share of all cores that other processes took meanwhile: above a few percent the longest
 latencies are theirs. The whole body needs real recordings (../shared/data, or DYNAKIN_TEST_DATA), interpolated to
 200 Hz. With the viewer its process runs; no browser is open, because one that draws without a graphics card takes the
 machine.
@@ -11,6 +11,8 @@ machine.
 from __future__ import annotations
 
 import argparse
+import contextlib
+import io
 import os
 import resource
 import sys
@@ -35,8 +37,10 @@ def main() -> None:
     parser.add_argument("--view", choices=["yes", "no"], action="append")
     parser.add_argument("--model", choices=["planar", "fullbody"], action="append")
     asked = parser.parse_args()
-    print("| model | states | viewer | frames | median ms | p99 ms | max ms | lost, left out | memory MB | others % |")
-    print("|---|---|---|---|---|---|---|---|---|---|", flush=True)
+    print(
+        "| model | states | viewer | frames | median ms | p99 ms | max ms | CPU median, p99 ms | lost, left out | memory MB | others % |"
+    )
+    print("|---|---|---|---|---|---|---|---|---|---|---|", flush=True)
     for name in asked.model or ["planar", "fullbody"]:
         for view in asked.view or ["no", "yes"]:
             measure(name, asked.seconds, view == "yes")
@@ -47,11 +51,13 @@ def measure(name: str, seconds: float, view: bool) -> None:
     recording, estimator = planar() if name == "planar" else fullbody()
     # Kept as numbers, not as objects: the benchmark's own memory does not grow.
     latency = np.full(int((seconds + 10.0) * RATE_HZ), np.nan)
+    worked = np.full(len(latency), np.nan)
     memory: list[int] = []
     count = 0
 
     def on_frame(frame: LiveFrame) -> None:
         nonlocal count
+        worked[count] = time.thread_time()
         latency[count] = time.monotonic() - frame.fused.arrived_s
         count += 1
         if count % 1000 == 0:
@@ -61,12 +67,8 @@ def measure(name: str, seconds: float, view: bool) -> None:
     if view:
         from dynakin.stream.viewer import Viewer
 
-        with open(os.devnull, "w") as nowhere:
-            told, sys.stdout = sys.stdout, nowhere
-            try:
-                sinks.insert(0, Viewer(port=8137))
-            finally:
-                sys.stdout = told
+        with contextlib.redirect_stdout(io.StringIO()):  # its address
+            sinks.insert(0, Viewer(port=8137))
         time.sleep(5.0)  # the page loads its libraries
     source = Replay(recording, loop=True, duration_s=seconds + 4.0)
     live = Live(estimator, [source], sinks, standing_wait_s=2.5, say=lambda text: None)
@@ -74,6 +76,7 @@ def measure(name: str, seconds: float, view: bool) -> None:
     live.run()
     after = busy_s(), own_s(), time.monotonic()
     ms = 1e3 * latency[int(SETTLED_S * RATE_HZ) : count]
+    cpu = 1e3 * np.diff(worked[int(SETTLED_S * RATE_HZ) : count])
     left_out = live.status.left_out
     grown = (memory[-1] - memory[1]) / 1024 if len(memory) > 2 else float("nan")
     cores = os.cpu_count() or 1
@@ -81,7 +84,7 @@ def measure(name: str, seconds: float, view: bool) -> None:
     share = 100.0 * others / ((after[2] - before[2]) * cores)
     print(
         f"| {name} | {len(estimator.state)} | {'yes' if view else 'no'} | {len(ms)} | {np.median(ms):.2f} | "
-        f"{np.percentile(ms, 99):.2f} | {ms.max():.1f} | {live.fusion.marker_counts.lost}, {left_out} | {grown:+.1f} | "
+        f"{np.percentile(ms, 99):.2f} | {ms.max():.1f} | {np.median(cpu):.2f}, {np.percentile(cpu, 99):.2f} | {live.fusion.marker_counts.lost}, {left_out} | {grown:+.1f} | "
         f"{share:.0f} |",
         flush=True,
     )

@@ -54,9 +54,8 @@ def picture(url: str, path: Path, width: int, height: int, wait_s: float) -> Non
             page.call("Runtime.evaluate", expression=DISMISS)
             time.sleep(1.5)
             data = base64.b64decode(page.call("Page.captureScreenshot", format="png")["data"])
-            Image.open(io.BytesIO(data)).convert("RGB").quantize(256, Image.Quantize.MAXCOVERAGE).save(
-                path, optimize=True
-            )
+            image = Image.open(io.BytesIO(data)).convert("RGB")
+            image.quantize(256, Image.Quantize.MAXCOVERAGE).save(path, optimize=True)
             print(f"{path}: {width} x {height}, {path.stat().st_size / 1000:.0f} kB")
         finally:
             browser.terminate()
