@@ -2,10 +2,10 @@
 
     OMP_NUM_THREADS=1 .venv/bin/python benchmarks/live_latency.py [--seconds 120] [--model fullbody] [--view yes]
 
-Prints a table. "CPU" is the time that the session's thread worked from one frame to the next, whoever else ran. "Others" is the share of all cores that other processes took meanwhile: above a few percent the longest
-latencies are theirs. The whole body needs real recordings (../shared/data, or DYNAKIN_TEST_DATA), interpolated to
-200 Hz. With the viewer its process runs; no browser is open, because one that draws without a graphics card takes the
-machine.
+Prints a table. "CPU": the time that the session's thread worked from one frame to the next, whoever else ran. "Others"
+is the share of all cores that other processes took meanwhile: above a few percent the longest latencies are theirs. The
+whole body needs real recordings (../shared/data, or DYNAKIN_TEST_DATA), interpolated to 200 Hz. With the viewer its
+process runs; no browser is open, because one that draws without a graphics card takes the machine.
 """
 
 from __future__ import annotations
@@ -28,6 +28,19 @@ from dynakin.simulation import simulate_squat
 from dynakin.stream import Callback, Live, LiveFrame, Replay, Sink
 
 RATE_HZ = 200.0
+COLUMNS = (
+    "model",
+    "states",
+    "viewer",
+    "frames",
+    "median ms",
+    "p99 ms",
+    "max ms",
+    "CPU median, p99 ms",
+    "lost, left out",
+    "memory MB",
+    "others %",
+)
 SETTLED_S = 2.0  # after the start, frames that came while the model was measured are caught up
 
 
@@ -37,10 +50,8 @@ def main() -> None:
     parser.add_argument("--view", choices=["yes", "no"], action="append")
     parser.add_argument("--model", choices=["planar", "fullbody"], action="append")
     asked = parser.parse_args()
-    print(
-        "| model | states | viewer | frames | median ms | p99 ms | max ms | CPU median, p99 ms | lost, left out | memory MB | others % |"
-    )
-    print("|---|---|---|---|---|---|---|---|---|---|---|", flush=True)
+    print(f"| {' | '.join(COLUMNS)} |")
+    print("|---" * len(COLUMNS) + "|", flush=True)
     for name in asked.model or ["planar", "fullbody"]:
         for view in asked.view or ["no", "yes"]:
             measure(name, asked.seconds, view == "yes")
@@ -82,12 +93,20 @@ def measure(name: str, seconds: float, view: bool) -> None:
     cores = os.cpu_count() or 1
     others = (after[0] - before[0]) - (after[1] - before[1])
     share = 100.0 * others / ((after[2] - before[2]) * cores)
-    print(
-        f"| {name} | {len(estimator.state)} | {'yes' if view else 'no'} | {len(ms)} | {np.median(ms):.2f} | "
-        f"{np.percentile(ms, 99):.2f} | {ms.max():.1f} | {np.median(cpu):.2f}, {np.percentile(cpu, 99):.2f} | {live.fusion.marker_counts.lost}, {left_out} | {grown:+.1f} | "
-        f"{share:.0f} |",
-        flush=True,
+    row = (
+        name,
+        f"{len(estimator.state)}",
+        "yes" if view else "no",
+        f"{len(ms)}",
+        f"{np.median(ms):.2f}",
+        f"{np.percentile(ms, 99):.2f}",
+        f"{ms.max():.1f}",
+        f"{np.median(cpu):.2f}, {np.percentile(cpu, 99):.2f}",
+        f"{live.fusion.marker_counts.lost}, {left_out}",
+        f"{grown:+.1f}",
+        f"{share:.0f}",
     )
+    print(f"| {' | '.join(row)} |", flush=True)
 
 
 def busy_s() -> float:

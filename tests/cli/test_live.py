@@ -27,11 +27,16 @@ def written(folder: Path) -> Path:
 
 
 def test_live_estimates_records_and_finishes(tmp_path: Path, capsys: Said) -> None:
-    source = f"replay:{written(tmp_path)},speed=0"
+    source = "simulate:squat,model=sagittal7,duration=5,speed=0"
     assert main(["live", "--source", source, *PERSON, "--record", str(tmp_path / "r")]) == 0
     said = capsys.readouterr().out
     assert "Stand still" in said and "Ready: move." in said and "--finish" in said
     assert (tmp_path / "r" / "stream.dkr").stat().st_size > 100_000
+    assert main(["live", "--finish", str(tmp_path / "r"), "-o", str(tmp_path / "o")]) == 0
+    assert (tmp_path / "o" / "report.html").exists()
+    known = str(tmp_path / "o" / "parameters.json")
+    assert main(["live", "--source", source, *PERSON, "--parameters", known, "--lag", "10"]) == 0
+    assert "go on from" in capsys.readouterr().out
 
 
 def test_nothing_but_a_simulated_person_is_needed(capsys: Said) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -13,7 +14,8 @@ import dynakin
 from dynakin.errors import ModelError, StreamError
 from dynakin.recordings import Recording
 from dynakin.simulation import simulate_squat
-from dynakin.stream import Callback, Live, LiveFrame, MarkerPacket, Packet, PlatePacket, Replay, Streams
+from dynakin.stream import Callback, Live, LiveFrame, MarkerPacket, Packet, PlatePacket, Replay, Sink, Streams
+from dynakin.stream.recorder import Recorder, recorded
 
 
 @pytest.fixture(scope="module")
@@ -191,6 +193,40 @@ def test_restart_and_recalibrate_without_stopping(squat: Recording) -> None:
     live.run()
     assert "The estimate begins anew." in said
     assert said.count("Ready: move.") == 2 and len(frames) > 300
+
+
+class Buttons(Sink):
+    """Somebody who presses a button at each of some frames."""
+
+    def __init__(self, presses: dict[int, str]) -> None:
+        self.presses, self.frames, self.waiting = presses, 0, list[str]()
+
+    def frame(self, frame: LiveFrame) -> None:
+        self.frames += 1
+        if self.frames in self.presses:
+            self.waiting.append(self.presses[self.frames])
+
+    def asked(self) -> list[str]:
+        found, self.waiting = self.waiting, []
+        return found
+
+
+def test_buttons_record_restart_and_recalibrate(squat: Recording, tmp_path: Path) -> None:
+    said: list[str] = []
+    buttons = Buttons({50: "record", 150: "restart", 250: "record", 300: "recalibrate"})
+    settings = {"model": "sagittal7", "markers": "opencap", "mass_kg": 70.0}
+    live = Live(
+        estimator(),
+        [Edited(squat, lambda packet: [packet])],
+        [buttons],
+        say=said.append,
+        standing_wait_s=2.0,
+        record=lambda: Recorder(tmp_path / "r", settings),
+    )
+    live.run()
+    ends = [said.index(text) for text in ("Recording.", "The estimate begins anew.", "The recording has ended.")]
+    assert ends == sorted(ends) and said.count("Ready: move.") == 2
+    assert 1.5 < np.ptp(recorded(tmp_path / "r").time) < 2.6  # what came between the two presses
 
 
 def test_constants_go_on_from_an_earlier_session(squat: Recording) -> None:

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import dynakin
+from dynakin.errors import ConfigError
 from dynakin.recordings import Recording
 from dynakin.simulation import simulate_squat
 from dynakin.stream import Callback, Live, LiveFrame, Replay, Started
@@ -84,3 +85,21 @@ def test_the_page_is_served_to_this_machine_and_ends_with_the_session(
     live = session(squat, [viewer])
     live.run()
     assert viewer._process.poll() == 0  # it ended by itself and without an error
+
+
+def test_without_viser_it_is_said_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    from dynakin.stream import viewer
+
+    monkeypatch.setattr(viewer.importlib.util, "find_spec", lambda name: None)
+    with pytest.raises(ConfigError, match=r"needs viser, which is not installed; pip install 'dynakin\[live\]'"):
+        viewer.Viewer()
+
+
+def test_a_port_in_use_is_passed_over() -> None:
+    from dynakin.stream.viewer import _free_port
+
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        port = taken.getsockname()[1]
+        assert _free_port("127.0.0.1", port) > port
+    with pytest.raises(ConfigError, match="none of 20 ports can be served"):
+        _free_port("203.0.113.1", 8080)

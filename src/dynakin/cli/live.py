@@ -155,7 +155,7 @@ def _sinks(
             from dynakin.stream.viewer import Viewer
         except ImportError as error:
             raise ConfigError(
-                f"--view needs a package that is not here ({error}); pip install 'dynakin[live]'"
+                f"--view needs a package that is not here ({error}); pip install 'dynakin[live]', or make live"
             ) from None
         sinks.append(Viewer(host, port))
     return sinks

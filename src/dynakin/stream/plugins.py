@@ -36,5 +36,7 @@ def plugin(group: str, text: str, **more: str) -> Any:
     try:
         make: Callable[[str, dict[str, str]], Any] = entries[kind].load()
     except ImportError as error:
-        raise ConfigError(f"{kind}: needs a package that is not here ({error}); pip install 'dynakin[live]'") from None
+        raise ConfigError(
+            f"{kind}: needs a package that is not here ({error}); pip install 'dynakin[live]', or make live"
+        ) from None
     return make(address, options | more)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import importlib.util
 import json
 import queue
+import socket
 import subprocess
 import sys
 import threading
@@ -19,6 +20,7 @@ from dynakin.stream.packets import StreamInfo
 from dynakin.stream.picture import Picture
 from dynakin.stream.sinks import LiveFrame, Sink, Started, Status
 
+_PORTS = 20  # that are tried from the one asked for
 _PICTURES_S = 1.0 / 40.0
 
 
@@ -29,12 +31,13 @@ class Viewer(Sink):
         host: address that the page is served at; 127.0.0.1 is seen by this machine alone. port: its port.
 
     Raises:
-        ConfigError: viser is not installed.
+        ConfigError: viser is not installed, or no port is free.
     """
 
     def __init__(self, host: str = "127.0.0.1", port: int = 8080) -> None:
         if importlib.util.find_spec("viser") is None:
-            raise ConfigError("--view needs viser, which is not installed; pip install 'dynakin[live]'")
+            raise ConfigError("--view needs viser, which is not installed; pip install 'dynakin[live]', or make live")
+        port = _free_port(host, port)
         self.url = f"http://{'127.0.0.1' if host == '0.0.0.0' else host}:{port}"
         who = "this machine alone" if host in ("127.0.0.1", "localhost", "::1") else "everyone in the network"
         print(f"Viewer: {self.url} (seen by {who})", flush=True)
@@ -118,3 +121,19 @@ class Viewer(Sink):
             except OSError:
                 return  # the page is gone; the estimate goes on
         self._process.stdin.close()
+
+
+def _free_port(host: str, first: int) -> int:
+    """The first port that nobody serves: another session may be open.
+
+    Raises:
+        ConfigError: none of them, or an address that is not this machine's.
+    """
+    error: OSError | None = None
+    for port in range(first, min(first + _PORTS, 65536)):
+        try:
+            with socket.create_server((host, port), family=socket.AF_INET6 if ":" in host else socket.AF_INET):
+                return port
+        except OSError as found:
+            error = found
+    raise ConfigError(f"--host {host} --port {first}: none of {_PORTS} ports can be served ({error})")
