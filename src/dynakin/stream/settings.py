@@ -7,7 +7,6 @@ from typing import Any
 
 from dynakin.config import make_config
 from dynakin.filter import Estimator
-from dynakin.model import load_model
 
 
 def estimator_of(settings: dict[str, Any], lag: int = 0) -> Estimator:
@@ -17,15 +16,4 @@ def estimator_of(settings: dict[str, Any], lag: int = 0) -> Estimator:
         DynakinError: a key or value that is wrong.
     """
     config = make_config(settings | {"trial": Path("live"), "output": Path("live")}, "live")
-    return Estimator(
-        load_model(config.model, config.subject(), markers=config.markers, table=config.table),
-        config.noise_settings(),
-        priors=config.priors,
-        bounds=config.bounds,
-        side=config.side,
-        vertical=config.vertical,
-        forward=config.forward,
-        estimate=config.estimate,
-        plates=config.plates,
-        lag=lag,
-    )
+    return config.estimator(lag)

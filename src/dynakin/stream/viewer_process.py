@@ -76,41 +76,30 @@ class Page:
         free = [name for name, locked in zip(setup["coordinates"], setup["locked"], strict=True) if not locked]
         knees = [name for name in free if "knee" in name]
         self.chosen = gui.add_dropdown("Coordinate", free, initial_value=(knees or free)[0])
-        empty, none = np.zeros(2), np.full(2, np.nan)
-        self.plots["angle"] = gui.add_uplot(
-            (empty, none),
-            (uplot.Series(label="s"), uplot.Series(label="angle, deg (m)", stroke="#2166ac", width=2)),
-            title="Angle, deg (m)",
-            legend=uplot.Legend(show=False),
-            scales={"x": uplot.Scale(time=False)},
-            aspect=2.2,
-        )
-        self.plots["moment"] = gui.add_uplot(
-            (empty, none, none, none),
-            (
-                uplot.Series(label="s"),
-                uplot.Series(label="moment, N m", stroke="#b2182b", width=2),
-                uplot.Series(label="- 2 sd", stroke="#e3a3a9", width=1),
-                uplot.Series(label="+ 2 sd", stroke="#e3a3a9", width=1),
-            ),
-            bands=(uplot.Band(series=(3, 2), fill="rgba(178,24,43,0.15)"),),
-            title="Moment, N m (N), with two standard deviations",
-            legend=uplot.Legend(show=False),
-            scales={"x": uplot.Scale(time=False)},
-            aspect=2.2,
-        )
+        line = uplot.Series(label="angle, deg (m)", stroke="#2166ac", width=2)
+        self._add_plot("angle", "Angle, deg (m)", [line])
+        line = uplot.Series(label="moment, N m", stroke="#b2182b", width=2)
+        band = [uplot.Series(label=f"{sign} 2 sd", stroke="#e3a3a9", width=1) for sign in "-+"]
+        self._add_plot("moment", "Moment, N m (N), with two standard deviations", [line, *band])
         gui.add_markdown(_LEGEND)
         if setup["constants"]:
-            masses = [name for name in setup["constants"] if name.startswith("length/")] or setup["constants"]
-            self.constant = gui.add_dropdown("Constant", setup["constants"], initial_value=masses[0])
-            self.plots["constant"] = gui.add_uplot(
-                (empty, none),
-                (uplot.Series(label="s"), uplot.Series(label="m or kg", stroke="#4d7d3b", width=2)),
-                title="Constant, m or kg",
-                legend=uplot.Legend(show=False),
-                scales={"x": uplot.Scale(time=False)},
-                aspect=2.2,
-            )
+            lengths = [name for name in setup["constants"] if name.startswith("length/")] or setup["constants"]
+            self.constant = gui.add_dropdown("Constant", setup["constants"], initial_value=lengths[0])
+            line = uplot.Series(label="m or kg", stroke="#4d7d3b", width=2)
+            self._add_plot("constant", "Constant, m or kg", [line])
+
+    def _add_plot(self, name: str, title: str, lines: list[uplot.Series]) -> None:
+        """A plot over time; with three lines the area between the last two is filled."""
+        bands = (uplot.Band(series=(3, 2), fill="rgba(178,24,43,0.15)"),) if len(lines) == 3 else None
+        self.plots[name] = self.server.gui.add_uplot(
+            (np.zeros(2), *[np.full(2, np.nan)] * len(lines)),
+            (uplot.Series(label="s"), *lines),
+            bands=bands,
+            title=title,
+            legend=uplot.Legend(show=False),
+            scales={"x": uplot.Scale(time=False)},
+            aspect=2.2,
+        )
 
     def tell(self, text: str, phase: str) -> None:
         """Shows a sentence."""
