@@ -10,7 +10,7 @@ CPP_TESTS := $(shell find cpp/tests -type f)
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: all demo test test-python test-cpp lint stubs bench peers clean prerequisites
+.PHONY: all demo live test test-python test-cpp lint stubs bench peers clean prerequisites
 all: $(VENV)/.built
 
 prerequisites:
@@ -36,6 +36,14 @@ $(VENV)/.built: $(VENV)/.env $(CORE)
 $(VENV)/.dev: $(VENV)/.built
 	$(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[dev]"
 	@touch $@
+
+# What the viewer and the capture systems need; `make live` then shows a simulated person.
+$(VENV)/.live: $(VENV)/.built
+	$(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[live]"
+	@touch $@
+
+live: $(VENV)/.live
+	$(BIN)/dynakin live --source simulate:squat --view
 
 demo: $(VENV)/.built
 	$(BIN)/dynakin demo -o $(OUT)

@@ -9,9 +9,10 @@ from typing import Any, Literal, Self
 from pydantic import Field, model_validator
 
 from dynakin.errors import ConfigError, ModelError
-from dynakin.filter import Noise, presets
+from dynakin.filter import Estimator, Noise, presets
 from dynakin.filter.extend import QUANTITIES, Quantity
 from dynakin.model import Bounds, CarriedLoad, Definition, OpenSimOptions, Priors, Subject, load_model
+from dynakin.model.identified import read_identified
 from dynakin.model.subject import Sex
 from dynakin.model.validation import Strict, nearest, read_toml, validate
 from dynakin.recordings import PlateLoad
@@ -135,6 +136,27 @@ class RunConfig(Strict):
             return validate(Noise, changed, "noise")
         except ModelError as error:
             raise ConfigError(error.message) from None
+
+    def estimator(self, lag: int = 0) -> Estimator:
+        """An estimator of its model with its settings.
+
+        Raises:
+            ModelError, ConfigError: the model or a setting is wrong.
+        """
+        return Estimator(
+            self.definition(),
+            self.noise_settings(),
+            priors=self.priors,
+            bounds=self.bounds,
+            side=self.side,
+            vertical=self.vertical,
+            forward=self.forward,
+            estimate=self.estimate,
+            plates=self.plates,
+            loads=self.loads,
+            parameters=None if self.parameters is None else read_identified(self.parameters),
+            lag=lag,
+        )
 
     def as_used(self) -> dict[str, Any]:
         """Plain data for an output's config.toml: every path absolute, so that the file works from where it lies."""

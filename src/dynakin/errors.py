@@ -32,6 +32,10 @@ class OutputError(DynakinError):
     """Results cannot be written (folder missing, not writable, not a folder)."""
 
 
+class StreamError(DynakinError):
+    """A live source cannot be reached, or its connection is lost."""
+
+
 class DivergenceError(DynakinError):
     """The filter lost its estimate: non-finite state or indefinite covariance; the message names the
     frame."""

@@ -16,6 +16,7 @@ from dynakin.cli.compare import compare
 from dynakin.cli.console import print_error
 from dynakin.cli.demo import demo
 from dynakin.cli.identify import identify
+from dynakin.cli.live import live
 from dynakin.cli.model import model
 from dynakin.cli.print_config import print_config
 from dynakin.cli.run import run
@@ -34,7 +35,7 @@ app = typer.Typer(
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-for command in (run, demo, compare, batch, identify, simulate, check, model):
+for command in (run, live, demo, compare, batch, identify, simulate, check, model):
     app.command()(command)
 app.command("print-config")(print_config)
 app.add_typer(tune, name="tune")

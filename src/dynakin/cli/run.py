@@ -31,10 +31,9 @@ from dynakin.cli.summary import print_summary
 from dynakin.comparison import Trial, trial_of
 from dynakin.config import RunConfig, make_config, read_config
 from dynakin.errors import DynakinError
-from dynakin.filter import Estimator, presets
+from dynakin.filter import presets
 from dynakin.filter.zero import standing_zero
 from dynakin.identifiability import Identifiability, identifiability
-from dynakin.model.identified import read_identified
 from dynakin.recordings import read, without_plate_loads
 from dynakin.report import read_sensitivity, save_figures
 from dynakin.results import Estimate, check_output_writable
@@ -133,7 +132,7 @@ def estimate_from(
     Raises:
         DynakinError: anything that is wrong with the input, in one line.
     """
-    model = config.definition()
+    estimator = config.estimator()
     recording = read(
         config.trial,
         config.forces,
@@ -142,19 +141,6 @@ def estimate_from(
     )
     recording = without_plate_loads(recording, config.plate_loads, config.vertical)
     static = None if config.static is None else read(config.static)
-    estimator = Estimator(
-        model,
-        config.noise_settings(),
-        priors=config.priors,
-        bounds=config.bounds,
-        side=config.side,
-        vertical=config.vertical,
-        forward=config.forward,
-        estimate=config.estimate,
-        plates=config.plates,
-        loads=config.loads,
-        parameters=None if config.parameters is None else read_identified(config.parameters),
-    )
     estimate = estimator.run(recording, static=static, smooth=config.smooth, progress=progress)
     if (config.zero, config.signs) != ("model", "opensim"):
         zero = standing_zero(estimator, estimate, static) if config.zero == "standing" else {}
@@ -162,7 +148,7 @@ def estimate_from(
     estimate = replace(estimate, config=config.as_used() | estimate.config)
     assert estimator.initial is not None
     n_states = len(estimator.initial.names)
-    comparison = trial_of({presets.title(config.preset): estimate}, estimator.initial, model, whatever=True)
+    comparison = trial_of({presets.title(config.preset): estimate}, estimator.initial, estimator.model, whatever=True)
     if n_states > LARGEST_BENCH:
         note = (
             f"What the recording tells of the constants is left out: with {n_states} states it takes many minutes; "

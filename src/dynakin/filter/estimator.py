@@ -349,6 +349,33 @@ class Estimator:
             return None
         return step_estimate(self._core_model, self._time - self._lag.delay_s, self._lag.state, None)
 
+    @property
+    def core_model(self) -> _core.Model:
+        """The core's model, once started."""
+        if self._core_model is None:
+            raise ConfigError("core_model: the estimator has not been started; call start(recording) first")
+        return self._core_model
+
+    @property
+    def state(self) -> Array:
+        """The present state (n,), named by ``initial.names``."""
+        return self._started_filter("state").state
+
+    @property
+    def covariance(self) -> Array:
+        """Its covariance (n, n)."""
+        return self._started_filter("covariance").covariance
+
+    @property
+    def verdicts(self) -> list[str]:
+        """missing, accepted or refused: each marker in the last step and, last, the plates."""
+        return self._started_filter("verdicts").verdicts
+
+    def _started_filter(self, what: str) -> _core.Filter:
+        if self._filter is None:
+            raise ConfigError(f"{what}: the estimator has not been started; call start(recording) first")
+        return self._filter
+
     def deviations(self) -> dict[str, Array]:
         """Standard deviations of the present estimate, as it was last stepped: propagated now, not in every step.
 

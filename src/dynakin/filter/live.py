@@ -58,5 +58,7 @@ def deviations_of(model: _core.Model, x: Array, covariance: Array) -> dict[str, 
         found[name] = np.zeros(len(model.coordinate_names))
         found[name][free] = np.sqrt(variance[offset : offset + size])
     for name, jacobian in (("moments", _core.moment_jacobian(model, x)), ("wrench", _core.wrench_jacobian(model, x))):
-        found[name] = np.sqrt(np.einsum("ij,jk,ik->i", jacobian, covariance, jacobian))
+        used = np.flatnonzero(jacobian.any(axis=0))
+        part = jacobian[:, used]
+        found[name] = np.sqrt(((part @ covariance[np.ix_(used, used)]) * part).sum(axis=1))
     return found

@@ -61,16 +61,23 @@ def read(
     recording = reader(path, options)
     if forces is None:
         return recording
-    forces = Path(forces)
-    require_file(forces)
-    force_reader = FORCE_READERS.get(forces.suffix.casefold())
+    table = read_forces(Path(forces))
+    return attach_forces(recording, table, options)
+
+
+def read_forces(path: Path) -> Table:
+    """A table of ground forces at its own times.
+
+    Raises:
+        RecordingError: a file that is not there, of an unknown kind, or damaged.
+    """
+    require_file(path)
+    force_reader = FORCE_READERS.get(path.suffix.casefold())
     if force_reader is None:
         known = ", ".join(sorted(FORCE_READERS))
-        raise RecordingError(f"{forces}: found extension {forces.suffix!r}, expected forces as one of {known}")
-    table = force_reader(forces)
-    if forces.suffix.casefold() == ".csv":
-        table = _only_forces(table)
-    return attach_forces(recording, table, options)
+        raise RecordingError(f"{path}: found extension {path.suffix!r}, expected forces as one of {known}")
+    table = force_reader(path)
+    return _only_forces(table) if path.suffix.casefold() == ".csv" else table
 
 
 def _only_forces(table: Table) -> Table:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 from scipy import interpolate, signal
 
 from dynakin.errors import RecordingError
@@ -82,21 +83,30 @@ def resample(samples: Array, time_in: Array, time_out: Array, *, causal: bool = 
         raise RecordingError(
             f"forces from {time_in[0]:g} s to {time_in[-1]:g} s do not cover {time_out[0]:g} s to {time_out[-1]:g} s"
         )
+    if causal:
+        low_pass_first = low_pass_for(rate_in, rate_out)
+        samples = samples if low_pass_first is None else low_pass_first.push(samples)
+        held: Array = samples[np.maximum(latest_before(time_in, time_out, step), 0)]
+        return held
     if rate_in > 1.01 * rate_out:
-        if causal:
-            samples = CausalLowPass(rate_in, _PASS * rate_out).push(samples)
-        else:
-            samples = _antialias(samples, rate_in, rate_out)
+        samples = _antialias(samples, rate_in, rate_out)
     nearest = np.clip(np.rint((time_out - time_in[0]) * rate_in).astype(int), 0, len(time_in) - 1)
     if np.abs(time_in[nearest] - time_out).max() < 0.01 * step:
         picked: Array = samples[nearest]
         return picked
-    if causal:
-        latest = np.searchsorted(time_in, time_out + 1e-6 * step, side="right") - 1
-        held: Array = samples[np.clip(latest, 0, len(time_in) - 1)]
-        return held
     inside = np.clip(time_out, time_in[0], time_in[-1])
     return np.asarray(interpolate.CubicSpline(time_in, samples, axis=0)(inside))
+
+
+def low_pass_for(rate_in: float, rate_out: float) -> CausalLowPass | None:
+    """The causal filter that goes before samples are picked at a lower rate (Hz), None where no filter is needed."""
+    return CausalLowPass(rate_in, _PASS * rate_out) if rate_in > 1.01 * rate_out else None
+
+
+def latest_before(time_in: Array, time_out: Array, step_s: float) -> npt.NDArray[np.intp]:
+    """Index of the latest of ``time_in`` at or before each of ``time_out``, -1 where there is none; 1 % of a step of
+    the input counts as the same time."""
+    return np.searchsorted(time_in, time_out + 0.01 * step_s, side="right") - 1
 
 
 def same_times(a: Array, b: Array) -> bool:

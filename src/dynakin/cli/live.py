@@ -1,0 +1,161 @@
+"""`dynakin live`: estimate while it is measured."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from dynakin.cli.console import busy, out
+from dynakin.cli.options import Estimated, Height, Markers, Mass, Preset, Sex, Side, TableName
+from dynakin.cli.run import estimated, forward_direction
+from dynakin.cli.summary import print_summary
+from dynakin.errors import ConfigError
+from dynakin.recordings import read
+from dynakin.recordings.read import FORCE_READERS
+from dynakin.stream import SINKS, SOURCES, Live, Replay, Sink, plugin
+from dynakin.stream.fusion import DELAY_S
+from dynakin.stream.recorder import Recorder, finish
+from dynakin.stream.settings import estimator_of
+from dynakin.stream.start import read_known
+
+# Seconds of standing that are asked for, and how long they are waited for.
+_LIVE_STANDING_S, _REPLAY_STANDING_S, _SHORT_STANDING_S = (2.0, 20.0), (2.0, 3.0), (0.4, 0.4)
+_SHORT_S = 6.0
+
+
+def live(
+    source: Annotated[
+        str | None,
+        typer.Option(
+            help="Where samples come from: simulate:squat, replay:FILE[,speed=2][,loop], lsl:NAME, qtm:HOST, or a "
+            "plug-in's KIND:..."
+        ),
+    ] = None,
+    forces: Annotated[str | None, typer.Option(help="Plates: another source, or a force file beside replay.")] = None,
+    model: Annotated[str, typer.Option(help="Model: fullbody, squat7, sagittal7, a .toml or .osim file.")] = "fullbody",
+    markers: Markers = None,
+    mass: Mass = None,
+    height: Height = None,
+    sex: Sex = None,
+    preset: Preset = None,
+    side: Side = None,
+    estimate: Estimated = None,
+    vertical: Annotated[str | None, typer.Option(help="Laboratory axis that points up: auto, +Y, +Z, ...")] = None,
+    forward: Annotated[str | None, typer.Option(help="Facing direction: auto, an axis or three numbers.")] = None,
+    table: TableName = None,
+    static: Annotated[Path | None, typer.Option(help="Recording of the same person standing.")] = None,
+    parameters: Annotated[
+        Path | None, typer.Option(help="Go on with the constants of an earlier run: its parameters.json.")
+    ] = None,
+    standing_wait: Annotated[
+        float | None, typer.Option(help="Longest wait for somebody to stand still, s (20; replay: 3).")
+    ] = None,
+    delay: Annotated[float, typer.Option(help="Longest wait for packets that are late, s.")] = DELAY_S,
+    lag: Annotated[int, typer.Option(help="Also smooth, so many frames back.")] = 0,
+    view: Annotated[bool, typer.Option("--view", help="Show it as a web page.")] = False,
+    host: Annotated[str, typer.Option(help="Address of that page; 0.0.0.0: for everyone in the network.")] = (
+        "127.0.0.1"
+    ),
+    port: Annotated[int, typer.Option(help="Port of that page.")] = 8080,
+    record: Annotated[Path | None, typer.Option(help="Record what comes into this new folder.")] = None,
+    publish: Annotated[str | None, typer.Option(help="Send estimates on: lsl[:NAME], or a plug-in's KIND:...")] = None,
+    finish_folder: Annotated[
+        Path | None, typer.Option("--finish", help="Turn a folder of --record into results (-o), nothing else.")
+    ] = None,
+    output: Annotated[Path | None, typer.Option("-o", "--output", help="With --finish: folder for results.")] = None,
+) -> None:
+    """Estimate while it is measured: from a capture system, or a recording played as if it were one."""
+    if finish_folder is not None:
+        if output is None:
+            raise typer.BadParameter("--finish needs -o OUT, the folder for the results")
+        with busy("estimating"):
+            found = finish(finish_folder, output)
+        print_summary(found, output)
+        return
+    if source is None:
+        raise typer.BadParameter(
+            "--source is missing, expected simulate:squat, replay:FILE, lsl:NAME, qtm:HOST or a plug-in's KIND:..."
+        )
+    given = {
+        "markers": markers,
+        "mass_kg": mass,
+        "height_m": height,
+        "sex": sex,
+        "preset": preset,
+        "side": side,
+        "estimate": estimated(estimate),
+        "vertical": vertical,
+        "forward": forward_direction(forward),
+        "table": table,
+    }
+    settings = {"model": model} | {key: value for key, value in given.items() if value is not None}
+    sources = _sources(source, forces)
+    standing, wait = _LIVE_STANDING_S
+    if isinstance(sources[0], Replay):
+        standing, wait = _for_replay(sources[0], source, view and record is None)
+    sinks = _sinks(settings, record, publish, view, host, port)
+    try:
+        session = Live(
+            estimator_of(settings, lag),
+            sources,
+            sinks,
+            delay_s=delay,
+            standing_s=standing,
+            standing_wait_s=wait if standing_wait is None else standing_wait,
+            static=None if static is None else read(static),
+            known=None if parameters is None else read_known(parameters),
+            record=lambda: Recorder(Path(f"live-{datetime.now():%Y%m%d-%H%M%S}"), settings),
+            say=lambda text: out().print(text, soft_wrap=True),
+        )
+    except BaseException:
+        for sink in sinks:
+            sink.close()
+        raise
+    try:
+        session.run()
+    except KeyboardInterrupt:
+        out().print("Stopped.")
+    if record is not None:
+        out().print(f"Recorded in {record}; results from it: dynakin live --finish {record} -o OUT", soft_wrap=True)
+
+
+def _for_replay(replay: Replay, told: str, again: bool) -> tuple[float, float]:
+    """Seconds of standing and of waiting for them: a recording does not follow requests. One that is watched is
+    played again and again, so that the page stays."""
+    if again and "loop" not in told and not replay.loop:
+        replay.loop = True
+        out().print("Played again and again until Ctrl-C (loop=no: once).")
+    length = replay.recording.time[-1] - replay.recording.time[0]
+    return _SHORT_STANDING_S if length < _SHORT_S else _REPLAY_STANDING_S
+
+
+def _sources(source: str, forces: str | None) -> list[Any]:
+    if forces is None:
+        return [plugin(SOURCES, source)]
+    if Path(forces).suffix.casefold() in FORCE_READERS and ":" not in forces[2:]:
+        if not source.startswith("replay:"):
+            raise ConfigError(f"--forces {forces} is a file: it goes with replay:FILE only; expected a source")
+        return [plugin(SOURCES, source, forces=forces)]
+    return [plugin(SOURCES, source), plugin(SOURCES, forces)]
+
+
+def _sinks(
+    settings: dict[str, Any], record: Path | None, publish: str | None, view: bool, host: str, port: int
+) -> list[Sink]:
+    sinks: list[Sink] = []
+    if publish is not None:
+        sinks.append(plugin(SINKS, publish))
+    if record is not None:
+        sinks.append(Recorder(record, settings))
+    if view:
+        try:
+            from dynakin.stream.viewer import Viewer
+        except ImportError as error:
+            raise ConfigError(
+                f"--view needs a package that is not here ({error}); pip install 'dynakin[live]', or make live"
+            ) from None
+        sinks.append(Viewer(host, port))
+    return sinks

@@ -1,0 +1,36 @@
+"""The recorder's own process: copies its standard input to a file, and on to the disk twice a second.
+
+Run as a script, with the standard library alone, so that it is there at once. Whatever happens to the session, what it
+has sent is written; whatever happens to this process, what it has written stays.
+"""
+
+import os
+import select
+import sys
+import time
+
+SYNC_S = 0.5
+
+
+def main(path: str) -> None:
+    """Until the input ends."""
+    out = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
+    synced, dirty = time.monotonic(), False
+    while True:
+        ready = select.select([0], [], [], SYNC_S)[0] if os.name == "posix" else [0]
+        if ready:
+            data = os.read(0, 1 << 16)
+            if not data:
+                break
+            while data:
+                data = data[os.write(out, data) :]
+            dirty = True
+        if dirty and time.monotonic() - synced > SYNC_S:
+            os.fsync(out)
+            synced, dirty = time.monotonic(), False
+    os.fsync(out)
+    os.close(out)
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])

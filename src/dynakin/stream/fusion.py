@@ -1,0 +1,217 @@
+"""Markers and plates, each with its own clock and rate, as samples for the estimator: fused by time stamp."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.errors import StreamError
+from dynakin.filter import Sample
+from dynakin.recordings import DEFAULT_THRESHOLD_N
+from dynakin.stream.clock import Clock, offset_between
+from dynakin.stream.in_order import Counts, InOrder
+from dynakin.stream.packets import MarkerPacket, Packet, PlatePacket, StreamInfo
+from dynakin.stream.plate_samples import PlateSamples
+
+Array = npt.NDArray[np.float64]
+
+DELAY_S = 0.05
+"""Longest wait for a packet that is missing or late."""
+SILENT_S = 0.25
+"""A stream from which nothing has come for so long is silent: nobody waits for it."""
+LEARN_S = 1.0
+"""How long arrivals are watched before two clocks that have nothing in common are put together."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fused:
+    """One sample for the estimator.
+
+    Attributes:
+        sample: markers, plates or both at one time.
+        positions: (M, 3) m, as the markers came; NaN where they did not.
+        wrenches: (P, 6) N and N m at the same time; None without plates.
+        arrived_s: when its last part arrived, s of ``time.monotonic``.
+    """
+
+    sample: Sample
+    positions: Array
+    wrenches: Array | None
+    arrived_s: float
+
+
+class Fusion:
+    """Gives one sample at each marker frame, with the plates there; while markers are silent, with plates alone.
+
+    A frame goes out as soon as it is the next one and the plates have reached its time. Where something is missing
+    it waits at most ``delay_s``; what comes later than that is left out and counted. Times go on where a clock was
+    set back, and never back themselves.
+
+    Raises:
+        StreamError: there are no markers among the streams.
+    """
+
+    def __init__(self, markers: StreamInfo | None, plates: StreamInfo | None, *, delay_s: float = DELAY_S) -> None:
+        if markers is None or not markers.names:
+            raise StreamError("no stream of markers, expected one (plates alone tell no movement)")
+        self.markers, self.plates, self.delay_s = markers, plates, delay_s
+        self.period_s = 1.0 / markers.rate_hz
+        self._clocks = {info.clock: Clock() for info in (markers, plates) if info is not None}
+        self._frames: InOrder[MarkerPacket] = InOrder(self.period_s, delay_s, ordered=markers.ordered)
+        self._blocks: InOrder[PlatePacket] | None = None
+        self._resampled: PlateSamples | None = None
+        if plates is not None:
+            self._blocks = InOrder(1.0 / plates.rate_hz, delay_s, 4096, plates.ordered)
+            self._resampled = PlateSamples(plates.rate_hz, markers.rate_hz, len(plates.names))
+        self._offset_s: float | None = None if len(self._clocks) > 1 else 0.0  # of the plates' clock
+        self._early: list[PlatePacket] = []  # plates that came before the offset was known
+        self._first_arrived: dict[str, float] = {}
+        self._head: tuple[float, MarkerPacket] | None = None
+        self._marker_arrived = self._plate_arrived = -np.inf
+        self._last_s: float | None = None
+        self.without_plates = 0  # frames that went without the wrench though plates were told
+
+    @property
+    def marker_counts(self) -> Counts:
+        """What was wrong with the markers' stamps."""
+        return self._frames.counts
+
+    @property
+    def plate_counts(self) -> Counts:
+        """What was wrong with the plates' stamps."""
+        return Counts() if self._blocks is None else self._blocks.counts
+
+    @property
+    def clock_offset_s(self) -> float | None:
+        """What is added to the plates' stamps; None while it is not known."""
+        return self._offset_s
+
+    @property
+    def clock_restarts(self) -> int:
+        """How often a clock was set back."""
+        return max(clock.restarts for clock in self._clocks.values())
+
+    def markers_silent(self, now_s: float) -> bool:
+        """Whether nothing comes from the markers."""
+        return now_s - self._marker_arrived > max(SILENT_S, 3.0 * self.period_s)
+
+    def plates_silent(self, now_s: float) -> bool:
+        """Whether plates were told and nothing comes from them."""
+        return self.plates is not None and now_s - self._plate_arrived > SILENT_S
+
+    def push(self, packet: Packet) -> None:
+        """Take a packet, as it arrived."""
+        if isinstance(packet, MarkerPacket):
+            self._push_markers(packet)
+        elif self.plates is not None:
+            self._push_plates(packet)
+
+    def _push_markers(self, packet: MarkerPacket) -> None:
+        if packet.positions.shape != (len(self.markers.names), 3):
+            self._frames.counts.invalid += 1
+            return
+        self._marker_arrived = packet.arrived_s
+        self._first_arrived.setdefault("markers", packet.arrived_s)
+        time = self._clocks[self.markers.clock].time(packet.time_s, packet.arrived_s)
+        if time is None:
+            self._frames.counts.invalid += 1
+            return
+        self._frames.push(time, time, packet.arrived_s, MarkerPacket(time, packet.positions, packet.arrived_s))
+
+    def _push_plates(self, packet: PlatePacket) -> None:
+        assert self.plates is not None and self._blocks is not None
+        stamps = np.atleast_1d(np.asarray(packet.time_s, float))
+        if not len(stamps) or packet.wrenches.shape != (len(stamps), len(self.plates.names), 6):
+            self._blocks.counts.invalid += 1
+            return
+        self._plate_arrived = packet.arrived_s
+        self._first_arrived.setdefault("plates", packet.arrived_s)
+        clock = self._clocks[self.plates.clock]
+        newest = clock.time(float(stamps[-1]), packet.arrived_s)
+        if newest is None or not (np.diff(stamps) > 0.0).all():
+            self._blocks.counts.invalid += 1
+            return
+        placed = PlatePacket(stamps + (newest - stamps[-1]), packet.wrenches, packet.arrived_s)
+        if self._offset_s is None:
+            self._early.append(placed)
+            self._learn_offset(packet.arrived_s)
+            return
+        self._take_block(placed)
+
+    def _learn_offset(self, now_s: float) -> None:
+        """Put the two clocks together once both streams have been watched for a while."""
+        assert self.plates is not None
+        if len(self._first_arrived) < 2 or now_s - max(self._first_arrived.values()) < LEARN_S:
+            return
+        self._offset_s = offset_between(self._clocks[self.markers.clock], self._clocks[self.plates.clock])
+        for packet in self._early:
+            self._take_block(packet)
+        self._early.clear()
+
+    def _take_block(self, packet: PlatePacket) -> None:
+        assert self._blocks is not None and self._resampled is not None and self._offset_s is not None
+        time = packet.time_s + self._offset_s
+        placed = PlatePacket(time, packet.wrenches, packet.arrived_s)
+        self._blocks.push(float(time[0]), float(time[-1]), packet.arrived_s, placed, len(time))
+
+    def poll(self, now_s: float) -> list[Fused]:
+        """All samples that are ready, oldest first; at ``now_s`` infinite all that are left."""
+        if self._blocks is not None and self._resampled is not None:
+            while (block := self._blocks.pop(now_s)) is not None:
+                self._resampled.push(block.time_s, block.wrenches)
+        found: list[Fused] = []
+        while True:
+            if self._head is None:
+                frame = self._frames.pop(now_s)
+                if frame is None:
+                    break
+                self._head = (frame.time_s, frame)
+            time, frame = self._head
+            if not self._plates_ready(time, frame.arrived_s, now_s):
+                break
+            self._head = None
+            found.append(self._fused(time, frame.positions, max(frame.arrived_s, self._plate_arrival())))
+        if np.isfinite(now_s) and self._head is None and self._last_s is not None and self.markers_silent(now_s):
+            found += self._plates_alone()
+        return found
+
+    def _plate_arrival(self) -> float:
+        return self._plate_arrived if self._offset_s is not None and np.isfinite(self._plate_arrived) else -np.inf
+
+    def _plates_ready(self, time_s: float, arrived_s: float, now_s: float) -> bool:
+        if self._resampled is None or self._offset_s is None:
+            return True
+        return self._resampled.covers(time_s) or self.plates_silent(now_s) or now_s - arrived_s >= self.delay_s
+
+    def _plates_alone(self) -> list[Fused]:
+        """Samples without markers, at the markers' rate, as far as the plates reach."""
+        found: list[Fused] = []
+        assert self._last_s is not None
+        if self._resampled is None:
+            return found
+        missing = np.full((len(self.markers.names), 3), np.nan)
+        while self._resampled.newest_s - (time := self._last_s + self.period_s) > self.delay_s:
+            if self._resampled.at(time) is None:
+                break
+            found.append(self._fused(time, missing, self._plate_arrived))
+            self._frames.skip_to(time)
+        return found
+
+    def _fused(self, time_s: float, positions: Array, arrived_s: float) -> Fused:
+        wrenches = None
+        if self._resampled is not None and self.plates is not None:
+            wrenches = self._resampled.at(time_s) if self._offset_s is not None else None
+            if wrenches is not None:  # an empty plate, as offline
+                idle = np.linalg.norm(wrenches[:, :3], axis=1) < DEFAULT_THRESHOLD_N
+                wrenches = (
+                    np.where(idle[:, None], 0.0, wrenches)
+                    if self.plates.rate_hz > 1.01 * self.markers.rate_hz
+                    else wrenches
+                )
+            self.without_plates += wrenches is None
+        self._last_s = time_s
+        markers = dict(zip(self.markers.names, positions, strict=True))
+        plates = {} if wrenches is None or self.plates is None else dict(zip(self.plates.names, wrenches, strict=True))
+        return Fused(Sample(time_s, markers, plates), positions, wrenches, arrived_s)

@@ -1,0 +1,128 @@
+"""Watches a session: rate, latency, what is refused or missing, what has settled, what fell silent."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.filter import Estimator, StepEstimate
+from dynakin.model import InitialModel
+from dynakin.stream.fusion import Fused, Fusion
+from dynakin.stream.sinks import Status
+
+Array = npt.NDArray[np.float64]
+
+_SETTLE_S = 5.0  # constants that moved by less than their own standard deviation in so long have settled
+_SOON_S = 1.0
+_SLOW_S = 60.0  # how often it is said that frames were left out
+
+
+class Monitor:
+    """What a session's status shows, kept cheap: a step pays for some sums only.
+
+    Args:
+        plates: whether plates were told. used: whether the filter takes them.
+    """
+
+    def __init__(self, initial: InitialModel, rate_hz: float, plates: bool, used: bool) -> None:
+        self.initial, self.rate_hz = initial, rate_hz
+        self.last = Status(phase="running")
+        self._plates, self._used = plates, used
+        self._recent: deque[tuple[float, float]] = deque()
+        kinds = [name.split("/")[0] for name in initial.names]
+        self._constants = np.flatnonzero([kind in ("length", "inertia") for kind in kinds])
+        self._bounded = np.flatnonzero(np.isfinite(initial.lower) & [k in ("length", "inertia") for k in kinds])
+        self._since: tuple[float, Array] | None = None
+        self._begun: float | None = None
+        self._silent = {"markers": False, "plates": False}
+        self._restarts = 0
+        self.left_out = self._told_left_out = 0
+        self._told_s = -np.inf
+        self.stepped_s = -np.inf  # time of the last step
+
+    def status(
+        self,
+        fusion: Fusion,
+        fused: Fused,
+        estimate: StepEstimate,
+        smoothed: StepEstimate | None,
+        state: Array,
+        verdicts: Sequence[str],
+    ) -> Status:
+        """The status of a step. verdicts: of each marker and the plates, as the filter tells them."""
+        names, report = self.initial.recorded_markers, estimate.report
+        on_plates = "none"
+        if self._plates:
+            plates = {"accepted": "used", "refused": "refused"}.get(verdicts[-1], "left out")
+            on_plates = "silent" if fused.wrenches is None else plates if self._used else "left out"
+        at = [k for k in self._bounded if not self.initial.lower[k] < state[k] < self.initial.upper[k]]
+        recent = self._recent
+        rows = 0 if report is None else report.n_rows
+        span = recent[-1][0] - recent[0][0] if len(recent) > 1 else np.nan
+        markers, blocks = fusion.marker_counts, fusion.plate_counts
+        self.last = Status(
+            phase="running",
+            rate_hz=(len(recent) - 1) / span if span > 0.0 else float("nan"),
+            latency_ms=1e3 * max((late for _, late in recent), default=float("nan")),
+            nis=report.nis / rows if report is not None and rows else float("nan"),
+            refused=tuple(name for name, word in zip(names, verdicts, strict=False) if word == "refused"),
+            missing=tuple(name for name, word in zip(names, verdicts, strict=False) if word == "missing"),
+            plates=on_plates,
+            at_bound=tuple(self.initial.names[k] for k in at),
+            tracking="" if report is None else report.tracking,
+            left_out=self.left_out,
+            late=markers.late + blocks.late,
+            lost=markers.lost + blocks.lost,
+            duplicate=markers.duplicate + blocks.duplicate,
+            settled=self.last.settled,
+            delay_s=0.0 if smoothed is None else estimate.time_s - smoothed.time_s,
+        )
+        return self.last
+
+    def published(self, time_s: float, latency_s: float) -> None:
+        """An estimate went out, so long after its sample had arrived."""
+        self.stepped_s = time_s
+        self._recent.append((time_s, latency_s))
+        while time_s - self._recent[0][0] > _SOON_S:
+            self._recent.popleft()
+
+    def settling(self, time_s: float, state: Array, estimator: Estimator) -> list[str]:
+        """A sentence once lengths and masses have come to rest."""
+        if self.last.settled or not len(self._constants):
+            return []
+        values = state[self._constants]
+        if self._since is None or self._begun is None:
+            self._since, self._begun = (time_s, values), time_s
+            return []
+        if time_s - self._since[0] < _SETTLE_S:
+            return []
+        sd = np.sqrt(np.diagonal(estimator.covariance)[self._constants])
+        moved = np.abs(values - self._since[1]) > sd
+        self._since = (time_s, values)
+        if moved.any():
+            return []
+        self.last = replace(self.last, settled=True)
+        return [f"Lengths and masses have settled, {time_s - self._begun:.0f} s after the start."]
+
+    def changes(self, fusion: Fusion, now_s: float) -> list[str]:
+        """Sentences on frames left out, streams that fell silent or came back, and clocks that were set back."""
+        said = []
+        for kind, silent in (("markers", fusion.markers_silent(now_s)), ("plates", fusion.plates_silent(now_s))):
+            if silent != self._silent[kind]:
+                self._silent[kind] = silent
+                goes_on = "going on with markers alone" if kind == "plates" else "the estimate waits for them"
+                said.append(f"The {kind} are silent; {goes_on}." if silent else f"The {kind} are back.")
+        if self.left_out > self._told_left_out and now_s - self._told_s > _SLOW_S:
+            said.append(
+                f"This computer is too slow for {self.rate_hz:g} Hz: {self.left_out - self._told_left_out} frames were "
+                "left out."
+            )
+            self._told_left_out, self._told_s = self.left_out, now_s
+        if fusion.clock_restarts > self._restarts:
+            self._restarts = fusion.clock_restarts
+            said.append("A source's clock was set back; time goes on.")
+        return said

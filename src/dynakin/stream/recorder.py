@@ -1,0 +1,149 @@
+"""Records what comes, as it comes; turned into the usual output folder afterwards."""
+
+from __future__ import annotations
+
+import queue
+import subprocess
+import sys
+import threading
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dynakin.errors import OutputError, RecordingError
+from dynakin.recordings import Recording
+from dynakin.results import Estimate, check_output_writable
+from dynakin.stream.fusion import Fused, Fusion
+from dynakin.stream.packets import MarkerPacket, Packet, PlatePacket, StreamInfo
+from dynakin.stream.record_format import packet_record, read_records, text_record
+from dynakin.stream.settings import estimator_of
+from dynakin.stream.sinks import Sink, Status
+from dynakin.stream.start import recording_of
+
+FILE = "stream.dkr"
+
+
+class Recorder(Sink):
+    """Writes every packet through a process of its own, which outlives a session that is killed.
+
+    Args:
+        folder: new, or empty. settings: keys of the configuration, for `finish`.
+
+    Raises:
+        OutputError: the folder holds something, or cannot be made.
+    """
+
+    def __init__(self, folder: str | Path, settings: dict[str, Any] | None = None) -> None:
+        self.folder, self.settings = Path(folder), dict(settings or {})
+        try:
+            self.folder.mkdir(parents=True, exist_ok=True)
+            filled = any(self.folder.iterdir())
+        except OSError as error:
+            raise OutputError(f"{self.folder}: cannot be written ({error.strerror})") from None
+        if filled:
+            raise OutputError(f"{self.folder}: is not empty, expected a new folder for a recording")
+        self.restarts = 0  # of the process, which somebody else ended
+        self._queue: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
+        self._process = self._begin()
+        self._thread = threading.Thread(target=self._write, daemon=True)
+        self._thread.start()
+
+    @property
+    def pid(self) -> int:
+        """Process that writes."""
+        return self._process.pid
+
+    def opened(self, markers: StreamInfo, plates: StreamInfo | None) -> None:
+        """Writes what is needed to read the rest."""
+        told = {"markers": asdict(markers), "plates": None if plates is None else asdict(plates)}
+        self._queue.put(text_record({"streams": told, "settings": self.settings, "version": 1}))
+
+    def packet(self, packet: Packet) -> None:
+        """Writes it."""
+        self._queue.put(packet_record(packet))
+
+    def said(self, text: str, status: Status) -> None:
+        """Writes it."""
+        self._queue.put(text_record({"said": text, "phase": status.phase}))
+
+    def close(self) -> None:
+        """Everything is on the disk afterwards; may be called twice."""
+        if not self._thread.is_alive():
+            return
+        self._queue.put(None)
+        self._thread.join(10.0)
+
+    def _begin(self) -> subprocess.Popen[bytes]:
+        command = [sys.executable, "-I", str(Path(__file__).with_name("append.py")), str(self.folder / FILE)]
+        return subprocess.Popen(command, stdin=subprocess.PIPE, start_new_session=True, bufsize=0)
+
+    def _write(self) -> None:
+        while (data := self._queue.get()) is not None:
+            try:
+                self._send(data)
+            except OSError:  # somebody ended the process: a new one goes on in the same file
+                self.restarts += 1
+                self._process.wait()
+                self._process = self._begin()
+                self._send(data)
+        assert self._process.stdin is not None
+        self._process.stdin.close()
+        self._process.wait(10.0)
+
+    def _send(self, data: bytes) -> None:
+        assert self._process.stdin is not None
+        rest = memoryview(data)
+        while rest:
+            rest = rest[self._process.stdin.write(rest) :]
+
+
+def read_recorded(folder: str | Path) -> tuple[list[Fused], StreamInfo, StreamInfo | None, dict[str, Any]]:
+    """Samples of a recorded session, fused as they were live, its streams and its settings.
+
+    Raises:
+        RecordingError: nothing was recorded there.
+    """
+    path = Path(folder) / FILE
+    fusion: Fusion | None = None
+    settings: dict[str, Any] = {}
+    found: list[Fused] = []
+    for record in read_records(path):
+        if isinstance(record, MarkerPacket | PlatePacket):
+            if fusion is not None:
+                fusion.push(record)
+                found += fusion.poll(record.arrived_s)
+        elif "streams" in record:
+            streams = {kind: info and _info(info) for kind, info in record["streams"].items()}
+            fusion, settings = Fusion(streams["markers"], streams["plates"]), record["settings"]
+    if fusion is None:
+        raise RecordingError(f"{path}: holds no recorded session")
+    return found + fusion.poll(np.inf), fusion.markers, fusion.plates, settings
+
+
+def recorded(folder: str | Path) -> Recording:
+    """A recorded session as a recording, laboratory frame.
+
+    Raises:
+        RecordingError: nothing was recorded there.
+    """
+    found, markers, plates, _ = read_recorded(folder)
+    return recording_of(found, markers.names, plates.names if plates else (), Path(folder).name)
+
+
+def finish(folder: str | Path, output: str | Path) -> Estimate:
+    """Turn a recorded session into the usual output folder, by the same estimate offline.
+
+    Raises:
+        RecordingError: nothing was recorded there. Others: as `dynakin run`.
+    """
+    check_output_writable(Path(output))
+    settings = read_recorded(folder)[3]
+    estimate = estimator_of(settings).run(recorded(folder))
+    estimate.save(Path(output))
+    return estimate
+
+
+def _info(told: dict[str, Any]) -> StreamInfo:
+    return StreamInfo(tuple(told["names"]), float(told["rate_hz"]), str(told["clock"]), bool(told.get("ordered")))

@@ -1,0 +1,315 @@
+"""A live session: from packets to published estimates, with a guided start."""
+
+from __future__ import annotations
+
+import time
+from collections import deque
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from dynakin.errors import DivergenceError, DynakinError, ModelError, StreamError
+from dynakin.filter import Estimator, Sample
+from dynakin.recordings import Recording
+from dynakin.stream.feet import LiveFeet
+from dynakin.stream.fusion import DELAY_S, Fused, Fusion
+from dynakin.stream.monitor import Monitor
+from dynakin.stream.packets import Source
+from dynakin.stream.reader import Notice, Reader
+from dynakin.stream.sinks import LiveFrame, Sink, Started, Status
+from dynakin.stream.start import begin, check_labels, quietest, recording_of, stands, unknown_mass
+
+_POLL_S = 0.005
+_ASK_S = 0.1  # how often sinks are asked for wishes, and the standing person is looked at
+_DEVIATIONS_S = 0.2
+_SPARSE_S = 0.05  # steps are never further apart than this because the computer is slow
+_MASS_KG = 70.0  # of a person of whom nothing is told, so that at least the movement is seen
+
+
+class Live:
+    """Estimates while it is measured.
+
+    Args:
+        estimator: not started; its ``lag`` gives smoothed frames too.
+        sources: one with markers; plates from the same or another one.
+        sinks: where the estimates go.
+        delay_s: longest wait for what is missing (`Fusion`).
+        standing_s: how long the person stands still at the start.
+        standing_wait_s: after so long without, the quietest moment since then is taken.
+        max_late_s: where the estimate is further behind what arrives, frames are left out; they are counted.
+        static, known: see `begin`.
+        wait_s: how long to wait for the sources.
+        record: makes a recorder, for the viewer's button; pressed again it ends.
+        say: called with each sentence for the user.
+    """
+
+    def __init__(
+        self,
+        estimator: Estimator,
+        sources: Sequence[Source],
+        sinks: Sequence[Sink] = (),
+        *,
+        delay_s: float = DELAY_S,
+        standing_s: float = 2.0,
+        standing_wait_s: float = 20.0,
+        static: Recording | None = None,
+        known: Mapping[str, tuple[float, float]] | None = None,
+        wait_s: float = 30.0,
+        max_late_s: float = 0.25,
+        record: Callable[[], Sink] | None = None,
+        say: Callable[[str], None] = print,
+    ) -> None:
+        self.estimator, self.sinks = estimator, list(sinks)
+        self.delay_s, self.standing_s, self.standing_wait_s = delay_s, standing_s, standing_wait_s
+        self.static, self.known = static, known
+        self.max_late_s = max_late_s
+        self._say, self._record = say, record
+        self._recording: Sink | None = None
+        self._reader = Reader(sources, wait_s)
+        self._fusion: Fusion | None = None
+        self._window: deque[Fused] = deque()
+        self._standing_since: float | None = None
+        self._came_s = 0.0
+        self._looked = self._asked = self._told_sd = -np.inf
+        self._monitor: Monitor | None = None
+        self._use_plates = True
+        self._feet: LiveFeet | None = None
+        self._running = False
+        self._labels_checked = False
+        self._subject: dict[str, float] = {}
+        self._stopped = False
+
+    @property
+    def fusion(self) -> Fusion:
+        """Markers and plates as they are fused, with what was wrong with them.
+
+        Raises:
+            StreamError: the streams are not known yet.
+        """
+        if self._fusion is None:
+            raise StreamError("the session has not been opened")
+        return self._fusion
+
+    @property
+    def status(self) -> Status:
+        """How it goes, as of the last step."""
+        return Status() if self._monitor is None else self._monitor.last
+
+    def run(self) -> None:
+        """Until the sources end, or `stop` is called.
+
+        Raises:
+            StreamError: a source cannot be reached, or ended before anybody was measured. ModelError, RecordingError:
+                what came does not fit the model.
+        """
+        try:
+            self._open()
+            while not self._stopped and not self._reader.over:
+                self._turn()
+            self._take(np.inf)
+            if self._reader.over and self.estimator.initial is None:
+                raise StreamError(
+                    f"the streams ended before the model was measured: {self._came_s:.1f} s came, expected "
+                    f"{self.standing_s:g} s of standing"
+                )
+        finally:
+            self._reader.close()
+            for sink in self.sinks:
+                sink.close()
+
+    def stop(self) -> None:
+        """End `run` soon; from any thread."""
+        self._stopped = True
+
+    def restart(self) -> None:
+        """Begin the estimate anew from the model as it was measured, without standing."""
+        if self.estimator.initial is None:
+            return
+        self.estimator.start_from(self.estimator.initial)
+        self._begin_running("The estimate begins anew.")
+
+    def recalibrate(self) -> None:
+        """Measure the model anew: ask to stand still."""
+        self._running = False
+        self._window.clear()
+        self._standing_since = None
+
+    def _open(self) -> None:
+        self.say("Waiting for the streams.")
+        streams = self._reader.open()
+        markers, plates = streams.markers, streams.plates
+        self._fusion = Fusion(markers, plates, delay_s=self.delay_s)
+        assert markers is not None
+        told = "no plates" if plates is None else f"{len(plates.names)} plates at {plates.rate_hz:g} Hz"
+        self.say(f"Streams: {len(markers.names)} markers at {markers.rate_hz:g} Hz, {told}.")
+        for note in streams.notes:
+            self.say(note)
+        if not streams.paced:
+            self.max_late_s = np.inf
+        self._subject = dict(streams.subject)
+        if unknown_mass(self.estimator.model, self._subject, plates is not None):
+            self._subject["mass_kg"] = _MASS_KG
+            self.say(
+                f"Warning: nobody tells the mass and there are no plates; {_MASS_KG:g} kg are taken, so that moments "
+                "are right in shape only."
+            )
+        for sink in self.sinks:
+            sink.opened(markers, plates)
+
+    def _turn(self) -> None:
+        packet = self._reader.get(_POLL_S)
+        # What waits in the queue is judged by when it arrived, however late the filter comes to it.
+        now = time.monotonic() if packet is None or isinstance(packet, Notice) else packet.arrived_s
+        if isinstance(packet, Notice):
+            self.say(packet.text)
+            if packet.fatal is not None:
+                raise packet.fatal
+        elif packet is not None:
+            for sink in self.sinks:
+                sink.packet(packet)
+            self.fusion.push(packet)
+        self._take(now)
+        if now - self._asked > _ASK_S:
+            self._asked = now
+            self._wishes()
+            if self._monitor is not None and self._running and not self._reader.over:
+                for text in self._monitor.changes(self.fusion, now):
+                    self.say(text)
+
+    def _wishes(self) -> None:
+        for wish in [wish for sink in self.sinks for wish in sink.asked()]:
+            if wish in ("restart", "recalibrate", "stop"):
+                getattr(self, wish)()
+            elif wish == "record" and self._record is not None:
+                self._switch_recorder(self._record)
+
+    def _switch_recorder(self, record: Callable[[], Sink]) -> None:
+        """Begin to record, or end it."""
+        if self._recording is not None:
+            self.sinks.remove(self._recording)
+            self._recording.close()
+            self._recording = None
+            self.say("The recording has ended.")
+            return
+        try:
+            self._recording = record()
+        except DynakinError as error:
+            self.say(error.message)
+            return
+        self._recording.opened(self.fusion.markers, self.fusion.plates)
+        self.sinks.append(self._recording)
+        self.say("Recording.")
+
+    def _take(self, now_s: float) -> None:
+        for fused in self.fusion.poll(now_s):
+            if self._running:
+                if not self._behind(fused):
+                    self._step(fused)
+            else:
+                self._stand(fused)
+
+    def _behind(self, fused: Fused) -> bool:
+        """Whether to leave a frame out, so that what is shown is what happens now; some are always taken."""
+        assert self._monitor is not None
+        since = fused.sample.time_s - self._monitor.stepped_s
+        if time.monotonic() - fused.arrived_s <= self.max_late_s or not 0.0 <= since < _SPARSE_S:
+            return False
+        self._monitor.left_out += 1
+        return True
+
+    def _stand(self, fused: Fused) -> None:
+        """Look for somebody who stands still; then measure the model."""
+        info = self.fusion.markers
+        t = fused.sample.time_s
+        if self._standing_since is None:
+            self._standing_since = t
+            self.say(f"Stand still and upright for {self.standing_s:g} s, please.")
+        self._came_s = t - self._standing_since
+        self._window.append(fused)
+        longest = max(self.standing_s, self.standing_wait_s) + 0.5 / info.rate_hz
+        while t - self._window[0].sample.time_s > longest:
+            self._window.popleft()
+        if t - self._looked < _ASK_S and t >= self._looked:
+            return
+        self._looked = t
+        if t - self._window[0].sample.time_s < self.standing_s - 1.5 / info.rate_hz:
+            return
+        plates = self.fusion.plates.names if self.fusion.plates else ()
+        if not self._labels_checked:
+            positions = np.stack([one.positions for one in self._window])
+            seen = [bool(np.isfinite(positions[:, k]).all(axis=1).any()) for k in range(len(info.names))]
+            self.say(check_labels(self.estimator.model, info.names, seen))
+            self._labels_checked = True
+        since = t - self.standing_s - 0.5 / info.rate_hz
+        recent = [one for one in self._window if one.sample.time_s >= since]
+        recording, static = recording_of(recent, info.names, plates, subject=self._subject), self.static
+        waited = t - self._standing_since > self.standing_wait_s
+        if not stands(recording):
+            if not waited:
+                return
+            whole = recording_of(list(self._window), info.names, plates, subject=self._subject)
+            recording, quiet, text = quietest(whole)
+            static = static or quiet
+            self.say(f"Nobody stood still for {self.standing_s:g} s: {text}")
+        try:
+            _, said, self._use_plates = begin(self.estimator, recording, static=static, known=self.known)
+        except ModelError as error:
+            if waited:
+                raise
+            self.say(f"{error.message}; trying again.")
+            self._window.clear()
+            return
+        for text in said:
+            self.say(text)
+        self._begin_running("Ready: move.")
+
+    def _begin_running(self, text: str) -> None:
+        initial, model = self.estimator.initial, self.estimator.core_model
+        assert initial is not None
+        plates = self.fusion.plates is not None
+        self._monitor = Monitor(initial, self.fusion.markers.rate_hz, plates, plates and self._use_plates)
+        self._feet = None
+        if initial.feet and self.fusion.plates is not None:
+            names = self.fusion.plates.names
+            self._feet = LiveFeet(initial, self.estimator.noise, names, self.estimator.plates)
+        self._running = True
+        self._window.clear()
+        started = Started(initial, model, self.fusion.markers.rate_hz)
+        for sink in self.sinks:
+            sink.started(started)
+        self.say(text)
+
+    def _step(self, fused: Fused) -> None:
+        monitor = self._monitor
+        assert monitor is not None
+        sample = fused.sample if self._use_plates else Sample(fused.sample.time_s, fused.sample.markers)
+        try:
+            estimate = self.estimator.step(sample)
+        except DivergenceError as error:
+            self.say(f"{error.message}; the estimate begins anew.")
+            self.restart()
+            return
+        smoothed = self.estimator.delayed() if self.estimator.lag else None
+        state = self.estimator.state
+        if self._feet is not None:
+            wrenches = fused.wrenches if self._use_plates else None
+            estimate = self._feet.moments(self.estimator.core_model, state, estimate, wrenches)
+        deviations = None
+        if not 0.0 <= sample.time_s - self._told_sd < _DEVIATIONS_S and self._reader.backlog < 4:
+            self._told_sd = sample.time_s
+            deviations = self.estimator.deviations()
+        status = monitor.status(self.fusion, fused, estimate, smoothed, state, self.estimator.verdicts)
+        frame = LiveFrame(estimate, smoothed, fused, state, deviations, status)
+        for sink in self.sinks:
+            sink.frame(frame)
+        monitor.published(sample.time_s, time.monotonic() - fused.arrived_s)
+        for text in monitor.settling(sample.time_s, state, self.estimator):
+            self.say(text)
+
+    def say(self, text: str) -> None:
+        """Tell the user."""
+        phase = "running" if self._running else "waiting" if self._standing_since is None else "standing"
+        status = Status(phase=phase) if self._monitor is None or not self._running else self._monitor.last
+        self._say(text)
+        for sink in self.sinks:
+            sink.said(text, status)

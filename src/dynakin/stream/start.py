@@ -1,0 +1,219 @@
+"""The start of a live session: markers checked against the model, the standing person measured."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from dynakin.errors import ModelError, RecordingError
+from dynakin.filter import Estimator
+from dynakin.model import Definition, InitialModel
+from dynakin.model.definition import ModelDefinition
+from dynakin.model.marker_set import choose_marker_set, match_markers
+from dynakin.recordings import (
+    DEFAULT_PAIRS,
+    DEFAULT_THRESHOLD_N,
+    Plate,
+    Recording,
+    Surface,
+    check_plates,
+    plate_from_wrench,
+    standing_window,
+)
+from dynakin.recordings.plates import LOADED_N, MASS_REFUSED_KG
+from dynakin.recordings.vertical import axis_vector, find_vertical
+from dynakin.stream.fusion import Fused
+from dynakin.units import GRAVITY_M_S2
+
+_NOW_S = 0.1  # the present posture, from a few frames
+_KINDS = ("length", "marker", "inertia")
+
+
+def check_labels(model: Definition, came: Sequence[str], seen: Iterable[bool]) -> str:
+    """Whether a model's markers are among those that came; gives a sentence on which are used.
+
+    Args:
+        seen: whether each was seen at all.
+
+    Raises:
+        ModelError: less than half of them; the message lists what came and what was expected.
+    """
+    if not isinstance(model, ModelDefinition):
+        source = model.source
+        expected = [marker.name for marker in source.markers]
+        found = [name for name in expected if name in came]
+        name = source.name
+    else:
+        try:
+            chosen = model.marker_set or choose_marker_set(came)
+        except ModelError as error:
+            raise ModelError(f"{error.message}; what came: {', '.join(came)}") from None
+        sides = ("right", "left", "centre")
+        expected = [marker.aliases(side)[0] for marker in chosen.usual for side in sides if marker.aliases(side)]
+        usual = {marker.name for marker in chosen.usual}
+        matched = match_markers(chosen, came, seen, "the stream").names
+        found = [name for (marker, _), name in matched.items() if marker in usual]
+        name = chosen.name
+    if 2 * len(found) < len(expected):
+        raise ModelError(
+            f"the stream's markers do not fit the model: {len(found)} of {len(expected)} found; came: "
+            f"{', '.join(came)}; expected those of {name}: {', '.join(expected)}"
+        )
+    return f"{len(found)} of the {len(expected)} markers of {name} are there."
+
+
+def recording_of(
+    fused: Sequence[Fused],
+    markers: Sequence[str],
+    plates: Sequence[str],
+    name: str = "live",
+    subject: Mapping[str, float] | None = None,
+) -> Recording:
+    """Samples as a recording, laboratory frame; plates as far as any of these samples has them.
+
+    Args:
+        subject: mass (kg) and height (m) as the source tells them.
+
+    Raises:
+        RecordingError: no samples, or no vertical axis to be found.
+    """
+    if not fused:
+        raise RecordingError(f"{name}: no frames, expected some")
+    time = np.array([one.sample.time_s for one in fused])
+    positions = np.stack([one.positions for one in fused])
+    made = Recording(name, None, time, tuple(markers), positions, subject=dict(subject or {}))
+    if not plates or all(one.wrenches is None for one in fused):
+        return made
+    none = np.full((len(plates), 6), np.nan)
+    wrenches = np.stack([none if one.wrenches is None else one.wrenches for one in fused])
+    up = axis_vector(find_vertical(made, DEFAULT_PAIRS)[0])
+    return made.with_plates(tuple(_plate(name, wrenches[:, k], up) for k, name in enumerate(plates)))
+
+
+def _plate(name: str, wrench: np.ndarray, up: np.ndarray) -> Plate:
+    """A plate that lies in the floor, through the laboratory's origin: streams don't tell corners."""
+    floor = Surface(np.zeros(3), up)
+    with np.errstate(invalid="ignore"):
+        return plate_from_wrench(
+            name,
+            wrench[:, :3],
+            wrench[:, 3:],
+            floor,
+            corners=None,
+            threshold_n=DEFAULT_THRESHOLD_N,
+            zero_unloaded=False,
+        )
+
+
+def unknown_mass(model: Definition, told: Mapping[str, float], plates: bool) -> bool:
+    """Whether nobody tells the person's mass and nothing can weigh them."""
+    return isinstance(model, ModelDefinition) and model.subject.mass_kg is None and "mass_kg" not in told and not plates
+
+
+def stands(recording: Recording) -> bool:
+    """Whether the person stands still for nearly all of a recording."""
+    window = standing_window(recording)
+    return window is not None and window.stop - window.start >= 0.8 * recording.n_frames
+
+
+def quietest(recording: Recording) -> tuple[Recording, Recording | None, str]:
+    """What to begin with where nobody stands still for long: the present moment, half a second or more of standing
+    before it where there was any, and words for it."""
+    end = float(recording.time[-1])
+    window = standing_window(recording)
+    if window is None:
+        present = _weighed(recording.window(end - _NOW_S, end), recording)
+        mass = present.subject.get("mass_kg")
+        told = f"; without another mass {mass:.1f} kg" if mass and mass != recording.subject.get("mass_kg") else ""
+        return present, None, f"the present posture is taken{told}."
+    still = recording.time[window]
+    quiet = recording.window(float(still[0]), float(still[-1]))
+    return recording.window(end - _NOW_S, end), quiet, f"{still[-1] - still[0]:.1f} s of it are taken."
+
+
+def _weighed(present: Recording, whole: Recording) -> Recording:
+    """With the mass by the mean load of a movement, where nothing else tells it: a moment alone weighs nobody."""
+    if not whole.plates or "mass_kg" in present.subject:
+        return present
+    load = np.nanmean(np.sum([plate.force for plate in whole.plates], axis=0), axis=0)
+    mass = float(np.linalg.norm(load)) / GRAVITY_M_S2
+    return replace(present, subject={**present.subject, "mass_kg": mass}) if mass > MASS_REFUSED_KG[0] else present
+
+
+def begin(
+    estimator: Estimator,
+    standing: Recording,
+    *,
+    static: Recording | None = None,
+    known: Mapping[str, tuple[float, float]] | None = None,
+) -> tuple[InitialModel, list[str], bool]:
+    """Measure the model on the standing person and make the estimator ready.
+
+    Args:
+        static: another recording of the person standing: lengths and places come from it.
+        known: value and standard deviation of constants from an earlier session, by their names.
+
+    Returns:
+        the model, what there is to say, and whether the plates can be used.
+
+    Raises:
+        ModelError, RecordingError: model, markers and plates do not fit.
+    """
+    initial = estimator.start(standing, static=static)
+    said = [message for message in initial.messages if message.startswith("Warning")]
+    if known:
+        initial = estimator.start_from(_continued(initial, known))
+        said.append(f"Lengths, marker places and masses go on from {len(known)} saved values.")
+    usable = True
+    if standing.plates:
+        if max(np.nan_to_num(np.abs(plate.force)).max() for plate in standing.plates) < LOADED_N:
+            return initial, [*said, "Nobody stands on the plates yet; they are not checked."], usable
+        check = check_plates(
+            static if static is not None and static.plates else standing,
+            initial.ground,
+            None if initial.feet else initial.weighed_kg,
+        )
+        if check.refusal:
+            raise RecordingError(f"plates: {check.refusal}")
+        weighed = check.mass_kg_from_plates is not None
+        said += [text for text in check.messages if text.startswith("Warning") or (weighed and "kg" in text)]
+        mass, tolerance = check.mass_kg_from_plates, estimator.noise.plate_load_tolerance
+        if mass is not None and tolerance is not None and abs(mass - initial.weighed_kg) > tolerance * mass:
+            usable = False
+            said.append(
+                f"Warning: the plates carry {mass:.1f} kg where the person weighs {initial.weighed_kg:.1f} kg; the "
+                "plates are not used."
+            )
+    return initial, said, usable
+
+
+def _continued(initial: InitialModel, known: Mapping[str, tuple[float, float]]) -> InitialModel:
+    """The same model with constants as they were found before, as sure as they were."""
+    x0, sd0 = initial.x0.copy(), initial.sd0.copy()
+    found = 0
+    for k, name in enumerate(initial.names):
+        if name in known and name.split("/")[0] in _KINDS:
+            x0[k], sd0[k] = known[name]
+            found += 1
+    if not found:
+        raise ModelError("the saved parameters are another model's: none of their names is in this model")
+    return replace(initial, x0=np.clip(x0, initial.lower, initial.upper), sd0=sd0)
+
+
+def read_known(path: Path) -> dict[str, tuple[float, float]]:
+    """Constants and their standard deviations from a run's ``parameters.json``.
+
+    Raises:
+        ModelError: the file cannot be read or is none of that kind.
+    """
+    try:
+        entries = json.loads(path.read_text(encoding="utf-8"))["parameters"]
+        return {str(e["name"]): (float(e["value"]), float(e["sd"])) for e in entries if e["estimated"]}
+    except OSError as error:
+        raise ModelError(f"{path}: cannot be read ({error.strerror or error})") from None
+    except (ValueError, KeyError, TypeError) as error:
+        raise ModelError(f"{path}: no parameters.json of a run ({error})") from None

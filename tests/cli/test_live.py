@@ -1,0 +1,77 @@
+"""`dynakin live` as a user calls it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from dynakin.cli import main
+from dynakin.recordings import Recording
+from dynakin.simulation import simulate_squat
+
+Said = pytest.CaptureFixture[str]
+PERSON = ["--model", "sagittal7", "--markers", "opencap", "--mass", "70", "--height", "1.75", "--sex", "male"]
+
+
+def written(folder: Path) -> Path:
+    """A recording as a file."""
+    recording: Recording = simulate_squat(seed=1, duration_s=5.0).recording
+    columns = ["time"] + [f"{name}_{axis}" for name in recording.marker_names for axis in "xyz"]
+    rows = [",".join(columns)]
+    for k, t in enumerate(recording.time):
+        rows.append(",".join([f"{t:.4f}", *(f"{value:.6f}" for value in recording.markers[k].ravel())]))
+    path = folder / "squat.csv"
+    path.write_text("\n".join(rows).replace("nan", "") + "\n")
+    return path
+
+
+def test_live_estimates_records_and_finishes(tmp_path: Path, capsys: Said) -> None:
+    source = "simulate:squat,model=sagittal7,duration=5,speed=0"
+    assert main(["live", "--source", source, *PERSON, "--record", str(tmp_path / "r")]) == 0
+    said = capsys.readouterr().out
+    assert "Stand still" in said and "Ready: move." in said and "--finish" in said
+    assert (tmp_path / "r" / "stream.dkr").stat().st_size > 100_000
+    assert main(["live", "--finish", str(tmp_path / "r"), "-o", str(tmp_path / "o")]) == 0
+    assert (tmp_path / "o" / "report.html").exists()
+    known = str(tmp_path / "o" / "parameters.json")
+    assert main(["live", "--source", source, *PERSON, "--parameters", known, "--lag", "10"]) == 0
+    assert "go on from" in capsys.readouterr().out
+
+
+def test_nothing_but_a_simulated_person_is_needed(capsys: Said) -> None:
+    assert main(["live", "--source", "simulate:squat,duration=5,speed=0"]) == 0
+    said = capsys.readouterr().out
+    assert "51 markers at 100 Hz, 2 plates" in said and "Ready: move." in said and "Warning" not in said
+
+
+def test_markers_alone_are_enough_to_see_a_person_move(tmp_path: Path, capsys: Said) -> None:
+    source = f"replay:{written(tmp_path)},speed=0"
+    assert main(["live", "--source", source, "--model", "sagittal7", "--markers", "opencap"]) == 0
+    said = capsys.readouterr().out
+    assert "70 kg are taken" in said and "Ready: move." in said
+
+
+def test_a_recording_that_is_too_short_is_told_so(tmp_path: Path, capsys: Said) -> None:
+    assert main(["live", "--source", f"replay:{written(tmp_path)},speed=0,duration=0.2", *PERSON]) == 2
+    assert "ended before the model was measured: 0.2 s came" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--source", "nowhere:x"], "expected one of lsl:..., qtm:..., replay:..., simulate:..."),
+        (["--source", "replay:none.c3d"], "none.c3d"),
+        (["--source", "replay:x.trc,sped=2"], "unknown option 'sped'"),
+        (["--source", "simulate:squat,sed=2"], "unknown option 'sed'"),
+        (["--source", "simulate:dance"], "dance"),
+        (["--source", "lsl:a", "--forces", "b.mot"], "goes with replay:FILE only"),
+        ([], "--source is missing"),
+        (["--finish", "nothing", "-o", "out"], "cannot be read"),
+    ],
+)
+def test_what_is_wrong_is_said_in_one_line(arguments: list[str], words: str, tmp_path: Path, capsys: Said) -> None:
+    finish = [str(tmp_path / "o") if a == "out" else a for a in arguments]
+    assert main(["live", *finish]) == 2
+    said = capsys.readouterr().err
+    assert words in said and said.count("\n") == 1

@@ -1,0 +1,144 @@
+"""What was recorded can be read, whoever was killed."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dynakin.errors import OutputError, RecordingError
+from dynakin.recordings import Recording
+from dynakin.simulation import simulate_squat
+from dynakin.stream import Replay
+from dynakin.stream.recorder import FILE, Recorder, finish, recorded
+
+from .made import MARKERS, PLATES, block, frame
+
+SETTINGS = {"model": "sagittal7", "markers": "opencap", "mass_kg": 70.0, "height_m": 1.75, "sex": "male"}
+
+SESSION = """
+import sys, time
+sys.path.insert(0, {tests!r})
+from dynakin.simulation import simulate_squat
+from dynakin.stream import Replay
+from dynakin.stream.recorder import Recorder
+from dataclasses import replace
+source = Replay(simulate_squat(seed=1, duration_s=8.0).recording, loop=True)
+recorder = Recorder({folder!r}, {settings!r})
+streams = source.open()
+recorder.opened(streams.markers, streams.plates)
+print("ready", flush=True)
+while True:
+    for packet in source.read(0.1):
+        recorder.packet(replace(packet, arrived_s=time.monotonic()))
+        print(packet.time_s if not hasattr(packet, "wrenches") else "", flush=True)
+"""
+
+
+@pytest.fixture(scope="module")
+def squat() -> Recording:
+    return simulate_squat(seed=1, duration_s=5.0).recording
+
+
+def record(recording: Recording, folder: Path) -> None:
+    source, recorder = Replay(recording, speed=0.0), Recorder(folder, SETTINGS)
+    streams = source.open()
+    assert streams.markers is not None
+    recorder.opened(streams.markers, streams.plates)
+    while (packets := source.read(0.0)) is not None:
+        for packet in packets:
+            recorder.packet(
+                type(packet)(packet.time_s, *list(vars(packet).values())[1:2], float(np.max(packet.time_s)))
+            )  # type: ignore[call-arg,arg-type]
+    recorder.close()
+
+
+def test_what_was_recorded_is_what_came(squat: Recording, tmp_path: Path) -> None:
+    record(squat, tmp_path / "r")
+    found = recorded(tmp_path / "r")
+    np.testing.assert_array_equal(found.markers, squat.markers)
+    np.testing.assert_array_equal(found.total_wrench(), squat.total_wrench())
+    np.testing.assert_array_equal(found.time, squat.time)
+
+
+def test_a_recorded_session_becomes_the_usual_output(squat: Recording, tmp_path: Path) -> None:
+    record(squat, tmp_path / "r")
+    estimate = finish(tmp_path / "r", tmp_path / "out")
+    assert len(estimate.time) == squat.n_frames
+    assert {"coordinates.mot", "estimate.nc", "report.html"} <= {path.name for path in (tmp_path / "out").iterdir()}
+
+
+def test_a_session_killed_while_recording_loses_nothing_but_the_last_moment(tmp_path: Path) -> None:
+    folder = tmp_path / "r"
+    code = SESSION.format(tests=str(Path(__file__).parent), folder=str(folder), settings=SETTINGS)
+    session = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    assert session.stdout is not None
+    times = []
+    for line in session.stdout:
+        if line.strip() not in ("", "ready"):
+            times.append(float(line))
+        if times and times[-1] > 2.0:
+            break
+    os.kill(session.pid, signal.SIGKILL)
+    session.wait()
+    session.stdout.close()
+    deadline = time.monotonic() + 10.0
+    found = recorded(folder)
+    while found.time[-1] < times[-1] - 0.1 and time.monotonic() < deadline:  # the writer is still at it
+        time.sleep(0.1)
+        found = recorded(folder)
+    assert found.time[-1] >= times[-1] - 0.1 and found.n_frames >= len(times) - 10
+    estimate = finish(folder, tmp_path / "out")
+    assert len(estimate.time) == found.n_frames and (tmp_path / "out" / "coordinates.mot").exists()
+
+
+def test_a_writer_killed_goes_on_in_the_same_file(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "r")
+    recorder.opened(MARKERS, PLATES)
+    for k in range(100):
+        recorder.packet(block(k / 100))
+        recorder.packet(frame(k / 100))
+        if k == 50:
+            time.sleep(0.8)
+            os.kill(recorder.pid, signal.SIGKILL)
+            time.sleep(0.1)
+    recorder.close()
+    found = recorded_times(tmp_path / "r")
+    assert recorder.restarts == 1 and found[0] == 0.0 and found[-1] == pytest.approx(0.99)
+    assert len(found) >= 95
+
+
+def recorded_times(folder: Path) -> list[float]:
+    from dynakin.stream.record_format import read_records
+
+    return [r.time_s for r in read_records(folder / FILE) if hasattr(r, "positions")]
+
+
+def test_a_file_cut_anywhere_is_read_up_to_there(tmp_path: Path) -> None:
+    recorder = Recorder(tmp_path / "r")
+    recorder.opened(MARKERS, None)
+    for k in range(20):
+        recorder.packet(frame(k / 100))
+    recorder.close()
+    whole = (tmp_path / "r" / FILE).read_bytes()
+    for end in range(len(whole) - 100, len(whole)):
+        (tmp_path / "r" / FILE).write_bytes(whole[:end])
+        assert len(recorded_times(tmp_path / "r")) >= 18
+    damaged = bytearray(whole)
+    damaged[len(whole) // 2] ^= 255
+    (tmp_path / "r" / FILE).write_bytes(damaged)
+    assert len(recorded_times(tmp_path / "r")) == 19
+
+
+def test_a_folder_that_holds_something_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "x").write_text("mine")
+    with pytest.raises(OutputError, match="is not empty"):
+        Recorder(tmp_path)
+    with pytest.raises(RecordingError, match="cannot be read"):
+        recorded(tmp_path / "nothing")

@@ -1,0 +1,241 @@
+"""A session from a replayed recording to published estimates."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dynakin
+from dynakin.errors import ModelError, StreamError
+from dynakin.recordings import Recording
+from dynakin.simulation import simulate_squat
+from dynakin.stream import Callback, Live, LiveFrame, MarkerPacket, Packet, PlatePacket, Replay, Sink, Streams
+from dynakin.stream.recorder import Recorder, recorded
+
+
+@pytest.fixture(scope="module")
+def squat() -> Recording:
+    return simulate_squat(seed=1, duration_s=8.0).recording
+
+
+def estimator(lag: int = 0) -> dynakin.Estimator:
+    subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
+    return dynakin.Estimator(dynakin.load_model("sagittal7", subject=subject, markers="opencap"), lag=lag)
+
+
+def run(source: object, lag: int = 0, **options: object) -> tuple[list[LiveFrame], list[str], Live]:
+    frames: list[LiveFrame] = []
+    said: list[str] = []
+    live = Live(estimator(lag), [source], [Callback(frames.append)], say=said.append, **options)  # type: ignore[list-item,arg-type]
+    live.run()
+    return frames, said, live
+
+
+def test_live_equals_offline_on_the_same_samples(squat: Recording) -> None:
+    frames, said, _ = run(Replay(squat, speed=0.0))
+    assert "Ready: move." in said and any(text.startswith("Stand still") for text in said)
+    first = frames[0].estimate.time_s
+    offline = estimator()
+    initial = offline.start(squat.window(first - 2.01 - 1e-6, first - 0.005))
+    begin = int(np.searchsorted(squat.time, first - 1e-6))
+    assert len(frames) == squat.n_frames - begin  # no frame is lost
+    time_, markers = (
+        squat.time[begin:],
+        initial.ground.points_to_ground(
+            np.stack([squat.marker(name)[begin:] for name in initial.recorded_markers], axis=1)
+        ),
+    )
+    wrench = initial.ground.wrench_to_ground(squat.total_wrench())[begin:]
+    arrays = offline.run_arrays(time_, markers, wrench)
+    np.testing.assert_allclose(np.stack([f.state for f in frames]), arrays["state"], atol=1e-9)
+
+
+def test_a_lag_is_shown_as_its_delay(squat: Recording) -> None:
+    frames, _, _ = run(Replay(squat, speed=0.0, duration_s=4.0), lag=20)
+    last = frames[-1]
+    assert last.smoothed is not None
+    assert last.status.delay_s == pytest.approx(0.2, abs=1e-6) == last.estimate.time_s - last.smoothed.time_s
+
+
+def test_wrong_labels_list_what_came_and_what_was_expected(squat: Recording) -> None:
+    strange = replace(squat, marker_names=tuple(f"ball{k}" for k in range(len(squat.marker_names))))
+    with pytest.raises(ModelError, match=r"0 of \d+ found; came: ball0, ball1.*expected those of opencap: "):
+        run(Replay(strange, speed=0.0))
+
+
+def test_half_of_the_markers_gone_for_three_seconds(squat: Recording) -> None:
+    markers = squat.markers.copy()
+    gone = (squat.time > 3.0) & (squat.time < 6.0)
+    markers[np.ix_(gone, range(0, markers.shape[1], 2))] = np.nan
+    whole, _, _ = run(Replay(squat, speed=0.0))
+    frames, _, _ = run(Replay(replace(squat, markers=markers), speed=0.0))
+    assert len(frames) == len(whole) and frames[200].status.missing
+    last = np.rad2deg(frames[-1].estimate.coordinates - whole[-1].estimate.coordinates)
+    assert np.abs(last).max() < 3.0  # once they are back; in between a segment without markers is only guessed
+    assert all(np.isfinite(f.estimate.coordinates).all() for f in frames)
+
+
+class Edited(Replay):
+    """A replay whose packets are changed on the way, at the recording's own pace by the times of arrival."""
+
+    def __init__(self, recording: Recording, edit: Callable[[Packet], list[Packet]]) -> None:
+        super().__init__(recording, speed=0.0)
+        self.edit = edit
+
+    def read(self, timeout_s: float) -> list[Packet] | None:
+        packets = super().read(timeout_s)
+        if packets is None:
+            return None
+        arrived = [replace(p, arrived_s=1000.0 + float(np.max(p.time_s)) + 0.001) for p in packets]
+        return [one for packet in arrived for one in self.edit(packet)]
+
+
+def test_silent_plates_are_told_and_the_estimate_goes_on(squat: Recording) -> None:
+    def silent(packet: Packet) -> list[Packet]:
+        at = float(np.max(packet.time_s))
+        return [] if isinstance(packet, PlatePacket) and 4.0 < at < 6.0 else [packet]
+
+    frames, said, _ = run(Edited(squat, silent))
+    words = " ".join(said)
+    assert "The plates are silent; going on with markers alone." in words and "The plates are back." in words
+    by_time = {round(f.estimate.time_s, 2): f.status.plates for f in frames}
+    assert (by_time[3.5], by_time[5.0], by_time[7.0]) == ("used", "silent", "used")
+    assert frames[-1].estimate.time_s == pytest.approx(squat.time[-1])
+
+
+def test_late_packets_and_steps_of_zero_or_backwards_leave_the_estimate_as_it_is(squat: Recording) -> None:
+    past: list[Packet] = []
+
+    def disturb(packet: Packet) -> list[Packet]:
+        if not isinstance(packet, MarkerPacket):
+            return [packet]
+        past.append(packet)
+        at = packet.time_s
+        found: list[Packet] = [packet]
+        if round(at, 2) == 5.5:  # 500 at once, all long past
+            found += [replace(one, arrived_s=packet.arrived_s) for one in past[:500]]
+        if round(100 * at) % 50 == 20:
+            found += [packet, replace(packet, time_s=at - 0.02), replace(packet, time_s=float("nan"))]
+        return found
+
+    whole, _, _ = run(Replay(squat, speed=0.0))
+    frames, _, live = run(Edited(squat, disturb))
+    assert live.fusion.marker_counts.late >= 500 and live.fusion.marker_counts.duplicate >= 10
+    np.testing.assert_array_equal([f.estimate.time_s for f in frames], [f.estimate.time_s for f in whole])
+    np.testing.assert_array_equal(frames[-1].state, whole[-1].state)
+
+
+def test_a_computer_that_is_too_slow_leaves_frames_out_and_says_so(squat: Recording) -> None:
+    frames: list[LiveFrame] = []
+    said: list[str] = []
+
+    def slow(frame: LiveFrame) -> None:
+        frames.append(frame)
+        time.sleep(0.02)
+
+    source = Replay(squat.window(0.0, 6.0), speed=2.0)
+    live = Live(estimator(), [source], [Callback(slow)], say=said.append, standing_s=1.0, max_late_s=0.1)
+    live.run()
+    assert frames[-1].status.left_out > 20 and any("too slow" in text for text in said)
+    steps = np.diff([f.estimate.time_s for f in frames])
+    assert steps.max() < 0.07 and np.isfinite(frames[-1].estimate.coordinates).all()
+
+
+class Breaking:
+    """A replay whose connection breaks once, for half a second, and that then begins at time 0 again."""
+
+    def __init__(self, recording: Recording, at_s: float) -> None:
+        self.replay, self.at_s, self.broken = Replay(recording, speed=1.0), at_s, 0.0
+
+    def open(self, timeout_s: float) -> Streams:
+        if self.broken and time.monotonic() - self.broken < 0.6:
+            raise StreamError("nobody answers")
+        return self.replay.open(timeout_s)
+
+    def read(self, timeout_s: float) -> list[Packet] | None:
+        packets = self.replay.read(timeout_s)
+        if not self.broken and packets and float(np.max(packets[-1].time_s)) > self.at_s:
+            self.broken = time.monotonic()
+            raise StreamError("connection reset")
+        return packets
+
+    def close(self) -> None:
+        self.replay.close()
+
+
+def test_a_source_that_is_killed_and_comes_back(squat: Recording) -> None:
+    frames, said, live = run(Breaking(squat.window(0.0, 4.0), at_s=3.0))
+    words = " ".join(said)
+    assert "is lost (connection reset)" in words and "The source is back." in words and "set back" in words
+    times = np.array([f.estimate.time_s for f in frames])
+    assert (np.diff(times) > 0).all() and times[-1] > 6.0 and live.fusion.clock_restarts == 1
+    assert frames[-1].status.tracking in ("following", "found", "restarted")
+
+
+def test_restart_and_recalibrate_without_stopping(squat: Recording) -> None:
+    frames: list[LiveFrame] = []
+    said: list[str] = []
+    live = Live(estimator(), [Replay(squat, speed=0.0)], [], say=said.append, standing_wait_s=2.0)
+
+    def on_frame(frame: LiveFrame) -> None:
+        frames.append(frame)
+        if len(frames) == 100:
+            live.restart()
+        if len(frames) == 200:
+            live.recalibrate()
+
+    live.sinks.append(Callback(on_frame))
+    live.run()
+    assert "The estimate begins anew." in said
+    assert said.count("Ready: move.") == 2 and len(frames) > 300
+
+
+class Buttons(Sink):
+    """Somebody who presses a button at each of some frames."""
+
+    def __init__(self, presses: dict[int, str]) -> None:
+        self.presses, self.frames, self.waiting = presses, 0, list[str]()
+
+    def frame(self, frame: LiveFrame) -> None:
+        self.frames += 1
+        if self.frames in self.presses:
+            self.waiting.append(self.presses[self.frames])
+
+    def asked(self) -> list[str]:
+        found, self.waiting = self.waiting, []
+        return found
+
+
+def test_buttons_record_restart_and_recalibrate(squat: Recording, tmp_path: Path) -> None:
+    said: list[str] = []
+    buttons = Buttons({50: "record", 150: "restart", 250: "record", 300: "recalibrate"})
+    settings = {"model": "sagittal7", "markers": "opencap", "mass_kg": 70.0}
+    live = Live(
+        estimator(),
+        [Edited(squat, lambda packet: [packet])],
+        [buttons],
+        say=said.append,
+        standing_wait_s=2.0,
+        record=lambda: Recorder(tmp_path / "r", settings),
+    )
+    live.run()
+    ends = [said.index(text) for text in ("Recording.", "The estimate begins anew.", "The recording has ended.")]
+    assert ends == sorted(ends) and said.count("Ready: move.") == 2
+    assert 1.5 < np.ptp(recorded(tmp_path / "r").time) < 2.6  # what came between the two presses
+
+
+def test_constants_go_on_from_an_earlier_session(squat: Recording) -> None:
+    frames, _, live = run(Replay(squat, speed=0.0, duration_s=4.0))
+    initial = live.estimator.initial
+    assert initial is not None
+    known = {name: (float(frames[-1].state[k]), 0.001) for k, name in enumerate(initial.names)}
+    again, said, other = run(Replay(squat, speed=0.0, duration_s=4.0), known=known)
+    assert any("go on from" in text for text in said) and other.estimator.initial is not None
+    k = initial.names.index(next(name for name in initial.names if name.startswith("length/")))
+    assert other.estimator.initial.x0[k] == pytest.approx(frames[-1].state[k])
+    assert len(again) == len(frames)
