@@ -39,6 +39,15 @@ def test_live_estimates_records_and_finishes(tmp_path: Path, capsys: Said) -> No
     assert "go on from" in capsys.readouterr().out
 
 
+def test_an_identified_subject_is_refused_where_it_is_another_models(tmp_path: Path, capsys: Said) -> None:
+    """What is told of it comes from `run`; here only that the file is read and reaches the model."""
+    source = "simulate:squat,model=sagittal7,duration=5,speed=0"
+    wrong = tmp_path / "subject.toml"
+    wrong.write_text('model = "squat7"\n')
+    assert main(["live", "--source", source, *PERSON, "--parameters", str(wrong)]) == 2
+    assert "subject.toml" in capsys.readouterr().err
+
+
 def test_nothing_but_a_simulated_person_is_needed(capsys: Said) -> None:
     assert main(["live", "--source", "simulate:squat,duration=5,speed=0"]) == 0
     said = capsys.readouterr().out

@@ -48,7 +48,8 @@ def live(
     table: TableName = None,
     static: Annotated[Path | None, typer.Option(help="Recording of the same person standing.")] = None,
     parameters: Annotated[
-        Path | None, typer.Option(help="Go on with the constants of an earlier run: its parameters.json.")
+        Path | None,
+        typer.Option(help="A known person: parameters.json of an earlier run, or what dynakin identify wrote (.toml)."),
     ] = None,
     standing_wait: Annotated[
         float | None, typer.Option(help="Longest wait for somebody to stand still, s (20; replay: 3).")
@@ -91,6 +92,8 @@ def live(
         "forward": forward_direction(forward),
         "table": table,
     }
+    if parameters is not None and parameters.suffix.casefold() == ".toml":
+        given["parameters"], parameters = str(parameters.absolute()), None
     settings = {"model": model} | {key: value for key, value in given.items() if value is not None}
     sources = _sources(source, forces)
     standing, wait = _LIVE_STANDING_S
