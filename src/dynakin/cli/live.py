@@ -10,8 +10,8 @@ from typing import Annotated, Any
 import typer
 
 from dynakin.cli.console import busy, out
-from dynakin.cli.options import Estimated, Height, Markers, Mass, Preset, Sex, Side, TableName
-from dynakin.cli.run import estimated, forward_direction
+from dynakin.cli.options import Estimated, Height, Markers, Mass, Preset, Sex, Side, TableName, forward_direction
+from dynakin.cli.run import estimated
 from dynakin.cli.summary import print_summary
 from dynakin.errors import ConfigError
 from dynakin.recordings import read

@@ -25,6 +25,7 @@ from dynakin.cli.options import (
     Static,
     TableName,
     Vertical,
+    forward_direction,
 )
 from dynakin.cli.summary import print_summary
 from dynakin.comparison import Trial, trial_of
@@ -162,15 +163,3 @@ def estimated(text: str | None) -> list[str] | None:
     if text is None:
         return None
     return [] if text.strip() == "none" else [part.strip() for part in text.split(",") if part.strip()]
-
-
-def forward_direction(text: str | None) -> str | tuple[float, ...] | None:
-    """`--forward 0,1,0` as numbers; a word stays a word and is checked with the configuration."""
-    if text is None or "," not in text:
-        return text
-    try:
-        return tuple(float(part) for part in text.split(","))
-    except ValueError:
-        raise typer.BadParameter(
-            f"--forward is {text!r}, expected auto, an axis (+X) or three numbers (0,1,0)"
-        ) from None
