@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from datetime import datetime
 from pathlib import Path
 from typing import Annotated, Any
@@ -117,6 +118,8 @@ def live(
         for sink in sinks:
             sink.close()
         raise
+    gc.collect()
+    gc.freeze()  # what was imported is never garbage; looking through it would cost tens of milliseconds now and then
     try:
         session.run()
     except KeyboardInterrupt:
