@@ -63,8 +63,8 @@ def without_plates() -> dynakin.Noise:
 def filtered(estimate: tuple[str, ...], *, smooth: bool = False) -> tuple[float, Array]:
     """Marker distance (mm) of the .osim model from markers alone, and the markers' measured paths."""
     recording = recorded("squats1")
-    definition = load_opensim(FILE, Subject(mass_kg=MASS["squats1"]), estimate=estimate)
-    estimator = dynakin.Estimator(definition, without_plates())
+    definition = load_opensim(FILE, Subject(mass_kg=MASS["squats1"]))
+    estimator = dynakin.Estimator(definition, without_plates(), estimate=estimate)
     markers, wrench = recording_arrays(recording, estimator.start(recording), gaps=True)
     wrench[:] = np.nan
     run = estimator.run_smoothed_arrays if smooth else estimator.run_arrays

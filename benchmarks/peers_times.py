@@ -24,7 +24,7 @@ def steps(file: Path, data: Path, mass: float, kinds: tuple[str, ...], plates: b
     noise = dynakin.presets.default()
     if not plates:
         noise = noise.model_copy(update={"plate_force": 0.0, "plate_moment": 0.0, "plate_delay_s": 0.0})
-    estimator = dynakin.Estimator(load_opensim(file, Subject(mass_kg=mass), estimate=kinds), noise)
+    estimator = dynakin.Estimator(load_opensim(file, Subject(mass_kg=mass)), noise, estimate=kinds)
     initial = estimator.start(recording)
     markers, wrench = recording_arrays(recording, initial, gaps=True)
     if not plates:
@@ -38,7 +38,7 @@ def steps(file: Path, data: Path, mass: float, kinds: tuple[str, ...], plates: b
 
 def biorbd_frames(file: Path, data: Path, mass: float) -> tuple[str, Array]:
     recording = dynakin.read(data / "squats1.trc").window(0.0, 10.0)
-    initial = dynakin.Estimator(load_opensim(file, Subject(mass_kg=mass), estimate=())).start(recording)
+    initial = dynakin.Estimator(load_opensim(file, Subject(mass_kg=mass)), estimate=()).start(recording)
     markers = np.stack([recording.marker(name) for name in initial.recorded_markers], axis=1)
     n, spent, places = kalman(initial.spec, markers, 100.0)
     gap = 1000.0 * np.sqrt(np.nanmean(((places - markers) ** 2).sum(axis=2)))

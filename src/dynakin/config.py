@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal, Self
@@ -12,9 +11,9 @@ from pydantic import Field, model_validator
 from dynakin.errors import ConfigError, ModelError
 from dynakin.filter import Noise, presets
 from dynakin.filter.extend import QUANTITIES, Quantity
-from dynakin.model import Bounds, CarriedLoad, Priors, Subject
+from dynakin.model import Bounds, CarriedLoad, Definition, OpenSimOptions, Priors, Subject, load_model
 from dynakin.model.subject import Sex
-from dynakin.model.validation import Strict, nearest, validate
+from dynakin.model.validation import Strict, nearest, read_toml, validate
 from dynakin.recordings import PlateLoad
 
 # Keys that name files: relative to the configuration file that they stand in.
@@ -27,7 +26,7 @@ class RunConfig(Strict):
     trial: Path = Field(examples=["squat.c3d"])
     """Recording to estimate: .c3d, .trc or .csv. Paths are relative to this file."""
     model: str = Field(examples=["squat7"])
-    """Built-in model (fullbody, squat7, sagittal7) or a .toml file of your own."""
+    """Built-in model (fullbody, squat7, sagittal7) or a .toml or .osim file of your own."""
     output: Path = Field(examples=["out/squat"])
     """Folder for the results. It is replaced if it holds an earlier output, and refused if it holds anything else."""
 
@@ -86,6 +85,8 @@ class RunConfig(Strict):
     """Standard deviations at the first frame."""
     bounds: Bounds = Bounds()
     """Half widths of the bounds of equation (9)."""
+    opensim: OpenSimOptions = OpenSimOptions()
+    """What of an OpenSim model can be estimated; other models do not read it."""
     grid: dict[str, tuple[float, float, int]] | None = Field(default=None, examples=[{"jerk": [1.0, 1e4, 5]}])
     """Settings that `tune grid` varies: NAME = [from, to, steps], logarithmic. `run` does not read it."""
 
@@ -108,6 +109,14 @@ class RunConfig(Strict):
     def subject(self) -> Subject:
         """Who is measured."""
         return Subject(mass_kg=self.mass_kg, height_m=self.height_m, sex=self.sex)
+
+    def definition(self) -> Definition:
+        """The model, not measured yet.
+
+        Raises:
+            ModelError: as `load_model`.
+        """
+        return load_model(self.model, self.subject(), self.markers, self.table, self.opensim)
 
     def noise_settings(self) -> Noise:
         """The preset with the changes of [noise].
@@ -147,12 +156,7 @@ def read_config(path: Path, paths: Sequence[str] = _PATHS) -> dict[str, Any]:
     Raises:
         ConfigError: no such file, or not TOML (with the line).
     """
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"{path}: not a TOML file: {error}") from None
+    content = read_toml(path, ConfigError)
     for key in paths:
         if isinstance(content.get(key), str):
             content[key] = str(path.parent / content[key])

@@ -12,14 +12,14 @@ from pydantic import BaseModel
 
 from dynakin.config import RunConfig
 from dynakin.filter import Noise, presets
-from dynakin.model import Bounds, Priors
+from dynakin.model import Bounds, OpenSimOptions, Priors
 
 _HEADER = """\
 # Configuration of `dynakin run`. Keys with a # right before them hold their default or, where there is none, an
 # example: take the # away to change them. Options on the command line win over this file.
 """
 _RECORD = {"ground", "versions"}  # written into outputs, not for people to set
-_TABLES: dict[str, type[BaseModel]] = {"noise": Noise, "priors": Priors, "bounds": Bounds}
+_TABLES: dict[str, type[BaseModel]] = {"noise": Noise, "priors": Priors, "bounds": Bounds, "opensim": OpenSimOptions}
 _WIDTH = 110
 
 
@@ -39,7 +39,12 @@ def config_template(preset: str = "default") -> str:
         if key == "preset":
             value, required = preset, True
         parts.append("\n" + _comment(docs[key]) + ("" if required else "#") + _line(key, value))
-    defaults: dict[str, BaseModel] = {"noise": presets.preset(preset), "priors": Priors(), "bounds": Bounds()}
+    defaults: dict[str, BaseModel] = {
+        "noise": presets.preset(preset),
+        "priors": Priors(),
+        "bounds": Bounds(),
+        "opensim": OpenSimOptions(),
+    }
     for table, schema in _TABLES.items():
         table_docs = attribute_docs(schema)
         lines = [f"\n\n{_comment(docs[table])}[{table}]\n"]

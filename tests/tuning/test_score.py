@@ -13,8 +13,9 @@ from dynakin.filter import Estimator, presets
 from dynakin.recordings import Recording
 from dynakin.results import marker_rms_mm, signal_fit
 from dynakin.tuning import Shared, prepare
-from dynakin.tuning.score import score_task
+from dynakin.tuning.score import figures_of, score_task
 from dynakin.tuning.settings import changed, check_setting, value_of
+from dynakin.tuning.trial import undoubting
 
 
 def test_the_papers_criterion_is_the_sum_of_what_run_reports(paper: Shared, definition, recording: Recording) -> None:
@@ -48,8 +49,11 @@ def test_ahead_is_one_for_a_filter_that_only_holds_the_last_value(default: Share
 
 
 def test_a_declared_sigma_is_not_the_one_that_is_tried(paper: Shared) -> None:
-    small, large = (score_task(paper, (0, {"marker_scale": s, "force": s})) for s in (1.0, 100.0))
-    assert large["sigma"] > small["sigma"]  # in units of what is tried it would be the other way round
+    louder = {"marker_scale": 100.0, "force": 100.0 * paper.base.force, "moment": 100.0 * paper.base.moment}
+    trial, tried = paper.trials[0], changed(paper.base, louder)
+    found = score_task(paper, (0, louder))["sigma"]
+    assert found == figures_of(trial, undoubting(tried), paper.base)["sigma"]
+    assert found == pytest.approx(10.0 * figures_of(trial, undoubting(tried), tried)["sigma"])
 
 
 def test_what_the_starting_gates_refuse_is_taken_out_once(definition, recording: Recording) -> None:

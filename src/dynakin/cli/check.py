@@ -13,8 +13,7 @@ from rich.table import Table
 from rich.text import Text
 
 from dynakin.cli.console import out, table
-from dynakin.cli.options import Force, Forward, Height, Markers, Mass, Sex, Side, Static, Vertical
-from dynakin.cli.run import forward_direction
+from dynakin.cli.options import Force, Forward, Height, Markers, Mass, Sex, Side, Static, Vertical, forward_direction
 from dynakin.errors import DynakinError
 from dynakin.model import (
     Definition,

@@ -11,7 +11,7 @@ import typer
 from rich.console import Console
 from rich.padding import Padding
 
-from dynakin.cli.compare_inputs import cases_of, chosen_trials, halves_of
+from dynakin.cli.compare_inputs import cases_of, chosen_trials, given_keys, halves_of
 from dynakin.cli.console import as_table, busy, out, progress_bar
 from dynakin.cli.options import (
     ForceThreshold,
@@ -26,7 +26,6 @@ from dynakin.cli.options import (
     TableName,
     Vertical,
 )
-from dynakin.cli.run import forward_direction
 from dynakin.comparison import (
     HORIZON_S,
     Trial,
@@ -87,20 +86,9 @@ def compare(
     """Compare the filter with the table and the classical method, over one or many trials (the paper's Table II)."""
     if output is not None:
         check_comparison_folder(output)
-    given = {
-        "model": model,
-        "markers": markers,
-        "static": static,
-        "mass_kg": mass,
-        "height_m": height,
-        "sex": sex,
-        "side": side,
-        "vertical": vertical,
-        "forward": forward_direction(forward),
-        "table": table,
-        "plate_filter_hz": plate_filter,
-        "force_threshold_n": force_threshold,
-    }
+    given = given_keys(
+        model, markers, static, mass, height, sex, side, vertical, forward, table, plate_filter, force_threshold
+    )
     chosen = chosen_trials(trials or [], identify_trial, test_trial, halved or not_seen)
     cases = cases_of(chosen, forces or [], preset or [], cutoff, given)
     console = out()

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from dynakin.cli.options import forward_direction
 from dynakin.comparison import halves
 from dynakin.comparison.case import Case, case_of
 from dynakin.config import make_config, read_config
@@ -81,3 +82,34 @@ def _case(trial: Path, given: dict[str, Any], presets: Sequence[str], cutoff_hz:
 
 def _times(n: int) -> str:
     return "once" if n == 1 else f"{n} times"
+
+
+def given_keys(
+    model: str | None,
+    markers: str | None,
+    static: Path | None,
+    mass: float | None,
+    height: float | None,
+    sex: str | None,
+    side: str | None,
+    vertical: str | None,
+    forward: str | None,
+    table: str | None,
+    plate_filter: float | None,
+    force_threshold: float | None,
+) -> dict[str, Any]:
+    """The command line's options by the keys of a configuration."""
+    return {
+        "model": model,
+        "markers": markers,
+        "static": static,
+        "mass_kg": mass,
+        "height_m": height,
+        "sex": sex,
+        "side": side,
+        "vertical": vertical,
+        "forward": forward_direction(forward),
+        "table": table,
+        "plate_filter_hz": plate_filter,
+        "force_threshold_n": force_threshold,
+    }

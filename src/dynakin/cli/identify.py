@@ -9,8 +9,7 @@ from typing import Annotated
 import typer
 
 from dynakin.cli.console import out, progress_bar, table
-from dynakin.cli.options import Forward, Height, Markers, Mass, Sex, Side, Static, Vertical
-from dynakin.cli.run import forward_direction
+from dynakin.cli.options import Forward, Height, Markers, Mass, Sex, Side, Static, Vertical, forward_direction
 from dynakin.errors import ConfigError
 from dynakin.filter import Estimator
 from dynakin.identification import Identified, change_between, change_in_words, identify_subject

@@ -28,3 +28,15 @@ ForceThreshold = Annotated[
 Backend = Annotated[str, typer.Option(help="Who works: processes or threads of this machine, or dask.")]
 Jobs = Annotated[int | None, typer.Option(help="Workers at a time on this machine; else one a core.")]
 Scheduler = Annotated[str | None, typer.Option(help="Address of the Dask cluster's scheduler, tcp://HOST:PORT.")]
+
+
+def forward_direction(text: str | None) -> str | tuple[float, ...] | None:
+    """`--forward 0,1,0` as numbers; a word stays a word and is checked with the configuration."""
+    if text is None or "," not in text:
+        return text
+    try:
+        return tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise typer.BadParameter(
+            f"--forward is {text!r}, expected auto, an axis (+X) or three numbers (0,1,0)"
+        ) from None

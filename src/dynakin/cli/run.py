@@ -25,6 +25,7 @@ from dynakin.cli.options import (
     Static,
     TableName,
     Vertical,
+    forward_direction,
 )
 from dynakin.cli.summary import print_summary
 from dynakin.comparison import Trial, trial_of
@@ -33,7 +34,6 @@ from dynakin.errors import DynakinError
 from dynakin.filter import Estimator, presets
 from dynakin.filter.zero import standing_zero
 from dynakin.identifiability import Identifiability, identifiability
-from dynakin.model import load_model
 from dynakin.model.identified import read_identified
 from dynakin.recordings import read, without_plate_loads
 from dynakin.report import read_sensitivity, save_figures
@@ -133,7 +133,7 @@ def estimate_from(
     Raises:
         DynakinError: anything that is wrong with the input, in one line.
     """
-    model = load_model(config.model, config.subject(), markers=config.markers, table=config.table)
+    model = config.definition()
     recording = read(
         config.trial,
         config.forces,
@@ -181,15 +181,3 @@ def estimated(text: str | None) -> list[str] | None:
     if text is None:
         return None
     return [] if text.strip() == "none" else [part.strip() for part in text.split(",") if part.strip()]
-
-
-def forward_direction(text: str | None) -> str | tuple[float, ...] | None:
-    """`--forward 0,1,0` as numbers; a word stays a word and is checked with the configuration."""
-    if text is None or "," not in text:
-        return text
-    try:
-        return tuple(float(part) for part in text.split(","))
-    except ValueError:
-        raise typer.BadParameter(
-            f"--forward is {text!r}, expected auto, an axis (+X) or three numbers (0,1,0)"
-        ) from None

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import typer
 from rich.padding import Padding
 
-from dynakin.cli.compare_inputs import cases_of
+from dynakin.cli.compare_inputs import cases_of, given_keys
 from dynakin.cli.console import as_table, busy, out, progress_bar
 from dynakin.cli.options import (
     Backend,
@@ -30,7 +30,6 @@ from dynakin.cli.options import (
     TableName,
     Vertical,
 )
-from dynakin.cli.run import forward_direction
 from dynakin.comparison.case import Case
 from dynakin.engine import Journal, open_pool
 from dynakin.engine.folder import ROWS, open_folder
@@ -167,37 +166,6 @@ def fit(
         console.print(sentence)
     console.print(f"\nPreset  {folder / 'preset_fit.toml'} (dynakin run ... --preset FILE)", soft_wrap=True)
     console.print(f"Tables  {folder / 'fit.csv'}, {folder / 'fit.json'}", soft_wrap=True)
-
-
-def given_keys(
-    model: str | None,
-    markers: str | None,
-    static: Path | None,
-    mass: float | None,
-    height: float | None,
-    sex: str | None,
-    side: str | None,
-    vertical: str | None,
-    forward: str | None,
-    table: str | None,
-    plate_filter: float | None,
-    force_threshold: float | None,
-) -> dict[str, Any]:
-    """The command line's options by the keys of a configuration."""
-    return {
-        "model": model,
-        "markers": markers,
-        "static": static,
-        "mass_kg": mass,
-        "height_m": height,
-        "sex": sex,
-        "side": side,
-        "vertical": vertical,
-        "forward": forward_direction(forward),
-        "table": table,
-        "plate_filter_hz": plate_filter,
-        "force_threshold_n": force_threshold,
-    }
 
 
 def axes_of(vary: Sequence[str], cases: Sequence[Case]) -> tuple[Axis, ...]:

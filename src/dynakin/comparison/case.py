@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from dynakin.comparison.setup import Setup
 from dynakin.config import RunConfig
 from dynakin.filter import presets as known_presets
-from dynakin.model import load_model
 from dynakin.recordings import Recording, read, without_plate_loads
 
 
@@ -36,7 +35,7 @@ def case_of(config: RunConfig, presets: Sequence[str], cutoff_hz: float) -> Case
         for name in (presets or [config.preset])
     }
     setup = Setup(
-        load_model(config.model, config.subject(), markers=config.markers, table=config.table),
+        config.definition(),
         noise,
         cutoff_hz,
         config.priors,

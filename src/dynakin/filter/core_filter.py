@@ -5,12 +5,15 @@ from __future__ import annotations
 from collections.abc import Collection
 
 import numpy as np
+import numpy.typing as npt
 
 from dynakin import _core
 from dynakin.errors import ConfigError
 from dynakin.filter.extend import QUANTITIES, Quantity, continuous_noise, extended, initial_covariance
 from dynakin.filter.noise import Noise, gate_limits
 from dynakin.model import InitialModel
+
+Array = npt.NDArray[np.float64]
 
 
 def core_filter(
@@ -52,13 +55,7 @@ def filter_settings(
         process_variance=noise.process_variance(layout),
         process_density=density,
         decay_rate=decay,
-        marker_variance=noise.marker_variance(
-            initial.recorded_markers,
-            initial.marker_variance,
-            initial.soft_tissue_m,
-            initial.unmodelled_m,
-            "soft_tissue" in estimate,
-        ),
+        marker_variance=marker_variance(initial, noise, estimate),
         wrench_covariance=noise.wrench_covariance(),
         reference_point=initial.plate_centre if point == "auto" else np.array(point, dtype=float),
         total_mass=initial.weighed_kg if noise.total_mass_use == "frame" else None,
@@ -71,4 +68,15 @@ def filter_settings(
         wrench_needs_markers=noise.recover,
         iterate_beyond=np.inf if noise.iterate_beyond is None else noise.iterate_beyond,
         recovery=recovery,
+    )
+
+
+def marker_variance(initial: InitialModel, noise: Noise, estimate: Collection[Quantity] = QUANTITIES) -> Array:
+    """R (M,) m^2 of the markers of a model that has the states these settings ask for."""
+    return noise.marker_variance(
+        initial.recorded_markers,
+        initial.marker_variance,
+        initial.soft_tissue_m,
+        initial.unmodelled_m,
+        "soft_tissue" in estimate,
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -11,7 +10,7 @@ import tomli_w
 
 from dynakin.errors import ConfigError, ModelError, OutputError
 from dynakin.filter.noise import Noise
-from dynakin.model.validation import nearest, validate
+from dynakin.model.validation import nearest, read_toml, validate
 
 _KEYS = ("base", "noise")
 
@@ -26,12 +25,7 @@ def read_preset(path: Path, named: Callable[[str], Noise]) -> Noise:
     Raises:
         ConfigError: the file cannot be read, or a key or value is wrong; the message names it.
     """
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
-    except tomllib.TOMLDecodeError as error:
-        raise ConfigError(f"{path}: not a TOML file: {error}") from None
+    content = read_toml(path, ConfigError)
     for key in content:
         if key not in _KEYS:
             raise ConfigError(f"{path}: unknown key {key!r}{nearest(key, _KEYS)}; expected keys: {', '.join(_KEYS)}")

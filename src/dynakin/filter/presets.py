@@ -21,7 +21,7 @@ def default() -> Noise:
         marker_place=0.0,
         jerk=60.0,
         jerk_translation=10.0,
-        floating_jerk=1e4,
+        floating_jerk=3e4,
         floating_jerk_translation=1e3,
         length_drift=3e-6,
         length_skin=0.6,

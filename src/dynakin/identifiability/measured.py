@@ -10,6 +10,7 @@ import numpy.typing as npt
 from dynakin import _core
 from dynakin.errors import ConfigError
 from dynakin.filter import Estimator
+from dynakin.filter.core_filter import marker_variance
 from dynakin.filter.extend import initial_covariance
 from dynakin.model import InitialModel
 
@@ -48,7 +49,7 @@ class MeasuredModel:
         initial, noise = estimator.initial, estimator.noise
         if initial is None:
             raise ConfigError("identifiability: the estimator has not been started; call run or start first")
-        variance = noise.marker_variance(initial.recorded_markers, initial.marker_variance, initial.soft_tissue_m)
+        variance = marker_variance(initial, noise, estimator.estimate)
         return cls(
             _core.Model(initial.spec),
             initial,

@@ -7,7 +7,7 @@ from dynakin.model.initialise import initialise
 from dynakin.model.loads import CarriedLoad, with_loads
 from dynakin.model.marker_set import available_marker_sets, load_marker_set
 from dynakin.model.measure import measure
-from dynakin.model.opensim import OpenSimDefinition, load_opensim
+from dynakin.model.opensim import OpenSimDefinition, OpenSimOptions, load_opensim
 from dynakin.model.priors import Bounds, Priors
 from dynakin.model.subject import Subject
 from dynakin.model.table import load_table
@@ -19,6 +19,7 @@ __all__ = [
     "InitialModel",
     "ModelDefinition",
     "OpenSimDefinition",
+    "OpenSimOptions",
     "Priors",
     "Subject",
     "available_marker_sets",

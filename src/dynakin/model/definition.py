@@ -9,7 +9,7 @@ from pathlib import Path
 from dynakin.errors import ModelError
 from dynakin.model.marker_schema import MarkerSetFile
 from dynakin.model.marker_set import load_marker_set
-from dynakin.model.opensim.definition import OpenSimDefinition, load_opensim
+from dynakin.model.opensim.definition import OpenSimDefinition, OpenSimOptions, load_opensim
 from dynakin.model.schema import ModelFile
 from dynakin.model.subject import Subject
 from dynakin.model.table import BodyTable, load_table
@@ -55,16 +55,18 @@ def load_model(
     subject: Subject | None = None,
     markers: str | Path = "auto",
     table: str | Path = "dumas",
+    opensim: OpenSimOptions | None = None,
 ) -> Definition:
     """A built-in model ("sagittal7", "squat7"), a TOML file, or an OpenSim model (.osim, versions 3 and 4).
 
-    An OpenSim model brings its own markers and inertia; ``load_opensim`` has its options.
+    An OpenSim model brings its own markers and inertia.
 
     Args:
         subject: who is measured; nothing is known where not given.
         markers: "auto" (by the recording's names), a built-in set ("opencap", "plug-in-gait"), or a TOML
             file.
         table: "dumas", "deleva" or a CSV file of the same shape.
+        opensim: what of an OpenSim model can be estimated; other models do not read it.
 
     Raises:
         ModelError: an unknown name (the nearest is suggested), or a wrong file (file and key are named).
@@ -73,7 +75,7 @@ def load_model(
     if Path(name_or_path).suffix.casefold() == ".osim":
         if str(markers) != "auto":
             raise ModelError(f"markers is {str(markers)!r}, expected auto: {name} has markers of its own")
-        return load_opensim(name, subject)
+        return load_opensim(name, subject, opensim)
     return load_built_in_or_toml(name, subject, markers, table)
 
 

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
 
-from dynakin.errors import ModelError
+from dynakin.errors import DynakinError, ModelError
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
@@ -46,18 +46,18 @@ class Strict(BaseModel):
 Schema = TypeVar("Schema", bound=BaseModel)
 
 
-def read_toml(path: Path) -> dict[str, Any]:
+def read_toml(path: Path, raises: type[DynakinError] = ModelError) -> dict[str, Any]:
     """The content of a TOML file.
 
     Raises:
-        ModelError: no such file, not readable, or not TOML (with the line).
+        ModelError (or ``raises``): no such file, not readable, or not TOML (with the line).
     """
     try:
         return tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
-        raise ModelError(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
+        raise raises(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
     except tomllib.TOMLDecodeError as error:
-        raise ModelError(f"{path}: not a TOML file: {error}") from None
+        raise raises(f"{path}: not a TOML file: {error}") from None
 
 
 def _place(location: tuple[int | str, ...], data: Any) -> str:

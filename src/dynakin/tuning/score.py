@@ -11,7 +11,8 @@ import numpy.typing as npt
 
 from dynakin import _core
 from dynakin.filter import Noise
-from dynakin.filter.core_filter import core_filter
+from dynakin.filter.core_filter import core_filter, marker_variance
+from dynakin.filter.extend import extended
 from dynakin.results import COMPONENTS
 from dynakin.tuning.settings import changed
 from dynakin.tuning.trial import TuningTrial, undoubting
@@ -63,7 +64,7 @@ def score_task(shared: Shared, payload: tuple[int, Mapping[str, float]]) -> dict
 
 def run_score(trial: TuningTrial, noise: Noise, markers: Array | None = None, trace: bool = False) -> dict[str, Any]:
     """The core's sums over the trial's frames that count; see `_core.Filter.score`."""
-    _, _, core = core_filter(trial.initial, noise)
+    _, _, core = core_filter(trial.initial, noise, trial.estimate)
     given = trial.markers if markers is None else markers
     found: dict[str, Any] = core.score(
         trial.time, given, trial.wrench, trial.first, trial.end, ahead=trial.ahead, lost_m=LOST_M, trace=trace
@@ -118,7 +119,7 @@ def left_out_mm(trial: TuningTrial, noise: Noise) -> float | None:
 
 def left_out_error(trial: TuningTrial, noise: Noise, hidden: Array, marker: int) -> float | None:
     """RMS distance (mm) of one marker that ``hidden`` (T, M, 3) does not hold."""
-    _, model, core = core_filter(trial.initial, noise)
+    _, model, core = core_filter(trial.initial, noise, trial.estimate)
     traced = core.score(trial.time, hidden, trial.wrench, trial.first, trial.end, lost_m=LOST_M, trace=True)
     if traced["divergence"]:
         return None
@@ -146,8 +147,8 @@ def _distances(rms: Array) -> Array:
 
 def _declared_sd(trial: TuningTrial, noise: Noise) -> Array:
     """Standard deviation (3M + 6,) of each channel's noise; the moments' about the ground origin."""
-    initial = trial.initial
-    markers = noise.marker_variance(initial.recorded_markers, initial.marker_variance, initial.soft_tissue_m)
+    initial = extended(trial.initial, noise, trial.estimate)
+    markers = marker_variance(initial, noise, trial.estimate)
     point = initial.plate_centre if noise.reference_point_m == "auto" else np.array(noise.reference_point_m)
     x, y, z = point
     lever = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])

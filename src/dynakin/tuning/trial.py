@@ -10,6 +10,7 @@ import numpy.typing as npt
 from dynakin.engine.journal import digest
 from dynakin.filter import Estimator, Noise
 from dynakin.filter.alignment import in_step
+from dynakin.filter.extend import QUANTITIES, Quantity
 from dynakin.model import InitialModel
 from dynakin.recordings import Recording
 from dynakin.results import evaluation_window
@@ -30,6 +31,7 @@ class TuningTrial:
         first, end: the frames that count; those before are filtered too.
         ahead: frames of the horizon of "100 ms ahead".
         taken_out: sensors that the starting settings refused, summed over frames.
+        estimate: kinds of parameters that are estimated.
     """
 
     name: str
@@ -41,6 +43,7 @@ class TuningTrial:
     end: int
     ahead: int
     taken_out: int = 0
+    estimate: tuple[Quantity, ...] = QUANTITIES
 
     def counted(self, first: int, end: int) -> TuningTrial:
         """The same, judged on other frames."""
@@ -68,6 +71,7 @@ class TuningTrial:
         return {
             "name": self.name,
             "arrays": [digest([float(x).hex() for x in values.ravel()]) for values in arrays],
+            "estimate": list(self.estimate),
             "counted": [self.first, self.end, self.ahead],
         }
 
@@ -108,6 +112,7 @@ def prepare(
         len(recording.time),
         max(1, round(horizon_s / step)),
         taken_out,
+        estimator.estimate,
     )
 
 

@@ -10,7 +10,8 @@ import pytest
 import dynakin
 from dynakin import _core
 from dynakin.errors import ModelError
-from dynakin.model import Subject, initialise, load_model, load_opensim
+from dynakin.filter import presets
+from dynakin.model import InitialModel, Subject, initialise, load_model, load_opensim
 from dynakin.model.opensim.initial import feet_of, limits_of
 from dynakin.model.opensim.read import read_osim
 from dynakin.model.opensim.skin import skin_of
@@ -53,20 +54,22 @@ def test_everything_from_the_file_but_mass_and_posture(folder: Path, squats: Rec
 
 def test_what_is_estimated_is_a_choice(folder: Path, squats: Recording) -> None:
     path = folder / FILE
-    nothing = initialise(load_opensim(path, estimate=()), squats)
+
+    def started(estimate: tuple[str, ...], **options: object) -> InitialModel:
+        noise = presets.default().model_copy(update={"plate_force": 0.0, "plate_moment": 0.0, "plate_delay_s": 0.0})
+        return dynakin.Estimator(load_opensim(path, **options), noise, estimate=estimate).start(squats)
+
+    nothing = started(())
     assert len(nothing.names) == 3 * 31  # toes have no markers
     assert [c.name for c in nothing.spec.coordinates if c.locked] == ["mtp_angle_r", "mtp_angle_l"]
-    assert len(initialise(load_opensim(path, estimate=(), lock_unseen=False), squats).names) == 3 * 33
-    # Of a place that is held, what is not known of it is noise of its marker, whoever holds it.
-    definition = load_opensim(path, estimate=("markers",))
-    places = initialise(definition, squats)
+    assert len(started((), lock_unseen=False).names) == 3 * 33
+    places = started(("markers",))
     assert len(places.names) == 3 * 31 + 3 * 45
-    held = dynakin.Estimator(definition, estimate=("lengths",)).start_from(places)
-    np.testing.assert_allclose(held.unmodelled_m, nothing.unmodelled_m)
+    # Of a place that is held, what is not known of it is noise of its marker.
     assert (nothing.unmodelled_m > places.unmodelled_m).all()
-    few = initialise(load_opensim(path, scale=("femur_r", "femur_l"), share_sides=False, estimate=("lengths",)), squats)
+    few = started(("lengths",), scale=("femur_r", "femur_l"), share_sides=False)
     assert [name for name in few.names if name.startswith("length")] == ["length/scale_femur_r", "length/scale_femur_l"]
-    shared = initialise(load_opensim(path, scale=("femur_r", "femur_l"), estimate=("lengths", "inertia")), squats)
+    shared = started(("lengths", "inertia"), scale=("femur_r", "femur_l"))
     k = shared.names.index("length/scale_femur")
     assert (shared.x0[k], shared.lower[k], shared.upper[k]) == (1.0, 0.8, 1.2)
     assert shared.dimensionless == {"scale_femur"}
@@ -99,8 +102,8 @@ def test_wrong_requests_are_refused(folder: Path, squats: Recording, tmp_path: P
         initialise(load_opensim(small_model(tmp_path, "PinJoint", 4)), squats)
     with pytest.raises(ModelError, match=r"no marker 'R_HJ'.*did you mean 'R_HJC'"):
         initialise(load_opensim(folder / FILE, leave_out=("R_HJ",)), squats)
-    with pytest.raises(ModelError, match="estimate"):
-        load_opensim(folder / FILE, estimate=("masses",))
+    with pytest.raises(ModelError, match="lightest_share"):
+        load_opensim(folder / FILE, lightest_share=1.0)
     with pytest.raises(ModelError, match="unknown key 'scal'"):
         load_opensim(folder / FILE, scal=None)
     with pytest.raises(ModelError, match="expected auto"):

@@ -14,21 +14,16 @@ from dynakin.model.opensim.scales import scale_names
 from dynakin.model.subject import Subject
 from dynakin.model.validation import Strict, validate
 
-Estimated = Literal["lengths", "markers", "soft_tissue", "inertia"]
-ALL: tuple[Estimated, ...] = ("lengths", "markers", "soft_tissue", "inertia")
-
 
 class OpenSimOptions(Strict):
-    """What is estimated of an OpenSim model beside its motion, and what is taken as the file has it."""
+    """What of an OpenSim model can be estimated, and what is taken as the file has it."""
 
     scale: Literal["all"] | tuple[str, ...] | None = "all"
-    """Bodies with a scale parameter, on which the joints placed on that body depend; None: none."""
+    """Bodies with a scale parameter, on which the joints placed on that body depend; []: none."""
     share_sides: bool = True
     """Whether mirrored bodies (femur_r, femur_l) share one."""
     scale_masses: bool = True
     """Whether all masses and inertias are multiplied so that they sum to the subject's mass."""
-    estimate: tuple[Estimated, ...] = ALL
-    """Which constants are estimated, and whether skin and flesh move under the markers."""
     lightest_share: float = Field(default=0.01, ge=0.0, lt=1.0)
     """Bodies of less than this part of the whole mass keep the file's mass and inertia: no recording tells of them."""
     lock_unseen: bool = True
@@ -44,7 +39,7 @@ class OpenSimDefinition:
     Attributes:
         source: the file's content.
         subject: mass, height, sex, as far as they are told.
-        options: what is estimated.
+        options: what can be estimated.
         scales: scale parameter of each body that has one.
     """
 
@@ -64,17 +59,20 @@ class OpenSimDefinition:
         return self.source.path
 
 
-def load_opensim(path: str | Path, subject: Subject | None = None, **options: object) -> OpenSimDefinition:
+def load_opensim(
+    path: str | Path, subject: Subject | None = None, options: OpenSimOptions | None = None, **fields: object
+) -> OpenSimDefinition:
     """An OpenSim model (.osim, versions 3 and 4) for the filter.
 
     Args:
         subject: who is measured; nothing is known where not given.
-        options: fields of ``OpenSimOptions``.
+        options: what can be estimated; ``fields`` are single ones of it (``scale=None``).
 
     Raises:
         ModelError: the file or an option is wrong, or holds what is not supported; its place is named.
     """
     source = read_osim(path)
-    chosen = validate(OpenSimOptions, options, "OpenSim model")
+    given = {} if options is None else options.model_dump()
+    chosen = validate(OpenSimOptions, given | fields, "OpenSim model")
     scales = scale_names(source, chosen.scale, share=chosen.share_sides)
     return OpenSimDefinition(source, subject or Subject(), chosen, scales)

@@ -30,7 +30,6 @@ _A_TURN = 1e-3  # rad: files write pi with few digits
 _MODEL_M = 0.003
 """Standard deviation of a marker for what a generic skeleton, scaled, gets wrong of a person's joints: on `squats1` the
 normalised innovations are consistent with it (1.1), and far too large with the cameras' noise alone (1.9 to 18)."""
-_SKIN_SHARE = 0.5  # of the declared size, as the default preset has it, where no state stands for it
 _FEET = ("calcn", "foot", "calc", "talus")  # bodies that stand on the ground, the first that a model has
 
 
@@ -68,8 +67,6 @@ def lay_on(
             source,
             definition.scales,
             markers=[marker for marker, _ in chosen],
-            estimate_scales="lengths" in options.estimate,
-            estimate_places="markers" in options.estimate,
             estimate_inertia=carried,
             values=values,
             lock=lock,
@@ -99,7 +96,6 @@ def lay_on(
     x0 = np.array(core.initial_state(), dtype=float)
     table = {f"inertia/{s.name}/{k}": v for s in spec.segments for k, v in zip(INERTIA_NAMES, s.inertia, strict=True)}
     skin = np.array([skin_of(marker.name, marker.body) for marker, _ in chosen])
-    moves = "soft_tissue" in options.estimate
     known = priors or Priors()
     known = known.model_copy(update={"marker_m": float(np.hypot(known.marker_m, fit.rms_m / np.sqrt(3.0)))})
     return InitialModel(
@@ -111,7 +107,7 @@ def lay_on(
         upper=upper,
         table=in_layout(names, table, np.nan),
         marker_variance=skin[:, 0],
-        soft_tissue_m=skin[:, 1] if moves else np.zeros(len(skin)),
+        soft_tissue_m=skin[:, 1],
         ground=frame,
         plate_centre=first_centre_of_pressure(recording, frame),
         recorded_markers=tuple(name for _, name in chosen),
@@ -122,16 +118,9 @@ def lay_on(
         messages=tuple(messages),
         plan=None,
         feet=feet_of(source),
-        unmodelled_m=_unmodelled(skin[:, 1], options.estimate, known.marker_m),
+        unmodelled_m=np.full(len(skin), _MODEL_M),
         dimensionless=frozenset(lengths),
     )
-
-
-def _unmodelled(declared_m: Array, estimate: tuple[str, ...], place_m: float) -> Array:
-    """(M,) m: what is not estimated, of skin and of the markers' places, is noise beside the skeleton's errors."""
-    skin = 0.0 if "soft_tissue" in estimate else _SKIN_SHARE
-    place = 0.0 if "markers" in estimate else place_m
-    return np.sqrt(_MODEL_M**2 + place**2 + (skin * declared_m) ** 2)
 
 
 def limits_of(source: OpenSimModel) -> dict[str, Interval]:
@@ -172,8 +161,6 @@ def _of_subject(
 
 def _estimated_bodies(source: OpenSimModel, definition: OpenSimDefinition, messages: list[str]) -> list[str]:
     """Bodies whose ten numbers are estimated; says which are not."""
-    if "inertia" not in definition.options.estimate:
-        return []
     heavy = [b for b in source.bodies if b.mass > 0.0 and b.mass >= definition.options.lightest_share * source.mass]
     impossible = [body.name for body in heavy if not body.rigid.possible()]
     if impossible:

@@ -43,7 +43,7 @@ def _sets() -> tuple[dict[str, Skin], dict[str, Skin]]:
         for marker in load_marker_set(name).markers:
             if marker.variance is None:
                 continue
-            skin = (float(marker.variance), 1e-3 * float(marker.soft_tissue_mm))
+            skin = (float(marker.variance), marker.soft_tissue_m(planar=False))
             segments.setdefault(_part(marker.segment), []).append(skin)
             for alias in (*marker.right, *marker.left, *marker.centre):
                 named.setdefault(plain_name(alias), skin)

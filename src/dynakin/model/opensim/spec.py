@@ -53,8 +53,6 @@ def to_spec(
     scales: Mapping[str, str],
     *,
     markers: Sequence[Marker] | None = None,
-    estimate_scales: bool = True,
-    estimate_places: bool = True,
     estimate_inertia: Collection[str] = (),
     values: Mapping[str, float] | None = None,
     lock: Collection[str] = (),
@@ -80,7 +78,7 @@ def to_spec(
             for c in free_coordinates(model)
             if c.name in moving
         ],
-        parameters=[_core.ParameterSpec(name, 1.0, estimate_scales) for name in used_scales(placed)],
+        parameters=[_core.ParameterSpec(name, 1.0, True) for name in used_scales(placed)],
         segments=[
             _core.SegmentSpec(
                 name=name,
@@ -94,7 +92,7 @@ def to_spec(
             )
             for name, segment in placed.items()
         ],
-        markers=[_core.MarkerSpec(m.name, m.body, np.array(m.location), AXES, [estimate_places] * 3) for m in sites],
+        markers=[_core.MarkerSpec(m.name, m.body, np.array(m.location), AXES, AXES) for m in sites],
         gravity=np.array(model.gravity),
     )
 
