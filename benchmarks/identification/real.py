@@ -1,6 +1,6 @@
 """Held out on real recordings: `squats1` by halves, and `squats1` with `static1` judged on `walking1`.
 
-    python benchmarks/identification/real.py [--model sagittal7|fullbody|FILE.osim] [--data FOLDER]
+    python benchmarks/identification/real.py [--model sagittal7|fullbody|FILE.osim] [--data FOLDER] [--walking]
 
 `product` is what `dynakin run --parameters` does: the filter itself, started from the subject file, on the judging part
 with its plates taken away, smoothed; the others are predictions of `candidates.py`. `walking1` is for models in space:
@@ -85,6 +85,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--data", type=Path, default=Path("../shared/data/opencap_subject4"))
     parser.add_argument("--model", default="sagittal7")
+    parser.add_argument("--walking", action="store_true", help="walking1 alone, for models in space.")
     args = parser.parse_args()
     squats, static, walking = (
         dynakin.read(args.data / f"{name}.trc", args.data / f"{name}_grf.mot")
@@ -92,7 +93,7 @@ def main() -> None:
     )
     markers = {} if args.model.endswith(".osim") else {"markers": "opencap"}
     model = dynakin.load_model(args.model, subject=dynakin.Subject(mass_kg=MASS_KG), **markers)
-    for order, with_static in ((1, False), (-1, False), (1, True), (-1, True)):
+    for order, with_static in () if args.walking else ((1, False), (-1, False), (1, True), (-1, True)):
         first, second = halves(squats)[::order]
         compare(model, [first, static] if with_static else [first], static, second, walks=False)
     if args.model not in ("sagittal7", "squat7"):

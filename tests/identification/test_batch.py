@@ -10,6 +10,7 @@ import pytest
 from dynakin.identification import (
     MeasuredTrial,
     Unknowns,
+    decide,
     identify_batch,
     integrated_autocorrelation,
 )
@@ -83,3 +84,17 @@ def test_autocorrelation_of_a_first_order_process() -> None:
         x[k] = rho * x[k - 1] + e
     assert integrated_autocorrelation(x) == pytest.approx((1 + rho) / (1 - rho), rel=0.15)
     assert integrated_autocorrelation(rng.normal(size=count)) == pytest.approx(1.0, abs=0.1)
+
+
+def test_where_the_table_is_right_it_is_kept(case: Case) -> None:
+    """Plates that say what the table says, with errors that last: nothing that others fit to them may be used."""
+    rng = np.random.default_rng(3)
+    unknowns = Unknowns.of(case.common)
+    trials = []
+    for trial in exact(case, np.zeros(len(unknowns.sd))):
+        count = len(trial.movement.time)
+        slow = np.repeat(rng.normal(size=(count // 10 + 1, 6)), 10, axis=0)[:count]
+        trials.append(replace(trial, wrench=trial.wrench + slow * [5.0, 5.0, 0.0, 0.0, 0.0, 3.0]))
+    decision = decide(case.common, trials)
+    assert decision.use == "table"
+    assert decision.in_words()[-1].startswith("The table is kept: held-out gain")

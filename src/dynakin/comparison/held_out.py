@@ -13,7 +13,7 @@ from dynakin.comparison.statistics import spread
 from dynakin.comparison.table2 import Row, unit_of
 from dynakin.errors import ModelError, RecordingError
 from dynakin.filter.smoothing import can_smooth
-from dynakin.model import InitialModel, initialise
+from dynakin.model import Bounds, Definition, InitialModel, Priors, initialise
 from dynakin.recordings import GroundFrame, Recording, check_plates
 from dynakin.reference import identify, predicted_wrench, reference_methods
 from dynakin.results import COMPONENTS, Estimate, evaluation_window, signal_fit
@@ -167,18 +167,46 @@ def marker_paths(recording: Recording, initial: InitialModel, ground: GroundFram
     return ground.points_to_ground(np.stack(paths, axis=1))
 
 
-def _start(identified: Identified, recording: Recording) -> InitialModel:
-    """Where the judging trial begins; lengths, places and body as measured for the identifying one."""
-    measured, setup = identified.initial, identified.setup
+def start_as(
+    measured: InitialModel,
+    definition: Definition,
+    recording: Recording,
+    ground: GroundFrame | None,
+    static: Recording,
+    *,
+    forward: str | tuple[float, float, float],
+    priors: Priors | None,
+    bounds: Bounds | None,
+) -> InitialModel:
+    """Where a trial begins on a model that was ``measured`` on another one: lengths, places and body as there.
+
+    Args:
+        definition: that was measured. ground: of the same laboratory, None: found. static: lengths come from it.
+        forward, priors, bounds: as for `initialise`.
+    """
     known = {"mass_kg": measured.mass_kg, "height_m": measured.height_m}
-    definition = replace(setup.definition, subject=setup.definition.subject.model_copy(update=known))
     return initialise(
-        definition,
+        replace(definition, subject=definition.subject.model_copy(update=known)),
         recording,
-        identified.ground,
-        static=identified.static or identified.recording,
+        ground,
+        static=static,
         side=measured.side,
         vertical=measured.ground.vertical,
+        forward=forward,
+        priors=priors,
+        bounds=bounds,
+    )
+
+
+def _start(identified: Identified, recording: Recording) -> InitialModel:
+    """Where the judging trial begins; lengths, places and body as measured for the identifying one."""
+    setup = identified.setup
+    return start_as(
+        identified.initial,
+        setup.definition,
+        recording,
+        identified.ground,
+        identified.static or identified.recording,
         forward=setup.forward,
         priors=setup.priors,
         bounds=setup.bounds,

@@ -10,11 +10,11 @@ import numpy.typing as npt
 
 from dynakin import _core
 from dynakin.comparison.freeze import freeze, initial_values
-from dynakin.comparison.held_out import marker_paths, measured_wrench
+from dynakin.comparison.held_out import marker_paths, measured_wrench, start_as
 from dynakin.errors import ModelError, RecordingError
 from dynakin.filter import Estimator
 from dynakin.filter.total_wrench import leave_out_unknown
-from dynakin.model import InitialModel, OpenSimDefinition, initialise
+from dynakin.model import InitialModel, OpenSimDefinition
 from dynakin.recordings import GroundFrame, Recording, check_plates
 from dynakin.recordings.foot_loads import LOADED_N, foot_loads
 from dynakin.recordings.smoothing import CUTOFF_HZ, smooth
@@ -200,16 +200,13 @@ class Common:
         return wrench
 
     def _start(self, recording: Recording, ground: GroundFrame | None) -> InitialModel:
-        estimator, initial = self.estimator, self.initial
-        known = {"mass_kg": initial.mass_kg, "height_m": initial.height_m}
-        definition = replace(estimator.model, subject=estimator.model.subject.model_copy(update=known))
-        return initialise(
-            definition,
+        estimator = self.estimator
+        return start_as(
+            self.initial,
+            estimator.model,
             recording,
             ground,
-            static=self.static,
-            side=initial.side,
-            vertical=initial.ground.vertical,
+            self.static,
             forward=estimator.forward,
             priors=estimator.priors,
             bounds=estimator.bounds,

@@ -19,8 +19,8 @@ SCALED_M = 0.4  # of a segment that a dimensionless factor of an OpenSim model s
 
 @dataclass(frozen=True)
 class GeometryPriors:
-    """Standard deviations of what geometry may be wrong by. Tight on purpose: with 10 mm and 2 deg a subject's
-    simulated tasks predict one another worse (docs/identification.md), as skin that follows a posture is no constant.
+    """Standard deviations of what geometry may be wrong by, where it is free. Tight, as skin that follows a posture is
+    no constant; 10 mm and 2 deg foretell one simulated task of three better and two as well (docs/identification.md).
     """
 
     length_m: float = 0.004
