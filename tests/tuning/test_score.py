@@ -75,8 +75,11 @@ def test_halves_share_the_trial_and_add_up(default: Shared) -> None:
 
 
 def test_a_filter_that_loses_the_person_has_no_figures(paper: Shared) -> None:
-    found = score_task(paper, (0, {"coordinate": 1e-6, "speed": 1e-6, "acceleration": 1e-6}))
-    assert found["divergence"] and found["done"] < len(paper.trials[0].time)
+    trial = paper.trials[0]
+    markers = trial.markers.copy()
+    markers[150:] += 3.0  # somebody else, further than a body with its toes in the ground can reach
+    found = score_task(replace(paper, trials=(replace(trial, markers=markers),)), (0, {}))
+    assert found["divergence"] and 150 < found["done"] < len(trial.time)
     assert found["paper"] is None and found["nll"] is None
 
 
