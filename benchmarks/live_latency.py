@@ -4,8 +4,9 @@
 
 Prints a table. "CPU": the time that the session's thread worked from one frame to the next, whoever else ran. "Others"
 is the share of all cores that other processes took meanwhile: above a few percent the longest latencies are theirs. The
-whole body needs real recordings (../shared/data, or DYNAKIN_TEST_DATA), interpolated to 200 Hz. With the viewer its
-process runs; no browser is open, because one that draws without a graphics card takes the machine.
+whole body needs real recordings (../shared/data, or DYNAKIN_TEST_DATA), interpolated to 200 Hz and played forwards and
+backwards in turn, so that nothing jumps where it begins anew. With the viewer its process runs; no browser is open,
+because one that draws without a graphics card takes the machine.
 """
 
 from __future__ import annotations
@@ -145,7 +146,20 @@ def fullbody() -> tuple[Recording, dynakin.Estimator]:
     )
     denser = replace(recording, time=fine, markers=between(recording.time, recording.markers, fine), plates=plates)
     subject = dynakin.Subject(mass_kg=60.05, height_m=1.70)
-    return denser, dynakin.Estimator(dynakin.load_model("fullbody", subject))
+    return there_and_back(denser), dynakin.Estimator(dynakin.load_model("fullbody", subject))
+
+
+def there_and_back(recording: Recording) -> Recording:
+    """A movement that can be repeated without a jump; backwards it has the same forces."""
+
+    def both(values: np.ndarray) -> np.ndarray:
+        return np.concatenate([values, values[-2:0:-1]])
+
+    time_s = recording.time[0] + np.arange(2 * len(recording.time) - 2) / RATE_HZ
+    plates = tuple(
+        Plate(plate.name, *(both(np.asarray(getattr(plate, key))) for key in KEYS)) for plate in recording.plates
+    )
+    return replace(recording, time=time_s, markers=both(recording.markers), plates=plates)
 
 
 KEYS = ("force", "moment", "cop", "free_moment")

@@ -146,7 +146,7 @@ UpdateSums Filter::correct(const MarkerRef& markers, const Vector6& wrench) {
 // Gauss-Newton steps of the one update (iterated extended Kalman filter, Bell and Cathey 1993), from a measurement that
 // has been linearised at x_. The sums are those of the first step: of the innovation as it was predicted.
 UpdateSums Filter::iterate(const MarkerRef& markers, const Vector6& wrench, int most) {
-  constexpr double settled = 1e-6;  // rad or m
+  constexpr double settled = 1e-3;  // rad or m: a tangent is off by about half the square of its step
   x_before_ = x_;
   P_before_ = P_;
   UpdateSums first;

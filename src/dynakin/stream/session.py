@@ -23,6 +23,7 @@ _POLL_S = 0.005
 _ASK_S = 0.1  # how often sinks are asked for wishes, and the standing person is looked at
 _DEVIATIONS_S = 0.2
 _SPARSE_S = 0.05  # steps are never further apart than this because the computer is slow
+_CATCH_UP_S = 1.0  # with what came while the model was measured: that is left out too, but is no sign of slowness
 _MASS_KG = 70.0  # of a person of whom nothing is told, so that at least the movement is seen
 
 
@@ -69,7 +70,7 @@ class Live:
         self._fusion: Fusion | None = None
         self._window: deque[Fused] = deque()
         self._standing_since: float | None = None
-        self._came_s = 0.0
+        self._came_s = self._ready_s = 0.0
         self._looked = self._asked = self._told_sd = -np.inf
         self._monitor: Monitor | None = None
         self._use_plates = True
@@ -214,7 +215,8 @@ class Live:
         since = fused.sample.time_s - self._monitor.stepped_s
         if time.monotonic() - fused.arrived_s <= self.max_late_s or not 0.0 <= since < _SPARSE_S:
             return False
-        self._monitor.left_out += 1
+        if fused.arrived_s > self._ready_s + _CATCH_UP_S:
+            self._monitor.left_out += 1
         return True
 
     def _stand(self, fused: Fused) -> None:
@@ -273,6 +275,7 @@ class Live:
             names = self.fusion.plates.names
             self._feet = LiveFeet(initial, self.estimator.noise, names, self.estimator.plates)
         self._running = True
+        self._ready_s = time.monotonic()
         self._window.clear()
         started = Started(initial, model, self.fusion.markers.rate_hz)
         for sink in self.sinks:
