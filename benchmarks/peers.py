@@ -10,7 +10,9 @@ from __future__ import annotations
 
 import os
 import sys
+from collections.abc import Sequence
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -139,59 +141,81 @@ def residuals(peer: Kinematics) -> None:
         left_over(f"dynakin, {name}", dynakin.Estimator(definition).run(recorded("squats1")))
 
 
+GROUPS = (("flexions", FLEXION, 4), ("others of the legs", OTHERS, 6), ("pelvis", PELVIS, 6))
+
+
 def angles() -> None:
+    """Beside the recording's own inverse kinematics, whose weights it does not tell, and beside equal weights."""
     for trial in ("squats1", "walking1"):
         recording = recorded(trial)
         judged = np.ones(recording.n_frames, dtype=bool)
         if trial == "walking1":
             judged = (recording.time >= WALK[0]) & (recording.time <= WALK[1])
         table = read_table(DATA / f"{trial}_ik.mot")
-        for name, definition in models(trial).items():
-            estimator = dynakin.Estimator(definition)
+        theirs = Angles(table.names, table.time, table.values)
+        peer = inverse_kinematics(load(FILE), DATA / f"{trial}.trc")
+        equal = Angles(peer.coordinates, peer.time, peer.values)
+        print(
+            f"\n### `{trial}`, OpenSim with equal weights beside the recording's own\n\n| what | measured |\n|---|---|"
+        )
+        for title, wanted, _ in GROUPS:
+            print(f"| {title}, deg | {apart(equal, theirs, recording.time[judged], wanted)} |")
+        estimators = {name: dynakin.Estimator(definition) for name, definition in models(trial).items()}
+        held = dynakin.Estimator(models(trial)[".osim"], without_plates(), estimate=())
+        for name, estimator in {**estimators, ".osim, held as in OpenSim, markers only": held}.items():
             estimate = estimator.run(recording)
-            print(f"\n### `{trial}`, {name}\n\n| what | measured | goal |\n|---|---|---|")
-            for title, wanted, goal in (
-                ("flexions", FLEXION, 4),
-                ("others of the legs", OTHERS, 6),
-                ("pelvis", PELVIS, 6),
-            ):
-                print(f"| {title}, deg | {apart(estimate, table, wanted, judged)} | {goal} |")
-            told(estimate, judged)
+            ours = Angles(estimate.coordinate_names, estimate.time, estimate.data["coordinates"].values)
+            print(
+                f"\n### `{trial}`, {name}\n\n| what | beside the recording's own | with equal weights | goal |\n"
+                "|---|---|---|---|"
+            )
+            for title, wanted, goal in GROUPS:
+                gaps = [apart(ours, other, recording.time[judged], wanted) for other in (theirs, equal)]
+                print(f"| {title}, deg | {' | '.join(gaps)} | {goal} |")
+            if estimator is not held:
+                told(estimate, judged)
 
 
-def apart(estimate: Estimate, table: object, wanted: list[str], judged: Array) -> str:
-    """RMS difference of each coordinate from OpenSim's, less its mean, deg."""
-    names, found = estimate.coordinate_names, []
+class Angles(NamedTuple):
+    """Coordinates of a movement: names, time (T,) s, values (T, C) rad."""
+
+    names: Sequence[str]
+    time: Array
+    values: Array
+
+    def at(self, name: str, time: Array) -> Array:
+        return np.interp(time, self.time, self.values[:, list(self.names).index(name)])
+
+
+def apart(ours: Angles, theirs: Angles, time: Array, wanted: list[str]) -> str:
+    """RMS difference of each coordinate that both have, less its mean, deg."""
+    found = []
     for name in wanted:
-        if name not in names or name not in table.names:
-            continue
-        theirs = np.interp(estimate.time, table.time, table.values[:, table.names.index(name)])
-        gap = estimate.data["coordinates"].values[:, names.index(name)] - theirs
-        gap = np.rad2deg((gap + np.pi) % (2 * np.pi) - np.pi)[judged]
-        found.append(f"{name} {gap.std():.1f}")
+        if name in ours.names and name in theirs.names:
+            gap = ours.at(name, time) - theirs.at(name, time)
+            found.append(f"{name} {np.rad2deg((gap + np.pi) % (2 * np.pi) - np.pi).std():.1f}")
     return ", ".join(found)
 
 
 def told(estimate: Estimate, judged: Array) -> None:
     data = estimate.data
     measured, placed = data["markers_measured"].values[judged], data["markers_estimated"].values[judged]
-    print(f"| markers, mm | {distance_mm(measured, placed):.1f} | |")
+    print(f"| markers, mm | {distance_mm(measured, placed):.1f} | | |")
     bounded = [p for p in estimate.parameters if p.estimated and (p.lower is not None or p.upper is not None)]
     on = [p.name for p in bounded if p.at_bound]
-    print(
-        f"| parameters on a bound | {len(on)} of {len(bounded)} ({100 * len(on) / max(len(bounded), 1):.1f} %) | 5 % |"
-    )
+    share = 100 * len(on) / max(len(bounded), 1)
+    print(f"| parameters on a bound | {len(on)} of {len(bounded)} ({share:.1f} %) | | 5 % |")
     moved = displacements(estimate, judged)
     ratio = {n: d.rms / d.declared for n, d in moved.items() if d.rms is not None and d.declared}
     worst = sorted(ratio, key=lambda n: -ratio[n])[:3]
     beyond = sum(value > 1.5 for value in ratio.values())
     print(
         f"| soft tissue, RMS over declared size | median {np.median(list(ratio.values())):.2f}, {beyond} of "
-        f"{len(ratio)} beyond 1.5; largest {', '.join(f'{n} {ratio[n]:.1f}' for n in worst)} | 1.5 |"
+        f"{len(ratio)} beyond 1.5; largest {', '.join(f'{n} {ratio[n]:.1f}' for n in worst)} | | 1.5 |"
     )
     refused = (data["verdict"].values == 2).sum(axis=0)
     often = [f"{s} {k}" for s, k in zip(data["sensor"].values, refused, strict=True) if k]
-    print(f"| frames refused | {', '.join(often) or 'none'} | |", flush=True)
+    print(f"| frames refused | {', '.join(often) or 'none'} | | |", flush=True)
 
 
 def forecast(peer: Kinematics) -> None:
