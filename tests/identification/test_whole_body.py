@@ -29,7 +29,7 @@ def test_bodies_are_possible_and_weigh_what_was_measured(identified: Identified)
     assert len(bodies) == 15
     assert all(body.possible() for body in bodies)
     assert sum(body.mass for body in bodies) == pytest.approx(70.0, rel=1e-9)
-    for text in ("FZ", "MX", "70.00 kg in all", "right thigh"):
+    for text in ("FZ", "MX", "70.00 kg together", "right thigh"):
         assert text in " ".join(identified.subject.report)
 
 

@@ -76,7 +76,7 @@ def _print(found: Identified) -> None:
     total = found.posterior.unknowns.bodies.total
     shown = table(
         "segment", "mass, kg", "table's", "sd", "centre of mass moved", numbers=(1, 2, 3),
-        title=f"Identified bodies ({used}), {total:.2f} kg in all",
+        title=f"Identified bodies ({used}), {total:.2f} kg of {found.subject.mass_kg:.2f}",
     )  # fmt: skip
     for row in segment_rows(found.posterior):
         shown.add_row(row.segment, f"{row.mass:.2f}", f"{row.table:.2f}", f"{row.sd:.2f}", row.moved)

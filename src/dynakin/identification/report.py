@@ -69,7 +69,7 @@ def _moved(posterior: Posterior) -> list[str]:
     centres = [f"{row.segment} {row.moved}" for row in rows if row.moved]
     moved = listed(centres, 40) if centres else f"none by {1e3 * _CENTRE_M:.0f} mm"
     total = posterior.unknowns.bodies.total
-    return [f"Masses, {total:.2f} kg in all: {listed(masses, 40)}.", f"Centres of mass that moved: {moved}."]
+    return [f"Masses, {total:.2f} kg together: {listed(masses, 40)}.", f"Centres of mass that moved: {moved}."]
 
 
 def base_in_words(batch: Batch) -> list[str]:
