@@ -22,6 +22,7 @@ from peers_times import times
 import dynakin
 from dynakin.comparison import Setup, halves, identify_on, predict_blind
 from dynakin.comparison.held_out import measured_wrench
+from dynakin.filter.events import REFUSED
 from dynakin.filter.samples import recording_arrays
 from dynakin.model import Definition, Subject, load_model, load_opensim
 from dynakin.recordings import Recording, read_table
@@ -213,7 +214,7 @@ def told(estimate: Estimate, judged: Array) -> None:
         f"| soft tissue, RMS over declared size | median {np.median(list(ratio.values())):.2f}, {beyond} of "
         f"{len(ratio)} beyond 1.5; largest {', '.join(f'{n} {ratio[n]:.1f}' for n in worst)} | | 1.5 |"
     )
-    refused = (data["verdict"].values == 2).sum(axis=0)
+    refused = (data["verdict"].values == REFUSED).sum(axis=0)
     often = [f"{s} {k}" for s, k in zip(data["sensor"].values, refused, strict=True) if k]
     print(f"| frames refused | {', '.join(often) or 'none'} | | |", flush=True)
 

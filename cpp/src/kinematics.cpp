@@ -103,4 +103,14 @@ void marker_jacobian(const Model& model, const KinematicState& state, int marker
       if (c != k_none) out.col(column_slot[c]) += state.segments[site.segment].R_GB.col(k);
 }
 
+std::vector<std::vector<int>> marker_column_slots(const Model& model) {
+  std::vector<std::vector<int>> slots;
+  for (std::size_t m = 0; m < model.markers().size(); ++m) {
+    const auto& columns = model.marker_columns(static_cast<int>(m));
+    slots.emplace_back(model.state_size(), k_none);
+    for (std::size_t k = 0; k < columns.size(); ++k) slots.back()[columns[k]] = static_cast<int>(k);
+  }
+  return slots;
+}
+
 }  // namespace dynakin

@@ -27,6 +27,7 @@ Measurement::Measurement(const Model& model, const FilterSettings& settings)
     : model_(model),
       settings_(settings),
       wrench_used_(model.spec().wrench_measured),
+      slot_(marker_column_slots(model)),
       wrench_scratch_(6, model.state_size()),
       kinematics_(model),
       late_kinematics_(model),
@@ -41,8 +42,6 @@ Measurement::Measurement(const Model& model, const FilterSettings& settings)
   for (std::size_t m = 0; m < model.markers().size(); ++m) {
     const auto& columns = model.marker_columns(static_cast<int>(m));
     widest = std::max(widest, columns.size());
-    slot_.emplace_back(model.state_size(), k_none);
-    for (std::size_t k = 0; k < columns.size(); ++k) slot_.back()[columns[k]] = static_cast<int>(k);
     blocks_.emplace_back();
     blocks_.back().columns = &columns;
     blocks_.back().H.setZero(3, columns.size());

@@ -54,14 +54,13 @@ void RowVariances::operator()(const Eigen::MatrixXd& J, const Eigen::MatrixXd& P
 
 OutputDeviation::OutputDeviation(const Model& model)
     : model_(model),
+      slot_(marker_column_slots(model)),
       work_(model),
       moment_variances_(static_cast<Eigen::Index>(model.coordinates().size()), model.state_size()) {
   std::size_t widest = 0;
   for (std::size_t m = 0; m < model.markers().size(); ++m) {
     const auto& columns = model.marker_columns(static_cast<int>(m));
     widest = std::max(widest, columns.size());
-    slot_.emplace_back(model.state_size(), k_none);
-    for (std::size_t k = 0; k < columns.size(); ++k) slot_.back()[columns[k]] = static_cast<int>(k);
   }
   marker_J_.setZero(3, static_cast<Eigen::Index>(widest));
   wrench_J_.setZero(6, model.state_size());

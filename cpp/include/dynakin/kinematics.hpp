@@ -50,8 +50,11 @@ double parameter_value(const Model& model, const StateRef& x, int parameter);
 void forward_kinematics(const Model& model, const StateRef& x, KinematicState& out);
 
 // d p_GM / dx at the columns model.marker_columns(marker), zero-filled first; rows: x, y, z (3, columns).
-// column_slot[c] gives the place of state column c in the list.
+// column_slot[c] gives the place of state column c in the list (`marker_column_slots`).
 void marker_jacobian(const Model& model, const KinematicState& state, int marker, const std::vector<int>& column_slot,
                      Eigen::Ref<Eigen::Matrix<double, 3, Eigen::Dynamic>> out);
+
+// For each marker and state column its place in model.marker_columns(marker), or k_none.
+std::vector<std::vector<int>> marker_column_slots(const Model& model);
 
 }  // namespace dynakin

@@ -12,6 +12,8 @@ from dynakin.results.records import EventKind
 
 REFUSED = 2
 """Value of a verdict: 0 missing, 1 accepted, 2 refused (as the core has it)."""
+FOLLOWING = 0
+"""Value of tracking where nothing is wrong."""
 TRACKING = ("following", "doubtful", "lost", "found", "restarted")
 """Words of the core's tracking states, by their number."""
 

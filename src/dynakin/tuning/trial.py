@@ -10,6 +10,7 @@ import numpy.typing as npt
 from dynakin.engine.journal import digest
 from dynakin.filter import Estimator, Noise
 from dynakin.filter.alignment import in_step
+from dynakin.filter.events import FOLLOWING, REFUSED
 from dynakin.filter.extend import QUANTITIES, Quantity
 from dynakin.model import InitialModel
 from dynakin.recordings import Recording
@@ -18,7 +19,6 @@ from dynakin.results import evaluation_window
 Array = npt.NDArray[np.float64]
 
 HORIZON_S = 0.1
-_REFUSED, _FOLLOWING = 2, 0  # the core's Verdict and Tracking
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +94,8 @@ def prepare(
     if _doubts(estimator.noise):
         arrays, shift, _ = estimator.run_in_step(initial, recording.time, markers, wrench)
         wrench = in_step(recording.time, wrench, shift) if shift else wrench
-        refused = arrays["verdicts"] == _REFUSED
-        refused[arrays["tracking"] != _FOLLOWING] = True
+        refused = arrays["verdicts"] == REFUSED
+        refused[arrays["tracking"] != FOLLOWING] = True
         taken_out = int(refused.sum())
         markers, wrench = markers.copy(), wrench.copy()
         markers[refused[:, :-1]] = np.nan
