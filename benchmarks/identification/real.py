@@ -11,6 +11,7 @@ from the error.
 from __future__ import annotations
 
 import argparse
+import os
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -28,6 +29,7 @@ from dynakin.recordings import Recording
 from dynakin.results import COMPONENTS
 
 Array = np.ndarray
+DATA = Path(os.environ.get("DYNAKIN_TEST_DATA", "../shared/data")) / "opencap_subject4"
 MASS_KG = 60.05  # by the plates of static1 and squats1
 WALKING_KG = 63.0  # by those of walking1
 WALKING_S = (0.15, 1.20)  # every stance foot is on a plate
@@ -83,7 +85,7 @@ def compare(
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
-    parser.add_argument("--data", type=Path, default=Path("../shared/data/opencap_subject4"))
+    parser.add_argument("--data", type=Path, default=DATA)
     parser.add_argument("--model", default="sagittal7")
     parser.add_argument("--walking", action="store_true", help="walking1 alone, for models in space.")
     args = parser.parse_args()

@@ -57,7 +57,8 @@ def plausible(estimator: Estimator, estimate: Estimate, frames: npt.NDArray[np.b
     assert np.abs(np.diff(q[:, turns], axis=0)).max() < 15.0  # deg a frame: nothing flips over
     bound = [p for p in estimate.parameters if p.at_bound]
     assert len(bound) <= 0.05 * len(estimate.parameters)
-    assert np.nanmean(data["nis"].values / data["n_rows"].values) < 1.5
+    # Deviations are too large (1 would be right): measured 0.03 to 0.16.
+    assert 0.02 < np.nanmean(data["nis"].values / data["n_rows"].values) < 1.5
 
 
 def from_opensim(folder: Path, name: str, recording: Recording, estimate: Estimate) -> dict[str, Array]:
@@ -78,6 +79,7 @@ def test_squats(data_dir: Path) -> None:
     away = from_opensim(data_dir, "opencap_subject4/squats1_ik.mot", recording, estimate)
     assert max(away[name].std() for name in LEGS) < 4.5  # measured: hip 3.8, knee 3.3, ankle 4.2; goal 4
     assert max(away[name].std() for name in OTHERS) < 6.0
+    assert np.abs(estimate.data["wrench_remainder"].values).max() < 1e-9  # NaN would fail: both feet are on plates
 
 
 def test_walking(data_dir: Path) -> None:

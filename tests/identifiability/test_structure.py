@@ -35,6 +35,15 @@ def test_seven_hinges_in_the_plane_show_22_of_28(measured: MeasuredModel) -> Non
     assert in_no_base_parameter(base, measured) == []
 
 
+def test_a_whole_body_in_space_is_told_too() -> None:
+    """Neighbours share what a hinge lets move; gauges that are said alike are one sentence."""
+    structure = structure_of(estimator_of(load_model("fullbody")))
+    assert structure.base.rank == 105 and len(structure.base.over) == 150
+    said = structure.gauges_in_words
+    assert len(set(said)) == len(said) < len(structure.gauges.found)
+    assert "joint of the right hand: a mass at it may belong to the right forearm or to the right hand" in said
+
+
 def test_parameters_with_the_same_base_parameters_give_the_same_wrench(measured: MeasuredModel) -> None:
     """And those with others do not: the base parameters are all that the wrench depends on."""
     base = base_of(measured)

@@ -1,4 +1,4 @@
-"""`dynakin identify`: inertial parameters and geometry of a subject from several trials, kept where they predict."""
+"""`dynakin identify`: inertial parameters of a subject from several trials, kept where they predict."""
 
 from __future__ import annotations
 

@@ -24,21 +24,24 @@ from dynakin.model import (
     load_model,
 )
 from dynakin.model.definition import load_built_in_or_toml
-from dynakin.model.marker_schema import MarkerSetFile
+from dynakin.model.marker_schema import Marker, MarkerSetFile
 from dynakin.model.schema import ModelFile
 from dynakin.model.schema import Segment as ModelSegment
 
 
 def model(
     name: Annotated[
-        str | None, typer.Argument(help="squat7, sagittal7, a .toml or .osim file; none: list them.")
+        str | None, typer.Argument(help="squat7, sagittal7, fullbody, a .toml or .osim file; none: list them.")
     ] = None,
     markers: Markers = None,
     identifiable: Annotated[
         bool, typer.Option("--identifiability", help="What its measurements can tell: base parameters and gauges.")
     ] = False,
     trial: Annotated[
-        Path | None, typer.Option(help="With --identifiability: what this recording tells, and what would tell more.")
+        Path | None,
+        typer.Option(
+            help="With --identifiability: what this recording tells, and what would tell more."
+        ),
     ] = None,
     forces: Force = None,
     mass: Mass = None,
@@ -136,27 +139,34 @@ def _marker_sets(definition: ModelDefinition) -> list[MarkerSetFile]:
         return [definition.marker_set]
     needed = [s.name for s in definition.model.segments if s.axes and s.without_markers is None]
     sets = [load_marker_set(name) for name in available_marker_sets()]
-    return [s for s in sets if {*needed} <= {home for _, home in _sites(definition.model, s)}]
+    return [s for s in sets if {*needed} <= {segment for segment, _ in _sites(definition.model, s)}]
 
 
-def _sites(model: ModelFile, marker_set: MarkerSetFile) -> list[tuple[str, str]]:
-    """Markers of the set that the model carries, each with its segment."""
-    home = {part: s.name for s in model.segments for part in s.parts} | {s.name: s.name for s in model.segments}
-    return [(m.name, home[m.segment]) for m in marker_set.markers if m.measures(planar=True) and m.segment in home]
+def _sites(model: ModelFile, marker_set: MarkerSetFile) -> list[tuple[str, Marker]]:
+    """Segments with the markers of the set that sit on them."""
+    return [
+        (segment.name, marker)
+        for segment in model.segments
+        for marker in marker_set.markers
+        if marker.measures(model.planar) and marker.segment in (segment.name, *segment.parts)
+    ]
+
+
+def _names(marker: Marker, side: str | None) -> str:
+    """Names in recordings, on one side where the model has two."""
+    sides = ("right", "left", "centre") if side is None else (side, "centre")
+    return " | ".join(filter(None, (", ".join(marker.aliases(one)) for one in sides)))
 
 
 def _markers(model: ModelFile, marker_set: MarkerSetFile) -> Table:
     rows = table(
         "segment", "marker", "names in recordings", "sd, mm", numbers=(3,), title=f"Markers of set {marker_set.name}"
     )
-    for segment in model.segments:
-        for name, home in _sites(model, marker_set):
-            if home != segment.name:
-                continue
-            marker = marker_set.marker(name)
-            names = " | ".join(filter(None, (", ".join(a) for a in (marker.right, marker.left, marker.centre))))
+    side = {segment.name: segment.side for segment in model.segments}
+    for segment, marker in _sites(model, marker_set):
+        if names := _names(marker, side[segment]):
             sd = "" if marker.variance is None else f"{1000 * np.sqrt(marker.variance):.0f}"
-            rows.add_row(segment.name, name, names, sd)
+            rows.add_row(segment, marker.name, names, sd)
     return rows
 
 

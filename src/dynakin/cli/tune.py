@@ -51,7 +51,7 @@ Trials = Annotated[
     list[Path] | None, typer.Argument(metavar="TRIAL...", help="Recordings, or a configuration (.toml) for each.")
 ]
 Forces = Annotated[list[Path] | None, typer.Option("--forces", help="Ground forces, one a trial, in order.")]
-ModelName = Annotated[str | None, typer.Option(help="Model: squat7, sagittal7 or a .toml file.")]
+ModelName = Annotated[str | None, typer.Option(help="Model: squat7, sagittal7, fullbody, a .toml or .osim file.")]
 Output = Annotated[Path, typer.Option("-o", "--output", help="Folder for table, figures and presets.")]
 
 _GAINS = ("coordinate", "speed", "acceleration")

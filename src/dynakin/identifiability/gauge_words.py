@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+
 from dynakin import _core
 from dynakin.identifiability.element_words import INERTIA
 from dynakin.identifiability.gauges import ZERO, Gauge
@@ -9,9 +11,10 @@ from dynakin.results.naming import listed, plural, words
 
 
 def gauges_in_words(gauges: tuple[Gauge, ...], spec: _core.ModelSpec) -> list[str]:
-    """A sentence a gauge; the displacements of skin, of which each marker has its own, in one."""
+    """A sentence a gauge, or for all that are said alike; the displacements of skin, each marker's own, in one."""
     skin = [gauge for gauge in gauges if _is_skin(gauge)]
-    said = [gauge_in_words(gauge, spec) for gauge in gauges if not _is_skin(gauge)]
+    alike = Counter(gauge_in_words(gauge, spec) for gauge in gauges if not _is_skin(gauge))
+    said = [text if count == 1 else f"{text}, in {count} directions" for text, count in alike.items()]
     if len(skin) > 1:
         markers = {name.split("/")[1] for gauge in skin for name in gauge.direction}
         said.append(

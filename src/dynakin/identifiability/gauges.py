@@ -13,6 +13,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.optimize import linprog
 
+from dynakin.errors import ModelError
 from dynakin.identifiability.measured import MeasuredModel
 
 Array = npt.NDArray[np.float64]
@@ -169,14 +170,20 @@ def _least(null: Array, part: list[int], k: int) -> Array:
     B = np.linalg.svd(B, full_matrices=False)[0][:, : np.linalg.matrix_rank(B, tol=_NOTHING)]
     c, d = B.shape
     eye = np.eye(c)
-    fit = linprog(
-        np.concatenate([np.zeros(d), np.ones(c)]),
-        A_ub=np.block([[B, -eye], [-B, -eye]]),
-        b_ub=np.zeros(2 * c),
-        A_eq=np.concatenate([B[part.index(k)], np.zeros(c)])[None],
-        b_eq=[1.0],
-        bounds=[(None, None)] * d + [(0.0, None)] * c,
-    )
+    for method in ("highs", "highs-ipm"):  # the simplex method gives up on some of a whole body's
+        fit = linprog(
+            np.concatenate([np.zeros(d), np.ones(c)]),
+            A_ub=np.block([[B, -eye], [-B, -eye]]),
+            b_ub=np.zeros(2 * c),
+            A_eq=np.concatenate([B[part.index(k)], np.zeros(c)])[None],
+            b_eq=[1.0],
+            bounds=[(None, None)] * d + [(0.0, None)] * c,
+            method=method,
+        )
+        if fit.x is not None:
+            break
+    else:
+        raise ModelError(f"identifiability: a sparse direction of {c} numbers was not found: {fit.message}")
     # The solver stops at 1e-7 or so: what is nearly 0 is put to 0 by solving for the rest exactly.
     vector = B @ fit.x[:d]
     zero = np.abs(vector) < 1e-5

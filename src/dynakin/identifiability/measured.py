@@ -16,7 +16,6 @@ from dynakin.model import InitialModel
 
 Array = npt.NDArray[np.float64]
 
-CONSTANT_BLOCKS = ("lengths", "markers", "inertia")
 _FASTEST, _HARDEST = 3.0, 30.0
 """rad/s and rad/s^2 (m/s, m/s^2): standard deviations of random motion, those of brisk gestures. Rank and gauges do not
 depend on them."""

@@ -1,4 +1,4 @@
-"""Inertial parameters and geometry of a subject from several trials, and whether they predict."""
+"""Inertial parameters of a subject from several trials, and whether they predict."""
 
 from dynakin.identification.batch import Posterior, at_start, identify_batch
 from dynakin.identification.bodies import Bodies, PlanarBodies, bodies_of
