@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 import dynakin
 from dynakin.errors import RecordingError
 from dynakin.filter.extend import initial_covariance
-from dynakin.identification import Common, Identified, foretell, identify_subject, rms_of
+from dynakin.identification import Common, Identified, foretell, identify_subject, measure_all, rms_of
 from dynakin.model.inertia import RigidBody
 from dynakin.simulation import simulate
 
@@ -79,3 +81,16 @@ def test_somebody_else_on_the_plates_is_refused_before_anything_takes_long() -> 
     common.check(squat.recording)
     with pytest.raises(RecordingError, match=r"carry 76\.\d kg on average, the subject weighs 70\.0 kg"):
         common.check(heavier)
+
+
+def test_a_walk_is_foretold_without_its_plates(identified: Identified) -> None:
+    """Other plates under the judging trial: the same prediction to the last bit, another verdict."""
+    common, (squat, walk) = identified.common, identified.trials
+    recording = simulate("fullbody", "gait", 2, 4.0).recording
+    plates = tuple(replace(plate, force=1.02 * plate.force, moment=0.9 * plate.moment) for plate in recording.plates)
+    (changed,) = measure_all(common, [recording.with_plates(plates)])
+    assert not np.array_equal(changed.wrench, walk.wrench, equal_nan=True)
+    before = foretell(common, [squat], walk.movement, ["bodies"])["bodies"]
+    after = foretell(common, [squat], changed.movement, ["bodies"])["bodies"]
+    np.testing.assert_array_equal(after, before)
+    assert not np.array_equal(rms_of(common, changed, after), rms_of(common, walk, before))

@@ -24,9 +24,7 @@ def estimator_of(folder: Path, estimate: tuple[Quantity, ...], noise: dynakin.No
 
 def marker_rms_mm(folder: Path, estimate: tuple[Quantity, ...]) -> float:
     """From markers alone."""
-    noise = dynakin.presets.default().model_copy(
-        update={"plate_force": 0.0, "plate_moment": 0.0, "plate_delay_s": 0.0}
-    )
+    noise = dynakin.presets.default().model_copy(update={"plate_force": 0.0, "plate_moment": 0.0, "plate_delay_s": 0.0})
     recording = dynakin.read(folder / "squats1.trc", folder / "squats1_grf.mot")
     estimator = estimator_of(folder, estimate, noise)
     markers, wrench = recording_arrays(recording, estimator.start(recording), gaps=True)
