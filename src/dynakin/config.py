@@ -81,7 +81,7 @@ class RunConfig(Strict):
     moment_nm, laboratory frame."""
 
     noise: dict[str, Any] = Field(default_factory=dict)
-    """Variances, SI units squared. Defaults: those of the preset."""
+    """Standard deviations, variances, densities and times, each as told beside it. Defaults: those of the preset."""
     priors: Priors = Priors()
     """Standard deviations at the first frame."""
     bounds: Bounds = Bounds()

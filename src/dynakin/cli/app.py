@@ -72,7 +72,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if type(error).__name__ == "NoArgsIsHelpError":  # its message is the help text
             typer.echo(str(getattr(error, "message", error)))
             return 2
-        print_error(f"{getattr(error, 'format_message', error.__str__)()} See dynakin --help.")
+        text = str(getattr(error, "format_message", error.__str__)()).rstrip(".")
+        command = getattr(getattr(error, "ctx", None), "command_path", "dynakin")
+        print_error(f"{text}. See {command} --help.")
         return 2
     except (KeyboardInterrupt, typer.Abort):
         print_error("stopped")

@@ -39,9 +39,7 @@ def model(
     ] = False,
     trial: Annotated[
         Path | None,
-        typer.Option(
-            help="With --identifiability: what this recording tells, and what would tell more."
-        ),
+        typer.Option(help="With --identifiability: what this recording tells, and what would tell more."),
     ] = None,
     forces: Force = None,
     mass: Mass = None,

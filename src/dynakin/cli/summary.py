@@ -21,6 +21,8 @@ def print_summary(estimate: Estimate, folder: Path) -> None:
     for message in estimate.messages:
         if message.startswith("Warning:"):
             console.print(message, style="yellow")
+        elif message.endswith("brought into step."):
+            console.print(message)
     console.print(f"Verdict: {' '.join(filter(None, verdicts))}", style="dim")
     console.print()
     console.print(f"Results  {folder}", soft_wrap=True)

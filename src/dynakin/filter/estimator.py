@@ -19,7 +19,7 @@ from dynakin.filter.live import StepEstimate, deviations_of, step_estimate
 from dynakin.filter.noise import Noise
 from dynakin.filter.samples import Sample, foreign_load, recording_arrays, sample_arrays
 from dynakin.filter.smoothing import check_can_smooth, smoothed
-from dynakin.filter.total_wrench import foot_wrenches, foreign_total, leave_out_unknown
+from dynakin.filter.total_wrench import doubtful_mass, foot_wrenches, foreign_total, leave_out_unknown
 from dynakin.model import Bounds, CarriedLoad, Definition, InitialModel, Priors, initialise, with_loads
 from dynakin.model.identified import IdentifiedSubject, with_identified
 from dynakin.model.validation import nearest
@@ -127,7 +127,9 @@ class Estimator:
         elif loads is not None and not foreign:
             on_feet = foot_wrenches(loads, initial, self.noise)
         try:
-            arrays, shift, clock = self.run_in_step(initial, recording.time, markers, wrench, progress, on_feet)
+            doubt = doubtful_mass(wrench, initial.weighed_kg)
+            passes = 0 if doubt else PASSES
+            arrays, shift, clock = self.run_in_step(initial, recording.time, markers, wrench, progress, on_feet, passes)
             wrench = in_step(recording.time, wrench, shift) if shift else wrench
             on_feet = on_feet and on_feet.in_step(recording.time, shift)
             if smooth:
@@ -136,7 +138,7 @@ class Estimator:
         except ValueError as error:  # a frame that the core refuses, named by it
             raise RecordingError(f"{recording.path or recording.name}: {error}") from None
         config = self.settings() | {"smooth": smooth}
-        notes += [] if foreign else clock
+        notes += [doubt] if doubt else [] if foreign else clock
         assert self._filter is not None
         covariances = (initial_covariance(initial, self.noise), self._filter.covariance)
         measured = (markers, wrench)
@@ -192,14 +194,15 @@ class Estimator:
         wrench: Array,
         progress: Progress | None = None,
         feet: FootWrenches | None = None,
+        passes: int = PASSES,
     ) -> tuple[dict[str, Array], float, list[str]]:
-        """`run_arrays`, again with the plates brought into step where they turn out to lag.
+        """`run_arrays`, again (``passes`` times at most) with the plates brought into step where they turn out to lag.
 
         Returns:
             The arrays, the seconds by which the last run took the plates earlier, and what there is to say of that.
         """
         arrays, shift = self.run_arrays(time, markers, wrench, progress, feet), 0.0
-        for _ in range(PASSES):
+        for _ in range(passes):
             delay = self._delay(arrays)
             if delay is None or not is_late(delay):
                 break

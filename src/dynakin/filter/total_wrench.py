@@ -15,6 +15,10 @@ from dynakin.units import GRAVITY_M_S2
 Array = npt.NDArray[np.float64]
 
 
+MASS_APART = 0.05
+"""Part of the weight by which the plates' mean may differ before the mass is doubted: movement explains 2 or 3 %."""
+_LEAST_FRAMES = 50
+
 _CONTACT = {
     on_plates.SWING: IN_THE_AIR,
     on_plates.MEASURED: MEASURED,
@@ -54,6 +58,20 @@ def leave_out_unknown(loads: FootLoads, wrench: Array) -> list[str]:
     wrench[~loads.total_known] = np.nan
     used = int(np.count_nonzero(np.isfinite(wrench).all(axis=1)))
     return [*loads.messages, f"The total wrench is measured in {used} of {len(wrench)} frames."]
+
+
+def doubtful_mass(wrench: Array, mass_kg: float) -> str | None:
+    """A sentence where the mean vertical force of the known frames of the wrench (T, 6) contradicts the mass."""
+    push = wrench[np.isfinite(wrench).all(axis=1), 1]
+    load = float(push.mean()) / GRAVITY_M_S2 if len(push) >= _LEAST_FRAMES else mass_kg
+    apart = abs(load - mass_kg) / mass_kg
+    if apart <= MASS_APART:
+        return None
+    return (
+        f"Warning: the plates carry {load:.1f} kg on average where the person weighs {mass_kg:.1f} kg "
+        f"({100.0 * apart:.0f} % apart, expected within {100.0 * MASS_APART:.0f} %): check the mass. Forces, moments "
+        "and inertia take the error on, and no delay of the plates is taken off, because a wrong mass looks like one."
+    )
 
 
 def foreign_total(wrench: Array, mass_kg: float, tolerance: float | None) -> str | None:

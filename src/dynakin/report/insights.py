@@ -162,7 +162,12 @@ def _prediction(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     )
     worst = max(ratio, key=lambda name: ratio[name])
     if ratio[worst] <= FOLLOWING:
-        return Insight("good", "One frame ahead", f"{text} That is about as good as after it is seen.")
+        return Insight(
+            "good",
+            "One frame ahead",
+            f"{text} At worst that is {ratio[worst]:.1f} times as far as after it is seen "
+            f"({COMPONENT_LABELS[worst][0].lower()}).",
+        )
     return Insight(
         "warning",
         "One frame ahead",

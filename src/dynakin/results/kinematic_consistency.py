@@ -6,6 +6,8 @@ import numpy as np
 
 # A mismatch below half of the coordinate's own speed is left unsaid: differencing measured angles makes noise too.
 TOLERATED = 0.5
+# Nor one that no one would notice, as of a coordinate that is locked or hardly moves.
+UNNOTICED = 0.01  # rad/s or m/s
 
 
 def speed_mismatch(time: np.ndarray, coordinates: np.ndarray, speeds: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -29,7 +31,7 @@ def mismatch_in_words(names: list[str], rotation: np.ndarray, mismatch: np.ndarr
     """One sentence about the worst coordinate, or an empty text where all speeds fit."""
     with np.errstate(divide="ignore", invalid="ignore"):
         ratio = np.where(mismatch > 0.0, mismatch / moving, 0.0)
-    wrong = np.flatnonzero(ratio > TOLERATED)
+    wrong = np.flatnonzero((ratio > TOLERATED) & (mismatch > UNNOTICED))
     if not len(wrong):
         return ""
     worst = int(wrong[np.argmax(mismatch[wrong])])

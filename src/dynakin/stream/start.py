@@ -128,7 +128,11 @@ def quietest(recording: Recording) -> tuple[Recording, Recording | None, str]:
     if window is None:
         present = _weighed(recording.window(end - _NOW_S, end), recording)
         mass = present.subject.get("mass_kg")
-        told = f"; without another mass {mass:.1f} kg" if mass and mass != recording.subject.get("mass_kg") else ""
+        told = (
+            f"; the plates' mean load, {mass:.1f} kg, is the mass where none is given"
+            if mass and mass != recording.subject.get("mass_kg")
+            else ""
+        )
         return present, None, f"the present posture is taken{told}."
     still = recording.time[window]
     quiet = recording.window(float(still[0]), float(still[-1]))

@@ -75,6 +75,14 @@ class Peer:
         rotations = [[[f.R().get(i, j) for j in range(3)] for i in range(3)] for f in frames]
         return np.array(rotations), np.array([f.p().to_numpy() for f in frames])
 
+    def inertia(self) -> dict[str, NDArray]:
+        """Each body's mass (kg), its centre (m) and xx, yy, zz, xy, xz, yz about the centre (kg m^2), as one (10,)."""
+        found = {}
+        for body in self.model.getBodySet():
+            tensor = [body.get_inertia().get(k) for k in range(6)]
+            found[body.getName()] = np.array([body.getMass(), *body.getMassCenter().to_numpy(), *tensor])
+        return found
+
     def marker_places(self) -> NDArray:
         """(M, 3) m, ground frame."""
         markers = self.model.getMarkerSet()

@@ -134,6 +134,10 @@ def test_opensim_loads_what_is_written(name: str, data_dir: Path, tmp_path: Path
     estimated = again(identified(model, scales, found_values(model, scales)[1]), tmp_path)
     core, peer, rng = _core.Model(to_spec(estimated, {})), Peer(tmp_path / "again.osim"), np.random.default_rng(7)
     there = [core.segment_names.index(body) for body in peer.bodies]
+    masses = peer.inertia()
+    assert len(masses) == len(estimated.bodies)
+    for body in estimated.bodies:
+        close(masses[body.name], np.array([body.mass, *body.centre, *body.inertia]))
     for _ in range(5):
         motion = random_motion(model, rng)
         q, qd, _ = coupled(model, motion)
@@ -142,6 +146,33 @@ def test_opensim_loads_what_is_written(name: str, data_dir: Path, tmp_path: Path
         close(R[there], peer.poses()[0])
         close(origins[there], peer.poses()[1])
         close(_core.marker_positions(core, as_state(core, motion)), peer.marker_places())
+
+
+def test_opensim_loads_a_built_in_model_measured_on_a_person(tmp_path: Path) -> None:
+    pytest.importorskip("opensim", reason="OpenSim is not installed (pip install opensim)")
+    from dynakin.simulation import save_trial, simulate
+
+    from .peer import Peer
+
+    trial = next(save_trial(simulate("fullbody", "squat", 1, 5.0), tmp_path / "person").glob("*.trc"))
+    out = tmp_path / "fullbody.osim"
+    command = ["model", "fullbody", "--markers", "opencap", "--mass", "70", "--trial", str(trial), "--export", str(out)]
+    result = CliRunner().invoke(app, command)
+    assert result.exit_code == 0, result.output
+    spec, peer, rng = to_spec(read_osim(out), {}), Peer(out), np.random.default_rng(9)
+    core = _core.Model(spec)
+    there = [core.segment_names.index(body) for body in peer.bodies]
+    assert sum(vector[0] for vector in peer.inertia().values()) == pytest.approx(70.0, rel=1e-9)
+    assert {"pelvis_tilt", "hip_flexion_r", "knee_angle_l", "subtalar_angle_r"} <= set(peer.names)
+    q = {c.name: c.value if c.locked else rng.uniform(-1.0, 1.0) for c in spec.coordinates}
+    peer.at(q, dict.fromkeys(q, 0.0))
+    x = core.initial_state()
+    for k, name in enumerate(core.layout.names):
+        x[k] = q.get(name, x[k])
+    R, origins = _core.segment_poses(core, x)
+    close(R[there], peer.poses()[0])
+    close(origins[there], peer.poses()[1])
+    close(_core.marker_positions(core, x), peer.marker_places())
 
 
 TREES = [planar_model(2), planar_model(50, n_segments=7), *(spatial_model(s, nonlinear=False) for s in range(100, 106))]
