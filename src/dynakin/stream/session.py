@@ -155,7 +155,11 @@ class Live:
                 "are right in shape only."
             )
         for sink in self.sinks:
-            sink.opened(markers, plates)
+            self._tell(sink)
+
+    def _tell(self, sink: Sink) -> None:
+        sink.begins(self._subject, self.delay_s)
+        sink.opened(self.fusion.markers, self.fusion.plates)
 
     def _turn(self) -> None:
         packet = self._reader.get(_POLL_S)
@@ -197,7 +201,7 @@ class Live:
         except DynakinError as error:
             self.say(error.message)
             return
-        self._recording.opened(self.fusion.markers, self.fusion.plates)
+        self._tell(self._recording)
         self.sinks.append(self._recording)
         self.say("Recording.")
 

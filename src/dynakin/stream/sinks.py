@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -81,6 +81,9 @@ class Started:
 
 class Sink:
     """Where estimates go; each method may be left out. None of them may block: the filter waits for it."""
+
+    def begins(self, subject: Mapping[str, float], delay_s: float) -> None:
+        """A session begins: mass (kg) and height (m) as its sources tell them, and how long it waits for packets."""
 
     def opened(self, markers: StreamInfo, plates: StreamInfo | None) -> None:
         """The streams are known."""
