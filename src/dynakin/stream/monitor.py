@@ -48,16 +48,23 @@ class Monitor:
         self,
         fusion: Fusion,
         fused: Fused,
+        whole: bool,
         estimate: StepEstimate,
         smoothed: StepEstimate | None,
         state: Array,
         verdicts: Sequence[str],
     ) -> Status:
-        """The status of a step. verdicts: of each marker and the plates, as the filter tells them."""
+        """The status of a step.
+
+        Args:
+            whole: whether the plates carry all of the person. verdicts: of each marker and the plates, as the filter
+                tells them.
+        """
         names, report = self.initial.recorded_markers, estimate.report
         on_plates = "none"
         if self._plates:
-            plates = {"accepted": "used", "refused": "refused"}.get(verdicts[-1], "left out")
+            others = "left out" if whole else "incomplete"
+            plates = {"accepted": "used", "refused": "refused"}.get(verdicts[-1], others)
             on_plates = "silent" if fused.wrenches is None else plates if self._used else "left out"
         at = [k for k in self._bounded if not self.initial.lower[k] < state[k] < self.initial.upper[k]]
         recent = self._recent

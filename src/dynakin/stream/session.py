@@ -289,28 +289,31 @@ class Live:
     def _step(self, fused: Fused) -> None:
         monitor = self._monitor
         assert monitor is not None
-        sample = fused.sample if self._use_plates else Sample(fused.sample.time_s, fused.sample.markers)
+        sample, feet, whole = fused.sample, None, True
+        if self._feet is not None:
+            wrenches = fused.wrenches if self._use_plates else None
+            feet, whole = self._feet.look(self.estimator.core_model, self.estimator.state, sample.time_s, wrenches)
+        if not (whole and self._use_plates):
+            sample = Sample(sample.time_s, sample.markers)
         try:
-            estimate = self.estimator.step(sample)
+            estimate = self.estimator.step(sample, feet)
         except DivergenceError as error:
             self.say(f"{error.message}; the estimate begins anew.")
             self.restart()
             return
         smoothed = self.estimator.delayed() if self.estimator.lag else None
         state = self.estimator.state
-        if self._feet is not None:
-            wrenches = fused.wrenches if self._use_plates else None
-            estimate = self._feet.moments(self.estimator.core_model, state, estimate, wrenches)
         deviations = None
         if not 0.0 <= sample.time_s - self._told_sd < _DEVIATIONS_S and self._reader.backlog < 4:
             self._told_sd = sample.time_s
             deviations = self.estimator.deviations()
-        status = monitor.status(self.fusion, fused, estimate, smoothed, state, self.estimator.verdicts)
+        status = monitor.status(self.fusion, fused, whole, estimate, smoothed, state, self.estimator.verdicts)
         frame = LiveFrame(estimate, smoothed, fused, state, deviations, status)
         for sink in self.sinks:
             sink.frame(frame)
         monitor.published(sample.time_s, time.monotonic() - fused.arrived_s)
-        for text in monitor.settling(sample.time_s, state, self.estimator):
+        news = self._feet.news() if self._feet is not None else []
+        for text in [*news, *monitor.settling(sample.time_s, state, self.estimator)]:
             self.say(text)
 
     def say(self, text: str) -> None:

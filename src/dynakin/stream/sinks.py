@@ -24,7 +24,8 @@ class Status:
         latency_ms: from a sample's arrival to its estimate, the longest of the last second.
         nis: normalised innovation squared over the rows used, near 1 where the noise is as declared; NaN without.
         refused: markers whose position the gate refused. missing: markers not seen.
-        plates: "used", "refused", "silent", "left out" or "none".
+        plates: "used", "refused", "silent", "incomplete" (they do not carry all of the person now: left out in this
+            step), "left out" or "none".
         at_bound: constants that sit on a bound.
         tracking: the filter's own word ("following", "doubtful", "lost", ...).
         left_out: frames so far for which the computer was too slow.
