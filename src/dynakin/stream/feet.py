@@ -51,8 +51,11 @@ class LiveFeet:
         self.feet = tuple(initial.feet)
         self._told = {p: self.feet.index(assigned[name]) for p, name in enumerate(plates) if name in assigned}
         segments = [marker.segment for marker in initial.spec.markers]
-        self._own = [np.flatnonzero([s == initial.feet[foot] for s in segments]) for foot in self.feet]
+        own = [np.flatnonzero([s == initial.feet[foot] for s in segments]) for foot in self.feet]
         F, P, M = len(self.feet), len(plates), len(segments)
+        self._own = np.full((F, max(map(len, own), default=0)), M)  # markers of each foot, filled up with M: none
+        for f, markers in enumerate(own):
+            self._own[f, : len(markers)] = markers
         self._standing, self._floor = np.full(M, np.inf), np.full(M, np.inf)
         self._time = -np.inf
         self._touched = np.full(F, -np.inf)  # when the foot last stood
@@ -81,7 +84,7 @@ class LiveFeet:
             self._owners[:] = False
         on = self._owners[:, : len(plates)]
         off = bears & ~((self._majority() | self._owners).any(axis=1) & bool(plates))
-        seen = [outline if len(own) else None for outline, own in zip(outlines, self._own, strict=True)]
+        seen = [None if (own == len(self._floor)).all() else outlines[[f]] for f, own in enumerate(self._own)]
         loads = divided(self.feet, plates, seen, on[None], off[None])
         known = bool(loads.total_known[0])
         for p in np.flatnonzero(on.sum(axis=0) > 1) if (loads.reason == SHARED).any() else ():
@@ -105,8 +108,8 @@ class LiveFeet:
             self._said.add(text)
             self._to_say.append(text)
 
-    def _move(self, model: _core.Model, state: Array, time_s: float, dt: float) -> tuple[list[Array], Flags]:
-        """Outlines (1, K, 2) of the feet, predicted, and whether each is low; keeps when it last stood."""
+    def _move(self, model: _core.Model, state: Array, time_s: float, dt: float) -> tuple[Array, Flags]:
+        """Outlines (F, K, 2) of the feet, predicted, and whether each is low; keeps when it last stood."""
         offset, size = model.layout.blocks["coordinates"]
         speeds, _ = model.layout.blocks["speeds"]
         ahead = state.copy()
@@ -118,10 +121,10 @@ class LiveFeet:
         self._floor = np.minimum(np.minimum(self._floor + _RISE_M_S * dt, self._standing), places[:, 1])
         self._time = time_s
         height = places[:, 1] - self._floor
-        touching = (height < NEAR_FLOOR_M) & (speed < SLOW_M_S)
-        self._touched[[bool(touching[own].any()) for own in self._own]] = time_s
-        low = np.array([bool((height[own] < _LOW_M).any()) for own in self._own])
-        return [places[None, own][:, :, [0, 2]] for own in self._own], low
+        touching = np.append((height < NEAR_FLOOR_M) & (speed < SLOW_M_S), False)
+        self._touched[touching[self._own].any(axis=1)] = time_s
+        low = np.append(height < _LOW_M, False)[self._own].any(axis=1)
+        return np.vstack([places[:, [0, 2]], np.full(2, np.nan)])[self._own], low
 
     def _plates(self, wrenches: Array) -> list[PlateLoad]:
         loads = self.initial.ground.wrench_to_ground(wrenches)
@@ -137,20 +140,20 @@ class LiveFeet:
         """(F, P) plates that carry a stance, as far as it has gone: near for most of the load."""
         return np.asarray(self._near > 0.5 * self._loaded)
 
-    def _assign(self, plates: list[PlateLoad], outlines: list[Array], bears: Flags, low: Flags) -> None:
+    def _assign(self, plates: list[PlateLoad], outlines: Array, bears: Flags, low: Flags) -> None:
         touches = self._touched == self._time
-        away = np.full((len(self.feet), len(plates)), np.inf)
-        for p, plate in enumerate(plates):
-            if not plate.loaded[0] or p in self._told:
-                continue
-            away[:, p] = [
-                float(np.nan_to_num(distance_to_hull(plate.cop, outline)[0], nan=np.inf)) for outline in outlines
-            ]
-            near = away[:, p] < NEAR_M
-            if touches.all() and away[:, p].min() > BETWEEN_M:
-                near |= bool(distance_to_hull(plate.cop, np.concatenate(outlines, axis=1))[0] < BETWEEN_M)
-            self._loaded[touches, p] += 1
-            self._near[touches & near, p] += 1
+        cops = np.concatenate([plate.cop for plate in plates])
+        F, P = len(self.feet), len(plates)
+        away = distance_to_hull(np.tile(cops, (F, 1)), np.repeat(outlines, P, axis=0)).reshape(F, P)
+        away = np.nan_to_num(away, nan=np.inf)  # of a plate that is not loaded
+        near = away < NEAR_M
+        apart = np.isfinite(away).any(axis=0) & (away.min(axis=0) > BETWEEN_M)
+        if touches.all() and apart.any():
+            both = np.broadcast_to(outlines.reshape(1, -1, 2), (P, outlines.size // 2, 2))
+            near |= apart & (distance_to_hull(cops, both) < BETWEEN_M)
+        loaded = np.array([plate.loaded[0] for plate in plates])
+        self._loaded += touches[:, None] & loaded
+        self._near += touches[:, None] & loaded & near
         mine = self._majority() & bears[:, None]
         for p, plate in enumerate(plates):
             push = float(plate.wrench[0, 1])
@@ -162,7 +165,7 @@ class LiveFeet:
                 self._owners[:, p] = mine[:, p]
             elif not self._owners[:, p].any():  # a foot that sets down, before it stands
                 nearest = int(np.argmin(away[:, p]))
-                self._owners[nearest, p] = bool(away[nearest, p] < NEAR_M and low[nearest])
+                self._owners[nearest, p] = bool(near[nearest, p] and low[nearest])
 
 
 class _Range:
