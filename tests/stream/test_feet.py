@@ -158,6 +158,16 @@ def test_two_feet_on_one_plate_share_it_as_offline_and_it_is_said_once(trial: Si
     assert person.feet.news() == []
 
 
+def test_a_foot_beside_the_plate_is_not_measured(trial: SimulatedTrial) -> None:
+    person = Standing(trial)
+    found, known = person.look(350.0, person.middles[0])
+    assert not known and found.contact.tolist() == [[MEASURED, NOT_MEASURED]]
+    np.testing.assert_allclose(found.wrench[0, 0, 1], 350.0)
+    person.feet = LiveFeet(person.initial, presets.default(), ("one",), {"one": "left"})  # the user knows better
+    found, known = person.look(350.0, person.middles[0])
+    assert not known and found.contact.tolist() == [[NOT_MEASURED, MEASURED]]
+
+
 def test_a_load_where_nobody_stands_is_not_the_person(trial: SimulatedTrial) -> None:
     person = Standing(trial)
     found, known = person.look(300.0, person.middles[0] + np.array([1.0, 0.0, 0.0]))

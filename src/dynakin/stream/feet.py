@@ -80,10 +80,11 @@ class LiveFeet:
         plates = [] if wrenches is None else self._plates(wrenches)
         if plates:
             self._assign(plates, outlines, bears, low)
+            loaded = np.array([plate.loaded[0] for plate in plates])
+            off = bears & ~(self._majority() | (self._owners & loaded)).any(axis=1)
         else:
-            self._owners[:] = False
+            self._owners[:], off = False, bears
         on = self._owners[:, : len(plates)]
-        off = bears & ~((self._majority() | self._owners).any(axis=1) & bool(plates))
         seen = [None if (own == len(self._floor)).all() else outlines[[f]] for f, own in enumerate(self._own)]
         loads = divided(self.feet, plates, seen, on[None], off[None])
         known = bool(loads.total_known[0])
@@ -151,6 +152,8 @@ class LiveFeet:
         if touches.all() and apart.any():
             both = np.broadcast_to(outlines.reshape(1, -1, 2), (P, outlines.size // 2, 2))
             near |= apart & (distance_to_hull(cops, both) < BETWEEN_M)
+        for p, foot in self._told.items():
+            near[:, p] = np.arange(F) == foot
         loaded = np.array([plate.loaded[0] for plate in plates])
         self._loaded += touches[:, None] & loaded
         self._near += touches[:, None] & loaded & near
@@ -160,7 +163,7 @@ class LiveFeet:
             if push <= EMPTY_N:
                 self._owners[:, p] = False
             elif p in self._told:
-                self._owners[:, p] = np.arange(len(self.feet)) == self._told[p]
+                self._owners[:, p] = near[:, p]
             elif mine[:, p].any():
                 self._owners[:, p] = mine[:, p]
             elif not self._owners[:, p].any():  # a foot that sets down, before it stands
