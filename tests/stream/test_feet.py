@@ -103,9 +103,9 @@ def test_smoothed_moments_and_bands_are_those_with_the_feet(squat: tuple[Live, l
 
 @pytest.mark.parametrize("seed", [1, 2])
 def test_walking_leaves_out_what_offline_leaves_out(seed: int) -> None:
-    """Measured: live keeps the 5 frames before a foot lands beside the plates, where the force is off by 3 N at most;
-    it leaves out 2 more after a foot has left the floor there, and 5 where one lands on a plate that is not loaded
-    yet."""
+    """Measured on six seeds: live keeps the 5 or 6 frames before a foot lands beside the plates, where the force is off
+    by 4 N at most; it leaves out 2 more after a foot has left the floor there, and 4 to 6 where one lands on a plate
+    that is not loaded yet."""
     walk = simulate("fullbody", "gait", seed)
     live, frames, said = session(Replay(walk.recording, speed=0.0), standing_s=0.3)
     assert live.estimator.initial is not None
