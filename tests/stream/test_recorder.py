@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +16,7 @@ import pytest
 from dynakin.errors import OutputError, RecordingError
 from dynakin.recordings import Recording
 from dynakin.simulation import simulate_squat
-from dynakin.stream import Replay
+from dynakin.stream import Packet, PlatePacket, Replay
 from dynakin.stream.recorder import FILE, Recorder, finish, recorded
 
 from .made import MARKERS, PLATES, block, frame
@@ -26,7 +27,7 @@ SESSION = """
 import sys, time
 sys.path.insert(0, {tests!r})
 from dynakin.simulation import simulate_squat
-from dynakin.stream import Replay
+from dynakin.stream import Packet, PlatePacket, Replay
 from dynakin.stream.recorder import Recorder
 from dataclasses import replace
 source = Replay(simulate_squat(seed=1, duration_s=8.0).recording, loop=True)
@@ -142,3 +143,35 @@ def test_a_folder_that_holds_something_is_refused(tmp_path: Path) -> None:
         Recorder(tmp_path)
     with pytest.raises(RecordingError, match="cannot be read"):
         recorded(tmp_path / "nothing")
+
+
+def test_a_recording_keeps_the_delay_and_the_person(tmp_path: Path) -> None:
+    """A block of the plates that came 0.2 s late: with a delay of 0.5 s it was waited for, also afterwards."""
+    source = Replay(simulate_squat(seed=1, duration_s=5.0).recording, speed=0.0)
+    streams = source.open()
+    assert streams.markers is not None and streams.plates is not None
+    unordered = replace(streams.plates, ordered=False)
+
+    def written(folder: Path, delay_s: float | None) -> Recording:
+        recorder = Recorder(folder, SETTINGS)
+        if delay_s is not None:
+            recorder.begins({"mass_kg": 61.5, "height_m": 1.66}, delay_s)
+        recorder.opened(replace(streams.markers, ordered=False), unordered)  # type: ignore[type-var]
+        source.open()
+        late: list[Packet] = []
+        while (packets := source.read(0.0)) is not None:
+            for packet in packets:
+                at = float(np.max(packet.time_s))
+                if isinstance(packet, PlatePacket) and 1.0 < at < 1.1:
+                    late.append(replace(packet, arrived_s=at + 0.2))
+                    continue
+                while late and late[0].arrived_s <= at:
+                    recorder.packet(late.pop(0))
+                recorder.packet(replace(packet, arrived_s=at))
+        recorder.close()
+        return recorded(folder)
+
+    waited, not_waited = written(tmp_path / "a", 0.5), written(tmp_path / "b", None)
+    assert waited.subject == {"mass_kg": 61.5, "height_m": 1.66} and not_waited.subject == {}
+    np.testing.assert_array_equal(waited.total_wrench(), source.recording.total_wrench())
+    assert not np.array_equal(not_waited.total_wrench(), source.recording.total_wrench(), equal_nan=True)

@@ -14,7 +14,8 @@ import dynakin
 from dynakin.errors import ModelError, StreamError
 from dynakin.recordings import Recording
 from dynakin.simulation import simulate_squat
-from dynakin.stream import Callback, Live, LiveFrame, MarkerPacket, Packet, PlatePacket, Replay, Sink, Streams
+from dynakin.stream import Callback, Fusion, Live, LiveFrame, MarkerPacket, Packet, PlatePacket, Replay, Sink, Streams
+from dynakin.stream.monitor import Monitor
 from dynakin.stream.recorder import Recorder, recorded
 
 
@@ -239,3 +240,15 @@ def test_constants_go_on_from_an_earlier_session(squat: Recording) -> None:
     k = initial.names.index(next(name for name in initial.names if name.startswith("length/")))
     assert other.estimator.initial.x0[k] == pytest.approx(frames[-1].state[k])
     assert len(again) == len(frames)
+
+
+def test_silent_markers_are_told_with_what_happens_then(squat: Recording) -> None:
+    def no_markers(packet: Packet) -> list[Packet]:
+        return [] if isinstance(packet, MarkerPacket) and 4.0 < packet.time_s < 5.0 else [packet]
+
+    _, said, _ = run(Edited(squat, no_markers))
+    assert "The markers are silent; going on with plates alone." in said and "The markers are back." in said
+    _, said, live = run(Replay(squat.window(0.0, 3.0), speed=0.0))
+    monitor = Monitor(live.estimator.initial, 100.0, plates=False, used=False)  # type: ignore[arg-type]
+    told = monitor.changes(Fusion(live.fusion.markers, None), 1e9)
+    assert told == ["The markers are silent; the estimate waits for them."]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import socket
 import time
 import urllib.request
@@ -15,7 +16,8 @@ from dynakin.recordings import Recording
 from dynakin.simulation import simulate_squat
 from dynakin.stream import Callback, Live, LiveFrame, Replay, Started
 from dynakin.stream.latest import Latest
-from dynakin.stream.picture import Picture, arrow, split
+from dynakin.stream.picture import Picture, arrow, in_words, split, status_text
+from dynakin.stream.sinks import Status
 
 
 def test_the_reader_gets_the_newest_once() -> None:
@@ -103,3 +105,21 @@ def test_a_port_in_use_is_passed_over() -> None:
         assert _free_port("127.0.0.1", port) > port
     with pytest.raises(ConfigError, match="none of 20 ports can be served"):
         _free_port("203.0.113.1", 8080)
+
+
+def test_a_status_of_many_names_stays_short_and_whole() -> None:
+    many = tuple(f"inertia/segment_{k}_{'x' * 60}" for k in range(300))
+    writer = Latest(1)
+    reader = Latest(1, path=writer.path)
+    writer.write(np.zeros(1), status_text(Status(missing=many, at_bound=many, refused=many[:2], tracking="following")))
+    found = reader.read()
+    assert found is not None
+    status = json.loads(found[1])
+    assert status["missing"]["count"] == 300 and status["tracking"] == "following"
+    assert in_words(status["at_bound"]).startswith("inertia/segment_0_x")
+    assert in_words(status["at_bound"]).endswith(" and 296 more") and "more" not in in_words(status["refused"])
+    assert in_words(json.loads(status_text(Status()))["refused"]) == "none"
+    with pytest.raises(ValueError, match="the text has 5000 bytes, expected 4096 at most"):
+        writer.write(np.zeros(1), b" " * 5000)
+    reader.close()
+    writer.close()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
@@ -90,6 +91,7 @@ class Estimator:
         self._lag: _core.FixedLag | None = None
         self._core_model: _core.Model | None = None
         self._time: float | None = None
+        self._stepped: deque[tuple[float, _core.FootLoads | None]] = deque(maxlen=lag + 1)
 
     def run(
         self,
@@ -263,6 +265,7 @@ class Estimator:
             check_can_smooth(self.noise)
         self._lag = _core.FixedLag(self._filter, self.lag) if self.lag else None
         self.initial, self._time = initial, None
+        self._stepped = deque(maxlen=self.lag + 1)
         return initial
 
     def run_arrays(
@@ -314,11 +317,20 @@ class Estimator:
         self._time = float(time[-1])
         return smoothed(arrays)
 
-    def step(self, sample: Sample) -> StepEstimate:
+    def step(self, sample: Sample, feet: FootWrenches | None = None) -> StepEstimate:
         """Take one sample, after `start`; samples come in the order of their times.
 
+        The six rows of the wrench are the sum of the sample's plates. For a model with a floating root give plates
+        only where they carry all that the ground does to the person, as `dynakin.stream.Live` decides in each step.
+
+        Args:
+            feet: for models with a floating root: the feet's wrenches in this frame (T = 1). Moments, deviations and
+                those of `delayed` are then what these leave, as in `run`. Without them the moments of a floating model
+                have no ground reaction in them, and are no joint moments of a person on the ground: use `run`, or
+                `dynakin.stream.Live`, which finds the feet's wrenches. The state does not depend on it.
+
         Raises:
-            RecordingError: the sample is older than the one before.
+            RecordingError: the sample is older than the one before. ModelError: feet that do not fit the model.
             DivergenceError: the filter lost its estimate.
         """
         if self._filter is None or self._core_model is None or self.initial is None:
@@ -327,6 +339,7 @@ class Estimator:
         if dt < 0.0:
             raise RecordingError(f"sample at {sample.time_s} s: older than the one before, at {self._time} s")
         markers, wrench = sample_arrays(sample, self.initial)
+        loads = self._loads(feet)
         if self._lag is not None:
             report = self._lag.step(dt, markers, wrench)
         else:
@@ -336,12 +349,14 @@ class Estimator:
         if report.diverged:
             raise DivergenceError(f"the filter diverged at {sample.time_s} s: {report.status}")
         self._time = sample.time_s
-        return step_estimate(self._core_model, sample.time_s, self._filter.state, report)
+        self._stepped.append((sample.time_s, loads))
+        return step_estimate(self._core_model, sample.time_s, self._filter.state, report, loads)
 
     def delayed(self) -> StepEstimate | None:
         """The frame that lies ``lag`` frames back, smoothed by all samples until now; None before there is one.
 
-        Its ``time_s`` is its own: the delay is the last sample's time less that.
+        Its ``time_s`` is its own: the delay is the last sample's time less that. Moments come from the feet's wrenches
+        that `step` was given for that frame; without them, of a floating model, they have no ground reaction in them.
 
         Raises:
             ConfigError: the estimator was made without a lag.
@@ -350,7 +365,9 @@ class Estimator:
             raise ConfigError("delayed: expected Estimator(..., lag=frames), started and stepped")
         if not self._lag.ready:
             return None
-        return step_estimate(self._core_model, self._time - self._lag.delay_s, self._lag.state, None)
+        time = self._time - self._lag.delay_s
+        _, loads = min(self._stepped, key=lambda stepped: abs(stepped[0] - time))
+        return step_estimate(self._core_model, time, self._lag.state, None, loads)
 
     @property
     def core_model(self) -> _core.Model:
@@ -383,11 +400,13 @@ class Estimator:
         """Standard deviations of the present estimate, as it was last stepped: propagated now, not in every step.
 
         Returns:
-            coordinates, speeds, accelerations, moments (C,), of all coordinates of the model; wrench (6,).
+            coordinates, speeds, accelerations, moments (C,), of all coordinates of the model; wrench (6,). Moments as
+            `step` gave them: with the feet's wrenches where it had these.
         """
         if self._filter is None or self._core_model is None:
             raise ConfigError("deviations: the estimator has not been started; call start(recording) first")
-        return deviations_of(self._core_model, self._filter.state, self._filter.covariance)
+        loads = self._stepped[-1][1] if self._stepped else None
+        return deviations_of(self._core_model, self._filter.state, self._filter.covariance, loads)
 
     def _loads(self, feet: FootWrenches | None) -> _core.FootLoads | None:
         assert self._core_model is not None

@@ -91,9 +91,9 @@ def foot_loads(
         for foot, names in markers.items()
         if (found := foot_contact(recording, ground, [n for n in names if "an" not in n.casefold()])) is not None
     }
-    plates = [_Load.of(plate, ground) for plate in recording.plates]
+    plates = [PlateLoad.of(plate, ground) for plate in recording.plates]
     work = _Assignment(recording, feet, contacts, plates, told)
-    return work.loads(ground)
+    return work.loads()
 
 
 def _check_assigned(told: dict[str, str], recording: Recording, feet: tuple[str, ...]) -> None:
@@ -106,7 +106,7 @@ def _check_assigned(told: dict[str, str], recording: Recording, feet: tuple[str,
 
 
 @dataclass(frozen=True, eq=False)
-class _Load:
+class PlateLoad:
     """One plate in the ground frame."""
 
     name: str
@@ -117,7 +117,7 @@ class _Load:
     corners: Array | None  # (4, 2)
 
     @classmethod
-    def of(cls, plate: Plate, ground: GroundFrame) -> _Load:
+    def of(cls, plate: Plate, ground: GroundFrame) -> PlateLoad:
         wrench = ground.wrench_to_ground(np.hstack([plate.force, plate.moment]))
         known = np.asarray(np.isfinite(wrench).all(axis=1)) & ~saturated(wrench[:, 1])
         loaded = np.nan_to_num(wrench[:, 1]) > LOADED_N
@@ -158,13 +158,72 @@ def to_the_end(owners: Flags, pressed: Flags) -> Flags:
     return owners
 
 
+def divided(
+    feet: tuple[str, ...],
+    plates: Sequence[PlateLoad],
+    outlines: Sequence[Array | None],
+    on: Flags,
+    off: Flags,
+    messages: tuple[str, ...] = (),
+) -> FootLoads:
+    """The plates' wrenches given to the feet that stand on them.
+
+    Args:
+        outlines: (T, K, 2) m of each foot's markers; None: the foot has none.
+        on: (T, F, P) this foot stands on this plate. off: (T, F) it may stand beside the plates.
+    """
+    n, F = off.shape
+    wrench, reason = np.zeros((n, F, 6)), np.full((n, F), SWING, dtype=np.int8)
+    total_known = np.full(n, bool(plates))
+    for p, plate in enumerate(plates):
+        owners = on[:, :, p]
+        count = owners.sum(axis=1)
+        for k in range(F):
+            alone = owners[:, k] & (count == 1)
+            wrench[alone, k] += plate.wrench[alone]
+            reason[alone, k] = np.maximum(reason[alone, k], MEASURED)
+        both = np.flatnonzero(count > 1)
+        share = _shares(plate, both, owners, outlines)
+        for k in range(F):
+            wrench[both, k] += share[:, k]
+            reason[both[owners[both, k]], k] = SHARED
+        total_known &= plate.known
+        reason[~plate.known[:, None] & owners] = UNKNOWN
+        if all(outline is not None for outline in outlines):
+            foreign = (count == 0) & (np.nan_to_num(plate.wrench[:, 1]) > FOREIGN_N)
+            total_known &= ~foreign
+    reason[off] = OFF_PLATE
+    total_known &= ~off.any(axis=1)
+    wrench[(reason == OFF_PLATE) | (reason == UNKNOWN)] = np.nan
+    all_measured = total_known & (reason != SHARED).all(axis=1)
+    return FootLoads(feet, wrench, reason, total_known, all_measured, messages)
+
+
+def _shares(plate: PlateLoad, frames: npt.NDArray[np.intp], owners: Flags, outlines: Sequence[Array | None]) -> Array:
+    """(K, F, 6) of a plate under two feet: force by the lever between the feet, each at its own middle."""
+    found = np.zeros((len(frames), len(outlines), 6))
+    for row, t in enumerate(frames):
+        own = np.flatnonzero(owners[t])[:2]
+        centres = [np.nanmean(outline[t], axis=0) for k in own if (outline := outlines[k]) is not None]
+        along = centres[1] - centres[0]
+        lever = (plate.cop[t] - centres[0]) @ along / max(float(along @ along), 1e-9)
+        part = 0.5 if not np.isfinite(lever) else float(np.clip(lever, 0.0, 1.0))
+        F, M = plate.wrench[t, :3], plate.wrench[t, 3:]
+        parts: tuple[float, float] = (1.0 - part, part)
+        points = [np.array([c[0], 0.0, c[1]]) if np.isfinite(c).all() else np.zeros(3) for c in centres]
+        rest = M - np.sum([s * np.cross(c, F) for s, c in zip(parts, points, strict=True)], axis=0)
+        for k, s, c in zip(own, parts, points, strict=True):
+            found[row, k] = s * np.concatenate([F, np.cross(c, F) + rest])
+    return found
+
+
 class _Assignment:
     def __init__(
         self,
         recording: Recording,
         feet: tuple[str, ...],
         contacts: dict[str, FootContact],
-        plates: list[_Load],
+        plates: list[PlateLoad],
         told: dict[str, str],
     ) -> None:
         self.recording, self.feet, self.contacts, self.plates, self.told = recording, feet, contacts, plates, told
@@ -225,7 +284,7 @@ class _Assignment:
         apart = np.fmin(distance_to_hull(cop, own.outline), distance_to_hull(cop, other.outline)) > BETWEEN_M
         return np.asarray((distance_to_hull(cop, both) < BETWEEN_M) & apart & own.stands & other.stands)
 
-    def upon(self, plate: _Load, foot: FootContact, frames: slice) -> Flags:
+    def upon(self, plate: PlateLoad, foot: FootContact, frames: slice) -> Flags:
         """Frames in which all touching markers of a foot lie within a plate's edges; none where these are not told."""
         outline, touching = foot.outline[frames], foot.touching[frames]
         if plate.corners is None:
@@ -246,53 +305,13 @@ class _Assignment:
                 away[:, m] = np.fmin(away[:, m], distance_to_hull(outline[:, m], corners))
         return np.asarray(((away > BEYOND_M) & np.isfinite(away) & touching).any(axis=1))
 
-    def loads(self, ground: GroundFrame) -> FootLoads:
-        n, F = self.recording.n_frames, len(self.feet)
-        wrench, reason = np.zeros((n, F, 6)), np.full((n, F), SWING, dtype=np.int8)
-        total_known = np.full(n, bool(self.plates))
+    def loads(self) -> FootLoads:
         for p, plate in enumerate(self.plates):
-            owners = self.on[:, :, p]
-            count = owners.sum(axis=1)
-            for k in range(F):
-                alone = owners[:, k] & (count == 1)
-                wrench[alone, k] += plate.wrench[alone]
-                reason[alone, k] = np.maximum(reason[alone, k], MEASURED)
-            both = np.flatnonzero(count > 1)
-            share = self.shares(plate, both, owners)
-            for k in range(F):
-                wrench[both, k] += share[:, k]
-                reason[both[owners[both, k]], k] = SHARED
-            lost = ~plate.known
-            total_known &= plate.known
-            reason[lost[:, None] & owners] = UNKNOWN
-            self.say(plate, lost, both, owners)
-            if len(self.contacts) == F:
-                foreign = (count == 0) & (np.nan_to_num(plate.wrench[:, 1]) > FOREIGN_N)
-                total_known &= ~foreign
-        reason[self.off] = OFF_PLATE
-        total_known &= ~self.off.any(axis=1)
-        wrench[(reason == OFF_PLATE) | (reason == UNKNOWN)] = np.nan
-        all_measured = total_known & (reason != SHARED).all(axis=1)
-        return FootLoads(self.feet, wrench, reason, total_known, all_measured, tuple(self.messages))
+            self.say(plate, ~plate.known, np.flatnonzero(self.on[:, :, p].sum(axis=1) > 1), self.on[:, :, p])
+        outlines = [self.contacts[foot].outline if foot in self.contacts else None for foot in self.feet]
+        return divided(self.feet, self.plates, outlines, self.on, self.off, tuple(self.messages))
 
-    def shares(self, plate: _Load, frames: npt.NDArray[np.intp], owners: Flags) -> Array:
-        """(K, F, 6) of a plate under two feet: force by the lever between the feet, each at its own middle."""
-        found = np.zeros((len(frames), len(self.feet), 6))
-        for row, t in enumerate(frames):
-            own = np.flatnonzero(owners[t])[:2]
-            centres = [np.nanmean(self.contacts[self.feet[k]].outline[t], axis=0) for k in own]
-            along = centres[1] - centres[0]
-            lever = (plate.cop[t] - centres[0]) @ along / max(float(along @ along), 1e-9)
-            part = 0.5 if not np.isfinite(lever) else float(np.clip(lever, 0.0, 1.0))
-            F, M = plate.wrench[t, :3], plate.wrench[t, 3:]
-            parts: tuple[float, float] = (1.0 - part, part)
-            points = [np.array([c[0], 0.0, c[1]]) if np.isfinite(c).all() else np.zeros(3) for c in centres]
-            rest = M - np.sum([s * np.cross(c, F) for s, c in zip(parts, points, strict=True)], axis=0)
-            for k, s, c in zip(own, parts, points, strict=True):
-                found[row, k] = s * np.concatenate([F, np.cross(c, F) + rest])
-        return found
-
-    def say(self, plate: _Load, lost: Flags, both: npt.NDArray[np.intp], owners: Flags) -> None:
+    def say(self, plate: PlateLoad, lost: Flags, both: npt.NDArray[np.intp], owners: Flags) -> None:
         time = self.recording.time
         for k, foot in enumerate(self.feet):
             if owners[:, k].any():

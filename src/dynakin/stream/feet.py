@@ -1,28 +1,44 @@
-"""Which foot each plate carries at this moment, so that joint moments of a floating model know the ground's push."""
+"""Which foot each plate carries at this moment, and whether the plates carry all of the person."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
 
 from dynakin import _core
-from dynakin.filter import FootWrenches, Noise, StepEstimate
-from dynakin.filter.foot_wrenches import IN_THE_AIR, MEASURED, NOT_MEASURED
+from dynakin.filter import FootWrenches, Noise
+from dynakin.filter.total_wrench import foot_wrenches
 from dynakin.model import InitialModel
-from dynakin.stream.picture import arrow
+from dynakin.recordings.feet import distance_to_hull
+from dynakin.recordings.foot_contact import AFTER_S, NEAR_FLOOR_M, SLOW_M_S
+from dynakin.recordings.foot_loads import (
+    BETWEEN_M,
+    EMPTY_N,
+    FLAT_FRAMES,
+    FOREIGN_N,
+    LOADED_N,
+    NEAR_M,
+    SHARED,
+    PlateLoad,
+    divided,
+)
 
 Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
 
-_REACH_M = 0.25  # a centre of pressure that is farther from both feet is nobody's
-_RAISED_M = 0.05  # a foot whose lowest marker is this much above its place while standing is in the air
+_LOW_M = 0.05  # a foot whose lowest marker is higher than this above its place in standing sets down on nothing
+_RISE_M_S = 0.0025  # how fast a marker's lowest place is forgotten, so that one bad moment does not stay
+_DT_S = (0.001, 0.05)  # how far ahead the feet are predicted
 
 
 class LiveFeet:
-    """Gives each plate to the foot nearest to its centre of pressure, frame by frame; offline (`foot_loads`) whole
-    stances are seen, which tells more where feet are close together.
+    """Gives each plate to the feet that stand on it, frame by frame, from the estimate before the step.
+
+    Offline (`recordings.foot_loads`) whole stances are seen; here a stance is what has been seen of it so far, with the
+    same thresholds: a foot stands where a marker is near its lowest place and slow, and for a while after (push-off). A
+    stance that no plate has carried yet is beside the plates.
 
     Args:
         assigned: plate -> "right" or "left", where it is known.
@@ -31,50 +47,143 @@ class LiveFeet:
     def __init__(
         self, initial: InitialModel, noise: Noise, plates: tuple[str, ...], assigned: Mapping[str, str]
     ) -> None:
-        self.initial, self.plates, self.assigned = initial, plates, dict(assigned)
+        self.initial, self.noise, self.plates = initial, noise, plates
         self.feet = tuple(initial.feet)
-        self._own = [
-            [k for k, marker in enumerate(initial.spec.markers) if marker.segment == initial.feet[foot]]
-            for foot in self.feet
-        ]
-        self._floor = [np.inf] * len(self.feet)
-        self._sd = (np.sqrt(noise.force / 2.0), np.sqrt(noise.moment / 2.0))
+        self._told = {p: self.feet.index(assigned[name]) for p, name in enumerate(plates) if name in assigned}
+        segments = [marker.segment for marker in initial.spec.markers]
+        own = [np.flatnonzero([s == initial.feet[foot] for s in segments]) for foot in self.feet]
+        F, P, M = len(self.feet), len(plates), len(segments)
+        self._own = np.full((F, max(map(len, own), default=0)), M)  # markers of each foot, filled up with M: none
+        for f, markers in enumerate(own):
+            self._own[f, : len(markers)] = markers
+        self._standing, self._floor = np.full(M, np.inf), np.full(M, np.inf)
+        self._time = -np.inf
+        self._touched = np.full(F, -np.inf)  # when the foot last stood
+        self._near, self._loaded = np.zeros((F, P), dtype=int), np.zeros((F, P), dtype=int)  # frames of this stance
+        self._owners = np.zeros((F, P), dtype=bool)  # of the plates that are pressed
+        self._range = _Range(P)
+        self._said: set[str] = set()
+        self._to_say: list[str] = []
 
-    def moments(self, model: _core.Model, state: Array, estimate: StepEstimate, wrenches: Array | None) -> StepEstimate:
-        """The estimate with moments that the feet's wrenches leave, as `Estimator.run` has them; NaN where the push on
-        a foot is not known.
+    def look(
+        self, model: _core.Model, state: Array, time_s: float, wrenches: Array | None
+    ) -> tuple[FootWrenches, bool]:
+        """The feet's wrenches at a time (T = 1), and whether the sum of the plates is the total wrench.
 
         Args:
-            wrenches: (P, 6) N and N m, laboratory frame, or None.
+            state: (n,) before the step. wrenches: (P, 6) N and N m, laboratory frame, or None.
         """
-        count = len(self.feet)
-        wrench, contact = np.zeros((1, count, 6)), np.full((1, count), IN_THE_AIR, dtype=np.uint8)
-        points = np.zeros((1, count, 3))
-        for f, own in enumerate(self._own):
-            height = float(estimate.markers[own, 1].min()) if own else 0.0
-            self._floor[f] = min(self._floor[f], height)
-            if height < self._floor[f] + _RAISED_M:
-                contact[0, f] = NOT_MEASURED
-        if wrenches is not None:
-            for name, load in zip(self.plates, self.initial.ground.wrench_to_ground(wrenches), strict=True):
-                found = arrow(load)
-                foot = self._foot(name, found[:3], estimate.markers)
-                if foot is not None:
-                    wrench[0, foot] += load
-                    points[0, foot] = found[:3]
-                    contact[0, foot] = MEASURED
-        segments = [self.initial.feet[foot] for foot in self.feet]
-        loads = FootWrenches.of(self.feet, segments, wrench, contact, *self._sd, points).core()
-        return replace(estimate, moments=_core.contact_moments(model, state, loads)["moments"])
+        dt = float(np.clip(time_s - self._time, *_DT_S))
+        outlines, low = self._move(model, state, time_s, dt)
+        bears = time_s - self._touched <= AFTER_S
+        self._near[~bears], self._loaded[~bears] = 0, 0
+        plates = [] if wrenches is None else self._plates(wrenches)
+        if plates:
+            self._assign(plates, outlines, bears, low)
+            loaded = np.array([plate.loaded[0] for plate in plates])
+            off = bears & ~(self._majority() | (self._owners & loaded)).any(axis=1)
+        else:
+            self._owners[:], off = False, bears
+        on = self._owners[:, : len(plates)]
+        seen = [None if (own == len(self._floor)).all() else outlines[[f]] for f, own in enumerate(self._own)]
+        loads = divided(self.feet, plates, seen, on[None], off[None])
+        known = bool(loads.total_known[0])
+        for p in np.flatnonzero(on.sum(axis=0) > 1) if (loads.reason == SHARED).any() else ():
+            self._say(
+                f"Both feet stand on {self.plates[p]}: its wrench is divided between them by its centre of pressure."
+            )
+        if plates and not known:
+            self._say(
+                "The plates do not carry all of the person (a foot beside them, a load where nobody stands, a plate at "
+                "the end of its range): the total wrench is left out for as long as that is so."
+            )
+        return foot_wrenches(loads, self.initial, self.noise), known
 
-    def _foot(self, plate: str, point: Array, markers: Array) -> int | None:
-        if not np.isfinite(point).all():
-            return None
-        if plate in self.assigned:
-            return self.feet.index(self.assigned[plate])
-        away = [
-            float(np.linalg.norm((markers[own] - point)[:, [0, 2]].mean(axis=0))) if own else np.inf
-            for own in self._own
+    def news(self) -> list[str]:
+        """Sentences, each said once."""
+        found, self._to_say = self._to_say, []
+        return found
+
+    def _say(self, text: str) -> None:
+        if text not in self._said:
+            self._said.add(text)
+            self._to_say.append(text)
+
+    def _move(self, model: _core.Model, state: Array, time_s: float, dt: float) -> tuple[Array, Flags]:
+        """Outlines (F, K, 2) of the feet, predicted, and whether each is low; keeps when it last stood."""
+        offset, size = model.layout.blocks["coordinates"]
+        speeds, _ = model.layout.blocks["speeds"]
+        ahead = state.copy()
+        ahead[offset : offset + size] += dt * state[speeds : speeds + size]
+        before, places = _core.marker_positions(model, state), _core.marker_positions(model, ahead)
+        speed = np.linalg.norm(places - before, axis=1) / dt
+        if not np.isfinite(self._time):
+            self._standing = before[:, 1].copy()
+        self._floor = np.minimum(np.minimum(self._floor + _RISE_M_S * dt, self._standing), places[:, 1])
+        self._time = time_s
+        height = places[:, 1] - self._floor
+        touching = np.append((height < NEAR_FLOOR_M) & (speed < SLOW_M_S), False)
+        self._touched[touching[self._own].any(axis=1)] = time_s
+        low = np.append(height < _LOW_M, False)[self._own].any(axis=1)
+        return np.vstack([places[:, [0, 2]], np.full(2, np.nan)])[self._own], low
+
+    def _plates(self, wrenches: Array) -> list[PlateLoad]:
+        loads = self.initial.ground.wrench_to_ground(wrenches)
+        known = np.isfinite(loads).all(axis=1) & ~self._range.at_end(loads[:, 1])
+        push = np.where(np.nan_to_num(loads[:, 1]) > LOADED_N, loads[:, 1], np.nan)
+        cop = np.stack([loads[:, 5] / push, -loads[:, 3] / push], axis=1)
+        return [
+            PlateLoad(name, loads[[p]], cop[[p]], np.isfinite(push[[p]]), known[[p]], None)
+            for p, name in enumerate(self.plates)
         ]
-        nearest = int(np.argmin(away))
-        return nearest if away[nearest] < _REACH_M else None
+
+    def _majority(self) -> Flags:
+        """(F, P) plates that carry a stance, as far as it has gone: near for most of the load."""
+        return np.asarray(self._near > 0.5 * self._loaded)
+
+    def _assign(self, plates: list[PlateLoad], outlines: Array, bears: Flags, low: Flags) -> None:
+        touches = self._touched == self._time
+        cops = np.concatenate([plate.cop for plate in plates])
+        F, P = len(self.feet), len(plates)
+        away = distance_to_hull(np.tile(cops, (F, 1)), np.repeat(outlines, P, axis=0)).reshape(F, P)
+        away = np.nan_to_num(away, nan=np.inf)  # of a plate that is not loaded
+        near = away < NEAR_M
+        apart = np.isfinite(away).any(axis=0) & (away.min(axis=0) > BETWEEN_M)
+        if touches.all() and apart.any():
+            both = np.broadcast_to(outlines.reshape(1, -1, 2), (P, outlines.size // 2, 2))
+            near |= apart & (distance_to_hull(cops, both) < BETWEEN_M)
+        for p, foot in self._told.items():
+            near[:, p] = np.arange(F) == foot
+        loaded = np.array([plate.loaded[0] for plate in plates])
+        self._loaded += touches[:, None] & loaded
+        self._near += touches[:, None] & loaded & near
+        mine = self._majority() & bears[:, None]
+        for p, plate in enumerate(plates):
+            push = float(plate.wrench[0, 1])
+            if push <= EMPTY_N:
+                self._owners[:, p] = False
+            elif p in self._told:
+                self._owners[:, p] = near[:, p]
+            elif mine[:, p].any():
+                self._owners[:, p] = mine[:, p]
+            elif not self._owners[:, p].any():  # a foot that sets down, before it stands
+                nearest = int(np.argmin(away[:, p]))
+                self._owners[nearest, p] = bool(near[nearest, p] and low[nearest])
+
+
+class _Range:
+    """Whether plates are at the end of their range, as `recordings.foot_loads.saturated` tells it afterwards."""
+
+    def __init__(self, plates: int) -> None:
+        self._top = np.full(plates, FOREIGN_N)
+        self._last, self._before = np.full(plates, np.nan), np.full(plates, np.nan)
+        self._flat = np.zeros(plates, dtype=int)
+
+    def at_end(self, push: Array) -> Flags:
+        """(P,) of the next frame's vertical forces (P,) N."""
+        self._top = np.fmax(self._top, push)
+        flat = (push > self._top * (1.0 - 1e-6)) & (np.abs(push - self._last) <= 1e-6 * self._top)
+        self._before = np.where(flat, self._before, self._last)
+        self._flat = np.where(flat, self._flat + 1, 0)
+        self._last = push.copy()
+        return np.asarray((self._flat >= FLAT_FRAMES - 1) & (self._before < 0.99 * self._top))

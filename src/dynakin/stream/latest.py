@@ -41,9 +41,14 @@ class Latest:
         self._seen = 0
 
     def write(self, numbers: Array, text: bytes) -> None:
-        """Replace what is there."""
+        """Replace what is there.
+
+        Raises:
+            ValueError: the text is longer than there is room; half of one is of no use.
+        """
+        if len(text) > self._text:
+            raise ValueError(f"the text has {len(text)} bytes, expected {self._text} at most")
         count = _HEAD.unpack_from(self._map, 0)[0]
-        text = text[: self._text]
         _HEAD.pack_into(self._map, 0, count + 1, len(text))
         self._map[_HEAD.size : _HEAD.size + len(text)] = text
         start = _HEAD.size + self._text

@@ -48,16 +48,23 @@ class Monitor:
         self,
         fusion: Fusion,
         fused: Fused,
+        whole: bool,
         estimate: StepEstimate,
         smoothed: StepEstimate | None,
         state: Array,
         verdicts: Sequence[str],
     ) -> Status:
-        """The status of a step. verdicts: of each marker and the plates, as the filter tells them."""
+        """The status of a step.
+
+        Args:
+            whole: whether the plates carry all of the person. verdicts: of each marker and the plates, as the filter
+                tells them.
+        """
         names, report = self.initial.recorded_markers, estimate.report
         on_plates = "none"
         if self._plates:
-            plates = {"accepted": "used", "refused": "refused"}.get(verdicts[-1], "left out")
+            others = "left out" if whole else "incomplete"
+            plates = {"accepted": "used", "refused": "refused"}.get(verdicts[-1], others)
             on_plates = "silent" if fused.wrenches is None else plates if self._used else "left out"
         at = [k for k in self._bounded if not self.initial.lower[k] < state[k] < self.initial.upper[k]]
         recent = self._recent
@@ -114,7 +121,7 @@ class Monitor:
         for kind, silent in (("markers", fusion.markers_silent(now_s)), ("plates", fusion.plates_silent(now_s))):
             if silent != self._silent[kind]:
                 self._silent[kind] = silent
-                goes_on = "going on with markers alone" if kind == "plates" else "the estimate waits for them"
+                goes_on = "going on with markers alone" if kind == "plates" else self._without_markers(fusion, now_s)
                 said.append(f"The {kind} are silent; {goes_on}." if silent else f"The {kind} are back.")
         if self.left_out > self._told_left_out and now_s - self._told_s > _SLOW_S:
             said.append(
@@ -126,3 +133,8 @@ class Monitor:
             self._restarts = fusion.clock_restarts
             said.append("A source's clock was set back; time goes on.")
         return said
+
+    def _without_markers(self, fusion: Fusion, now_s: float) -> str:
+        if not self._plates or fusion.plates_silent(now_s):
+            return "the estimate waits for them"
+        return "going on with plates alone" if self._used else "the movement is only predicted meanwhile"

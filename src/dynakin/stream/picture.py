@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from dynakin import _core
-from dynakin.stream.sinks import LiveFrame, Started
+from dynakin.stream.sinks import LiveFrame, Started, Status
 
 Array = npt.NDArray[np.float64]
 
 _LOADED_N = 20.0
 _SHOWN = ("length", "inertia")
+_NAMES, _NAME = 4, 40  # of a list of names, so many are shown, and so many characters of each
 
 
 class Picture:
@@ -85,6 +88,21 @@ class Picture:
                 far = np.linalg.norm(places[own] - centres[joint], axis=1)
                 found.append([joint, own[int(np.argmax(far))]])
         return found
+
+
+def status_text(status: Status) -> bytes:
+    """A status as JSON of a bounded length (2 kB): of each list of names its count and the first few, shortened."""
+    told = asdict(status)
+    for key, value in told.items():
+        if isinstance(value, tuple):
+            told[key] = {"count": len(value), "first": [name[:_NAME] for name in value[:_NAMES]]}
+    return json.dumps(told).encode()
+
+
+def in_words(names: Mapping[str, Any]) -> str:
+    """Names as `status_text` gives them: "a, b and 3 more", "none" without any."""
+    more = names["count"] - len(names["first"])
+    return (", ".join(names["first"]) or "none") + (f" and {more} more" if more else "")
 
 
 def rotations(spec: _core.ModelSpec) -> list[bool]:

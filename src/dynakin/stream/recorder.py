@@ -6,6 +6,7 @@ import queue
 import subprocess
 import sys
 import threading
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ import numpy as np
 from dynakin.errors import OutputError, RecordingError
 from dynakin.recordings import Recording
 from dynakin.results import Estimate, check_output_writable
-from dynakin.stream.fusion import Fused, Fusion
+from dynakin.stream.fusion import DELAY_S, Fused, Fusion
 from dynakin.stream.packets import MarkerPacket, Packet, PlatePacket, StreamInfo
 from dynakin.stream.record_format import packet_record, read_records, text_record
 from dynakin.stream.settings import estimator_of
@@ -44,6 +45,7 @@ class Recorder(Sink):
             raise OutputError(f"{self.folder}: cannot be written ({error.strerror})") from None
         if filled:
             raise OutputError(f"{self.folder}: is not empty, expected a new folder for a recording")
+        self._session: dict[str, Any] = {}
         self.restarts = 0  # of the process, which somebody else ended
         self._queue: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         self._process = self._begin()
@@ -55,10 +57,14 @@ class Recorder(Sink):
         """Process that writes."""
         return self._process.pid
 
+    def begins(self, subject: Mapping[str, float], delay_s: float) -> None:
+        """Keeps them, so that `finish` fuses as it was live."""
+        self._session = {"subject": dict(subject), "delay_s": delay_s}
+
     def opened(self, markers: StreamInfo, plates: StreamInfo | None) -> None:
         """Writes what is needed to read the rest."""
         told = {"markers": asdict(markers), "plates": None if plates is None else asdict(plates)}
-        self._queue.put(text_record({"streams": told, "settings": self.settings, "version": 1}))
+        self._queue.put(text_record({"streams": told, "settings": self.settings, **self._session, "version": 1}))
 
     def packet(self, packet: Packet) -> None:
         """Writes it."""
@@ -100,14 +106,15 @@ class Recorder(Sink):
 
 
 def read_recorded(folder: str | Path) -> tuple[list[Fused], StreamInfo, StreamInfo | None, dict[str, Any]]:
-    """Samples of a recorded session, fused as they were live, its streams and its settings.
+    """Samples of a recorded session, fused as they were live, its streams, and what it began with: "settings",
+    "subject" and "delay_s" (the last two are not in old recordings).
 
     Raises:
         RecordingError: nothing was recorded there.
     """
     path = Path(folder) / FILE
     fusion: Fusion | None = None
-    settings: dict[str, Any] = {}
+    begun: dict[str, Any] = {}
     found: list[Fused] = []
     for record in read_records(path):
         if isinstance(record, MarkerPacket | PlatePacket):
@@ -116,10 +123,11 @@ def read_recorded(folder: str | Path) -> tuple[list[Fused], StreamInfo, StreamIn
                 found += fusion.poll(record.arrived_s)
         elif "streams" in record:
             streams = {kind: info and _info(info) for kind, info in record["streams"].items()}
-            fusion, settings = Fusion(streams["markers"], streams["plates"]), record["settings"]
+            fusion = Fusion(streams["markers"], streams["plates"], delay_s=record.get("delay_s", DELAY_S))
+            begun = record
     if fusion is None:
         raise RecordingError(f"{path}: holds no recorded session")
-    return found + fusion.poll(np.inf), fusion.markers, fusion.plates, settings
+    return found + fusion.poll(np.inf), fusion.markers, fusion.plates, begun
 
 
 def recorded(folder: str | Path) -> Recording:
@@ -128,8 +136,9 @@ def recorded(folder: str | Path) -> Recording:
     Raises:
         RecordingError: nothing was recorded there.
     """
-    found, markers, plates, _ = read_recorded(folder)
-    return recording_of(found, markers.names, plates.names if plates else (), Path(folder).name)
+    found, markers, plates, begun = read_recorded(folder)
+    names = plates.names if plates else ()
+    return recording_of(found, markers.names, names, Path(folder).name, begun.get("subject"))
 
 
 def finish(folder: str | Path, output: str | Path) -> Estimate:
@@ -139,7 +148,7 @@ def finish(folder: str | Path, output: str | Path) -> Estimate:
         RecordingError: nothing was recorded there. Others: as `dynakin run`.
     """
     check_output_writable(Path(output))
-    settings = read_recorded(folder)[3]
+    settings = read_recorded(folder)[3]["settings"]
     estimate = estimator_of(settings).run(recorded(folder))
     estimate.save(Path(output))
     return estimate

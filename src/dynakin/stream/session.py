@@ -155,7 +155,11 @@ class Live:
                 "are right in shape only."
             )
         for sink in self.sinks:
-            sink.opened(markers, plates)
+            self._tell(sink)
+
+    def _tell(self, sink: Sink) -> None:
+        sink.begins(self._subject, self.delay_s)
+        sink.opened(self.fusion.markers, self.fusion.plates)
 
     def _turn(self) -> None:
         packet = self._reader.get(_POLL_S)
@@ -197,7 +201,7 @@ class Live:
         except DynakinError as error:
             self.say(error.message)
             return
-        self._recording.opened(self.fusion.markers, self.fusion.plates)
+        self._tell(self._recording)
         self.sinks.append(self._recording)
         self.say("Recording.")
 
@@ -285,28 +289,31 @@ class Live:
     def _step(self, fused: Fused) -> None:
         monitor = self._monitor
         assert monitor is not None
-        sample = fused.sample if self._use_plates else Sample(fused.sample.time_s, fused.sample.markers)
+        sample, feet, whole = fused.sample, None, True
+        if self._feet is not None:
+            wrenches = fused.wrenches if self._use_plates else None
+            feet, whole = self._feet.look(self.estimator.core_model, self.estimator.state, sample.time_s, wrenches)
+        if not (whole and self._use_plates):
+            sample = Sample(sample.time_s, sample.markers)
         try:
-            estimate = self.estimator.step(sample)
+            estimate = self.estimator.step(sample, feet)
         except DivergenceError as error:
             self.say(f"{error.message}; the estimate begins anew.")
             self.restart()
             return
         smoothed = self.estimator.delayed() if self.estimator.lag else None
         state = self.estimator.state
-        if self._feet is not None:
-            wrenches = fused.wrenches if self._use_plates else None
-            estimate = self._feet.moments(self.estimator.core_model, state, estimate, wrenches)
         deviations = None
         if not 0.0 <= sample.time_s - self._told_sd < _DEVIATIONS_S and self._reader.backlog < 4:
             self._told_sd = sample.time_s
             deviations = self.estimator.deviations()
-        status = monitor.status(self.fusion, fused, estimate, smoothed, state, self.estimator.verdicts)
+        status = monitor.status(self.fusion, fused, whole, estimate, smoothed, state, self.estimator.verdicts)
         frame = LiveFrame(estimate, smoothed, fused, state, deviations, status)
         for sink in self.sinks:
             sink.frame(frame)
         monitor.published(sample.time_s, time.monotonic() - fused.arrived_s)
-        for text in monitor.settling(sample.time_s, state, self.estimator):
+        news = self._feet.news() if self._feet is not None else []
+        for text in [*news, *monitor.settling(sample.time_s, state, self.estimator)]:
             self.say(text)
 
     def say(self, text: str) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -24,7 +24,8 @@ class Status:
         latency_ms: from a sample's arrival to its estimate, the longest of the last second.
         nis: normalised innovation squared over the rows used, near 1 where the noise is as declared; NaN without.
         refused: markers whose position the gate refused. missing: markers not seen.
-        plates: "used", "refused", "silent", "left out" or "none".
+        plates: "used", "refused", "silent", "incomplete" (they do not carry all of the person now: left out in this
+            step), "left out" or "none".
         at_bound: constants that sit on a bound.
         tracking: the filter's own word ("following", "doubtful", "lost", ...).
         left_out: frames so far for which the computer was too slow.
@@ -81,6 +82,9 @@ class Started:
 
 class Sink:
     """Where estimates go; each method may be left out. None of them may block: the filter waits for it."""
+
+    def begins(self, subject: Mapping[str, float], delay_s: float) -> None:
+        """A session begins: mass (kg) and height (m) as its sources tell them, and how long it waits for packets."""
 
     def opened(self, markers: StreamInfo, plates: StreamInfo | None) -> None:
         """The streams are known."""

@@ -10,14 +10,13 @@ import subprocess
 import sys
 import threading
 import time
-from dataclasses import asdict
 
 import numpy as np
 
 from dynakin.errors import ConfigError
 from dynakin.stream.latest import Latest
 from dynakin.stream.packets import StreamInfo
-from dynakin.stream.picture import Picture
+from dynakin.stream.picture import Picture, status_text
 from dynakin.stream.sinks import LiveFrame, Sink, Started, Status
 
 _PORTS = 20  # that are tried from the one asked for
@@ -82,7 +81,7 @@ class Viewer(Sink):
             return
         self._drawn = now
         numbers = self._picture.numbers(frame, self._deviations)
-        self._latest.write(numbers, json.dumps(asdict(frame.status)).encode())
+        self._latest.write(numbers, status_text(frame.status))
 
     def said(self, text: str, status: Status) -> None:
         """Shows what is told."""

@@ -15,7 +15,7 @@ import viser
 from viser import uplot
 
 from dynakin.stream.latest import Latest
-from dynakin.stream.picture import split
+from dynakin.stream.picture import in_words, split
 
 _PERIOD_S = 1.0 / 30.0
 _PLOT_S = 0.1
@@ -150,15 +150,13 @@ class Page:
             self.plots["constant"].data = (t, np.array([part["constants"][c] for part in self.history]))
 
     def _show_status(self, status: dict[str, Any]) -> None:
-        bound = ", ".join(status["at_bound"][:4]) or "none"
-        refused = ", ".join(status["refused"][:4]) or "none"
         rows = [
             ("Rate", f"{status['rate_hz']:.0f} Hz, latency {status['latency_ms']:.1f} ms"),
             ("Fit (NIS, near 1)", f"{status['nis']:.2f}, {status['tracking']}"),
             ("Plates", status["plates"]),
-            ("Markers", f"{len(status['missing'])} missing, refused: {refused}"),
+            ("Markers", f"{status['missing']['count']} missing, refused: {in_words(status['refused'])}"),
             ("Packets", f"late {status['late']}, lost {status['lost']}, twice {status['duplicate']}"),
-            ("At a bound", bound),
+            ("At a bound", in_words(status["at_bound"])),
             ("Constants", "settled" if status["settled"] else "settling"),
         ]
         if status["left_out"]:
