@@ -70,11 +70,12 @@ def check(
         definition = load_model(name, subject, markers=markers or "auto")
         console.print(f"What `run --model {name}` would do", style="bold")
         try:
-            if not recording.plates:
+            planar = not isinstance(definition, OpenSimDefinition) and definition.model.planar
+            if planar and not recording.plates:
                 raise DynakinError("no force plates, expected at least one (give --forces)")
             found = _laid_on(definition, recording, still, side or "auto", vertical or "auto", direction)
-            plates = check_plates(recording, found.ground, found.mass_kg)
-            if plates.refusal:
+            plates = check_plates(recording, found.ground, found.mass_kg if planar else None)
+            if recording.plates and plates.refusal:
                 raise DynakinError(plates.refusal)
         except DynakinError as error:
             console.print(Padding(Text(f"Refuse it: {error.message}", style="red"), (0, 0, 0, 2)))
@@ -147,7 +148,7 @@ def _marker_table(recording: Recording) -> Table:
 
 def _print_plates(console: Console, recording: Recording) -> None:
     if not recording.plates:
-        console.print("Force plates: none. `run` needs them (--forces GRF.mot).\n")
+        console.print("Force plates: none (--forces GRF.mot). Models in the plane need them.\n")
         return
     rows = table("plate", "mean force, N", "greatest, N", "loaded", numbers=(1, 2, 3), title="Force plates")
     for plate in recording.plates:

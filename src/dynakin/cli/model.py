@@ -126,7 +126,9 @@ def _coordinates(model: ModelFile) -> Table:
     for coordinate in model.coordinates:
         rotation = kinds[coordinate.name] == "rotation"
         low, high = (np.degrees(v) if rotation else v for v in coordinate.limits)
-        limits = "locked" if coordinate.locked else f"{low:.4g} to {high:.4g}"
+        limits = (
+            "locked" if coordinate.locked else "free" if np.isinf([low, high]).all() else f"{low:.4g} to {high:.4g}"
+        )
         rows.add_row(coordinate.name, limits, "deg" if rotation else "m", coordinate.description)
     return rows
 

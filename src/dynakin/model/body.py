@@ -11,6 +11,10 @@ from dynakin.errors import ModelError
 from dynakin.model.frames import Trial
 from dynakin.model.subject import Subject
 from dynakin.recordings import GroundFrame, Recording, check_plates
+from dynakin.recordings.foot_loads import foot_loads
+from dynakin.units import GRAVITY_M_S2
+
+_LEAST_FRAMES = 25
 
 
 class OnPlates(Protocol):
@@ -43,7 +47,7 @@ def find_mass(subject: Subject, trials: Sequence[OnPlates]) -> tuple[float, str]
         elif check.mass_kg_from_plates is None:
             reasons.append(f"nobody stands still on the plates of {recording.name}")
             if check.mean_mass_kg is not None:
-                means.append((check.mean_mass_kg, recording.name))
+                means.append((_of_whole_load(recording, trial.ground) or check.mean_mass_kg, recording.name))
         else:
             mass = float(check.mass_kg_from_plates)
             return mass, f"Mass {mass:.2f} kg: from the plates of {recording.name} while standing still."
@@ -54,11 +58,20 @@ def find_mass(subject: Subject, trials: Sequence[OnPlates]) -> tuple[float, str]
     for mass, name in means:
         return mass, (
             f"Warning: mass {mass:.2f} kg from the mean vertical force of {name}, in which nobody stands still; wrong "
-            "where anything but the ground pushes or pulls. Give the mass if it is known."
+            "by several percent in a walk of few steps, and where anything but the plates bears the person. Give the "
+            "mass if it is known."
         )
     raise ModelError(
         f"mass_kg is not given and cannot be found ({'; '.join(reasons)}); expected mass_kg of the subject"
     )
+
+
+def _of_whole_load(recording: Recording, ground: GroundFrame) -> float | None:
+    """Mean load (kg) of the frames in which every foot that stands is on a plate; None where these are few."""
+    loads = foot_loads(recording, ground)
+    push = loads.wrench[..., 1].sum(axis=1)[loads.total_known]
+    push = push[np.isfinite(push)]
+    return float(push.mean()) / GRAVITY_M_S2 if len(push) >= _LEAST_FRAMES else None
 
 
 def find_height(subject: Subject, recordings: list[Recording], trial: Trial) -> tuple[float | None, str]:

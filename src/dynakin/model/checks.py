@@ -70,9 +70,9 @@ def check_masses(
                 f"height_m is needed: no markers give the length of {by_height[0].name} (segment {segment})"
             )
         for part in by_height:
-            messages.append(
-                f"Length of {part.name} for the inertia table: {1000 * part.length:.0f} mm, from the height."
-            )
+            text = f"Length of {part.name} for the inertia table: {1000 * part.length:.0f} mm, from the height."
+            if text not in messages:  # right and left say the same
+                messages.append(text)
     total = sum(body.mass for body in bodies.values())
     if abs(total - mass_kg) > 1e-9 * mass_kg:
         messages.append(f"The segments of model {model.name} hold {total:.2f} kg of the body's {mass_kg:.2f} kg.")

@@ -42,6 +42,8 @@ def paired(names: Sequence[str]) -> Iterator[tuple[str, int, int]]:
 def asymmetry(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str, Any] | None:
     """Symmetry indices over the frames ``window``; None in a model that has no left and right.
 
+    Frames in which a moment or a foot's wrench is derived from the motion, because a plate is missing, do not count.
+
     Returns:
         ``coordinates``: by name without side, of the range of motion, the largest moment (absolute), positive and
         negative work. ``feet``: of the largest vertical force and of the impulse, where the feet's wrenches are known.
@@ -50,7 +52,9 @@ def asymmetry(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str, An
     angles, moments = (
         estimate.data[name].transpose("time", "coordinate").values[window] for name in ("coordinates", "moments")
     )
-    power = estimate.powers()[window]
+    # What is derived from the motion carries its errors: peaks of it would be taken for the person's.
+    derived = _derived(estimate, "moment_source", "coordinate", 1)[window]
+    moments, power = np.where(derived, np.nan, moments), np.where(derived, np.nan, estimate.powers()[window])
     found: dict[str, Any] = {}
     for name, *sides in paired(estimate.coordinate_names):
         done = [work_of(time, power[:, k]) for k in sides]
@@ -72,11 +76,19 @@ def _feet(estimate: Estimate, time: Array, window: npt.NDArray[np.bool_]) -> dic
     if "right" not in names or "left" not in names:
         return None
     push = estimate.data["foot_wrench"].sel(component="fy").transpose("time", "foot").values[window]
+    push = np.where(_derived(estimate, "foot_contact", "foot", 2)[window], np.nan, push)
     sides = [push[:, names.index(side)] for side in ("right", "left")]
     return {
         "peak_vertical_force": symmetry_index(*(_largest(side) for side in sides)),
         "impulse": symmetry_index(*(work_of(time, side).positive_j for side in sides)),
     }
+
+
+def _derived(estimate: Estimate, name: str, across: str, code: int) -> npt.NDArray[np.bool_]:
+    """(T, across) bool: where the code of ``name`` says so; nowhere in a model that has no such codes."""
+    if name not in estimate.data:
+        return np.zeros((len(estimate.time), estimate.data.sizes[across]), dtype=bool)
+    return np.asarray(estimate.data[name].transpose("time", across).values == code)
 
 
 def _largest(values: Array) -> float:

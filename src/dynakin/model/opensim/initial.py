@@ -83,6 +83,7 @@ def lay_on(
         f"markers to {1000.0 * fit.rms_m:.0f} mm (root mean square)."
     )
     spec = spec_at(fit.coordinates)
+    _refuse_too_few(source, spec, [name for _, name in chosen], recording)
     core = _core.Model(spec)
     names = list(core.layout.names)
     bodies = {body.name: body.rigid for body in source.bodies}
@@ -171,6 +172,17 @@ def _estimated_bodies(source: OpenSimModel, definition: OpenSimDefinition, messa
         share = 100.0 * definition.options.lightest_share
         messages.append(f"Inertia of bodies below {share:g} % of the mass is the file's: {', '.join(kept)}.")
     return chosen
+
+
+def _refuse_too_few(source: OpenSimModel, spec: _core.ModelSpec, names: list[str], recording: Recording) -> None:
+    """Markers that measure less than the coordinates say nothing of a posture."""
+    free = sum(not coordinate.locked for coordinate in spec.coordinates)
+    if 3 * len(names) < free:
+        raise ModelError(
+            f"{recording.path or recording.name}: {len(names)} of the {len(source.markers)} markers of "
+            f"{source.path.name} are there ({', '.join(names)}), expected at least {-(-free // 3)} for its {free} free "
+            "coordinates: name them alike"
+        )
 
 
 def _first_frame(measured: Array) -> int:
