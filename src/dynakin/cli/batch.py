@@ -17,6 +17,7 @@ from dynakin.engine.folder import ROWS, open_folder
 from dynakin.errors import ConfigError, DynakinError
 from dynakin.reference import CUTOFF_HZ
 from dynakin.report.text_tables import table2_text
+from dynakin.results.naming import plural
 
 
 def batch(
@@ -46,7 +47,9 @@ def batch(
     console = out()
     if result.rows:
         people = len({name.split("/")[0] for name in result.rows})
-        title = f"{len(result.rows)} trials of {people} subjects, mean ± standard deviation over trials"
+        title = (
+            f"{plural(len(result.rows), 'trial')} of {plural(people, 'subject')}, mean ± standard deviation over trials"
+        )
         console.print(as_table(table2_text(result.table2(), title)))
     with busy("writing tables"):
         write_batch(folder, result)

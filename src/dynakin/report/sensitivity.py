@@ -151,7 +151,8 @@ def _in_unit(grid: Sensitivity) -> str:
 
 def _axis_label(grid: Sensitivity, k: int) -> str:
     which = "Q in " if grid.names[k] in GAIN_NAMES else ""
-    return f"{grid.names[k]}\nlog₁₀ of {which or 'it in '}{grid.units[k]}"
+    unit = grid.units[k]
+    return f"{grid.names[k]}\nlog₁₀ of {'it, ' if unit.startswith('of ') else which or 'it in '}{unit}"
 
 
 def _edges(centres: Array) -> Array:
