@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.errors import RecordingError
 from dynakin.filter.foot_wrenches import IN_THE_AIR, MEASURED, NOT_MEASURED, FootWrenches
 from dynakin.filter.noise import Noise
 from dynakin.model import InitialModel
+from dynakin.recordings import PlateCheck, Recording, check_plates
 from dynakin.recordings import foot_loads as on_plates
-from dynakin.recordings.foot_loads import LOADED_N, FootLoads
+from dynakin.recordings.foot_loads import LOADED_N, FootLoads, foot_loads
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
@@ -43,6 +47,29 @@ def foot_wrenches(loads: FootLoads, initial: InitialModel, noise: Noise) -> Foot
     moment = np.hypot(np.sqrt(noise.moment / 2.0), _SHARED_REACH_M * shared)
     segments = [initial.feet[foot] for foot in loads.feet]
     return FootWrenches.of(loads.feet, segments, loads.wrench, contact, force, moment, pressure)
+
+
+def known_total(
+    recording: Recording, initial: InitialModel, wrench: Array, assigned: Mapping[str, str] | None = None
+) -> tuple[PlateCheck, FootLoads | None, list[str]]:
+    """Check the plates, and leave out (NaN, in place) the frames in which they do not tell the total wrench (T, 6) of a
+    floating model.
+
+    Args:
+        recording: with plates. assigned: plate -> foot, as for `foot_loads`.
+
+    Returns:
+        What the check found, the load of each foot (None for a model that stands fixed), and what there is to say.
+
+    Raises:
+        RecordingError: the plates are refused.
+    """
+    loads = foot_loads(recording, initial.ground, assigned=assigned) if initial.feet else None
+    # steps beside the plates: their mean load is no mass
+    check = check_plates(recording, initial.ground, None if initial.feet else initial.weighed_kg)
+    if check.refusal:
+        raise RecordingError(f"{recording.path or recording.name}: {check.refusal}")
+    return check, loads, [*check.messages, *(leave_out_unknown(loads, wrench) if loads is not None else [])]
 
 
 def leave_out_unknown(loads: FootLoads, wrench: Array) -> list[str]:
