@@ -12,7 +12,7 @@ from dynakin.errors import ConfigError, ModelError
 from dynakin.filter import Estimator, Noise, presets
 from dynakin.filter.extend import QUANTITIES, Quantity
 from dynakin.model import Bounds, CarriedLoad, Definition, OpenSimOptions, Priors, Subject, load_model
-from dynakin.model.identified import read_identified
+from dynakin.model.identified import IdentifiedSubject, read_identified
 from dynakin.model.subject import Sex
 from dynakin.model.validation import Strict, nearest, read_toml, validate
 from dynakin.recordings import PlateLoad
@@ -93,6 +93,8 @@ class RunConfig(Strict):
 
     ground: dict[str, Any] = Field(default_factory=dict)
     """Written into an output's config.toml for the record: the ground frame that was found. Not read."""
+    identified: str | None = None
+    """Written into an output's config.toml for the record: what was taken of `parameters`. Not read."""
     versions: dict[str, Any] = Field(default_factory=dict)
     """Written into an output's config.toml for the record. Not read."""
 
@@ -137,6 +139,14 @@ class RunConfig(Strict):
         except ModelError as error:
             raise ConfigError(error.message) from None
 
+    def identified_subject(self) -> IdentifiedSubject | None:
+        """The identified subject that it names.
+
+        Raises:
+            ModelError: as `read_identified`.
+        """
+        return None if self.parameters is None else read_identified(self.parameters)
+
     def estimator(self, lag: int = 0) -> Estimator:
         """An estimator of its model with its settings.
 
@@ -154,13 +164,13 @@ class RunConfig(Strict):
             estimate=self.estimate,
             plates=self.plates,
             loads=self.loads,
-            parameters=None if self.parameters is None else read_identified(self.parameters),
+            parameters=self.identified_subject(),
             lag=lag,
         )
 
     def as_used(self) -> dict[str, Any]:
         """Plain data for an output's config.toml: every path absolute, so that the file works from where it lies."""
-        plain = self.model_dump(mode="json", exclude={"ground", "versions", "grid"})
+        plain = self.model_dump(mode="json", exclude={"ground", "identified", "versions", "grid"})
         if presets.is_file(self.preset):
             plain["preset"] = str(Path(self.preset).absolute())
         for key in _PATHS:

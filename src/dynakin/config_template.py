@@ -18,7 +18,7 @@ _HEADER = """\
 # Configuration of `dynakin run`. Keys with a # right before them hold their default or, where there is none, an
 # example: take the # away to change them. Options on the command line win over this file.
 """
-_RECORD = {"ground", "versions"}  # written into outputs, not for people to set
+_RECORD = {"ground", "identified", "versions"}  # written into outputs, not for people to set
 _TABLES: dict[str, type[BaseModel]] = {"noise": Noise, "priors": Priors, "bounds": Bounds, "opensim": OpenSimOptions}
 _WIDTH = 110
 

@@ -22,7 +22,7 @@ CORRUPT, SWAPPED = "S3/squat_2", "S6/squat_1"
 def swap_plates(path: Path) -> None:
     """Each plate's forward and upward channels change places, as with a cable in the wrong socket.
 
-    (Were only the plates exchanged under the two feet, a model in the plane could not see it: it takes their sum.)
+    (Plates exchanged under the two feet: test_keys.py. A model in the plane takes their sum, so it loses nothing then.)
     """
     lines = path.read_text().splitlines()
     head = next(k for k, line in enumerate(lines) if line.startswith("time"))

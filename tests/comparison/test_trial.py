@@ -11,6 +11,7 @@ import pytest
 import dynakin
 from dynakin.comparison import Setup, Trial, trial_of
 from dynakin.errors import ModelError, RecordingError
+from dynakin.model.identified import IdentifiedSubject
 from dynakin.recordings import find_ground_frame
 from dynakin.reference import PlanarChain, classical_angles, landmark_paths
 from dynakin.results.mean_curves import MEASURED
@@ -23,6 +24,11 @@ def estimator(simulated: SimulatedTrial, setup: Setup) -> dynakin.Estimator:
     made = setup.estimator("default")
     made.start(simulated.recording)
     return made
+
+
+def test_a_comparison_starts_from_the_identified_subject(setup: Setup) -> None:
+    subject = IdentifiedSubject.model_construct(use="table")
+    assert replace(setup, parameters=subject).estimator("default").parameters is subject
 
 
 def test_nothing_is_filtered_again(compared: Trial, estimator: dynakin.Estimator) -> None:

@@ -90,6 +90,18 @@ def test_an_idle_plate_and_missing_foot_markers_are_told() -> None:
     assert any("no foot markers" in text for text in other.messages)
 
 
+@pytest.mark.parametrize(("factor", "told"), [(1.0, False), (-0.25, False), (-1.0, True)])
+def test_exchanged_plates_push_the_feet_apart(factor: float, told: bool) -> None:
+    """20 N inwards on each foot are what legs do; exchanged plates show them outwards. 5 N may be anything."""
+    recording = standing(70.0)
+    plates = tuple(replace(plate, force=plate.force * [1.0, 1.0, factor]) for plate in recording.plates)
+    found = check(recording.with_plates(plates), 70.0)
+    said = "Warning: plate 1 and plate 2 push the feet apart, with 20 N each on average over 101 frames"
+    assert any(text.startswith(said) for text in found.messages) == told
+    assert any("push the feet apart" in text for text in found.messages) == told
+    assert found.refusal is None
+
+
 def test_without_standing_the_mass_is_only_told() -> None:
     good = standing(70.0)
     hop = good.markers + np.array([0, 0.1, 0]) * np.sin(2 * np.pi * 2 * good.time)[:, None, None]

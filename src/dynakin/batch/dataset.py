@@ -13,7 +13,7 @@ from dynakin.model.validation import nearest
 # Keys of their own; all others are those of a run's configuration and hold for everything below them.
 _OF_DATASET = ("subjects", "trials", "presets")
 _OF_SUBJECT = ("name", "folder", "trials")
-_NOT_HERE = ("trial", "ground", "versions", "grid")
+_NOT_HERE = ("trial", "ground", "identified", "versions", "grid")
 _PATTERN = "*.c3d"
 
 
@@ -119,6 +119,7 @@ def _session(
     content = keys | _run_keys(entry, (), f"{where}, trial {name!r}")
     if "forces" in content:  # beside the trial; {trial} stands for its name
         content["forces"] = str(file.parent / str(content["forces"]).replace("{trial}", file.stem))
-    if "static" in content:
-        content["static"] = str(folder / str(content["static"]))
+    for key in ("static", "parameters"):
+        if key in content:
+            content[key] = str(folder / str(content[key]))
     return Session(subject, name, content | {"trial": str(file), "output": str(output / subject / name)})

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -78,7 +78,8 @@ def work_on(options: Options, payload: Session) -> dict[str, Any]:
     estimates = list(trial.estimates.values())
     if options.files:
         Path(config.output).parent.mkdir(parents=True, exist_ok=True)
-        estimates[0].save(config.output, comparison=trial)
+        used = config.model_copy(update={"preset": (options.presets or [config.preset])[0]}).as_used()
+        replace(estimates[0], config=used | estimates[0].config).save(config.output, comparison=trial)
     metrics = {name: estimate.metrics() for name, estimate in trial.estimates.items()}
     return {
         "fits": [[*key, *fit] for key, fit in trial_fits(trial).items()],
@@ -103,7 +104,7 @@ def belongs_to(dataset: Dataset, options: Options) -> dict[str, Any]:
 
 def _stamps(content: Mapping[str, Any]) -> list[Any]:
     found = []
-    for key in ("trial", "forces", "static"):
+    for key in ("trial", "forces", "static", "parameters"):
         file = Path(str(content.get(key, "")))
         if file.is_file():
             found.append([key, file.stat().st_size, file.stat().st_mtime_ns])

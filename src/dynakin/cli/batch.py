@@ -54,6 +54,10 @@ def batch(
     with busy("writing tables"):
         write_batch(folder, result)
     console.print(f"Tables  {folder}/table2.csv, table2_subjects.csv, trials.csv, batch.json", soft_wrap=True)
+    for name, row in result.rows.items():
+        for note in row["notes"]:
+            if note.startswith("Warning:"):
+                console.print(f"Warned  {name}: {note.removeprefix('Warning: ')}", soft_wrap=True)
     for name, failure in result.failures.items():
         console.print(f"Failed  {name}: {failure.message}", soft_wrap=True)
     if not result.rows:

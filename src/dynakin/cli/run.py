@@ -32,12 +32,11 @@ from dynakin.comparison import Trial, trial_of
 from dynakin.config import RunConfig, make_config, read_config
 from dynakin.errors import DynakinError
 from dynakin.filter import presets
-from dynakin.filter.zero import standing_zero
+from dynakin.filter.zero import asked_angles
 from dynakin.identifiability import Identifiability, identifiability
 from dynakin.recordings import read, without_plate_loads
 from dynakin.report import read_sensitivity, save_figures
 from dynakin.results import Estimate, check_output_writable
-from dynakin.results.angles import with_angles
 
 LARGEST_BENCH = 250
 """States up to which a run also tells what the recording says of the constants: it filters a dozen motions more."""
@@ -142,9 +141,7 @@ def estimate_from(
     recording = without_plate_loads(recording, config.plate_loads, config.vertical)
     static = None if config.static is None else read(config.static)
     estimate = estimator.run(recording, static=static, smooth=config.smooth, progress=progress)
-    if (config.zero, config.signs) != ("model", "opensim"):
-        zero = standing_zero(estimator, estimate, static) if config.zero == "standing" else {}
-        estimate = with_angles(estimate, zero, config.signs)
+    estimate = asked_angles(estimator, estimate, static, config.zero, config.signs)
     estimate = replace(estimate, config=config.as_used() | estimate.config)
     assert estimator.initial is not None
     n_states = len(estimator.initial.names)

@@ -151,7 +151,7 @@ def fit(
     cases = cases_of(trials or [], forces or [], [], CUTOFF_HZ, given, "tune fit")
     base = preset or cases[0].config.preset
     shared = shared_of(cases, base)
-    names = tuple(vary) if vary else usual_names(shared.base)
+    names = tuple(vary) if vary else usual_names(shared.base, shared.floating)
     folder = open_folder(output, ("fit.", "preset_"))
     journal = Journal(folder / ROWS, belongs_to_fit(shared))
     others = {name: make() for name, make in presets.PRESETS.items() if make() != shared.base}

@@ -46,6 +46,10 @@ def case_of(config: RunConfig, presets: Sequence[str], cutoff_hz: float) -> Case
         config.estimate,
         config.plates,
         config.loads,
+        config.identified_subject(),
+        config.smooth,
+        config.zero,
+        config.signs,
     )
     recording = read(
         config.trial, config.forces, plate_filter_hz=config.plate_filter_hz, force_threshold_n=config.force_threshold_n

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,8 +14,9 @@ from dynakin.comparison.statistics import spread
 from dynakin.comparison.table2 import Row, unit_of
 from dynakin.errors import ModelError, RecordingError
 from dynakin.filter.smoothing import can_smooth
+from dynakin.filter.total_wrench import known_total
 from dynakin.model import Bounds, Definition, InitialModel, Priors, initialise
-from dynakin.recordings import GroundFrame, Recording, check_plates
+from dynakin.recordings import GroundFrame, Recording
 from dynakin.reference import identify, predicted_wrench, reference_methods
 from dynakin.results import COMPONENTS, Estimate, evaluation_window, signal_fit
 
@@ -26,7 +28,7 @@ class Identified:
     """What was learned on the identifying trial.
 
     initial: the model as measured there. estimates: by preset. static: the recording that lengths were measured on.
-    wrench: (T, 6) N and N m, the plates', about the ground origin; ground: of the same laboratory, given to the judging
+    wrench: (T, 6) N and N m, the plates', as `measured_wrench`; ground: of the same laboratory, given to the judging
     trial too where both are one recording.
     """
 
@@ -43,13 +45,15 @@ class Identified:
 class Blind:
     """Predictions of a trial's wrench from its markers; nothing in here has seen its plates.
 
-    start: the judging trial's own coordinates and ground frame. wrenches: (T, 6) N and N m by method.
+    start: the judging trial's own coordinates and ground frame. wrenches: (T, 6) N and N m by method. plates: as
+    `Setup.plates`, for judging.
     """
 
     recording: Recording
     start: InitialModel
     wrenches: dict[str, Array]
     notes: tuple[str, ...]
+    plates: Mapping[str, str] | None = None
 
 
 def halves(recording: Recording) -> tuple[Recording, Recording]:
@@ -84,7 +88,7 @@ def identify_on(
         estimator = setup.estimator(preset)
         estimates[preset] = estimator.run(recording, static=static)
     assert estimator.initial is not None
-    wrench = measured_wrench(recording, estimator.initial)
+    wrench = measured_wrench(recording, estimator.initial, setup.plates)
     ground = estimator.initial.ground if same_recording else None
     return Identified(recording, static, setup, estimator.initial, estimates, wrench, ground)
 
@@ -122,21 +126,20 @@ def predict_blind(identified: Identified, recording: Recording) -> Blind:
         found |= _referred(identified, recording, start)
     except ModelError as error:
         notes.append(f"AT, the classical method and least squares are left out: {error.message}")
-    found["persistence: last"] = np.repeat(identified.wrench[-1:], recording.n_frames, axis=0)
-    found["persistence: mean"] = np.repeat(identified.wrench.mean(axis=0)[None], recording.n_frames, axis=0)
-    return Blind(recording, start, found, tuple(notes))
+    known = identified.wrench[np.isfinite(identified.wrench).all(axis=1)]
+    for label, guess in (("last", known[-1]), ("mean", known.mean(axis=0))):
+        found[f"persistence: {label}"] = np.repeat(guess[None], recording.n_frames, axis=0)
+    return Blind(recording, start, found, tuple(notes), setup.plates)
 
 
 def judge(blind: Blind, recording: Recording) -> list[Row]:
-    """The predictions against the plates of the same trial, over its window; rows by component, then method.
+    """The predictions against the plates of the same trial, over its window, where they tell the whole wrench; rows by
+    component, then method.
 
     Raises:
-        RecordingError: the trial has no plates, or they are refused.
+        RecordingError: as `measured_wrench`.
     """
-    measured = measured_wrench(recording, blind.start)
-    check = check_plates(recording, blind.start.ground, blind.start.mass_kg)
-    if check.refusal:
-        raise RecordingError(f"{recording.path or recording.name}: {check.refusal}")
+    measured = measured_wrench(recording, blind.start, blind.plates)
     window = evaluation_window(recording.time)
     rows = []
     for k in np.flatnonzero(blind.start.spec.wrench_measured):
@@ -146,18 +149,27 @@ def judge(blind: Blind, recording: Recording) -> list[Row]:
     return rows
 
 
-def measured_wrench(recording: Recording, initial: InitialModel) -> Array:
-    """The plates' total wrench (T, 6) N and N m about the ground origin.
+def measured_wrench(recording: Recording, initial: InitialModel, plates: Mapping[str, str] | None = None) -> Array:
+    """The plates' total wrench (T, 6) N and N m about the ground origin; NaN where they do not tell all of it.
+
+    Args:
+        plates: plate -> foot, as `Estimator` takes it.
 
     Raises:
-        RecordingError: there are no plates to identify on or to be judged by.
+        RecordingError: there are no plates to identify on or to be judged by, they are refused, or in no frame do they
+            tell the whole wrench.
     """
     if not recording.plates:
         raise RecordingError(
             f"{recording.path or recording.name}: no force plates, expected at least one: the comparison needs them "
             "(--forces)"
         )
-    return initial.ground.wrench_to_ground(recording.total_wrench())
+    wrench = initial.ground.wrench_to_ground(recording.total_wrench())
+    known_total(recording, initial, wrench, plates)
+    if not np.isfinite(wrench).all(axis=1).any():
+        where = recording.path or recording.name
+        raise RecordingError(f"{where}: in no frame do the plates tell the whole wrench, expected a second of them")
+    return wrench
 
 
 def marker_paths(recording: Recording, initial: InitialModel, ground: GroundFrame) -> Array:

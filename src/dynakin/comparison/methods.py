@@ -11,6 +11,7 @@ import xarray as xr
 
 from dynakin.comparison.setup import Setup
 from dynakin.errors import DynakinError, ModelError
+from dynakin.filter.zero import asked_angles
 from dynakin.model import Definition, InitialModel
 from dynakin.recordings import Recording
 from dynakin.reference import CUTOFF_HZ, Reference, reference_methods
@@ -102,7 +103,8 @@ def compare_trial(
     estimates = {}
     for preset in setup.noise:
         estimator = setup.estimator(preset)
-        estimates[preset] = estimator.run(recording, static=static, progress=progress)
+        estimate = estimator.run(recording, static=static, smooth=setup.smooth, progress=progress)
+        estimates[preset] = asked_angles(estimator, estimate, static, setup.zero, setup.signs)
     assert estimator.initial is not None
     return trial_of(estimates, estimator.initial, setup.definition, setup.cutoff_hz)
 

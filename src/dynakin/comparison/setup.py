@@ -8,8 +8,11 @@ from dataclasses import dataclass, field
 from dynakin.errors import ConfigError
 from dynakin.filter import Estimator, Noise, presets
 from dynakin.filter.extend import QUANTITIES, Quantity
+from dynakin.filter.zero import Zero
 from dynakin.model import Bounds, CarriedLoad, Definition, Priors
+from dynakin.model.identified import IdentifiedSubject
 from dynakin.reference import CUTOFF_HZ
+from dynakin.results.angles import Signs
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +23,8 @@ class Setup:
         definition: what `load_model` returns.
         noise: settings of each filter that is compared, by the name of its preset.
         cutoff_hz: of the reference methods' zero-lag low-pass, Hz.
-        priors, bounds, side, vertical, forward, estimate, plates, loads: as `Estimator` takes them.
+        priors, bounds, side, vertical, forward, estimate, plates, loads, parameters: as `Estimator` takes them.
+        smooth: as `Estimator.run`. zero, signs: of the joint angles, as in a run's configuration.
     """
 
     definition: Definition
@@ -34,6 +38,10 @@ class Setup:
     estimate: tuple[Quantity, ...] = QUANTITIES
     plates: Mapping[str, str] | None = None
     loads: tuple[CarriedLoad, ...] = ()
+    parameters: IdentifiedSubject | None = None
+    smooth: bool = False
+    zero: Zero = "model"
+    signs: Signs = "opensim"
 
     def __post_init__(self) -> None:
         if not self.noise:
@@ -54,4 +62,5 @@ class Setup:
             estimate=self.estimate,
             plates=self.plates,
             loads=self.loads,
+            parameters=self.parameters,
         )

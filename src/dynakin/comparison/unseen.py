@@ -17,7 +17,6 @@ from dynakin.comparison.statistics import Spread, spread
 from dynakin.comparison.table2 import MARKERS, unit_of
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.filter import Estimator
-from dynakin.filter.samples import recording_arrays
 from dynakin.model import InitialModel
 from dynakin.recordings import Recording
 from dynakin.results import COMPONENTS, evaluation_window, marker_rms_mm, signal_fit
@@ -83,7 +82,7 @@ def unseen_figures(
     for preset in setup.noise:
         estimator = setup.estimator(preset)
         initial = estimator.start(recording, static=static)
-        markers, wrench = recording_arrays(recording, initial)
+        markers, wrench, _ = estimator.measured(recording, initial)
         trial = _Trial(recording, initial, markers, wrench)
         figures |= _left_out(estimator, preset, trial, progress)
         figures |= _ahead(estimator, preset, trial, horizon_s)
@@ -110,7 +109,7 @@ class _Trial:
     recording: Recording
     initial: InitialModel
     markers: Array  # (T, M, 3) m, ground frame
-    wrench: Array  # (T, 6)
+    wrench: Array  # (T, 6); NaN where the plates do not tell all of it: neither fed nor judged
 
     def marker_errors(self, yardstick: str, method: str, estimated: Array, columns: Sequence[int]) -> Figures:
         """RMS distance (mm) of some markers (T, M, 3), over the window."""
@@ -128,6 +127,7 @@ class _Trial:
         return {
             (yardstick, COMPONENTS[k], method): signal_fit(self.wrench[window, k], estimated[window, k]).rms
             for k in np.flatnonzero(self.initial.spec.wrench_measured)
+            if np.isfinite(self.wrench[window, k]).any()
         }
 
 

@@ -18,14 +18,14 @@ from dynakin.filter.extend import QUANTITIES, Quantity, initial_covariance
 from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.filter.live import StepEstimate, deviations_of, step_estimate
 from dynakin.filter.noise import Noise
-from dynakin.filter.samples import Sample, foreign_load, recording_arrays, sample_arrays
+from dynakin.filter.samples import Sample, recording_arrays, sample_arrays
 from dynakin.filter.smoothing import check_can_smooth, smoothed
-from dynakin.filter.total_wrench import doubtful_mass, foot_wrenches, foreign_total, leave_out_unknown
+from dynakin.filter.total_wrench import doubtful_mass, foot_wrenches, known_total, leave_out_foreign
 from dynakin.model import Bounds, CarriedLoad, Definition, InitialModel, Priors, initialise, with_loads
 from dynakin.model.identified import IdentifiedSubject, with_identified
 from dynakin.model.validation import nearest
-from dynakin.recordings import Recording, check_plates
-from dynakin.recordings.foot_loads import FootLoads, foot_loads
+from dynakin.recordings import Recording
+from dynakin.recordings.foot_loads import FootLoads
 from dynakin.results import Estimate
 
 Array = npt.NDArray[np.float64]
@@ -146,37 +146,15 @@ class Estimator:
         measured = (markers, wrench)
         return assemble(arrays, self._core_model, initial, recording, measured, config, notes, covariances, on_feet)
 
-    def _judge_plates(
-        self, recording: Recording, initial: InitialModel, wrench: Array, loads: FootLoads | None
-    ) -> list[str]:
-        """Leaves out (NaN, in place) what is not the whole wrench (T, 6), and says so in sentences."""
-        notes: list[str] = []
-        if initial.feet:
-            if loads is None:
-                text = "No force plates: the total wrench is left out; inertial parameters stay as the table has them."
-                return [text]
-            notes += leave_out_unknown(loads, wrench)
-        check = check_plates(recording, initial.ground, None if initial.feet else initial.weighed_kg)
-        if check.refusal:
-            raise RecordingError(f"{recording.path or recording.name}: {check.refusal}")
-        if initial.feet:
-            foreign = foreign_total(wrench, initial.weighed_kg, self.noise.plate_load_tolerance)
-        else:
-            foreign = foreign_load(check, initial.weighed_kg, self.noise.plate_load_tolerance)
-        notes = [*check.messages, *notes]
-        if foreign:
-            wrench[:] = np.nan
-            notes.append(foreign)
-        return notes
-
     def _measured(
         self, recording: Recording, initial: InitialModel
     ) -> tuple[Array, Array, list[str], FootLoads | None]:
         markers, wrench = recording_arrays(recording, initial, gaps=self.noise.recover)
-        loads = None
-        if initial.feet and recording.plates:
-            loads = foot_loads(recording, initial.ground, assigned=self.plates)
-        notes = self._judge_plates(recording, initial, wrench, loads)
+        if not recording.plates:  # of a floating model: others need them
+            text = "No force plates: the total wrench is left out; inertial parameters stay as the table has them."
+            return markers, wrench, [text], None
+        check, loads, notes = known_total(recording, initial, wrench, self.plates)
+        notes += leave_out_foreign(check, wrench, initial, self.noise.plate_load_tolerance)
         return markers, wrench, notes, loads
 
     def measured(self, recording: Recording, initial: InitialModel) -> tuple[Array, Array, list[str]]:

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from dynakin.errors import RecordingError
 from dynakin.model import InitialModel
-from dynakin.recordings import PlateCheck, Recording
+from dynakin.recordings import Recording
 
 Array = npt.NDArray[np.float64]
 
@@ -81,19 +81,3 @@ def sample_arrays(sample: Sample, initial: InitialModel) -> tuple[Array, Array]:
         return np.ascontiguousarray(markers), np.full(6, np.nan)
     total = np.sum([np.asarray(plate, float) for plate in sample.plates.values()], axis=0)
     return np.ascontiguousarray(markers), initial.ground.wrench_to_ground(total)
-
-
-def foreign_load(check: PlateCheck, mass_kg: float, tolerance: float | None) -> str | None:
-    """A sentence where the plates' mean load is not the person's weight; None where it is, or nobody asks.
-
-    Args:
-        tolerance: part of the weight by which they may differ.
-    """
-    load = check.mass_kg_from_plates if check.mass_kg_from_plates is not None else check.mean_mass_kg
-    if tolerance is None or load is None or abs(load - mass_kg) <= tolerance * mass_kg:
-        return None
-    return (
-        f"Warning: the plates carry {load:.1f} kg where the person weighs {mass_kg:.1f} kg (more than "
-        f"{100.0 * tolerance:.0f} % apart): the mass is wrong, or something that the model does not have bears on them "
-        "(a weight, a cable, a rail, a foot beside a plate). The plates are not used."
-    )

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.errors import RecordingError
 from dynakin.filter.foot_wrenches import IN_THE_AIR, MEASURED, NOT_MEASURED, FootWrenches
 from dynakin.filter.noise import Noise
 from dynakin.model import InitialModel
+from dynakin.recordings import PlateCheck, Recording, check_plates
 from dynakin.recordings import foot_loads as on_plates
-from dynakin.recordings.foot_loads import LOADED_N, FootLoads
+from dynakin.recordings.foot_loads import LOADED_N, FootLoads, foot_loads
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
@@ -49,6 +53,29 @@ def foot_wrenches(loads: FootLoads, initial: InitialModel, noise: Noise) -> Foot
     return FootWrenches.of(loads.feet, segments, loads.wrench, contact, force, moment, pressure)
 
 
+def known_total(
+    recording: Recording, initial: InitialModel, wrench: Array, assigned: Mapping[str, str] | None = None
+) -> tuple[PlateCheck, FootLoads | None, list[str]]:
+    """Check the plates, and leave out (NaN, in place) the frames in which they do not tell the total wrench (T, 6) of a
+    floating model.
+
+    Args:
+        recording: with plates. assigned: plate -> foot, as for `foot_loads`.
+
+    Returns:
+        What the check found, the load of each foot (None for a model that stands fixed), and what there is to say.
+
+    Raises:
+        RecordingError: the plates are refused.
+    """
+    loads = foot_loads(recording, initial.ground, assigned=assigned) if initial.feet else None
+    # steps beside the plates: their mean load is no mass
+    check = check_plates(recording, initial.ground, None if initial.feet else initial.weighed_kg)
+    if check.refusal:
+        raise RecordingError(f"{recording.path or recording.name}: {check.refusal}")
+    return check, loads, [*check.messages, *(leave_out_unknown(loads, wrench) if loads is not None else [])]
+
+
 def leave_out_unknown(loads: FootLoads, wrench: Array) -> list[str]:
     """Make the rows of the total wrench (T, 6) NaN, in place, where the plates do not tell all of it.
 
@@ -74,6 +101,18 @@ def doubtful_mass(wrench: Array, mass_kg: float) -> str | None:
     )
 
 
+def leave_out_foreign(check: PlateCheck, wrench: Array, initial: InitialModel, tolerance: float | None) -> list[str]:
+    """Make the wrench (T, 6) NaN, in place, where the plates carry something else than the person; a sentence then."""
+    if initial.feet:
+        foreign = foreign_total(wrench, initial.weighed_kg, tolerance)
+    else:
+        foreign = foreign_load(check, initial.weighed_kg, tolerance)
+    if foreign is None:
+        return []
+    wrench[:] = np.nan
+    return [foreign]
+
+
 def foreign_total(wrench: Array, mass_kg: float, tolerance: float | None) -> str | None:
     """A sentence where the mean vertical force of the known frames of the wrench (T, 6) is not the person's weight.
 
@@ -90,4 +129,20 @@ def foreign_total(wrench: Array, mass_kg: float, tolerance: float | None) -> str
         f"Warning: the plates carry {load:.1f} kg on average where the person weighs {mass_kg:.1f} kg (more than "
         f"{100.0 * tolerance:.0f} % apart): the mass is wrong, or something that the model does not have bears on them "
         "(a weight, a cable, a rail). The plates are not used."
+    )
+
+
+def foreign_load(check: PlateCheck, mass_kg: float, tolerance: float | None) -> str | None:
+    """A sentence where the plates' mean load is not the person's weight; None where it is, or nobody asks.
+
+    Args:
+        tolerance: part of the weight by which they may differ.
+    """
+    load = check.mass_kg_from_plates if check.mass_kg_from_plates is not None else check.mean_mass_kg
+    if tolerance is None or load is None or abs(load - mass_kg) <= tolerance * mass_kg:
+        return None
+    return (
+        f"Warning: the plates carry {load:.1f} kg where the person weighs {mass_kg:.1f} kg (more than "
+        f"{100.0 * tolerance:.0f} % apart): the mass is wrong, or something that the model does not have bears on them "
+        "(a weight, a cable, a rail, a foot beside a plate). The plates are not used."
     )

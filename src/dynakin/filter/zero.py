@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -13,14 +13,30 @@ from dynakin.filter.smoothing import can_smooth
 from dynakin.model import InitialModel, initialise, with_loads
 from dynakin.recordings import Recording, standing_window
 from dynakin.results import Estimate
-from dynakin.results.angles import mean_angles
+from dynakin.results.angles import Signs, mean_angles, with_angles
 
 if TYPE_CHECKING:
     from dynakin.filter.estimator import Estimator
 
+Zero = Literal["model", "standing"]
+
 _HELD = 1e-3
 """Of their prior standard deviations: the constants stay what the trial made them."""
 _CONSTANT = ("length/", "marker/", "inertia/")
+
+
+def asked_angles(
+    estimator: Estimator, estimate: Estimate, static: Recording | None, zero: Zero, signs: Signs
+) -> Estimate:
+    """The estimate with joint angles to report as a configuration asks for them; itself where it asks for nothing.
+
+    Raises:
+        RecordingError, ModelError: as `standing_zero`.
+    """
+    if (zero, signs) == ("model", "opensim"):
+        return estimate
+    standing = standing_zero(estimator, estimate, static) if zero == "standing" else {}
+    return with_angles(estimate, standing, signs)
 
 
 def standing_zero(estimator: Estimator, estimate: Estimate, static: Recording | None) -> dict[str, float]:

@@ -13,10 +13,9 @@ from dynakin.comparison.freeze import freeze, initial_values
 from dynakin.comparison.held_out import marker_paths, measured_wrench, start_as
 from dynakin.errors import ModelError, RecordingError
 from dynakin.filter import Estimator
-from dynakin.filter.total_wrench import leave_out_unknown
 from dynakin.model import InitialModel, OpenSimDefinition
-from dynakin.recordings import GroundFrame, Recording, check_plates
-from dynakin.recordings.foot_loads import LOADED_N, foot_loads
+from dynakin.recordings import GroundFrame, Recording
+from dynakin.recordings.foot_loads import LOADED_N
 from dynakin.recordings.smoothing import CUTOFF_HZ, smooth
 from dynakin.units import GRAVITY_M_S2
 
@@ -158,7 +157,7 @@ class Common:
         Raises:
             RecordingError: it has none, or they are refused.
         """
-        wrench = self._known_wrench(recording, movement.start)
+        wrench = measured_wrench(recording, movement.start, self.estimator.plates)
         if not as_measured:
             first_of_second = movement.time[middle_of(len(movement.time))]
             wrench = _low_passed(recording.time, wrench, int(np.searchsorted(recording.time, first_of_second - 1e-9)))
@@ -175,9 +174,8 @@ class Common:
         where = recording.path or recording.name
         if not recording.plates:
             raise RecordingError(f"{where}: no force plates, expected at least one; give its ground forces (--forces)")
-        push = self._known_wrench(recording, self._start(replace(recording, plates=()), None))[:, 1]
-        if not np.isfinite(push).any():
-            raise RecordingError(f"{where}: in no frame do the plates tell the whole wrench, expected a second of them")
+        start = self._start(replace(recording, plates=()), None)
+        push = measured_wrench(recording, start, self.estimator.plates)[:, 1]
         load, weighed = float(np.nanmean(push)) / GRAVITY_M_S2, self.initial.weighed_kg
         if abs(load - weighed) > LOAD_APART * weighed:
             raise RecordingError(
@@ -188,16 +186,6 @@ class Common:
     def measured(self, recording: Recording, progress: Progress | None = None) -> MeasuredTrial:
         """A trial to identify on."""
         return self.with_plates(self.see(recording, progress=progress), recording)
-
-    def _known_wrench(self, recording: Recording, start: InitialModel) -> Array:
-        """(T, 6) about the ground origin, NaN where the plates do not tell all of it."""
-        wrench = measured_wrench(recording, start)
-        check = check_plates(recording, start.ground, None if self.floating else self.initial.weighed_kg)
-        if check.refusal:
-            raise RecordingError(f"{recording.path or recording.name}: {check.refusal}")
-        if self.floating:
-            leave_out_unknown(foot_loads(recording, start.ground, assigned=self.estimator.plates), wrench)
-        return wrench
 
     def _start(self, recording: Recording, ground: GroundFrame | None) -> InitialModel:
         estimator = self.estimator

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -17,7 +17,7 @@ from dynakin.results.versions import versions
 from dynakin.tuning.likelihood import REACH, Likelihood
 from dynakin.tuning.optimise import SETTLED, Optimum, curvature, deviations, minimise
 from dynakin.tuning.score import CRITERIA, Shared
-from dynakin.tuning.settings import changed, check_setting, together, value_of
+from dynakin.tuning.settings import changed, check_effect, check_setting, together, value_of, without_effect
 
 Array = npt.NDArray[np.float64]
 
@@ -29,8 +29,11 @@ USUAL = (
     "marker_place",
     "jerk",
     "jerk_translation",
+    "floating_jerk",
+    "floating_jerk_translation",
     "soft_tissue",
     "soft_tissue_time_s",
+    "floating_soft_tissue_time_s",
     "marker_sd_m",
     "marker_scale",
     "force",
@@ -98,11 +101,16 @@ class Fit:
         return changed(self.shared.base, together(self.shared.base, {s.name: s.value for s in self.settings}))
 
 
-def usual_names(noise: Noise) -> tuple[str, ...]:
-    """What is fitted where nothing is named: what these settings use."""
+def usual_names(noise: Noise, floating: Collection[bool] = (False,)) -> tuple[str, ...]:
+    """What is fitted where nothing is named: what these settings use.
+
+    Args:
+        floating: whether the model is fixed nowhere, of each trial.
+    """
     unused = "marker_scale" if noise.marker_sd_m is not None else "marker_sd_m"
     names = [name for name in USUAL if name != unused and (getattr(noise, name) or 0.0) > 0.0]
-    return tuple(name for name in names if not (name == "soft_tissue_time_s" and noise.soft_tissue == 0.0))
+    idle = without_effect(names, noise, floating)
+    return tuple(n for n in names if n not in idle and not (n.endswith("tissue_time_s") and noise.soft_tissue == 0.0))
 
 
 def belongs_to_fit(shared: Shared) -> dict[str, Any]:
@@ -138,6 +146,7 @@ class Fitter:
             raise ConfigError(f"fit: criterion {self.criterion!r}, expected one of nll, ahead, sigma, paper, nis")
         for name in self.names:
             value_of(self.shared.base, check_setting(name))
+        check_effect(self.names, self.shared.base, self.shared.floating)
 
     def run(self) -> Fit:
         """Fit on everything, then on all but a part, each part in turn.

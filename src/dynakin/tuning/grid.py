@@ -17,7 +17,7 @@ from dynakin.filter import Noise
 from dynakin.results import COMPONENTS
 from dynakin.results.versions import versions
 from dynakin.tuning.score import CRITERIA, Shared, score_task
-from dynakin.tuning.settings import changed, check_setting
+from dynakin.tuning.settings import changed, check_effect, check_setting
 
 Array = npt.NDArray[np.float64]
 
@@ -137,10 +137,11 @@ def run_grid(
     """Try every combination on every trial.
 
     Raises:
-        ConfigError: a combination that the filter cannot take. DynakinError: a task that failed otherwise than by
-            divergence.
+        ConfigError: a combination that the filter cannot take, or a setting without effect. DynakinError: a task that
+            failed otherwise than by divergence.
     """
     settings = combinations(axes)
+    check_effect([axis.name for axis in axes], shared.base, shared.floating)
     for axis in axes:
         for value in axis.values:
             changed(shared.base, {axis.name: value})

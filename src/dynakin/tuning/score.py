@@ -44,6 +44,11 @@ class Shared:
     base: Noise
     left_out: bool = False
 
+    @property
+    def floating(self) -> tuple[bool, ...]:
+        """Whether the model is fixed nowhere, of each trial."""
+        return tuple(bool(trial.initial.feet) for trial in self.trials)
+
 
 def score_task(shared: Shared, payload: tuple[int, Mapping[str, float]]) -> dict[str, Any]:
     """Figures of trial number ``payload[0]`` with the base settings changed by ``payload[1]``.

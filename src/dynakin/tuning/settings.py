@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 
 from dynakin.errors import ConfigError, ModelError
@@ -19,10 +19,13 @@ UNITS = {
     "inertia": "SI² a step",
     "jerk": "rad²/s⁵",
     "jerk_translation": "m²/s⁵",
+    "floating_jerk": "rad²/s⁵",
+    "floating_jerk_translation": "m²/s⁵",
     "length_drift": "m²/s",
     "soft_tissue": "of the declared size",
     "soft_tissue_least_m": "m",
     "soft_tissue_time_s": "s",
+    "floating_soft_tissue_time_s": "s",
     "marker_sd_m": "m",
     "marker_scale": "1",
     "force": "N²",
@@ -43,10 +46,13 @@ MEANINGS = {
     "inertia": "how fast inertial parameters may change",
     "jerk": "how abruptly joints accelerate",
     "jerk_translation": "how abruptly the body accelerates",
+    "floating_jerk": "how abruptly joints accelerate",
+    "floating_jerk_translation": "how abruptly the body accelerates",
     "length_drift": "how fast lengths may change",
     "soft_tissue": "how far skin and flesh move",
     "soft_tissue_least_m": "below which size soft tissue counts as noise",
     "soft_tissue_time_s": "how long skin stays displaced",
+    "floating_soft_tissue_time_s": "how long skin stays displaced",
     "marker_sd_m": "noise of the cameras",
     "marker_scale": "noise of the markers",
     "force": "noise of the forces",
@@ -71,6 +77,37 @@ def check_setting(name: str) -> str:
     return name
 
 
+def of_floating(name: str) -> str | None:
+    """The setting that stands in for this one on a model that is fixed nowhere; None: there is none."""
+    return f"floating_{name}" if f"floating_{name}" in UNITS else None
+
+
+def without_effect(names: Sequence[str], noise: Noise, floating: Collection[bool]) -> dict[str, str]:
+    """Those of the settings that no trial depends on, and why.
+
+    Args:
+        noise: all other settings. floating: whether the model is fixed nowhere, of each trial.
+    """
+    found = {}
+    for name in names:
+        other = of_floating(name)
+        if name.startswith("floating_") and not any(floating):
+            found[name] = f"a model that is fixed in the ground, expected {name.removeprefix('floating_')!r}"
+        elif other and all(floating) and (other in names or getattr(noise, other) is not None):
+            found[name] = f"a model that is fixed nowhere, expected {other!r}"
+    return found
+
+
+def check_effect(names: Sequence[str], noise: Noise, floating: Collection[bool]) -> None:
+    """Refuse settings that have no effect.
+
+    Raises:
+        ConfigError: there is one; the message names it and the one that has.
+    """
+    for name, why in without_effect(names, noise, floating).items():
+        raise ConfigError(f"setting {name!r} has no effect on {why}")
+
+
 def changed(noise: Noise, changes: Mapping[str, Any]) -> Noise:
     """The settings with some of them replaced.
 
@@ -90,6 +127,8 @@ def value_of(noise: Noise, name: str) -> float:
         ConfigError: it is 0 or not given, so that there is nothing to start from on a logarithmic scale.
     """
     value = getattr(noise, check_setting(name))
+    if value is None and name.startswith("floating_"):  # then as the usual one
+        value = getattr(noise, name.removeprefix("floating_"))
     if value is None or not value > 0.0:
         found = "not given" if value is None else "0"
         raise ConfigError(f"setting {name!r} is {found} in these settings, expected a positive value to start from")

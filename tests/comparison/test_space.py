@@ -1,0 +1,63 @@
+"""A walk across three plates: where a stance foot is beside them, the wrench is neither fed nor judged."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import dynakin
+from dynakin.comparison import Setup, judge
+from dynakin.comparison.held_out import Blind, measured_wrench
+from dynakin.comparison.unseen import _Trial
+from dynakin.filter import Estimator
+from dynakin.model import InitialModel
+from dynakin.recordings import Recording
+from dynakin.recordings.foot_loads import foot_loads
+from dynakin.results import COMPONENTS, evaluation_window
+from dynakin.simulation import simulate
+from dynakin.tuning import prepare
+
+WRONG = 1e6
+
+
+@pytest.fixture(scope="module")
+def walk() -> Recording:
+    return simulate("fullbody", "gait", 3, 5.0, 50.0).recording
+
+
+@pytest.fixture(scope="module")
+def estimator() -> Estimator:
+    subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
+    return Setup(dynakin.load_model("fullbody", subject)).estimator("default")
+
+
+@pytest.fixture(scope="module")
+def initial(walk: Recording, estimator: Estimator) -> InitialModel:
+    return estimator.start(walk)
+
+
+@pytest.fixture(scope="module")
+def known(walk: Recording, initial: InitialModel) -> np.ndarray:
+    found = foot_loads(walk, initial.ground).total_known
+    judged = found[evaluation_window(walk.time)]
+    assert judged.any() and not judged.all()
+    return found
+
+
+def test_one_mask_feeds_and_judges(
+    walk: Recording, estimator: Estimator, initial: InitialModel, known: np.ndarray
+) -> None:
+    _, fed, _ = estimator.measured(walk, initial)
+    for wrench in (fed, measured_wrench(walk, initial), prepare(walk, estimator).wrench):
+        assert np.array_equal(np.isfinite(wrench).all(axis=1), known)
+
+
+def test_frames_beside_the_plates_are_not_judged(walk: Recording, initial: InitialModel, known: np.ndarray) -> None:
+    """A prediction that is right where the total is known, and absurd elsewhere, has no error."""
+    told = initial.ground.wrench_to_ground(walk.total_wrench())
+    told[~known] = WRONG
+    rows = judge(Blind(walk, initial, {"told": told}, ()), walk)
+    assert {row.quantity for row in rows} == set(COMPONENTS)
+    assert all(row.rms.mean == 0.0 for row in rows)
+    trial = _Trial(walk, initial, np.empty((walk.n_frames, 0, 3)), measured_wrench(walk, initial))
+    assert set(trial.wrench_errors("", "told", told).values()) == {0.0}
