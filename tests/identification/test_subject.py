@@ -95,7 +95,8 @@ def test_command_line(files: list[str], tmp_path: Path, capsys: pytest.CaptureFi
     out = tmp_path / "out"
     assert main(["run", files[0], "--forces", files[0].replace("markers.trc", "forces.mot"), *OPTIONS,
                  "--parameters", str(file), "-o", str(out)]) == 0  # fmt: skip
-    assert 'use = "' in file.read_text() and (out / "config.toml").is_file()
+    assert 'use = "' in file.read_text() and 'identified = "' in (out / "config.toml").read_text()
+    assert main(["run", str(out / "config.toml")]) == 0  # that record is no key that a run trips over
 
 
 def test_what_is_wrong_with_the_input_is_one_line_and_nothing_is_written(
