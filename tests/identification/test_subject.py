@@ -87,7 +87,7 @@ def test_command_line(files: list[str], tmp_path: Path, capsys: pytest.CaptureFi
     file = tmp_path / "subject.toml"
     assert main(["identify", *files, *OPTIONS, "-o", str(file)]) == 0
     said = " ".join(capsys.readouterr().out.split())
-    for words in ("held-out gain", "70.00 kg together", "base parameters", "simulated_squat_3/markers, first half"):
+    for words in ("held-out gain", "70.00 kg of 70.00", "base parameters", "simulated_squat_3/markers, first half"):
         assert words in said
     assert [path.name for path in tmp_path.iterdir()] == ["subject.toml"]
     assert main(["identify", "--compare", str(file), str(file)]) == 0
