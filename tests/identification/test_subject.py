@@ -87,7 +87,7 @@ def test_command_line(files: list[str], tmp_path: Path, capsys: pytest.CaptureFi
     file = tmp_path / "subject.toml"
     assert main(["identify", *files, *OPTIONS, "-o", str(file)]) == 0
     said = " ".join(capsys.readouterr().out.split())
-    for words in ("held-out gain", "70.00 kg together", "base parameters", "simulated_squat_3/markers, first half"):
+    for words in ("held-out gain", "70.00 kg of 70.00", "base parameters", "simulated_squat_3/markers, first half"):
         assert words in said
     assert [path.name for path in tmp_path.iterdir()] == ["subject.toml"]
     assert main(["identify", "--compare", str(file), str(file)]) == 0
@@ -95,7 +95,8 @@ def test_command_line(files: list[str], tmp_path: Path, capsys: pytest.CaptureFi
     out = tmp_path / "out"
     assert main(["run", files[0], "--forces", files[0].replace("markers.trc", "forces.mot"), *OPTIONS,
                  "--parameters", str(file), "-o", str(out)]) == 0  # fmt: skip
-    assert 'use = "' in file.read_text() and (out / "config.toml").is_file()
+    assert 'use = "' in file.read_text() and 'identified = "' in (out / "config.toml").read_text()
+    assert main(["run", str(out / "config.toml")]) == 0  # that record is no key that a run trips over
 
 
 def test_what_is_wrong_with_the_input_is_one_line_and_nothing_is_written(
