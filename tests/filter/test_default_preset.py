@@ -202,3 +202,13 @@ def test_every_output_has_a_deviation_in_the_files(smoothed: Estimate, tmp_path)
         assert (values > 0.0).all(), name
     knee = smoothed.coordinate_names.index("knee")
     np.testing.assert_allclose(table.column("knee_moment"), smoothed.data["moments_sd"].values[:, knee], rtol=1e-5)
+
+
+def test_a_mass_that_the_plates_contradict_is_told_and_is_no_delay() -> None:
+    late = simulate_squat(seed=3, duration_s=10.0, noise=SensorNoise(plate_lag_s=0.04))
+    wrong = dynakin.Subject(mass_kg=78.0, height_m=1.75, sex="male")
+    model = dynakin.load_model("sagittal7", wrong, markers="opencap")
+    result = dynakin.Estimator(model, dynakin.presets.default()).run(late.recording)
+    told = [text for text in result.messages if text.startswith("Warning: the plates carry 70.")]
+    assert len(told) == 1 and "78.0 kg (10 % apart" in told[0]
+    assert not any("brought into step" in text for text in result.messages)

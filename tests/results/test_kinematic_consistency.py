@@ -35,3 +35,11 @@ def test_a_coordinate_at_rest_with_a_speed_is_wrong() -> None:
 def test_a_translation_is_told_in_metres() -> None:
     mismatch, moving = speed_mismatch(TIME, ANGLES, SPEEDS + np.array([0.0, 1.5]))
     assert "1.5 m/s off" in mismatch_in_words(["hip", "slide"], np.array([True, False]), mismatch, moving)
+
+
+def test_a_coordinate_that_is_locked_is_no_mismatch() -> None:
+    """Rounding of a coordinate that stands still is larger than its motion."""
+    still = 0.3 + 1e-16 * np.random.default_rng(1).normal(size=ANGLES.shape)
+    mismatch, moving = speed_mismatch(TIME, still, 0.002 * np.ones_like(ANGLES))
+    assert (mismatch > 1e3 * moving).all()
+    assert mismatch_in_words(["hip", "knee"], ROTATION, mismatch, moving) == ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -126,3 +127,10 @@ def test_a_whole_turn_is_no_limit(tmp_path: Path) -> None:
 def test_noise_of_a_marker_comes_from_its_name_or_its_body() -> None:
     assert skin_of("r.ASIS", "pelvis") == skin_of("L.ASIS", "elsewhere")
     assert skin_of("cluster_7", "femur_r")[1] > skin_of("cluster_7", "calcn_r")[1] > 0.0
+
+
+def test_too_few_markers_for_a_posture_are_refused(folder: Path, squats: Recording) -> None:
+    few = [squats.marker_names.index(name) for name in ("C7", "r_toe", "L_toe")]
+    poor = replace(squats, marker_names=tuple(squats.marker_names[k] for k in few), markers=squats.markers[:, few])
+    with pytest.raises(ModelError, match=r"squats1.*3 of the 49 markers .*C7.*expected at least \d+ for its \d+ free"):
+        initialise(load_model(folder / FILE, Subject(mass_kg=60.05)), poor, forward=(1.0, 0.0, 0.0))
