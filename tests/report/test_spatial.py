@@ -115,7 +115,7 @@ def test_feet_show_what_was_changed_in_place_of_a_residual(spatial: Estimate, me
 
 def test_work_and_symmetry_tables_hold_the_metrics(spatial: Estimate, metrics: dict[str, Any]) -> None:
     work = power_section(spatial, metrics).tables[0]
-    knee = next(row for row in work.rows if row[0] == "Knee angle")
+    knee = next(row for row in work.rows if row[0] == "Knee")
     assert knee[1] == "right"
     assert float(knee[2]) == pytest.approx(metrics["work"]["knee_angle_r"]["positive_j"], rel=0.01)
     tables = {table.title: table for table in asymmetry_section(spatial, metrics).tables}

@@ -28,7 +28,7 @@ _MOST_POINTS = 240
 class Line:
     """values (T,), NaN where there is nothing to draw; ``sd`` (T,) adds a band of two standard deviations.
 
-    dashed: (T,) bool, where the line is drawn dashed instead of solid. width in points.
+    dashed: (T,) bool, where the line is drawn dashed instead of solid; there it may leave the panel. width in points.
     """
 
     values: Array
@@ -87,7 +87,7 @@ def chart(
     for line in lines:
         dashed = np.zeros(len(time), dtype=bool) if line.dashed is None else line.dashed
         for part, more in ((~dashed, ""), (dashed, ' stroke-dasharray="36 26"')):
-            own = np.where(_with_next(part), line.values, np.nan)
+            own = np.where(_with_next(part), np.clip(line.values, low, high), np.nan)
             if path := _path(*thin(time, own, _MOST_POINTS), x, y):
                 parts.append(f'<path d="{path}" stroke="{line.colour}" stroke-width="{10 * line.width:.0f}"{more}/>')
     label = escape(f"{title} in {unit} over time", quote=True)
@@ -103,11 +103,18 @@ def _with_next(part: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
 
 
 def _range(lines: Sequence[Line], levels: Sequence[float], least: float) -> tuple[float, float]:
-    every = [line.values[np.isfinite(line.values)] for line in lines]
-    values = np.concatenate([*every, np.asarray(levels, dtype=float)])
+    solid = [line.values if line.dashed is None else line.values[~line.dashed] for line in lines]
+    values = np.concatenate([*solid, np.asarray(levels, dtype=float)])
+    values = values[np.isfinite(values)]
+    every = np.concatenate([line.values[np.isfinite(line.values)] for line in lines]) if lines else values
+    if not len(values):
+        values = every
     if not len(values):
         return -1.0, 1.0
     low, high = float(values.min()), float(values.max())
+    if len(every) and high > low:  # what is dashed is less sure: it does not press the rest flat
+        reach = 0.25 * (high - low)
+        low, high = min(low, max(float(every.min()), low - reach)), max(high, min(float(every.max()), high + reach))
     least = max(least, 1e-9 * max(1.0, abs(low), abs(high)))
     if high - low < least:
         low, high = 0.5 * (low + high - least), 0.5 * (low + high + least)

@@ -108,13 +108,14 @@ def parameter_path(
     return Panel(title, note, to_svg(figure, key, f"{title} in {unit} over time, with its bounds"))
 
 
-def rms_bars(key: str, rms: dict[str, float | None]) -> Panel:
-    """RMS distance of each marker as labelled bars, in the order of the model."""
+def rms_bars(key: str, rms: dict[str, float | None], most: float | None = None) -> Panel:
+    """RMS distance of each marker as labelled bars, in the order given; ``most`` fills the width, else the largest."""
     names = [name for name, value in rms.items() if value is not None]
     values = [value for value in rms.values() if value is not None]
     figure, axes = new_axes(4.3, 0.42 + 0.2 * len(names), fitted=True)
     places = np.arange(len(names))[::-1]
-    decimals = 1 if max(values, default=1.0) >= 1.0 else 2
+    most = most or max(values, default=1.0)
+    decimals = 1 if most >= 1.0 else 2
     axes.barh(places, values, color=ESTIMATED, height=0.62)
     for place, value in zip(places, values, strict=True):
         axes.annotate(
@@ -127,7 +128,7 @@ def rms_bars(key: str, rms: dict[str, float | None]) -> Panel:
             fontsize=8,
         )
     axes.set_yticks(places, names, color=INK)
-    axes.set_xlim(0.0, 1.18 * max(values, default=1.0) or 1.0)
+    axes.set_xlim(0.0, 1.18 * most or 1.0)
     axes.set_ylim(-0.6, len(names) - 0.4)
     axes.grid(False)
     axes.set_xticks([])

@@ -30,6 +30,11 @@ class Joint:
         side = next(iter(self.columns)) if len(self.columns) == 1 else ""
         return sentence(words(self.stem)) + (f", {side}" if side else "")
 
+    @property
+    def name(self) -> str:
+        """The title of what is no angle: `Knee`."""
+        return self.title.replace(" angle", "")
+
 
 def joints_of(estimate: Estimate) -> list[Joint]:
     """All coordinates that move, right and left together, legs first and what places the whole body last."""

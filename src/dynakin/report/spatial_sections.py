@@ -52,7 +52,8 @@ def spatial_marker_section(estimate: Estimate, metrics: dict[str, Any]) -> Secti
     window = metrics["window"]
     order = sorted(rms, key=lambda name: -(rms[name] or 0.0))
     halves = [order[: -(-len(order) // 2)], order[-(-len(order) // 2) :]]
-    bars = [rms_bars(f"rms-{k}", {name: rms[name] for name in half}) for k, half in enumerate(halves) if half]
+    most = max((value for value in rms.values() if value is not None), default=None)
+    bars = [rms_bars(f"rms-{k}", {name: rms[name] for name in half}, most) for k, half in enumerate(halves) if half]
     titled = [Panel("RMS distance, largest first", b.note, b.svg) if k == 0 else b for k, b in enumerate(bars)]
     titled[1:] = [Panel("RMS distance, continued", b.note, b.svg) for b in titled[1:]]
     return Section(
@@ -154,7 +155,7 @@ def _foot_part(estimate: Estimate, foot: str) -> Section:
 
     for k, component in enumerate(COMPONENTS[:3]):
         title, unit = COMPONENT_LABELS[component]
-        peak = np.nanmax(np.abs(wrenches["adjusted"][:, k]), initial=0.0)
+        peak = np.nanmax(np.abs(wrenches["adjusted"][~derived, k]), initial=0.0)
         per_kg = f", {number(peak / estimate.mass_kg, 'N/kg')}" if estimate.mass_kg else ""
         add(title, unit, wrenches["measured"][:, k], wrenches["adjusted"][:, k], f"peak {number(peak, unit)}{per_kg}")
     pressed = {kind: centre_of_pressure(wrench, estimate.floor_height_m) for kind, wrench in wrenches.items()}
@@ -244,14 +245,15 @@ def spatial_moment_section(estimate: Estimate) -> Section:
         for side, k in joint.columns.items():
             if not np.isfinite(moments[:, k]).any():
                 continue
-            own_sd = None if sd is None else sd[:, k]
-            wide = own_sd is not None and band_is_too_wide(moments[:, k], np.nan_to_num(own_sd))
             derived = source[:, k] == _SOURCE_DERIVED
+            own_sd = None if sd is None else np.where(derived, np.nan, sd[:, k])
+            wide = own_sd is not None and band_is_too_wide(moments[:, k], np.nan_to_num(own_sd))
             lines.append(Line(moments[:, k], SIDE_COLOURS[side], 1.2, None if wide else own_sd, derived))
-            low, high = (_two_digits(float(edge(moments[:, k]))) for edge in (np.nanmin, np.nanmax))
+            sure = moments[:, k] if np.isnan(moments[~derived, k]).all() else moments[~derived, k]
+            low, high = (_two_digits(float(edge(sure))) for edge in (np.nanmin, np.nanmax))
             notes.append(f"{f'{side} ' if side else ''}{low} to {high}")
         return (
-            chart(joint.title, unit, estimate.time, lines[::-1], note="; ".join(notes), least_range=0.02)
+            chart(joint.name, unit, estimate.time, lines[::-1], note="; ".join(notes), least_range=0.02)
             if lines
             else None
         )

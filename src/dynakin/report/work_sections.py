@@ -36,7 +36,7 @@ def power_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
             for side, k in joint.columns.items()
             if np.isfinite(powers[:, k]).any()
         )
-        shown = chart(joint.title, unit, estimate.time, lines[::-1], note=note, least_range=0.05)
+        shown = chart(joint.name, unit, estimate.time, lines[::-1], note=note, least_range=0.05)
         panels["Legs" if joint.region == "Legs" else ""].append(shown)
     window = metrics["window"]
     seconds = f"{window['start_s']:.4g} to {window['end_s']:.4g} s"
@@ -63,7 +63,7 @@ def _work_table(estimate: Estimate, joints: list[Joint], work: Mapping[str, Any]
             cells = [number(own[key], digits=3) for key in ("positive_j", "negative_j")]
             cells += [number(own[key], digits=2) for key in ("positive_j_per_kg", "negative_j_per_kg")]
             cells += [number(own[key], digits=3) for key in ("peak_w", "lowest_w")]
-            rows.append((joint.title if side in ("right", "") else "", side or "–", *cells))
+            rows.append((joint.name if side in ("right", "") else "", side or "–", *cells))
     headings = ("", "side", "positive, J", "negative, J", "positive, J/kg", "negative, J/kg", "peak, W", "lowest, W")
     return TextTable(title, headings, rows, tuple(range(2, 8)), folded=len(rows) > 12)
 
