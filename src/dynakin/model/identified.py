@@ -84,6 +84,10 @@ def read_identified(path: Path) -> IdentifiedSubject:
     Raises:
         ModelError: it cannot be read, or holds something else; the key is named.
     """
+    if path.suffix.casefold() == ".json":
+        raise ModelError(
+            f"{path}: expected what dynakin identify wrote (.toml); a run's parameters.json is for dynakin live"
+        )
     return validate(IdentifiedSubject, read_toml(path), str(path))
 
 

@@ -6,6 +6,8 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
+
 from dynakin.errors import RecordingError
 from dynakin.recordings.c3d import read_c3d
 from dynakin.recordings.csv import read_csv, read_csv_table
@@ -26,6 +28,9 @@ READERS: dict[str, Reader] = {".trc": read_trc, ".c3d": read_c3d, ".csv": read_c
 
 FORCE_READERS: dict[str, ForceReader] = {".mot": read_table, ".sto": read_table, ".csv": read_csv_table}
 """Readers of ground-force tables by extension."""
+
+_ENOUGH = 5  # markers that tell how large a person is
+_SPAN_M = (0.02, 50.0)
 
 
 def register_reader(extension: str, reader: Reader) -> None:
@@ -59,10 +64,29 @@ def read(
     if reader is None:
         raise RecordingError(f"{path}: found extension {path.suffix!r}, expected one of {', '.join(sorted(READERS))}")
     recording = reader(path, options)
+    _check_unit(recording, path)
     if forces is None:
         return recording
     table = read_forces(Path(forces))
     return attach_forces(recording, table, options)
+
+
+def _check_unit(recording: Recording, path: Path) -> None:
+    """A person's markers cannot be taken for one a thousand times as large, or as small."""
+    markers = recording.markers
+    if markers.shape[1] < _ENOUGH:
+        return
+    low, high = (
+        np.where(np.isnan(markers), np.inf, markers).min(1),
+        np.where(np.isnan(markers), -np.inf, markers).max(1),
+    )
+    span = np.linalg.norm(high - low, axis=1)[np.isfinite(low).all(axis=1)]
+    span_m = float(np.median(span)) if len(span) else 1.0
+    if not _SPAN_M[0] <= span_m <= _SPAN_M[1]:
+        raise RecordingError(
+            f"{path}: its markers span {span_m:.3g} m in a frame, expected 0.2 to 10 m of a person: the file's length "
+            "unit is wrong"
+        )
 
 
 def read_forces(path: Path) -> Table:
