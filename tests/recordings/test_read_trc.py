@@ -120,3 +120,16 @@ def test_no_such_file_folder_and_unknown_kind(tmp_path: Path) -> None:
         read(tmp_path)
     with pytest.raises(RecordingError, match=r"found extension '\.xyz', expected one of .*\.c3d"):
         read(write(tmp_path, "a.xyz", TRC))
+
+
+@pytest.mark.parametrize(("wrong", "words"), [("mm", r"span 0\.00[0-9]+ m"), ("m", r"span [0-9.e+]+ m")])
+def test_metres_called_millimetres_and_the_reverse_are_seen(tmp_path: Path, wrong: str, words: str) -> None:
+    scale = 1.0 if wrong == "mm" else 1000.0  # what the numbers are: metres, or millimetres
+    places = scale * np.random.default_rng(1).uniform([0.0, 0.0, -0.3], [0.4, 1.7, 0.3], (2, 8, 3))
+    names = "\t\t\t".join(f"M{k}" for k in range(8))
+    axes = "\t".join(f"{a}{k}" for k in range(8) for a in "XYZ")
+    rows = "".join(f"{k + 1}\t{0.01 * k}\t" + "\t".join(f"{v:.5f}" for v in places[k].ravel()) + "\n" for k in (0, 1))
+    top = TRC_TOP.replace("\t2\t2\tmm\t", f"\t2\t8\t{wrong}\t").splitlines()[:3]
+    text = "\n".join([*top, f"Frame#\tTime\t{names}\t\t", f"\t\t{axes}", "", rows])
+    with pytest.raises(RecordingError, match=rf"a\.trc.*{words} in a frame, expected 0\.2 to 10 m.*unit is wrong"):
+        read(write(tmp_path, "a.trc", text))
