@@ -161,8 +161,9 @@ def angles() -> None:
         )
         for title, wanted, _ in GROUPS:
             print(f"| {title}, deg | {apart(equal, theirs, recording.time[judged], wanted)} |")
-        estimators = {name: dynakin.Estimator(definition) for name, definition in models(trial).items()}
-        held = dynakin.Estimator(models(trial)[".osim"], without_plates(), estimate=())
+        definitions = models(trial)
+        estimators = {name: dynakin.Estimator(definition) for name, definition in definitions.items()}
+        held = dynakin.Estimator(definitions[".osim"], without_plates(), estimate=())
         for name, estimator in {**estimators, ".osim, held as in OpenSim, markers only": held}.items():
             estimate = estimator.run(recording)
             ours = Angles(estimate.coordinate_names, estimate.time, estimate.data["coordinates"].values)

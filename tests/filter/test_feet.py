@@ -18,10 +18,10 @@ from dynakin import _core
 from dynakin.errors import ModelError
 from dynakin.filter import FootWrenches
 from dynakin.filter.assemble import assemble
-from dynakin.filter.foot_wrenches import IN_THE_AIR, MEASURED, NOT_MEASURED
 from dynakin.filter.smoothing import smoothed
 from dynakin.recordings import GroundFrame, Plate, Recording, read_table
 from dynakin.results import Estimate
+from dynakin.results.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
 
 FRAMES = 60
 SPEC = floating_model(5)

@@ -9,8 +9,8 @@ import pytest
 
 import dynakin
 from dynakin.filter import presets
-from dynakin.filter.foot_wrenches import MEASURED, NOT_MEASURED
 from dynakin.recordings.foot_loads import foot_loads
+from dynakin.results.feet import MEASURED, NOT_MEASURED
 from dynakin.simulation import SimulatedTrial, simulate
 from dynakin.stream import Callback, Live, LiveFrame, Replay
 from dynakin.stream.feet import LiveFeet

@@ -14,16 +14,19 @@ from rich.padding import Padding
 from dynakin.cli.compare_inputs import cases_of, chosen_trials, given_keys, halves_of
 from dynakin.cli.console import as_table, busy, out, progress_bar
 from dynakin.cli.options import (
+    ForceEach,
     ForceThreshold,
     Forward,
     Height,
     Markers,
     Mass,
+    ModelName,
     PlateFilter,
     Sex,
     Side,
     Static,
     TableName,
+    Trials,
     Vertical,
 )
 from dynakin.comparison import (
@@ -52,13 +55,9 @@ HORIZON_MS = 1000.0 * HORIZON_S
 
 
 def compare(
-    trials: Annotated[
-        list[Path] | None, typer.Argument(metavar="TRIAL...", help="Recordings, or a configuration (.toml) for each.")
-    ] = None,
-    forces: Annotated[list[Path] | None, typer.Option("--forces", help="Ground forces, one a trial, in order.")] = None,
-    model: Annotated[
-        str | None, typer.Option(help="Model: fullbody, squat7, sagittal7, a .toml or .osim file.")
-    ] = None,
+    trials: Trials = None,
+    forces: ForceEach = None,
+    model: ModelName = None,
     markers: Markers = None,
     static: Static = None,
     mass: Mass = None,

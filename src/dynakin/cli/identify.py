@@ -9,7 +9,18 @@ from typing import Annotated
 import typer
 
 from dynakin.cli.console import out, progress_bar, table
-from dynakin.cli.options import Forward, Height, Markers, Mass, Sex, Side, Static, Vertical, forward_direction
+from dynakin.cli.options import (
+    Forward,
+    Height,
+    Markers,
+    Mass,
+    ModelName,
+    Sex,
+    Side,
+    Static,
+    Vertical,
+    forward_direction,
+)
 from dynakin.errors import ConfigError
 from dynakin.filter import Estimator
 from dynakin.identification import Identified, change_between, change_in_words, identify_subject
@@ -27,9 +38,7 @@ def identify(
         list[Path] | None,
         typer.Option("--forces", help="Ground forces of the trials, in their order; else TRIAL_grf.mot beside."),
     ] = None,
-    model: Annotated[
-        str | None, typer.Option(help="Model: squat7, sagittal7, fullbody, a .toml or an .osim file.")
-    ] = None,
+    model: ModelName = None,
     markers: Markers = None,
     static: Static = None,
     mass: Mass = None,

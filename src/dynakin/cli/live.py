@@ -10,7 +10,19 @@ from typing import Annotated, Any
 import typer
 
 from dynakin.cli.console import busy, out
-from dynakin.cli.options import Estimated, Height, Markers, Mass, Preset, Sex, Side, TableName, forward_direction
+from dynakin.cli.options import (
+    Estimated,
+    Forward,
+    Height,
+    Markers,
+    Mass,
+    Preset,
+    Sex,
+    Side,
+    TableName,
+    Vertical,
+    forward_direction,
+)
 from dynakin.cli.run import estimated
 from dynakin.cli.summary import print_summary
 from dynakin.errors import ConfigError
@@ -44,8 +56,8 @@ def live(
     preset: Preset = None,
     side: Side = None,
     estimate: Estimated = None,
-    vertical: Annotated[str | None, typer.Option(help="Laboratory axis that points up: auto, +Y, +Z, ...")] = None,
-    forward: Annotated[str | None, typer.Option(help="Facing direction: auto, an axis or three numbers.")] = None,
+    vertical: Vertical = None,
+    forward: Forward = None,
     table: TableName = None,
     static: Annotated[Path | None, typer.Option(help="Recording of the same person standing.")] = None,
     parameters: Annotated[

@@ -7,6 +7,11 @@ from typing import Annotated
 
 import typer
 
+Trials = Annotated[
+    list[Path] | None, typer.Argument(metavar="TRIAL...", help="Recordings, or a configuration (.toml) for each.")
+]
+ForceEach = Annotated[list[Path] | None, typer.Option("--forces", help="Ground forces, one a trial, in order.")]
+ModelName = Annotated[str | None, typer.Option(help="Model: fullbody, squat7, sagittal7, a .toml or .osim file.")]
 Force = Annotated[Path | None, typer.Option("--forces", help="Ground forces: .mot, .sto or .csv.")]
 Markers = Annotated[str | None, typer.Option(help="Marker set: auto, a built-in one or a .toml file.")]
 Static = Annotated[Path | None, typer.Option(help="Recording of the same person standing.")]

@@ -18,6 +18,7 @@ from dynakin.cli.options import (
     Height,
     Markers,
     Mass,
+    ModelName,
     PlateFilter,
     Preset,
     Sex,
@@ -45,9 +46,7 @@ LARGEST_BENCH = 250
 def run(
     trial: Annotated[Path, typer.Argument(help="Recording (.c3d, .trc, .csv), or a configuration (.toml).")],
     forces: Force = None,
-    model: Annotated[
-        str | None, typer.Option(help="Model: fullbody, squat7, sagittal7, a .toml or .osim file.")
-    ] = None,
+    model: ModelName = None,
     markers: Markers = None,
     static: Static = None,
     parameters: Annotated[

@@ -15,12 +15,14 @@ from dynakin.cli.compare_inputs import cases_of, given_keys
 from dynakin.cli.console import as_table, busy, out, progress_bar
 from dynakin.cli.options import (
     Backend,
+    ForceEach,
     ForceThreshold,
     Forward,
     Height,
     Jobs,
     Markers,
     Mass,
+    ModelName,
     PlateFilter,
     Preset,
     Scheduler,
@@ -28,6 +30,7 @@ from dynakin.cli.options import (
     Side,
     Static,
     TableName,
+    Trials,
     Vertical,
 )
 from dynakin.comparison.case import Case
@@ -47,11 +50,6 @@ from dynakin.tuning.settings import UNITS
 
 tune = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Choose noise settings by measurement.")
 
-Trials = Annotated[
-    list[Path] | None, typer.Argument(metavar="TRIAL...", help="Recordings, or a configuration (.toml) for each.")
-]
-Forces = Annotated[list[Path] | None, typer.Option("--forces", help="Ground forces, one a trial, in order.")]
-ModelName = Annotated[str | None, typer.Option(help="Model: squat7, sagittal7, fullbody, a .toml or .osim file.")]
 Output = Annotated[Path, typer.Option("-o", "--output", help="Folder for table, figures and presets.")]
 
 _GAINS = ("coordinate", "speed", "acceleration")
@@ -61,7 +59,7 @@ _GAINS = ("coordinate", "speed", "acceleration")
 def grid(
     output: Output,
     trials: Trials = None,
-    forces: Forces = None,
+    forces: ForceEach = None,
     model: ModelName = None,
     markers: Markers = None,
     static: Static = None,
@@ -119,7 +117,7 @@ def grid(
 def fit(
     output: Output,
     trials: Trials = None,
-    forces: Forces = None,
+    forces: ForceEach = None,
     model: ModelName = None,
     markers: Markers = None,
     static: Static = None,

@@ -11,11 +11,12 @@ import xarray as xr
 
 from dynakin import _core
 from dynakin.filter.events import events_of
-from dynakin.filter.foot_wrenches import MEASURED, FootWrenches
+from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.filter.parameters import parameters_of
 from dynakin.model import InitialModel
 from dynakin.recordings import Recording
 from dynakin.results import AXES, COMPONENTS, Estimate, Timing
+from dynakin.results.feet import MEASURED
 
 Array = npt.NDArray[np.float64]
 

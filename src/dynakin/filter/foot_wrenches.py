@@ -11,13 +11,9 @@ import numpy.typing as npt
 from dynakin import _core
 from dynakin.errors import ModelError
 from dynakin.filter.alignment import in_step
+from dynakin.results.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
 
 Array = npt.NDArray[np.float64]
-
-IN_THE_AIR, MEASURED, NOT_MEASURED = range(3)
-"""What `FootWrenches.contact` says of a foot: its wrench is zero, is measured, or is not known."""
-DERIVED, UNKNOWN = 1, 2
-"""What ``moment_source`` says beside 0: the only unmeasured contact, or one of several, lies behind that axis."""
 
 
 @dataclass(frozen=True, eq=False)

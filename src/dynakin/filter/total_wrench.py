@@ -8,12 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import RecordingError
-from dynakin.filter.foot_wrenches import IN_THE_AIR, MEASURED, NOT_MEASURED, FootWrenches
+from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.filter.noise import Noise
 from dynakin.model import InitialModel
 from dynakin.recordings import PlateCheck, Recording, check_plates
 from dynakin.recordings import foot_loads as on_plates
 from dynakin.recordings.foot_loads import LOADED_N, FootLoads, foot_loads
+from dynakin.results.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
@@ -21,7 +22,6 @@ Array = npt.NDArray[np.float64]
 
 MASS_APART = 0.05
 """Part of the weight by which the plates' mean may differ before the mass is doubted: movement explains 2 or 3 %."""
-_LEAST_FRAMES = 50
 
 _CONTACT = {
     on_plates.SWING: IN_THE_AIR,
@@ -89,60 +89,40 @@ def leave_out_unknown(loads: FootLoads, wrench: Array) -> list[str]:
 
 def doubtful_mass(wrench: Array, mass_kg: float) -> str | None:
     """A sentence where the mean vertical force of the known frames of the wrench (T, 6) contradicts the mass."""
-    push = wrench[np.isfinite(wrench).all(axis=1), 1]
-    load = float(push.mean()) / GRAVITY_M_S2 if len(push) >= _LEAST_FRAMES else mass_kg
-    apart = abs(load - mass_kg) / mass_kg
-    if apart <= MASS_APART:
+    load = _mean_load_kg(wrench, least=50)
+    if load is None or abs(load - mass_kg) <= MASS_APART * mass_kg:
         return None
     return (
         f"Warning: the plates carry {load:.1f} kg on average where the person weighs {mass_kg:.1f} kg "
-        f"({100.0 * apart:.0f} % apart, expected within {100.0 * MASS_APART:.0f} %): check the mass. Forces, moments "
-        "and inertia take the error on, and no delay of the plates is taken off, because a wrong mass looks like one."
+        f"({100.0 * abs(load - mass_kg) / mass_kg:.0f} % apart, expected within {100.0 * MASS_APART:.0f} %): check the "
+        "mass. Forces, moments and inertia take the error on, and no delay of the plates is taken off, because a wrong "
+        "mass looks like one."
     )
 
 
 def leave_out_foreign(check: PlateCheck, wrench: Array, initial: InitialModel, tolerance: float | None) -> list[str]:
-    """Make the wrench (T, 6) NaN, in place, where the plates carry something else than the person; a sentence then."""
-    if initial.feet:
-        foreign = foreign_total(wrench, initial.weighed_kg, tolerance)
-    else:
-        foreign = foreign_load(check, initial.weighed_kg, tolerance)
-    if foreign is None:
-        return []
-    wrench[:] = np.nan
-    return [foreign]
-
-
-def foreign_total(wrench: Array, mass_kg: float, tolerance: float | None) -> str | None:
-    """A sentence where the mean vertical force of the known frames of the wrench (T, 6) is not the person's weight.
+    """Make the wrench (T, 6) NaN, in place, where the plates' load is not the person's weight; a sentence then.
 
     Args:
         tolerance: part of the weight by which they may differ; None: nobody asks.
     """
-    push = wrench[np.isfinite(wrench).all(axis=1), 1]
-    if tolerance is None or len(push) < 10:
-        return None
-    load = float(push.mean()) / GRAVITY_M_S2
-    if abs(load - mass_kg) <= tolerance * mass_kg:
-        return None
-    return (
-        f"Warning: the plates carry {load:.1f} kg on average where the person weighs {mass_kg:.1f} kg (more than "
-        f"{100.0 * tolerance:.0f} % apart): the mass is wrong, or something that the model does not have bears on them "
-        "(a weight, a cable, a rail). The plates are not used."
-    )
-
-
-def foreign_load(check: PlateCheck, mass_kg: float, tolerance: float | None) -> str | None:
-    """A sentence where the plates' mean load is not the person's weight; None where it is, or nobody asks.
-
-    Args:
-        tolerance: part of the weight by which they may differ.
-    """
-    load = check.mass_kg_from_plates if check.mass_kg_from_plates is not None else check.mean_mass_kg
+    mass_kg = initial.weighed_kg
+    if initial.feet:
+        load, mean, bears = _mean_load_kg(wrench, least=10), " on average", "a weight, a cable, a rail"
+    else:
+        load = check.mass_kg_from_plates if check.mass_kg_from_plates is not None else check.mean_mass_kg
+        mean, bears = "", "a weight, a cable, a rail, a foot beside a plate"
     if tolerance is None or load is None or abs(load - mass_kg) <= tolerance * mass_kg:
-        return None
-    return (
-        f"Warning: the plates carry {load:.1f} kg where the person weighs {mass_kg:.1f} kg (more than "
+        return []
+    wrench[:] = np.nan
+    return [
+        f"Warning: the plates carry {load:.1f} kg{mean} where the person weighs {mass_kg:.1f} kg (more than "
         f"{100.0 * tolerance:.0f} % apart): the mass is wrong, or something that the model does not have bears on them "
-        "(a weight, a cable, a rail, a foot beside a plate). The plates are not used."
-    )
+        f"({bears}). The plates are not used."
+    ]
+
+
+def _mean_load_kg(wrench: Array, least: int) -> float | None:
+    """Mean vertical force of the known frames of a wrench (T, 6) as a mass; None of fewer than ``least``."""
+    push = wrench[np.isfinite(wrench).all(axis=1), 1]
+    return float(push.mean()) / GRAVITY_M_S2 if len(push) >= least else None

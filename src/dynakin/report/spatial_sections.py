@@ -20,7 +20,7 @@ from dynakin.report.sides import REGIONS, Joint, joints_of
 from dynakin.report.text_tables import TextTable
 from dynakin.results import AXES, COMPONENTS, Estimate
 from dynakin.results.angles import convention_of
-from dynakin.results.feet import MEASURED as CONTACT_MEASURED
+from dynakin.results.feet import DERIVED, NOT_MEASURED, UNKNOWN
 from dynakin.results.power import root_coordinates
 from dynakin.results.pressure import centre_of_pressure
 
@@ -30,7 +30,6 @@ SIDE_LINES = tuple(LineStyle(side, SIDE_COLOURS[side], 1.4) for side in ("right"
 _DERIVED = LineStyle("derived from the motion", "#5c6773", 1.2, "dashed")
 _DIRECTIONS = {"x": "forward", "y": "up", "z": "to the right"}
 _AXIS_COLOURS = {"x": "#0072B2", "y": "#009E73", "z": "#CC79A7"}
-_SOURCE_DERIVED, _SOURCE_UNKNOWN = 1, 2
 
 
 def spatial_marker_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
@@ -145,7 +144,7 @@ def _foot_part(estimate: Estimate, foot: str) -> Section:
         for kind, name in (("measured", "foot_wrench_measured"), ("adjusted", "foot_wrench"))
     }
     contact = estimate.data["foot_contact"].sel(foot=foot).values
-    derived = contact > CONTACT_MEASURED
+    derived = contact == NOT_MEASURED
     panels = []
 
     def add(title: str, unit: str, measured: Array, adjusted: Array, note: str = "", least: float = 0.0) -> None:
@@ -245,7 +244,7 @@ def spatial_moment_section(estimate: Estimate) -> Section:
         for side, k in joint.columns.items():
             if not np.isfinite(moments[:, k]).any():
                 continue
-            derived = source[:, k] == _SOURCE_DERIVED
+            derived = source[:, k] == DERIVED
             own_sd = None if sd is None else np.where(derived, np.nan, sd[:, k])
             wide = own_sd is not None and band_is_too_wide(moments[:, k], np.nan_to_num(own_sd))
             lines.append(Line(moments[:, k], SIDE_COLOURS[side], 1.2, None if wide else own_sd, derived))
@@ -267,7 +266,7 @@ def spatial_moment_section(estimate: Estimate) -> Section:
     ]
     shares = [
         f"{what} in {number(100.0 * share, '%', digits=2)} of the frames ({who})"
-        for code, what in ((_SOURCE_DERIVED, "derived from the motion"), (_SOURCE_UNKNOWN, "not known"))
+        for code, what in ((DERIVED, "derived from the motion"), (UNKNOWN, "not known"))
         if (share := float((source == code).any(axis=1).mean())) > 0.0
         for who in (_sides_with(estimate, source == code),)
     ]
@@ -281,7 +280,7 @@ def spatial_moment_section(estimate: Estimate) -> Section:
         "moments",
         "Joint moments",
         text,
-        lines=(*SIDE_LINES, *((_DERIVED,) if (source == _SOURCE_DERIVED).any() else ())),
+        lines=(*SIDE_LINES, *((_DERIVED,) if (source == DERIVED).any() else ())),
         band="" if sd is None else "± 2 standard deviations",
         parts=_by_region("moments", joints, draw),
     )

@@ -12,8 +12,10 @@ from dynakin.results.estimate import COMPONENTS
 if TYPE_CHECKING:
     from dynakin.results.estimate import Estimate
 
-IN_FLIGHT = 0
-MEASURED = 1
+IN_THE_AIR, MEASURED, NOT_MEASURED = range(3)
+"""Codes of ``foot_contact``: a foot's wrench is zero, is measured, or is not known."""
+DERIVED, UNKNOWN = 1, 2
+"""Codes of ``moment_source`` beside 0: the only unmeasured contact, or one of several, lies behind that axis."""
 
 
 def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str, Any] | None:
@@ -35,7 +37,7 @@ def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str,
     remainder = estimate.data["wrench_remainder"].transpose("time", "component").values[window]
     unmeasured = (contact > MEASURED).sum(axis=1)
     known = (contact == MEASURED) & (unmeasured == 0)[:, None]
-    flight = (contact == IN_FLIGHT).all(axis=1)
+    flight = (contact == IN_THE_AIR).all(axis=1)
     rms = {
         name: dict(zip(COMPONENTS, _rms(adjusted[known[:, k], k]), strict=True)) if known[:, k].any() else None
         for k, name in enumerate(estimate.foot_names)

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.results.feet import DERIVED, NOT_MEASURED
 from dynakin.results.power import work_of
 
 if TYPE_CHECKING:
@@ -53,7 +54,7 @@ def asymmetry(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str, An
         estimate.data[name].transpose("time", "coordinate").values[window] for name in ("coordinates", "moments")
     )
     # What is derived from the motion carries its errors: peaks of it would be taken for the person's.
-    derived = _derived(estimate, "moment_source", "coordinate", 1)[window]
+    derived = _derived(estimate, "moment_source", "coordinate", DERIVED)[window]
     moments, power = np.where(derived, np.nan, moments), np.where(derived, np.nan, estimate.powers()[window])
     found: dict[str, Any] = {}
     for name, *sides in paired(estimate.coordinate_names):
@@ -76,7 +77,7 @@ def _feet(estimate: Estimate, time: Array, window: npt.NDArray[np.bool_]) -> dic
     if "right" not in names or "left" not in names:
         return None
     push = estimate.data["foot_wrench"].sel(component="fy").transpose("time", "foot").values[window]
-    push = np.where(_derived(estimate, "foot_contact", "foot", 2)[window], np.nan, push)
+    push = np.where(_derived(estimate, "foot_contact", "foot", NOT_MEASURED)[window], np.nan, push)
     sides = [push[:, names.index(side)] for side in ("right", "left")]
     return {
         "peak_vertical_force": symmetry_index(*(_largest(side) for side in sides)),
