@@ -11,8 +11,9 @@ import numpy.typing as npt
 from dynakin import _core
 from dynakin.errors import ConfigError, DivergenceError, RecordingError
 from dynakin.filter import presets
-from dynakin.filter.alignment import PASSES, delay_of, in_step, in_words, is_late
+from dynakin.filter.alignment import PASSES, contradicted, delay_of, in_step, in_words, is_late
 from dynakin.filter.assemble import assemble
+from dynakin.filter.closure import plates_misfit
 from dynakin.filter.core_filter import core_filter, filter_settings
 from dynakin.filter.extend import QUANTITIES, Quantity, initial_covariance
 from dynakin.filter.foot_wrenches import FootWrenches
@@ -20,12 +21,11 @@ from dynakin.filter.live import StepEstimate, deviations_of, step_estimate
 from dynakin.filter.noise import Noise
 from dynakin.filter.samples import Sample, recording_arrays, sample_arrays
 from dynakin.filter.smoothing import check_can_smooth, smoothed
-from dynakin.filter.total_wrench import doubtful_mass, foot_wrenches, known_total, leave_out_foreign
+from dynakin.filter.total_wrench import Ground, doubtful_mass, foot_wrenches, known_ground
 from dynakin.model import Bounds, CarriedLoad, Definition, InitialModel, Priors, initialise, with_loads
 from dynakin.model.identified import IdentifiedSubject, with_identified
 from dynakin.model.validation import nearest
 from dynakin.recordings import Recording
-from dynakin.recordings.foot_loads import FootLoads
 from dynakin.results import Estimate
 
 Array = npt.NDArray[np.float64]
@@ -121,15 +121,15 @@ class Estimator:
             check_can_smooth(self.noise)
         initial = self.start(recording, static=static)
         assert self._core_model is not None
-        markers, wrench, notes, loads = self._measured(recording, initial)
-        foreign = bool(np.isnan(wrench).all())
+        markers, wrench, ground = self._measured(recording, initial)
+        notes = list(ground.notes)
         on_feet = None
-        if feet is not None and not foreign:
+        if feet is not None:
             on_feet = feet(initial)
-        elif loads is not None and not foreign:
-            on_feet = foot_wrenches(loads, initial, self.noise)
+        elif ground.loads is not None:
+            on_feet = foot_wrenches(ground.loads, initial, self.noise)
         try:
-            doubt = doubtful_mass(wrench, initial.weighed_kg)
+            doubt = doubtful_mass(wrench, initial.weighed_kg, ground.load_ratio)
             passes = 0 if doubt else PASSES
             arrays, shift, clock = self.run_in_step(initial, recording.time, markers, wrench, progress, on_feet, passes)
             wrench = in_step(recording.time, wrench, shift) if shift else wrench
@@ -140,22 +140,27 @@ class Estimator:
         except ValueError as error:  # a frame that the core refuses, named by it
             raise RecordingError(f"{recording.path or recording.name}: {error}") from None
         config = self.settings() | {"smooth": smooth}
-        notes += [doubt] if doubt else [] if foreign else clock
+        notes += [doubt] if doubt else clock if ground.usable else []
         assert self._filter is not None
         covariances = (initial_covariance(initial, self.noise), self._filter.covariance)
         measured = (markers, wrench)
-        return assemble(arrays, self._core_model, initial, recording, measured, config, notes, covariances, on_feet)
+        return assemble(
+            arrays,
+            self._core_model,
+            initial,
+            recording,
+            measured,
+            config,
+            notes,
+            covariances,
+            on_feet,
+            ground.undeclared,
+        )
 
-    def _measured(
-        self, recording: Recording, initial: InitialModel
-    ) -> tuple[Array, Array, list[str], FootLoads | None]:
+    def _measured(self, recording: Recording, initial: InitialModel) -> tuple[Array, Array, Ground]:
         markers, wrench = recording_arrays(recording, initial, gaps=self.noise.recover)
-        if not recording.plates:  # of a floating model: others need them
-            text = "No force plates: the total wrench is left out; inertial parameters stay as the table has them."
-            return markers, wrench, [text], None
-        check, loads, notes = known_total(recording, initial, wrench, self.plates)
-        notes += leave_out_foreign(check, wrench, initial, self.noise.plate_load_tolerance)
-        return markers, wrench, notes, loads
+        tolerance = self.noise.plate_load_tolerance
+        return markers, wrench, known_ground(recording, initial, markers, wrench, self.plates, tolerance)
 
     def measured(self, recording: Recording, initial: InitialModel) -> tuple[Array, Array, list[str]]:
         """What the filter takes of a recording: markers (T, M, 3) m, wrench (T, 6), NaN where it is not known (all of
@@ -164,7 +169,8 @@ class Estimator:
         Raises:
             RecordingError: markers or plates do not fit the model.
         """
-        return self._measured(recording, initial)[:3]
+        markers, wrench, ground = self._measured(recording, initial)
+        return markers, wrench, list(ground.notes)
 
     def run_in_step(
         self,
@@ -182,12 +188,16 @@ class Estimator:
             The arrays, the seconds by which the last run took the plates earlier, and what there is to say of that.
         """
         arrays, shift = self.run_arrays(time, markers, wrench, progress, feet), 0.0
+        misfit = plates_misfit(initial, time, markers, wrench)
         for _ in range(passes):
             delay = self._delay(arrays)
             if delay is None or not is_late(delay):
                 break
-            shift += delay[0]
-            taken = in_step(time, wrench, shift)
+            taken = in_step(time, wrench, shift + delay[0])
+            fits = plates_misfit(initial, time, markers, taken)
+            if misfit is not None and fits is not None and fits > misfit:
+                return arrays, shift, [contradicted(shift + delay[0], misfit, fits)]
+            shift, misfit = shift + delay[0], fits
             self.start_from(initial)
             arrays = self.run_arrays(time, markers, taken, progress, feet and feet.in_step(time, shift))
         return arrays, shift, in_words(shift, self._delay(arrays))

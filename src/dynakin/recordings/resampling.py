@@ -9,6 +9,9 @@ from scipy import interpolate, signal
 from dynakin.errors import RecordingError
 from dynakin.recordings.recording import Array
 
+UNEVEN = 0.1
+"""Part of a step by which a sample's time may be off an even rate: files round their times, and a lost sample moves
+all others by half a step and more."""
 _PASS = 0.4  # end of the pass band, times the marker rate
 _STOP = 0.6  # begin of the stop band: what lies between folds back only above the pass band
 _STOP_DB = 60.0
@@ -74,9 +77,10 @@ def resample(samples: Array, time_in: Array, time_out: Array, *, causal: bool = 
     """
     if same_times(time_in, time_out):
         return samples
-    rate_in, rate_out = _rate(time_in), _rate(time_out)
+    rate_in, rate_out = _mean_rate(time_in), _rate(time_out)
     step = 1 / rate_in
-    if np.abs(np.diff(time_in) * rate_in - 1).max() > 0.05:
+    even = time_in[0] + (time_in[-1] - time_in[0]) * np.linspace(0.0, 1.0, len(time_in))
+    if np.abs(time_in - even).max() > UNEVEN * step:
         raise RecordingError("the forces are sampled unevenly, expected a constant rate to resample from")
     # The last marker frame may lie up to one marker step after the last analog sample of the frame before.
     if time_out[0] < time_in[0] - 0.5 * step or time_out[-1] > time_in[-1] + max(step, 0.5 / rate_out):
@@ -128,6 +132,11 @@ def _antialias(samples: Array, rate_in: float, rate_out: float) -> Array:
 
 def _rate(time: Array) -> float:
     return float(1 / np.median(np.diff(time))) if len(time) > 1 else float("inf")
+
+
+def _mean_rate(time: Array) -> float:
+    """Of rounded times: their steps are all wrong, the whole is not."""
+    return (len(time) - 1) / float(time[-1] - time[0]) if len(time) > 1 else float("inf")
 
 
 def _check_cutoff(rate_hz: float, cutoff_hz: float) -> None:
