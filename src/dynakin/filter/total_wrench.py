@@ -176,10 +176,10 @@ def _undeclared_in_words(
     if _nearly_all(found):
         load = float(np.nanmean(wrench[judged, 1])) / GRAVITY_M_S2
         return [
-            f"Warning: the plates carry {load:.1f} kg on average where the motion of a person of "
-            f"{initial.weighed_kg:.1f} kg needs {load + float(np.nanmean(found.excess[judged, 1])) / GRAVITY_M_S2:.1f} "
-            "kg: the mass is wrong, a plate is missing, or something that no plate measures bears or pulls the person "
-            "(a seat, a weight, a cable, a rail). The plates are not used for the total."
+            f"Warning: the plates carry {load:.1f} kg on average where the person weighs {initial.weighed_kg:.1f} kg "
+            f"(by the motion {load + float(np.nanmean(found.excess[judged, 1])) / GRAVITY_M_S2:.1f} kg): the mass is "
+            "wrong, a plate is missing, or something that no plate measures bears or pulls the person (a seat, a "
+            "weight, a cable, a rail). The plates are not used for the total."
         ], beside
     spans, sizes, away = [], [], []
     for first, end in runs(found.undeclared):

@@ -73,9 +73,11 @@ class FootLoads:
 
     def with_undeclared(self, frames: Flags) -> FootLoads:
         """The same where something bears the person in these frames (T,) that no plate measures: the total is not
-        known there, and a foot that is not on a plate may be what it bears, unless it is surely in the air."""
+        known there, and a foot that is on no plate, or on one that reads nothing, may be what it bears, unless it is
+        surely in the air."""
         reason = self.reason.copy()
-        reason[frames[:, None] & (reason == SWING) & ~self.aloft] = UNKNOWN
+        light = (reason == SWING) | (np.nan_to_num(self.wrench[..., 1]) < LOADED_N)
+        reason[frames[:, None] & light & (reason <= SHARED) & ~self.aloft] = UNKNOWN
         wrench = np.where((reason == UNKNOWN)[..., None], np.nan, self.wrench)
         return replace(
             self,
