@@ -51,8 +51,9 @@ class RunConfig(Strict):
 
     preset: str = "default"
     """Noise settings to start from (default, paper, or a .toml file that `tune` wrote); [noise] changes single ones."""
-    smooth: bool = False
-    """Estimate each frame from all frames, those after it too. Not given: as it would be live."""
+    smooth: bool | None = Field(default=None, examples=[True])
+    """Estimate each frame from all frames, those after it too; false: as it would be live. Not given: true wherever the
+    noise settings have a smoother (preset paper has none)."""
     side: Literal["auto", "right", "left", "both"] = "auto"
     """Which side's markers a model uses that has one leg for both: auto (fewest gaps), right, left, both."""
     estimate: tuple[Quantity, ...] = QUANTITIES

@@ -54,7 +54,7 @@ def test_moments_of_a_whole_body_agree_with_the_offline_run(data_dir: Path) -> N
     source = Replay(recording, speed=0.0)
     live = Live(estimator, [source], [Callback(frames.append)], say=lambda text: None, standing_wait_s=2.0)
     live.run()
-    offline = estimator.again().run(recording)
+    offline = estimator.again().run(recording, smooth=False)
     names = [str(name) for name in offline.data["coordinate"].values]
     t0 = frames[0].estimate.time_s
     at = [k for k, t in enumerate(recording.time) if t >= t0 - 1e-6][: len(frames)]

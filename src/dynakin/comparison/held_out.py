@@ -86,7 +86,8 @@ def identify_on(
     estimates = {}
     for preset in setup.noise:
         estimator = setup.estimator(preset)
-        estimates[preset] = estimator.run(recording, static=static)
+        # only what it ends with is used, which smoothing does not change
+        estimates[preset] = estimator.run(recording, static=static, smooth=False)
     assert estimator.initial is not None
     wrench = measured_wrench(recording, estimator.initial, setup.plates)
     ground = estimator.initial.ground if same_recording else None

@@ -20,7 +20,7 @@ from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.filter.live import StepEstimate, deviations_of, step_estimate
 from dynakin.filter.noise import Noise
 from dynakin.filter.samples import Sample, recording_arrays, sample_arrays
-from dynakin.filter.smoothing import check_can_smooth, smoothed
+from dynakin.filter.smoothing import check_can_smooth, smoothed, whether_to_smooth
 from dynakin.filter.total_wrench import Ground, doubtful_mass, foot_wrenches, known_ground
 from dynakin.model import Bounds, CarriedLoad, Definition, InitialModel, Priors, initialise, with_loads
 from dynakin.model.identified import IdentifiedSubject, with_identified
@@ -98,7 +98,7 @@ class Estimator:
         recording: Recording,
         *,
         static: Recording | None = None,
-        smooth: bool = False,
+        smooth: bool | None = None,
         feet: Feet | None = None,
         progress: Progress | None = None,
     ) -> Estimate:
@@ -107,7 +107,8 @@ class Estimator:
         Args:
             recording: markers and plates, as `read` gives them.
             static: the same person and markers, standing: lengths and marker places are taken from it.
-            smooth: whether each frame is estimated from all frames, those after it too (`filter.smoothing`).
+            smooth: whether each frame is estimated from all frames, those after it too (`filter.smoothing`); False: as
+                it would be live. None: smoothed wherever the noise settings have a smoother, else a message says so.
             feet: for models with a floating root: gives the wrench of each foot once the model is measured and its
                 ground frame known, instead of the plates' own division by `foot_loads`. Moments are those that the
                 feet's wrenches leave, adjusted so that nothing is left at the root; the state does not depend on it.
@@ -115,10 +116,10 @@ class Estimator:
 
         Raises:
             ModelError, RecordingError: model, markers, plates and recording do not fit.
+            ConfigError: smoothing was asked for, and the noise settings have no smoother.
             DivergenceError: the filter lost its estimate; the message names the frame.
         """
-        if smooth:
-            check_can_smooth(self.noise)
+        smooth, unsmoothed = whether_to_smooth(smooth, self.noise)
         initial = self.start(recording, static=static)
         assert self._core_model is not None
         markers, wrench, ground = self._measured(recording, initial)
@@ -131,16 +132,17 @@ class Estimator:
         try:
             doubt = doubtful_mass(wrench, initial.weighed_kg, ground.load_ratio)
             passes = 0 if doubt else PASSES
-            arrays, shift, clock = self.run_in_step(initial, recording.time, markers, wrench, progress, on_feet, passes)
+            there, back = _shares(progress, recording.n_frames) if smooth else (progress, None)
+            arrays, shift, clock = self.run_in_step(initial, recording.time, markers, wrench, there, on_feet, passes)
             wrench = in_step(recording.time, wrench, shift) if shift else wrench
             on_feet = on_feet and on_feet.in_step(recording.time, shift)
             if smooth:
                 self.start_from(initial)
-                arrays = self.run_smoothed_arrays(recording.time, markers, wrench, progress, on_feet)
+                arrays = self.run_smoothed_arrays(recording.time, markers, wrench, back, on_feet)
         except ValueError as error:  # a frame that the core refuses, named by it
             raise RecordingError(f"{recording.path or recording.name}: {error}") from None
         config = self.settings() | {"smooth": smooth}
-        notes += [doubt] if doubt else clock if ground.usable else []
+        notes += [*([doubt] if doubt else clock if ground.usable else []), *unsmoothed]
         assert self._filter is not None
         covariances = (initial_covariance(initial, self.noise), self._filter.covariance)
         measured = (markers, wrench)
@@ -426,3 +428,10 @@ class Estimator:
         """The core's settings for a measured model: this noise, the marker set's variances, the bounds of (9)."""
         assert self._core_model is not None
         return filter_settings(initial, self.noise, self._core_model.layout, self.estimate)
+
+
+def _shares(progress: Progress | None, frames: int) -> tuple[Progress | None, Progress | None]:
+    """One progress for a run forwards and the smoothing after it, which goes over the frames twice."""
+    if progress is None:
+        return None, None
+    return lambda done, total: progress(done, 3 * frames), lambda done, total: progress(frames + done, 3 * frames)
