@@ -16,6 +16,7 @@ from dynakin.filter.parameters import parameters_of
 from dynakin.model import InitialModel
 from dynakin.recordings import Recording
 from dynakin.results import AXES, COMPONENTS, Estimate, Timing
+from dynakin.results.facing import nearly_singular
 from dynakin.results.feet import MEASURED
 
 Array = npt.NDArray[np.float64]
@@ -60,7 +61,7 @@ def assemble(
             "origin_m": initial.ground.origin_L.tolist(),
         },
     }
-    return Estimate(
+    estimate = Estimate(
         data=data,
         parameters=parameters,
         events=events_of(data, parameters, initial, noise.get("unseen_sd")),
@@ -71,6 +72,8 @@ def assemble(
         model_name=initial.spec.name,
         messages=[*recording.notes, *initial.messages, *notes],
     )
+    estimate.messages.extend(nearly_singular(estimate))
+    return estimate
 
 
 def _dataset(

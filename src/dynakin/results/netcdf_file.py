@@ -68,7 +68,7 @@ def full_dataset(estimate: Estimate) -> xr.Dataset:
         schema_version=SCHEMA_VERSION,
         dynakin_version=versions()["dynakin"],
         model=estimate.model_name,
-        frame="ground frame: X forward, Y up, Z right; origin at the model's ground origin; SI, radians",
+        frame=f"{estimate.ground.in_words}; SI, radians",
         messages="\n".join(estimate.messages),
         configuration=json.dumps(estimate.config, default=str),
     )
