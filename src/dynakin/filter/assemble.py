@@ -10,6 +10,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from dynakin import _core
+from dynakin.absent import finite
 from dynakin.filter.events import events_of
 from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.filter.parameters import parameters_of
@@ -72,8 +73,19 @@ def assemble(
         model_name=initial.spec.name,
         messages=[*recording.notes, *initial.messages, *notes],
     )
-    estimate.messages.extend(nearly_singular(estimate))
+    estimate.messages.extend([*_without_infinities(data), *nearly_singular(estimate)])
     return estimate
+
+
+def _without_infinities(data: xr.Dataset) -> list[str]:
+    """Takes infinite numbers for what they are, not known; a sentence on each variable that has any."""
+    said = []
+    for name, variable in data.data_vars.items():
+        count = int(np.isinf(variable.values).sum()) if variable.dtype.kind == "f" else 0
+        if count:
+            variable.values = finite(variable.values)
+            said.append(f"Warning: {name}: {count} numbers are infinite and left out.")
+    return said
 
 
 def _dataset(
