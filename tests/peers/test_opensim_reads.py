@@ -53,8 +53,8 @@ def test_moments_that_are_not_known_are_gaps(estimate: Estimate, tmp_path: Path)
     expected = data["moments"].values.copy()
     expected[5, 2] = np.nan
     np.testing.assert_allclose(table.getMatrix().to_numpy(), expected, rtol=1e-12, atol=1e-12, equal_nan=True)
-    storage = opensim.Storage(str(tmp_path / "moments.sto"))
-    assert storage.getSize() == len(estimate.time)
+    # The older Storage class has no word for a gap: it ends at the first one, whatever stands there (docs/formats.md).
+    assert opensim.Storage(str(tmp_path / "moments.sto")).getSize() < len(estimate.time)
 
 
 def test_wrench(folder: Path, estimate: Estimate) -> None:
