@@ -17,6 +17,7 @@ from dynakin.recordings import Recording
 from dynakin.reference import CUTOFF_HZ, Reference, reference_methods
 from dynakin.reference.methods import Lengths
 from dynakin.results import COMPONENTS, Estimate, evaluation_window
+from dynakin.results.facing import facing
 from dynakin.results.mean_curves import MEASURED, MeanCurve, mean_curves, signals
 from dynakin.results.repetitions import Found, repetitions_of
 
@@ -129,7 +130,7 @@ def trial_of(
         RecordingError: uneven time steps, or a cut-off that is not below half the rate; not with ``whatever``.
     """
     methods = [_filtered(preset, estimate) for preset, estimate in estimates.items()]
-    first = next(iter(estimates.values()))
+    first = facing(next(iter(estimates.values())))
     notes = how_estimated(estimates)
     options: tuple[tuple[str, Lengths], ...] = ((AT, "constant"), (CLASSICAL, "frame"))
     try:
@@ -171,7 +172,7 @@ def how_estimated(estimates: Mapping[str, Estimate]) -> list[str]:
 
 
 def _filtered(preset: str, estimate: Estimate) -> Method:
-    data = estimate.data
+    data = facing(estimate).data
     return Method(
         f"EKF ({preset})",
         "EKF",

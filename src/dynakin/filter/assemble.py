@@ -10,6 +10,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from dynakin import _core
+from dynakin.absent import finite
 from dynakin.filter.events import events_of
 from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.filter.parameters import parameters_of
@@ -18,6 +19,7 @@ from dynakin.filter.total_wrench import ELSEWHERE
 from dynakin.model import InitialModel
 from dynakin.recordings import Recording
 from dynakin.results import AXES, COMPONENTS, Estimate, Timing
+from dynakin.results.facing import nearly_singular
 from dynakin.results.feet import MEASURED
 
 Array = npt.NDArray[np.float64]
@@ -67,7 +69,7 @@ def assemble(
             "origin_m": initial.ground.origin_L.tolist(),
         },
     }
-    return Estimate(
+    estimate = Estimate(
         data=data,
         parameters=parameters,
         events=events_of(data, parameters, initial, noise.get("unseen_sd")),
@@ -78,6 +80,19 @@ def assemble(
         model_name=initial.spec.name,
         messages=[*recording.notes, *initial.messages, *notes],
     )
+    estimate.messages.extend([*_without_infinities(data), *nearly_singular(estimate)])
+    return estimate
+
+
+def _without_infinities(data: xr.Dataset) -> list[str]:
+    """Takes infinite numbers for what they are, not known; a sentence on each variable that has any."""
+    said = []
+    for name, variable in data.data_vars.items():
+        count = int(np.isinf(variable.values).sum()) if variable.dtype.kind == "f" else 0
+        if count:
+            variable.values = finite(variable.values)
+            said.append(f"Warning: {name}: {count} numbers are infinite and left out.")
+    return said
 
 
 def _dataset(

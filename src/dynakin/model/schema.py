@@ -192,6 +192,14 @@ class ModelFile(Strict):
         """Whether right and left limbs are modelled apart."""
         return any(segment.side is not None for segment in self.segments)
 
+    @property
+    def floating(self) -> bool:
+        """Whether the body may be anywhere and head anywhere: one root with six free coordinates without limits."""
+        roots = [segment for segment in self.segments if segment.parent == "ground"]
+        own = {axis.coordinate for segment in roots for axis in segment.axes}
+        free = {c.name for c in self.coordinates if not c.locked and not np.isfinite(c.limits).any()}
+        return self.sided and self.ground.origin is None and len(roots) == 1 and len(own & free) == len(own) == 6
+
     @model_validator(mode="before")
     @classmethod
     def _both_sides(cls, data: Any) -> Any:

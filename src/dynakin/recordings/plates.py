@@ -10,6 +10,7 @@ import numpy as np
 
 from dynakin.recordings.feet import DEFAULT_FOOT_MARKERS, distance_to_hull, foot_outline
 from dynakin.recordings.frame import GroundFrame
+from dynakin.recordings.plate_limits import beyond_limits
 from dynakin.recordings.recording import Array, Plate, Recording
 from dynakin.recordings.standing import standing_window
 from dynakin.units import GRAVITY_M_S2
@@ -84,6 +85,8 @@ def check_plates(
     centre of pressure lies under a foot, the force is near vertical, the free moment acts about the vertical
     and is small.
 
+    Over all frames, no plate may be beyond the limits of friction or of its own edges (`plate_limits`).
+
     Where nobody stands still, the mean over all loaded frames takes its place for all but the mass, which is
     only told.
 
@@ -101,6 +104,8 @@ def check_plates(
     feet = _feet(recording, ground, foot_markers or DEFAULT_FOOT_MARKERS, findings)
     under: dict[str, str] = {}
     for plate in recording.plates:
+        if (beyond := beyond_limits(plate, recording, ground)) is not None:
+            findings.refuse(beyond)
         push = ground.vectors_to_ground(plate.force)[frames, 1]
         loaded = np.flatnonzero(np.abs(np.nan_to_num(push)) > LOADED_N) + (frames.start or 0)
         if not len(loaded):

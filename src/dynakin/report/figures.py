@@ -17,6 +17,7 @@ from dynakin.report.plot import FILE_STYLE
 from dynakin.report.repetition_figure import repetitions_figure
 from dynakin.report.sensitivity import Sensitivity, read_sensitivity, sensitivity_figure
 from dynakin.results import Estimate
+from dynakin.results.facing import facing
 
 FORMATS = ("svg", "pdf", "png")
 _DATES: dict[str, dict[str, None]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {}}
@@ -65,6 +66,7 @@ def save_figures(
             f"comparison has {len(comparison.time)} frames, expected the estimate's {len(estimate.time)}: "
             "make it from the same recording"
         )
+    estimate = facing(estimate)
     draws: dict[str, Callable[[], Figure | None]] = {
         name: lambda draw=draw: draw(estimate, comparison)  # type: ignore[misc]
         for name, draw in FIGURES.items()

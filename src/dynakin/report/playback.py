@@ -133,7 +133,9 @@ def packed(values: np.ndarray) -> dict[str, Any]:
     """(N, C) as little-endian 16-bit numbers in base64: value = scale x number, -32768 missing."""
     finite = values[np.isfinite(values)]
     scale = float(np.max(np.abs(finite), initial=0.0)) / 32000.0 or 1.0
-    numbers = np.where(np.isfinite(values), np.round(np.nan_to_num(values) / scale), _MISSING).astype("<i2")
+    numbers = np.where(
+        np.isfinite(values), np.round(np.nan_to_num(values, posinf=0.0, neginf=0.0) / scale), _MISSING
+    ).astype("<i2")
     return {
         "scale": float(f"{scale:.6g}"),
         "columns": values.shape[1],

@@ -26,7 +26,8 @@ COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
 class Estimate:
     """What one run estimated. Do not change it: every file of `save` and the report are made from it.
 
-    ``data`` holds, in the ground frame (X forward, Y up, Z right), SI units and radians:
+    ``data`` holds, in the ground frame (Y up; the laboratory's own of a body that is fixed nowhere, with X forward of a
+    planar model), SI units and radians:
 
     ============================================================  ==========================  =====================
     variable                                                      dimensions                  unit

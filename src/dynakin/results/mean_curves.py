@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.results.estimate import COMPONENTS, Estimate
+from dynakin.results.facing import facing
 from dynakin.results.repetitions import Movement, Repetition, repetitions_of
 
 Array = npt.NDArray[np.float64]
@@ -130,6 +131,7 @@ def _mean_curve(movement: Movement, side: str, method: str, signal: Signal, each
 
 def estimate_curves(estimate: Estimate) -> list[MeanCurve]:
     """Mean curves of the filter's own quantities and of the plates'; nothing without a repetition."""
+    estimate = facing(estimate)
     preset = estimate.config.get("preset")
     arrays = {name: estimate.data[name].transpose("time", "coordinate").values for name in ("coordinates", "moments")}
     wrench = {

@@ -12,6 +12,7 @@ from dynakin.results.adaptation import adaptation
 from dynakin.results.bounds import parameter_bounds
 from dynakin.results.consistency import Consistency, consistency
 from dynakin.results.estimate import COMPONENTS, Estimate
+from dynakin.results.facing import facing
 from dynakin.results.feet import foot_figures
 from dynakin.results.fit import WrenchFit, marker_rms_mm, wrench_fit
 from dynakin.results.kinematic_consistency import mismatch_in_words, speed_mismatch
@@ -37,7 +38,11 @@ def evaluation_window(time: np.ndarray) -> np.ndarray:
 
 
 def compute_metrics(estimate: Estimate) -> dict[str, Any]:
-    """Everything in ``metrics.json`` as a plain dictionary; a figure that is not defined is None."""
+    """Everything in ``metrics.json`` as a plain dictionary; a figure that is not defined is None.
+
+    Components of the wrench are along the way the person faces: fx forward, fy up, fz to the right.
+    """
+    estimate = facing(estimate)
     window = evaluation_window(estimate.time)
     kept = estimate.time[window]
     return {

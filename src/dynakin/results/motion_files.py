@@ -27,7 +27,7 @@ def write_coordinates(estimate: Estimate, path: Path) -> None:
         estimate.coordinate_names,
         _in_degrees(estimate, "coordinates"),
         in_degrees=True,
-        notes=["Rotations in degrees, translations in metres."],
+        notes=["Rotations in degrees, translations in metres.", _frame(estimate)],
     )
 
 
@@ -40,7 +40,7 @@ def write_speeds(estimate: Estimate, path: Path) -> None:
         estimate.coordinate_names,
         _in_degrees(estimate, "speeds"),
         in_degrees=True,
-        notes=["Rotations in degrees per second, translations in metres per second."],
+        notes=["Rotations in degrees per second, translations in metres per second.", _frame(estimate)],
     )
 
 
@@ -53,7 +53,10 @@ def write_accelerations(estimate: Estimate, path: Path) -> None:
         estimate.coordinate_names,
         _in_degrees(estimate, "accelerations"),
         in_degrees=True,
-        notes=["Rotations in degrees per second squared, translations in metres per second squared."],
+        notes=[
+            "Rotations in degrees per second squared, translations in metres per second squared.",
+            _frame(estimate),
+        ],
     )
 
 
@@ -124,10 +127,14 @@ def write_wrench(estimate: Estimate, path: Path) -> None:
         table,
         in_degrees=False,
         notes=[
-            "Forces in N, moments in N m about the origin of the ground frame (X forward, Y up, Z right), "
-            "acting from the ground on the person."
+            "Forces in N, moments in N m about the origin of the frame, acting from the ground on the person.",
+            _frame(estimate),
         ],
     )
+
+
+def _frame(estimate: Estimate) -> str:
+    return f"Frame: {estimate.ground.in_words}."
 
 
 def _in_degrees(estimate: Estimate, variable: str) -> np.ndarray:

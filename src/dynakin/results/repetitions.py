@@ -66,7 +66,7 @@ class Found:
 
 @dataclass(frozen=True, eq=False)
 class BodyPaths:
-    """What repetitions are told from, ground frame, NaN where not known.
+    """What repetitions are told from, X forward and Y up, NaN where not known.
 
     time: (T,) s. pelvis: (T, 3) m. heels: by side, (T, 3) m each.
     """
@@ -83,6 +83,7 @@ def body_paths(recording: Recording, ground: GroundFrame, pelvis: Iterable[str] 
         pelvis: the recording's names of markers on the pelvis; none: iliac spines by their usual names. Heels are
             found by theirs (`recordings.DEFAULT_PAIRS`).
     """
+    ground = ground.facing()
     named = list(pelvis) or _present(recording, chain(*DEFAULT_PAIRS.pelvis))
     missing = np.full((recording.n_frames, 3), np.nan)
     middle = np.mean([recording.marker(name) for name in named], axis=0) if named else missing

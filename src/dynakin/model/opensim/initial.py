@@ -21,7 +21,7 @@ from dynakin.model.pose_start import start_posture
 from dynakin.model.priors import Bounds, Interval, Priors
 from dynakin.model.spec import in_layout
 from dynakin.model.state_priors import state_bounds, state_prior
-from dynakin.recordings import GroundFrame, Recording, find_ground_frame
+from dynakin.recordings import GroundFrame, Recording, find_ground_frame, find_laboratory_frame
 
 Array = npt.NDArray[np.float64]
 
@@ -44,13 +44,14 @@ def lay_on(
     priors: Priors | None = None,
     bounds: Bounds | None = None,
 ) -> InitialModel:
-    """`dynakin.initialise` of an OpenSim model; arguments and errors as there. The ground's origin is the
-    laboratory's."""
+    """`dynakin.initialise` of an OpenSim model; arguments and errors as there. The ground is the laboratory, Y up; X is
+    forward where it is asked for, or where the file holds the body so that it cannot head anywhere."""
     from dynakin.model.initialise import first_centre_of_pressure
 
     source, options, messages = definition.source, definition.options, list(definition.source.left_out)
     _refuse_other_gravity(source)
-    frame = ground or find_ground_frame(recording, vertical=vertical, forward=forward)
+    find = find_laboratory_frame if source.floating else find_ground_frame
+    frame = ground or find(recording, vertical=vertical, forward=forward)
     messages += frame.how
     source = _of_subject(definition, [r for r in (static, recording) if r is not None], frame, messages)
     chosen, said = sites(definition, recording)
@@ -82,6 +83,7 @@ def lay_on(
         f"Start: frame {first + 1} ({recording.time[first]:.2f} s), where the model of {source.path.name} fits the "
         f"markers to {1000.0 * fit.rms_m:.0f} mm (root mean square)."
     )
+    messages += _beyond_range(source, fit.coordinates)
     spec = spec_at(fit.coordinates)
     _refuse_too_few(source, spec, [name for _, name in chosen], recording)
     core = _core.Model(spec)
@@ -125,13 +127,27 @@ def lay_on(
 
 
 def limits_of(source: OpenSimModel) -> dict[str, Interval]:
-    """Limits (rad or m) of the free coordinates; a turn that is clamped to a whole one or more has none."""
+    """Limits (rad or m) of the free coordinates; a turn that is clamped to a whole one or more has none, nor has the
+    root of a body that is fixed nowhere: its ranges are those of the laboratory that the file was made in."""
     turns = {axis.coordinate for joint in source.joints for axis in joint.axes if axis.kind == "rotation"}
     found = {}
     for c in free_coordinates(source):
-        low, high = c.limits
+        low, high = (-np.inf, np.inf) if c.name in source.floating else c.limits
         found[c.name] = (-np.inf, np.inf) if c.name in turns and high - low > 2.0 * np.pi - _A_TURN else (low, high)
     return found
+
+
+def _beyond_range(source: OpenSimModel, start: dict[str, float]) -> list[str]:
+    """Says where the root starts beyond what the file clamps it to: OpenSim would draw it at the end of that range."""
+    clamped = [c for c in free_coordinates(source) if c.name in source.floating]
+    names = [c.name for c in clamped if not c.limits[0] <= start[c.name] <= c.limits[1]]
+    if not names:
+        return []
+    return [
+        f"Warning: {', '.join(names)} begin beyond the range to which {source.path.name} clamps them; OpenSim may not "
+        "follow coordinates.mot there. Widen the range in the file, or give --forward: X is then the way the person "
+        "faces."
+    ]
 
 
 def _refuse_other_gravity(source: OpenSimModel) -> None:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from pathlib import Path
 
 from dynakin.model.opensim.bodies import read_body, read_couplers
-from dynakin.model.opensim.description import Coordinate, Joint, Marker, Offset, OpenSimModel
-from dynakin.model.opensim.frames import GROUND, Frames, read_offset
+from dynakin.model.opensim.description import GROUND, Coordinate, Joint, Marker, Offset, OpenSimModel
+from dynakin.model.opensim.frames import Frames, read_offset
 from dynakin.model.opensim.joints import read_axes, read_coordinate
 from dynakin.model.opensim.xml_file import Node, read_xml
 from dynakin.model.validation import nearest
