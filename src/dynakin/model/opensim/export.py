@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from dynakin.elements import element
 from dynakin.errors import ModelError
 from dynakin.model.initial import InitialModel
 from dynakin.model.opensim.definition import OpenSimDefinition
@@ -55,8 +56,8 @@ def of_definition(definition: OpenSimDefinition, values: dict[str, float], mass_
     known |= {f"marker/{marker.name}" for marker in source.markers}
     known |= {f"inertia/{body.name}" for body in source.bodies}
     for name in values:
-        kind, *rest = name.split("/")
-        if kind in ("length", "marker", "inertia") and f"{kind}/{rest[0]}" not in known:
+        kind, owner, _ = element(name)
+        if kind in ("length", "marker", "inertia") and f"{kind}/{owner}" not in known:
             raise ModelError(f"{source.path}: has no {name}, which the parameters hold: they are another model's")
     if mass_kg is not None:
         source = with_mass(source, mass_kg)
