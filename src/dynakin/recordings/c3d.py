@@ -16,7 +16,7 @@ from dynakin.recordings.c3d_plates import read_plates
 from dynakin.recordings.limits import FASTEST_HZ, SLOWEST_HZ
 from dynakin.recordings.options import ReadOptions
 from dynakin.recordings.recording import Recording
-from dynakin.recordings.textfile import check_unique
+from dynakin.recordings.textfile import check_unique, trial_name
 from dynakin.recordings.trajectories import clean_markers
 from dynakin.units import length_factor
 
@@ -75,7 +75,7 @@ def _recording(data: Any, path: Path, options: ReadOptions, notes: list[str]) ->
     time = np.arange(frames) / rate
     plates, plate_notes = read_plates(parameters, analog, time, markers, unit, path, options)
     return Recording(
-        name=path.stem,
+        name=trial_name(path),
         path=path,
         time=time,
         marker_names=names,

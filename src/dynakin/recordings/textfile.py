@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import stat
 from collections import Counter
 from collections.abc import Sequence
@@ -17,6 +18,23 @@ LARGEST_TEXT = 64 * 2**20
 """Bytes of a model, table or configuration: the largest known (whole bodies with muscles) have a tenth."""
 
 
+_CONTROL = re.compile(r"[\x00-\x1f\x7f]+")
+
+
+def is_text(name: str) -> bool:
+    """Whether a name can be written as UTF-8; one of a file need not."""
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
+def trial_name(path: Path) -> str:
+    """What a recording is called: its file's name without ending; a line end in it is a blank."""
+    return _CONTROL.sub(" ", path.stem)
+
+
 def is_file(path: Path) -> bool:
     """Whether there is such a file; a name that no file can have (5,000 characters, a NUL) is none."""
     try:
@@ -27,6 +45,8 @@ def is_file(path: Path) -> bool:
 
 def require_file(path: Path, raises: type[DynakinError] = RecordingError) -> None:
     """Raise RecordingError (or ``raises``) unless ``path`` is a file: a pipe would be waited for for ever."""
+    if not is_text(str(path)):
+        raise raises(f"{path}: its name is no UTF-8 text, which outputs could not tell; rename it")
     try:
         mode = path.stat().st_mode
     except (FileNotFoundError, NotADirectoryError):
@@ -59,7 +79,7 @@ def read_lines(path: Path) -> list[str]:
     """All lines without their ends (LF, CRLF or CR), byte order mark removed; Latin-1 where it is not
     UTF-8."""
     raw = read_bytes(path)
-    if b"\0" in raw[:4096]:
+    if b"\0" in raw:
         raise RecordingError(f"{path}: is not a text file")
     try:
         text = raw.decode("utf-8-sig")
@@ -121,7 +141,10 @@ def check_time(time: Array, lines: Sequence[int], path: Path) -> None:
 
 
 def check_unique(names: Sequence[str], what: str, path: Path) -> None:
-    """Raise RecordingError where a name appears more than once."""
+    """Raise RecordingError where a name appears more than once, or would break the lines of a file."""
+    for name in names:
+        if _CONTROL.search(name):
+            raise RecordingError(f"{path}: found {what} {name!r}, expected a name without control characters")
     twice = [name for name, count in Counter(names).items() if count > 1]
     if twice:
         raise RecordingError(f"{path}: {what} {', '.join(map(repr, twice))} appears more than once")
