@@ -16,6 +16,7 @@ from dynakin.model.identified import IdentifiedSubject, read_identified
 from dynakin.model.subject import Sex
 from dynakin.model.validation import Strict, nearest, read_toml, validate
 from dynakin.recordings import PlateLoad
+from dynakin.recordings.textfile import is_file
 
 # Keys that name files: relative to the configuration file that they stand in.
 _PATHS = ("trial", "forces", "static", "parameters", "output")
@@ -195,7 +196,7 @@ def read_config(path: Path, paths: Sequence[str] = _PATHS) -> dict[str, Any]:
             content[key] = str(path.parent / content[key])
     for key in ("model", "markers", "table", "preset"):  # a name, or a file beside the configuration
         value = content.get(key)
-        if isinstance(value, str) and (path.parent / value).is_file():
+        if isinstance(value, str) and is_file(path.parent / value):
             content[key] = str(path.parent / value)
     return content
 

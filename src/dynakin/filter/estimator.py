@@ -32,6 +32,10 @@ Array = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]
 Feet = Callable[[InitialModel], FootWrenches | None]
 
+LARGEST_LAG = 1000
+"""Frames. Each step goes back over all of them and each keeps its covariance: a whole body's take half a gigabyte, and
+no camera's frame is so long that a step would end within it."""
+
 
 class Estimator:
     """Estimates movement and what drives it with one constrained extended Kalman filter.
@@ -70,8 +74,10 @@ class Estimator:
             if kind not in QUANTITIES:
                 known = ", ".join(QUANTITIES)
                 raise ConfigError(f"estimate: {kind!r} is unknown{nearest(kind, QUANTITIES)}; expected some of {known}")
-        if lag < 0:
-            raise ConfigError(f"lag is {lag}, expected 0 frames or more")
+        if not (isinstance(lag, int) and 0 <= lag <= LARGEST_LAG):
+            raise ConfigError(
+                f"lag is {lag!r}, expected 0 to {LARGEST_LAG} frames (all of a recording: run with smooth=True)"
+            )
         if loads and model.subject.mass_kg is None:
             raise ConfigError("loads: the plates carry them too, expected the person's own mass beside them (mass_kg)")
         self.model = model
@@ -320,15 +326,16 @@ class Estimator:
                 `dynakin.stream.Live`, which finds the feet's wrenches. The state does not depend on it.
 
         Raises:
-            RecordingError: the sample is older than the one before. ModelError: feet that do not fit the model.
+            RecordingError: the sample is older than the one before, or holds something else than numbers in the shapes
+                of `Sample`. ModelError: feet that do not fit the model.
             DivergenceError: the filter lost its estimate.
         """
         if self._filter is None or self._core_model is None or self.initial is None:
             raise ConfigError("step: the estimator has not been started; call start(recording) first")
+        markers, wrench = sample_arrays(sample, self.initial)
         dt = 0.0 if self._time is None else sample.time_s - self._time
         if dt < 0.0:
             raise RecordingError(f"sample at {sample.time_s} s: older than the one before, at {self._time} s")
-        markers, wrench = sample_arrays(sample, self.initial)
         loads = self._loads(feet)
         if self._lag is not None:
             report = self._lag.step(dt, markers, wrench)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import numpy.typing as npt
 from scipy import interpolate, signal
@@ -44,6 +46,12 @@ class CausalLowPass:
             self._state = signal.sosfilt_zi(self._sos)[:, :, None] * block[0]
         out, self._state = signal.sosfilt(self._sos, block, axis=0, zi=self._state)
         return np.asarray(out)
+
+
+def check_whole(name: str, time: Array, wrench: Array, path: Path) -> None:
+    """Raise RecordingError where a sample of a plate's wrench (N, 6) is missing: a filter would spread it over all."""
+    for k in np.flatnonzero(np.isnan(wrench).any(axis=1))[:1]:
+        raise RecordingError(f"{path}: {name} has no force at {time[k]:g} s, cannot be resampled or filtered")
 
 
 def low_pass(samples: Array, rate_hz: float, cutoff_hz: float, *, causal: bool = False) -> Array:
