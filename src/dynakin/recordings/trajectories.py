@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dynakin.recordings.recording import Array
+from dynakin.recordings.recording import Array, rate_of
 
 
 def clean_markers(names: tuple[str, ...], markers: Array) -> tuple[Array, list[str]]:
@@ -41,8 +41,9 @@ def timing_notes(time: Array, rate_in_header: float | None = None) -> list[str]:
     notes: list[str] = []
     step = np.diff(time)
     median = float(np.median(step))
-    if rate_in_header and abs(rate_in_header * median - 1) > 0.01:
-        notes.append(f"The header says {rate_in_header:g} Hz, the time column {1 / median:.4g} Hz: the latter is used.")
+    rate = rate_of(time)
+    if rate_in_header and abs(rate_in_header / rate - 1) > 0.01:
+        notes.append(f"The header says {rate_in_header:g} Hz, the time column {rate:.4g} Hz: the latter is used.")
     if np.abs(step / median - 1).max() > 0.5:
         k = int(np.argmax(np.abs(step / median - 1)))
         notes.append(f"Time steps are uneven: {step[k]:.4g} s after {time[k]:.6g} s, {median:.4g} s elsewhere.")

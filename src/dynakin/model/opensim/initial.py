@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,7 +14,7 @@ from dynakin.model.body import find_mass
 from dynakin.model.inertia import INERTIA_NAMES
 from dynakin.model.initial import InitialModel
 from dynakin.model.opensim.definition import OpenSimDefinition
-from dynakin.model.opensim.description import OpenSimModel
+from dynakin.model.opensim.description import Marker, OpenSimModel
 from dynakin.model.opensim.sites import sites, with_mass
 from dynakin.model.opensim.skin import skin_of
 from dynakin.model.opensim.spec import free_coordinates, to_spec, unseen
@@ -22,6 +23,7 @@ from dynakin.model.priors import Bounds, Interval, Priors
 from dynakin.model.spec import in_layout
 from dynakin.model.state_priors import state_bounds, state_prior
 from dynakin.recordings import GroundFrame, Recording, find_ground_frame, find_laboratory_frame
+from dynakin.recordings.landmarks import DEFAULT_PAIRS, FacingPairs
 
 Array = npt.NDArray[np.float64]
 
@@ -30,6 +32,7 @@ _A_TURN = 1e-3  # rad: files write pi with few digits
 _MODEL_M = 0.003
 """Standard deviation of a marker for what a generic skeleton, scaled, gets wrong of a person's joints: on `squats1` the
 normalised innovations are consistent with it (1.1), and far too large with the cameras' noise alone (1.9 to 18)."""
+_APART_M, _LEVEL_M = 0.08, 0.03  # of markers that show which way a body points; of markers that lie beside each other
 _FEET = ("calcn", "foot", "calc", "talus")  # bodies that stand on the ground, the first that a model has
 
 
@@ -51,7 +54,9 @@ def lay_on(
     source, options, messages = definition.source, definition.options, list(definition.source.left_out)
     _refuse_other_gravity(source)
     find = find_laboratory_frame if source.floating else find_ground_frame
-    frame = ground or find(recording, vertical=vertical, forward=forward)
+    frame = ground or find(
+        recording, vertical=vertical, forward=forward, pairs=_facing_pairs(source, sites(definition, recording)[0])
+    )
     messages += frame.how
     source = _of_subject(definition, [r for r in (static, recording) if r is not None], frame, messages)
     chosen, said = sites(definition, recording)
@@ -218,6 +223,26 @@ def _reach(source: OpenSimModel) -> dict[str, float]:
         ]
         found[name] = max([found[name], *joints])
     return found
+
+
+def _facing_pairs(source: OpenSimModel, chosen: Sequence[tuple[Marker, str]]) -> FacingPairs:
+    """Recorded markers that lie behind each other on feet and pelvis: bodies of OpenSim's models have X forward."""
+
+    def on(body: str) -> list[tuple[float, float, str]]:
+        return sorted((m.location[0], m.location[2], name) for m, name in chosen if m.body == body)
+
+    def ends(body: str) -> list[tuple[str, str]]:
+        """Backmost and foremost; of each side, where there are several."""
+        places = on(body)
+        if not places or places[-1][0] - places[0][0] < _APART_M:
+            return []
+        back = sorted((z, name) for x, z, name in places if x - places[0][0] < _LEVEL_M)
+        front = sorted((z, name) for x, z, name in places if places[-1][0] - x < _LEVEL_M)
+        return [(back[0][1], front[0][1]), (back[-1][1], front[-1][1])]
+
+    feet = [pair for body in feet_of(source).values() for pair in ends(body)]
+    pelvis = [pair for body in source.bodies if "pelvis" in body.name.casefold() for pair in ends(body.name)]
+    return FacingPairs((*feet, *DEFAULT_PAIRS.heel_toe), (*pelvis, *DEFAULT_PAIRS.pelvis))
 
 
 def feet_of(source: OpenSimModel) -> dict[str, str]:
