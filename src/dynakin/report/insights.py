@@ -105,12 +105,12 @@ def insights(estimate: Estimate, metrics: dict[str, Any]) -> list[Insight]:
     return [insight for insight in found if insight is not None]
 
 
-def _moments(metrics: dict[str, Any]) -> Insight:
-    """Which moments are measured, and what that leaves out."""
+def _moments(metrics: dict[str, Any]) -> Insight | None:
+    """Why moments are not measured, and what that leaves out; how many are is said before all findings."""
     found = metrics["moments"]
     if all(count["measured"] == found["frames"] for count in found["legs"].values()):
-        return Insight("good", "Joint moments", found["verdict"])
-    text = [found["verdict"], "Peaks, work, symmetry and mean curves are of measured moments only."]
+        return None
+    text = ["Peaks, work, symmetry and mean curves are of measured moments only."]
     if any(count["absent"] for count in found["legs"].values()):
         text.append("Absent moments, powers and joint reactions are nan in the files.")
     if any(count["derived"] for count in found["legs"].values()):

@@ -42,6 +42,7 @@ class SpatialPlayback:
     end_time: str
     feet: list[str]
     has_reaction: bool
+    has_measured: bool
     has_mass_centre: bool
     has_derived: bool
     moment_unit: str
@@ -96,6 +97,7 @@ def spatial_playback(estimate: Estimate) -> SpatialPlayback:
         end_time=f"{estimate.time[frames[-1]]:.2f} s",
         feet=estimate.foot_names,
         has_reaction=bool(len(load)),
+        has_measured=bool(np.isfinite(arrays["measured_forces"]).any()),
         has_mass_centre="mass_centre" in arrays,
         has_derived=bool(arrays["derived"].any() or arrays["moments_derived"].any()),
         moment_unit="N m/kg" if estimate.mass_kg else "N m",

@@ -20,7 +20,7 @@ from dynakin.report.sides import REGIONS, Joint, joints_of
 from dynakin.report.text_tables import TextTable
 from dynakin.results import AXES, COMPONENTS, Estimate
 from dynakin.results.angles import convention_of
-from dynakin.results.feet import foot_sources
+from dynakin.results.feet import ROUNDING, foot_sources
 from dynakin.results.metrics import evaluation_window
 from dynakin.results.power import root_coordinates
 from dynakin.results.pressure import centre_of_pressure
@@ -316,8 +316,9 @@ def _left_at_root(estimate: Estimate, source: npt.NDArray[np.uint8]) -> list[str
     known = _of(estimate, "moments", "coordinate")[:, root][(source[:, root] == MOMENT_MEASURED).all(axis=1)]
     if not known.size or not np.isfinite(known).any():
         return []
-    left = number(float(np.nanmax(np.abs(known))), "N or N m", digits=2)
-    return [f"At the root at most {left} is left in the {len(known)} frames in which every contact is measured."]
+    most = float(np.nanmax(np.abs(known)))
+    left = "nothing" if most <= ROUNDING else f"at most {number(most, 'N or N m', digits=2)}"
+    return [f"At the root {left} is left in the {len(known)} frames in which every contact is measured."]
 
 
 def _two_digits(value: float) -> str:

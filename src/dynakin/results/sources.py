@@ -70,33 +70,50 @@ def measured_wrench(data: xr.Dataset) -> Array:
 
 
 def legs_of(data: xr.Dataset) -> list[str]:
-    """(C,) name of the foot that each coordinate's segment carries or hangs on, "" for trunk, arms and root.
+    """(C,) name of the foot on whose leg each coordinate moves a segment, "" for trunk, arms and root.
 
-    A coordinate is a leg's where its segment lies between one foot and the first segment that all feet share, or
-    beyond that foot.
+    A leg reaches from its foot up to, but without, the first segment that all feet share, and holds what hangs on it.
+    Of a model whose feet are not told, legs are the sided limbs that hang on the root: ``thigh_r``, not ``humerus_r``.
     """
-    if "foot_segment" not in data.coords or "coordinate_segment" not in data.coords:
+    if "coordinate_segment" not in data.coords or "joint_parent" not in data.coords:
         return [""] * data.sizes["coordinate"]
     segments = [str(name) for name in data["joint_segment"].values]
     parents = [int(parent) for parent in data["joint_parent"].values]
-    chains: dict[str, list[int]] = {}
-    for foot, segment in zip(data["foot"].values, data["foot_segment"].values, strict=True):
-        at, chain = segments.index(str(segment)), []
-        while at >= 0:
-            chain.append(at)
-            at = parents[at]
-        chains[str(foot)] = chain
     legs = [""] * len(segments)
-    for foot, chain in chains.items():
-        shared = {k for other, every in chains.items() if other != foot for k in every}
-        for k in chain:
-            if parents[k] >= 0 and k not in shared:
-                legs[k] = foot
+    if "foot_segment" in data.coords:
+        chains = {
+            str(foot): _up_from(segments.index(str(segment)), parents)
+            for foot, segment in zip(data["foot"].values, data["foot_segment"].values, strict=True)
+        }
+        for foot, chain in chains.items():
+            shared = {k for other, every in chains.items() if other != foot for k in every}
+            for k in chain:
+                if parents[k] >= 0 and k not in shared:
+                    legs[k] = foot
+    else:
+        for k, name in enumerate(segments):
+            if parents[k] >= 0 and parents[parents[k]] < 0:
+                legs[k] = _side(name)
     for k, parent in enumerate(parents):  # parents stand before their children
-        if parent >= 0 and not legs[k] and legs[parent]:
+        if parent >= 0 and not legs[k]:
             legs[k] = legs[parent]
     carried = dict(zip(segments, legs, strict=True))
     return [carried[str(name)] for name in data["coordinate_segment"].values]
+
+
+def _up_from(k: int, parents: list[int]) -> list[int]:
+    chain = []
+    while k >= 0:
+        chain.append(k)
+        k = parents[k]
+    return chain
+
+
+def _side(segment: str) -> str:
+    for side in ("right", "left"):
+        if segment.endswith((f"_{side[0]}", f"_{side}")) or segment.startswith(f"{side}_"):
+            return side
+    return ""
 
 
 def moment_figures(estimate: Estimate) -> dict[str, Any]:
@@ -105,7 +122,7 @@ def moment_figures(estimate: Estimate) -> dict[str, Any]:
     """
     data = estimate.data
     sources = moment_sources(data)
-    groups = _groups(data, sources)
+    groups = _groups(data)
     legs = {name: _count(sources[:, columns].max(axis=1)) for name, columns in groups.items()}
     reasons = []
     if any(count["measured"] < len(sources) for count in legs.values()):
@@ -121,18 +138,11 @@ def moment_figures(estimate: Estimate) -> dict[str, Any]:
     }
 
 
-def _groups(data: xr.Dataset, sources: Codes) -> dict[str, list[int]]:
-    """Columns by leg; of a model whose legs are not told apart all, and of one without feet what is not measured."""
+def _groups(data: xr.Dataset) -> dict[str, list[int]]:
+    """Columns by leg; all of a model whose legs are not told apart."""
     legs = legs_of(data)
     groups = {leg: [k for k, own in enumerate(legs) if own == leg] for leg in dict.fromkeys(legs) if leg}
-    if not groups:
-        names = [str(name) for name in data["coordinate"].values]
-        lacking = [k for k in range(len(names)) if (sources[:, k] != MEASURED).any()]
-        for side, end in (("right", "_r"), ("left", "_l")):
-            if own := [k for k in lacking if names[k].endswith(end)]:
-                groups[side] = own
-        groups = groups or {"": lacking or list(range(len(names)))}
-    return groups
+    return groups or {"": list(range(len(legs)))}
 
 
 def _count(codes: Codes) -> dict[str, int]:

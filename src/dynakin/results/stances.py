@@ -70,14 +70,17 @@ def compared_stances(estimate: Estimate, window: Flags) -> dict[str, list[slice]
 
 def counted(estimate: Estimate, window: Flags) -> Flags:
     """(T, C) frames in which a moment counts: all of the window where it is measured throughout; of a leg else the
-    stances and swings that are whole and measured in every frame; of anything else none."""
+    stances and swings that are whole and measured in every frame, if there is a stance among them; of anything else
+    none."""
     measured = sources.moment_sources(estimate.data) == sources.MEASURED
     found = np.zeros(measured.shape, dtype=bool)
     found[window] = measured[window].all(axis=0)
     legs = sources.legs_of(estimate.data)
     for foot in estimate.foot_names:
+        whole = [phase for phase in phases(estimate, foot, window) if phase.whole]
+        known = np.array([measured[phase.frames].all(axis=0) for phase in whole]).reshape(len(whole), -1)
         own = np.array([leg == foot for leg in legs])
-        for phase in phases(estimate, foot, window):
-            if phase.whole:
-                found[phase.frames] |= own & measured[phase.frames].all(axis=0)
+        own &= known[[phase.stance for phase in whole]].any(axis=0)
+        for phase, throughout in zip(whole, known, strict=True):
+            found[phase.frames] |= own & throughout
     return found

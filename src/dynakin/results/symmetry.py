@@ -86,17 +86,18 @@ def asymmetry(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str, An
 
 
 def _reason(estimate: Estimate, stances: dict[str, list[slice]] | None, window: npt.NDArray[np.bool_]) -> str | None:
-    legs = sources.legs_of(estimate.data)
+    """Why moments, work or forces of the sides are not compared; None where they are."""
     if stances is None:
-        codes = sources.moment_sources(estimate.data)[window]
-        lacking = [foot for foot in estimate.foot_names if codes[:, [leg == foot for leg in legs]].any()]
-        why = "are not measured in every frame, and a part of a stance may miss its peak"
-        return f"Moments and forces of the {' and '.join(lacking)} leg {why}." if lacking else None
+        codes, legs = sources.moment_sources(estimate.data)[window], sources.legs_of(estimate.data)
+        if not codes[:, [bool(leg) or not any(legs) for leg in legs]].any():
+            return None
+        return "Moments of the legs are not measured in every frame, and what is missing may hold the peak."
     lacking = [foot for foot, own in stances.items() if not own]
     if not lacking:
         return None
+    noun, verb = ("foot", "has") if len(lacking) == 1 else ("feet", "have")
     return (
-        f"The {' and the '.join(lacking)} foot has no stance that is measured from touch-down to toe-off: a part of "
+        f"The {' and '.join(lacking)} {noun} {verb} no stance that is measured from touch-down to toe-off: a part of "
         "one has no peak and no impulse to compare."
     )
 
