@@ -19,14 +19,13 @@ import numpy as np
 
 import dynakin
 from dynakin.filter import Noise, presets
-from dynakin.results.feet import DERIVED
+from dynakin.results.sources import DERIVED, MEASURED
 from dynakin.simulation import SimulatedTrial, simulate
 
 SUBJECT = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
 DURATION_S = {"squat": 15.0, "gait": 4.0}
 START_S = {"squat": 5.0, "gait": 0.5}
 ON_PLATES_N = 1.0  # what the plates may miss of the whole vertical force
-MEASURED = 0  # code of moment_source
 FLEXION = ("hip_flexion", "knee_angle", "ankle_angle")
 LEG = (*FLEXION, "hip_adduction", "hip_rotation", "subtalar_angle")
 GROUPS = {

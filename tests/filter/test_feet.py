@@ -183,10 +183,19 @@ def test_both_sides_are_compared(estimate: Estimate) -> None:
     angle = {side: estimate.data["coordinates"].sel(coordinate=f"leg0_0_{side}").values for side in "rl"}
     r, left = np.ptp(angle["r"]), np.ptp(angle["l"])
     assert found["coordinates"]["leg0_0"]["range"] == pytest.approx(100 * (r - left) / ((r + left) / 2))
-    push = values(estimate, "foot_wrench")[:, :, 1]
-    known = np.where(values(estimate, "foot_contact") == NOT_MEASURED, np.nan, push)
-    assert (np.isnan(known) & np.isfinite(push)).any()  # derived from the motion: no peak of the person's
-    right, left = (np.nanmax(np.abs(known[:, NAMES.index(side)])) for side in ("right", "left"))
+    assert found["feet"] == {"peak_vertical_force": None, "impulse": None}  # no stance of the left is measured whole
+    assert "The left foot has no stance" in found["reason"]
+
+
+def test_feet_are_compared_over_whole_measured_stances(data: Trial) -> None:
+    codes = np.full((FRAMES, 2), MEASURED, np.uint8)
+    codes[:5, 0] = codes[25:30, 0] = codes[:10, 1] = codes[30:35, 1] = IN_THE_AIR
+    codes[45:50, 0] = NOT_MEASURED  # one contact: derived
+    stepping = estimate_of(data, feet_of(data, codes))
+    found = stepping.metrics()["asymmetry"]
+    assert found["stances"] == {"left": 1, "right": 1} and found["reason"] is None
+    push = values(stepping, "foot_wrench")[:, :, 1]
+    left, right = (np.abs(push[part, k]).max() for k, part in enumerate((slice(5, 25), slice(10, 30))))
     assert found["feet"]["peak_vertical_force"] == pytest.approx(100 * (right - left) / ((right + left) / 2))
 
 
@@ -213,7 +222,7 @@ def test_files(estimate: Estimate, tmp_path: Path) -> None:
     assert powers.names[0] == f"{estimate.coordinate_names[0]}_power"
     with xr.open_dataset(folder / "estimate.nc") as stored:
         np.testing.assert_array_equal(stored["foot_wrench"].values, values(estimate, "foot_wrench"))
-        assert stored["foot_contact"].attrs["units"].startswith("0 in the air")
+        assert stored["foot_contact"].attrs["flag_meanings"] == "in_the_air measured not_measured"
 
 
 def test_the_feet_change_nothing_but_the_moments(data: Trial, feet: FootWrenches) -> None:

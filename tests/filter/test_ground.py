@@ -13,7 +13,8 @@ from dynakin import Estimate, Estimator, Subject, load_model
 from dynakin.filter.closure import closure
 from dynakin.filter.total_wrench import Ground
 from dynakin.recordings import Plate, Recording
-from dynakin.results.feet import DERIVED, IN_THE_AIR, MEASURED, NOT_MEASURED, UNKNOWN
+from dynakin.results.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
+from dynakin.results.sources import ABSENT, DERIVED
 from dynakin.simulation import simulate
 from dynakin.units import GRAVITY_M_S2
 
@@ -63,7 +64,7 @@ def test_a_seat_that_nothing_measures_is_noticed_and_leaves_no_moments(seed: int
     seat = np.asarray(recording.plates[2].force[:, 1])
     assert recording.plates[2].name == "plate 3" and seat.max() > 0.25 * WEIGHT
     found = person("squat7").run(recording.with_plates(recording.plates[:2]))
-    absent = sources(found, "knee") == UNKNOWN
+    absent = sources(found, "knee") == ABSENT
     assert absent[seat > 0.2 * WEIGHT].all() and not absent[seat < 0.01 * WEIGHT][50:-50].mean() > 0.1
     assert np.array_equal(np.isnan(found.data["moments"].sel(coordinate="knee").values), absent)
     assert np.isnan(found.data["wrench_measured"].values[absent]).all()
@@ -96,7 +97,7 @@ def test_a_box_that_nothing_measures_is_no_flight() -> None:
     early, late = recording.time < 1.9, recording.time > 2.4
     assert (contact[early] == NOT_MEASURED).all() and (contact[late] == MEASURED).all()
     assert np.isnan(found.data["moments"].sel(coordinate="knee_angle_r").values[early]).all()
-    assert (sources(found, "elbow_flex_r")[early] == UNKNOWN).all()  # it may be a rail as well
+    assert (sources(found, "elbow_flex_r")[early] == ABSENT).all()  # it may be a rail as well
     assert (sources(found, "knee_angle_r")[late] == 0).all()
 
 
@@ -139,7 +140,7 @@ def test_a_foot_beside_the_plates_alone_is_derived() -> None:
     codes = sources(found, "ankle_angle_r"), sources(found, "ankle_angle_l")
     assert any((code == DERIVED).any() for code in codes)
     moments = found.data["moments"].sel(coordinate=["ankle_angle_r", "ankle_angle_l"]).values
-    assert np.array_equal(np.isnan(moments), np.stack(codes, axis=1) == UNKNOWN)
+    assert np.array_equal(np.isnan(moments), np.stack(codes, axis=1) == ABSENT)
 
 
 class TestRealRecordings:
@@ -154,7 +155,7 @@ class TestRealRecordings:
         seated = (time < 0.8) | ((time > 2.6) & (time < 3.5))
         alone = ((time > 1.07) & (time < 2.26)) | ((time > 3.74) & (time < 4.89))
         for side in "rl":
-            assert (sources(found, f"hip_flexion_{side}")[seated] == UNKNOWN).all()
+            assert (sources(found, f"hip_flexion_{side}")[seated] == ABSENT).all()
             assert (sources(found, f"hip_flexion_{side}")[alone] == 0).all()
             assert (sources(found, f"ankle_angle_{side}")[alone] == 0).all()
         pressed = np.min([p.force[:, 1] for p in recording.plates[:2]], axis=0) > 25.0  # seated too

@@ -9,7 +9,7 @@ import pytest
 
 import dynakin
 from dynakin.errors import ModelError
-from dynakin.results.feet import UNKNOWN
+from dynakin.results.sources import ABSENT
 
 
 @pytest.fixture(scope="module")
@@ -63,7 +63,7 @@ def test_flywheel_squat_runs_to_the_end_without_preparation(data_dir: Path, mass
             values = values[:, [0, 1, 5]]
         known = np.ones(values.shape, dtype=bool)
         if name == "moments":  # the cable's force is in the plates and in no segment
-            known = result.data["moment_source"].values != UNKNOWN
+            known = result.data["moment_source"].values != ABSENT
             assert not known.all()
         assert np.array_equal(np.isfinite(values), known), name
     if side != "auto":  # the right shoulder is lost for 68 frames

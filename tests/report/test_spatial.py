@@ -91,14 +91,17 @@ def test_angles_follow_the_zero_and_the_signs_that_were_asked_for(spatial: Estim
     assert "standing zero" in section.text and "clinical" in section.text
 
 
-def test_moments_are_per_kg_and_derived_ones_dashed(spatial: Estimate) -> None:
-    section = spatial_moment_section(spatial)
+def test_moments_are_per_kg_and_derived_ones_dashed(spatial: Estimate, metrics: dict[str, Any]) -> None:
+    section = spatial_moment_section(spatial, metrics)
     knee, hip = section.parts[0].panels[1], section.parts[0].panels[0]
     assert knee.note == "right −1.50 to 0.00; left −0.75 to 0.00"
     assert "stroke-dasharray" in knee.svg and knee.svg.count("stroke-dasharray") == 1  # the left one only
     assert "N m/kg</text>" in hip.svg
-    assert "derived from the motion in 17 % of the frames (legs)" in section.text
-    assert "not known in 8.3 % of the frames (legs)" in section.text
+    assert section.text.startswith(
+        "Leg moments: right measured in 551 of 601 frames and absent in 50; left measured in 451, derived from the "
+        "motion in 100 and absent in 50."
+    )
+    assert hip.note == "right no whole measured stance; left no whole measured stance"
     assert any(line.label == "derived from the motion" for line in section.lines)
     assert not any("Pelvis" in panel.title for part in section.parts for panel in [*part.panels, *part.folded])
 

@@ -115,6 +115,7 @@ def test_metrics_hold_the_keys_of_the_design(estimate: Estimate) -> None:
     metrics = compute_metrics(estimate)
     assert set(metrics) == {
         "schema_version",
+        "moments",
         "peak_moments_per_kg",
         "work",
         "angles",

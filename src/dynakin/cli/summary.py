@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+from rich.console import Console
 from rich.table import Table
 
 from dynakin.cli.console import out, table
@@ -17,6 +18,7 @@ def print_summary(estimate: Estimate, folder: Path) -> None:
     """Fit, what to look at, speed, and where the files lie."""
     console = out()
     metrics = estimate.metrics()
+    _print_moments(console, metrics["moments"])
     console.print(_figures(estimate, metrics))
     verdicts = [metrics[block]["verdict"] for block in ("consistency", "adaptation", "soft_tissue")]
     for message in estimate.messages:
@@ -28,6 +30,14 @@ def print_summary(estimate: Estimate, folder: Path) -> None:
     console.print()
     console.print(f"Results  {folder}", soft_wrap=True)
     console.print(f"Report   {folder / 'report.html'}", soft_wrap=True)
+
+
+def _print_moments(console: Console, moments: dict[str, Any]) -> None:
+    """First of all which moments there are, and why not all."""
+    whole = all(count["measured"] == moments["frames"] for count in moments["legs"].values())
+    console.print(moments["verdict"], style="" if whole else "yellow")
+    for reason in moments["reasons"]:
+        console.print(f"  {reason}", style="dim")
 
 
 def _figures(estimate: Estimate, metrics: dict[str, Any]) -> Table:

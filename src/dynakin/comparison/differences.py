@@ -61,13 +61,13 @@ def angle_differences(trials: Sequence[Trial]) -> list[AngleDifference]:
 
 
 def moment_differences(trials: Sequence[Trial]) -> list[MomentDifference]:
-    """Every joint moment of every filter against AT's; empty where that cannot be had."""
+    """Every measured joint moment of every filter against AT's; empty where that cannot be had."""
     found: dict[tuple[str, str, str], list[SignalFit]] = {}
     for trial in trials:
         for method, reference in _pairs(trial, AT):
             for k, name in enumerate(trial.coordinate_names):
                 w = trial.window
-                fit = signal_fit(reference.moments[w, k], method.moments[w, k])
+                fit = signal_fit(reference.moments[w, k], method.measured_moments()[w, k])
                 unit = "N m" if trial.rotation[k] else "N"
                 found.setdefault((name, unit, method.name), []).append(fit)
     return [

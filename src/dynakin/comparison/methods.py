@@ -20,6 +20,7 @@ from dynakin.results import COMPONENTS, Estimate, evaluation_window
 from dynakin.results.facing import facing
 from dynakin.results.mean_curves import MEASURED, MeanCurve, mean_curves, signals
 from dynakin.results.repetitions import Found, repetitions_of
+from dynakin.results.sources import measured_only, moment_sources, wrench_sources
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -47,6 +48,10 @@ class Method:
     markers: Array
     wrench: Array
     data: xr.Dataset
+
+    def measured_moments(self) -> Array:
+        """Moments (T, C), NaN where a contact behind them is not measured: what figures and mean curves take."""
+        return measured_only(self.moments, moment_sources(self.data))
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +89,12 @@ class Trial:
     def curves(self) -> list[MeanCurve]:
         """Mean curves of each method's coordinates, moments and wrench over the repetitions, and of the plates'."""
         names, rotation = self.coordinate_names, self.rotation
-        methods = {m.name: signals(names, rotation, m.coordinates, m.moments, m.wrench) for m in self.methods}
+        methods = {
+            m.name: signals(
+                names, rotation, m.coordinates, m.measured_moments(), measured_only(m.wrench, wrench_sources(m.data))
+            )
+            for m in self.methods
+        }
         methods[MEASURED] = signals(names, rotation, wrench=self.measured_wrench)
         return mean_curves(self.time, self.repetitions.items, methods, self.mass_kg)
 

@@ -7,7 +7,8 @@ import numpy.typing as npt
 import xarray as xr
 
 from dynakin.filter.foot_wrenches import FootWrenches
-from dynakin.results.feet import DERIVED, NOT_MEASURED, UNKNOWN
+from dynakin.results.feet import NOT_MEASURED
+from dynakin.results.sources import ABSENT, DERIVED, MEASURED
 
 Flags = npt.NDArray[np.bool_]
 Codes = npt.NDArray[np.uint8]
@@ -30,17 +31,17 @@ def with_sources(data: xr.Dataset, feet: FootWrenches | None, undeclared: Flags)
     moved = [segments.index(str(name)) for name in data["coordinate_segment"].values]
     if feet is None:
         blind = np.isnan(data["wrench_measured"].transpose("time", "component").values).all(axis=1)
-        joints = np.tile(np.where(blind, DERIVED, 0)[:, None], (1, len(segments)))
-        moments = np.tile(np.where(blind, DERIVED, 0)[:, None], (1, len(moved)))
+        joints = np.tile(np.where(blind, DERIVED, MEASURED)[:, None], (1, len(segments)))
+        moments = np.tile(np.where(blind, DERIVED, MEASURED)[:, None], (1, len(moved)))
         legs = np.zeros(len(segments), dtype=bool)
     else:
         at = [segments.index(name) for name in feet.segments]
         joints = _behind(feet.contact, at, parents)
         moments = data["moment_source"].transpose("time", "coordinate").values.copy()
         legs = _below_the_thighs([segments.index(name) for name in dict.fromkeys(feet.segments)], parents)
-    joints[np.ix_(undeclared, ~legs)] = UNKNOWN
-    moments[np.ix_(undeclared, ~legs[moved])] = UNKNOWN
-    known, held = moments != UNKNOWN, joints != UNKNOWN
+    joints[np.ix_(undeclared, ~legs)] = ABSENT
+    moments[np.ix_(undeclared, ~legs[moved])] = ABSENT
+    known, held = moments != ABSENT, joints != ABSENT
     found = data.assign(
         moment_source=(("time", "coordinate"), moments.astype(np.uint8)),
         joint_source=(("time", "joint"), joints.astype(np.uint8)),
@@ -54,7 +55,7 @@ def with_sources(data: xr.Dataset, feet: FootWrenches | None, undeclared: Flags)
 def _behind(contact: Codes, at: list[int], parents: npt.NDArray[np.int_]) -> Codes:
     """(T, J) codes of the joints' loads by the unmeasured contacts (T, F) that lie behind each."""
     lacks = contact == NOT_MEASURED
-    code = np.where(lacks.sum(axis=1) > 1, UNKNOWN, DERIVED)
+    code = np.where(lacks.sum(axis=1) > 1, ABSENT, DERIVED)
     joints = np.zeros((len(contact), len(parents)), dtype=np.uint8)
     for k, segment in enumerate(at):
         while segment >= 0:

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from matplotlib.ticker import MaxNLocator
 
 from dynakin.report.panels import Panel
-from dynakin.report.plot import GRID, LIMIT, thin
+from dynakin.report.plot import GRID, LIMIT, thin, with_next
 
 Array = npt.NDArray[np.float64]
 Place = Callable[[Array], Array]
@@ -87,19 +87,12 @@ def chart(
     for line in lines:
         dashed = np.zeros(len(time), dtype=bool) if line.dashed is None else line.dashed
         for part, more in ((~dashed, ""), (dashed, ' stroke-dasharray="36 26"')):
-            own = np.where(_with_next(part), np.clip(line.values, low, high), np.nan)
+            own = np.where(with_next(part), np.clip(line.values, low, high), np.nan)
             if path := _path(*thin(time, own, _MOST_POINTS), x, y):
                 parts.append(f'<path d="{path}" stroke="{line.colour}" stroke-width="{10 * line.width:.0f}"{more}/>')
     label = escape(f"{title} in {unit} over time", quote=True)
     svg = f'<svg class="chart" viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img" aria-label="{label}">{"".join(parts)}</svg>'
     return Panel(title, note, svg)
-
-
-def _with_next(part: npt.NDArray[np.bool_]) -> npt.NDArray[np.bool_]:
-    """A stretch with the frame after it, so that solid and dashed stretches meet."""
-    grown = part.copy()
-    grown[1:] |= part[:-1]
-    return grown
 
 
 def _range(lines: Sequence[Line], levels: Sequence[float], least: float) -> tuple[float, float]:

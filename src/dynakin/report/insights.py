@@ -86,6 +86,7 @@ def in_short(found: list[Insight]) -> str:
 def insights(estimate: Estimate, metrics: dict[str, Any]) -> list[Insight]:
     """All findings, in the order of the report."""
     found = [
+        _moments(metrics),
         _markers(estimate, metrics),
         _wrench(estimate, metrics),
         _prediction(estimate, metrics),
@@ -102,6 +103,23 @@ def insights(estimate: Estimate, metrics: dict[str, Any]) -> list[Insight]:
         _step_time(estimate),
     ]
     return [insight for insight in found if insight is not None]
+
+
+def _moments(metrics: dict[str, Any]) -> Insight | None:
+    """Why moments are not measured, and what that leaves out; how many are is said before all findings."""
+    found = metrics["moments"]
+    if all(count["measured"] == found["frames"] for count in found["legs"].values()):
+        return None
+    text = ["Peaks, work, symmetry and mean curves are of measured moments only."]
+    if any(count["absent"] for count in found["legs"].values()):
+        text.append("Absent moments, powers and joint reactions are nan in the files.")
+    if any(count["derived"] for count in found["legs"].values()):
+        text.append("Derived ones are in the files with their flag (moments_source.sto) and dashed in the figures.")
+    text += found["reasons"][:3]
+    if len(found["reasons"]) > 3:
+        text.append(f"{plural(len(found['reasons']) - 3, 'more reason')} under Joint moments.")
+    advice = "Give the forces of every contact (--forces), and plates under every step that is to be judged."
+    return Insight("warning", "Joint moments", " ".join(text), advice)
 
 
 def _markers(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:

@@ -9,7 +9,7 @@ from matplotlib.axes import Axes
 
 from dynakin.report.method_styles import LineStyle
 from dynakin.report.panels import Panel
-from dynakin.report.plot import new_axes, thin, to_svg
+from dynakin.report.plot import MEASURED, draw_sourced, new_axes, thin, to_svg
 from dynakin.results.mean_curves import PERCENT, MeanCurve
 
 
@@ -20,12 +20,17 @@ def overlaid(
     time: np.ndarray,
     lines: Sequence[tuple[LineStyle, np.ndarray]],
     *,
+    derived: np.ndarray | None = None,
     note: str = "",
 ) -> Panel:
-    """Signals (T,) of several methods over time, the first at the bottom."""
+    """Signals (T,) of several methods over time, the first at the bottom; solid ones but the measured are dashed where
+    they are ``derived`` (T,) bool, because a contact is not measured."""
     figure, axes = new_axes()
     for style, values in lines:
-        axes.plot(*thin(time, values), color=style.colour, linewidth=style.width, linestyle=style.pattern)
+        if style.dash == "solid" and style.colour != MEASURED:
+            draw_sourced(axes, time, values, derived, color=style.colour, linewidth=style.width)
+        else:
+            axes.plot(*thin(time, values), color=style.colour, linewidth=style.width, linestyle=style.pattern)
     axes.set_xlim(float(time[0]), float(time[-1]))
     _finish(axes, "time, s", unit)
     return Panel(title, note, to_svg(figure, key, f"{title} in {unit} over time, by method"))

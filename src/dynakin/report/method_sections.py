@@ -19,12 +19,13 @@ from dynakin.comparison.methods import AT, CLASSICAL, Method
 from dynakin.comparison.statistics import Spread
 from dynakin.report.labels import COMPONENT_LABELS, moment_note, number, sentence, words
 from dynakin.report.method_panels import overlaid
-from dynakin.report.method_styles import LineStyle, method_styles
+from dynakin.report.method_styles import DERIVED_LINE, LineStyle, method_styles
 from dynakin.report.panels import Panel
 from dynakin.report.section import Section
 from dynakin.report.text_tables import table2_text
 from dynakin.results import COMPONENTS
 from dynakin.results.mean_curves import MEASURED
+from dynakin.results.sources import DERIVED, moment_sources
 
 _Difference = TypeVar("_Difference", AngleDifference, MomentDifference)
 ABOUT_TABLE2 = (
@@ -62,6 +63,7 @@ def wrench_part(trial: Trial, key: str) -> Section:
     """Figure 6: each modelled component as measured, by the filters and by AT."""
     methods = [*trial.of_kind(AT), *trial.of_kind("EKF")]
     rms = {(row.quantity, row.method): row.rms for row in table2([trial])}
+    derived = np.isnan(trial.measured_wrench) & np.isfinite(trial.measured_wrench).any(axis=0)
     panels = []
     for k, component in enumerate(COMPONENTS):
         if not trial.of_kind(AT) or not np.isfinite(trial.measured_wrench[:, k]).any():
@@ -70,8 +72,19 @@ def wrench_part(trial: Trial, key: str) -> Section:
         lines = _lines(trial, methods, [method.wrench[:, k] for method in methods])
         measured = (method_styles([MEASURED])[MEASURED], trial.measured_wrench[:, k])
         note = _each({method.name: rms[component, method.name] for method in reversed(methods)}, unit)
-        panels.append(overlaid(f"{key}-{component}", title, unit, trial.time, [measured, *lines], note=f"RMS: {note}"))
-    return Section(f"{key}-wrench", "Ground reaction by method", "", panels, lines=_key(trial, [MEASURED], methods))
+        panels.append(
+            overlaid(
+                f"{key}-{component}",
+                title,
+                unit,
+                trial.time,
+                [measured, *lines],
+                derived=derived[:, k],
+                note=f"RMS: {note}",
+            )
+        )
+    styles = _key(trial, [MEASURED], methods, derived=bool(derived.any()))
+    return Section(f"{key}-wrench", "Ground reaction by method", "", panels, lines=styles)
 
 
 def angle_part(trial: Trial, key: str) -> Section:
@@ -103,6 +116,7 @@ def moment_part(trial: Trial, key: str) -> Section:
     methods = [*trial.of_kind("EKF"), *trial.of_kind(AT)]
     panels: dict[str, Panel] = {}
     estimate = next(iter(trial.estimates.values()))
+    derived = moment_sources(estimate.data) == DERIVED  # by the plates alone, so alike for all filters
     for name, rows in _by_coordinate(moment_differences([trial])).items():
         k = trial.coordinate_names.index(name)
         unit = rows[0].unit
@@ -113,7 +127,9 @@ def moment_part(trial: Trial, key: str) -> Section:
         about = moment_note(estimate, name)
         note = f"{about}; {note}" if about else note
         title = f"{sentence(words(name))} moment"
-        panels[name] = overlaid(f"{key}-moment-{name}", title, unit, trial.time, lines, note=note)
+        panels[name] = overlaid(
+            f"{key}-moment-{name}", title, unit, trial.time, lines, derived=derived[:, k], note=note
+        )
     knees = [panel for name, panel in panels.items() if "knee" in name]
     others = [panel for name, panel in panels.items() if "knee" not in name]
     return Section(
@@ -123,7 +139,7 @@ def moment_part(trial: Trial, key: str) -> Section:
         knees or others,
         folded=others if knees else [],
         folded_title="The other joints’ moments against AT",
-        lines=_key(trial, [], methods),
+        lines=_key(trial, [], methods, derived=bool(derived.any())),
     )
 
 
@@ -132,9 +148,10 @@ def _lines(trial: Trial, methods: Sequence[Method], values: list[np.ndarray]) ->
     return [(styles[method.name], signal) for method, signal in zip(methods, values, strict=True)]
 
 
-def _key(trial: Trial, more: list[str], methods: Sequence[Method]) -> tuple[LineStyle, ...]:
+def _key(trial: Trial, more: list[str], methods: Sequence[Method], *, derived: bool = False) -> tuple[LineStyle, ...]:
     styles = method_styles([MEASURED, *(method.name for method in trial.methods)])
-    return tuple(styles[name] for name in [*more, *(method.name for method in methods)])
+    own = tuple(styles[name] for name in [*more, *(method.name for method in methods)])
+    return (*own, DERIVED_LINE) if derived else own
 
 
 def _each(figures: dict[str, Spread], unit: str) -> str:

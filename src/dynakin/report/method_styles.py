@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
-from dynakin.report.plot import ESTIMATED, MEASURED, REFERENCE
+from dynakin.report.plot import ESTIMATED, MEASURED, QUIET, REFERENCE
 
 # After the first filter: Okabe and Ito's green, purple and sky blue, for further presets beside it.
 _FILTERS = (ESTIMATED, "#009E73", "#CC79A7", "#56B4E9")
@@ -34,6 +34,10 @@ class LineStyle:
     def pattern(self) -> tuple[float, tuple[float, ...] | None]:
         """Of matplotlib's dashes."""
         return (0.0, _PATTERNS[self.dash] or None)
+
+
+DERIVED_LINE = LineStyle("derived from the motion", QUIET, 1.2, "dashed")
+"""In the key of figures in which some of a line is derived, because a contact is not measured."""
 
 
 def method_styles(names: Iterable[str]) -> dict[str, LineStyle]:

@@ -13,12 +13,13 @@ from dynakin.comparison.methods import AT, CLASSICAL, Method
 from dynakin.report.body import chain_of, colours_of, floor_height, marker_segments
 from dynakin.report.colours import SIDE_COLOURS, side_of
 from dynakin.report.labels import COMPONENT_LABELS, is_planar, moment_note, number, sentence, words
-from dynakin.report.method_styles import LineStyle, method_styles
+from dynakin.report.method_styles import DERIVED_LINE, LineStyle, method_styles
 from dynakin.report.panels import band_is_too_wide
-from dynakin.report.plot import ESTIMATED, INK, MEASURED, QUIET
+from dynakin.report.plot import ESTIMATED, INK, MEASURED, QUIET, draw_sourced
 from dynakin.report.sides import joints_of
 from dynakin.results import COMPONENTS, Estimate, evaluation_window, repetitions_of
 from dynakin.results.fit import signal_fit
+from dynakin.results.sources import DERIVED, moment_sources, wrench_sources
 
 _PICTURES = 6
 
@@ -150,6 +151,7 @@ def wrench_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure
     if not shown:
         return None
     at = _reference(comparison, AT)
+    derived = wrench_sources(estimate.data) == DERIVED
     figure = Figure(figsize=(7.2, 0.5 + 1.35 * len(shown)), layout="constrained")
     every = figure.subplots(len(shown), 1, sharex=True, squeeze=False).ravel()
     window = evaluation_window(estimate.time)
@@ -158,7 +160,7 @@ def wrench_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure
         axes.plot(estimate.time, measured[:, k], color=MEASURED, linewidth=2.8, solid_capstyle="round")
         if at is not None:
             _draw(axes, estimate.time, at.wrench[:, k], at)
-        axes.plot(estimate.time, estimated[:, k], color=ESTIMATED, linewidth=1.0)
+        draw_sourced(axes, estimate.time, estimated[:, k], derived[:, k], color=ESTIMATED, linewidth=1.0)
         rms = [f"EKF {number(signal_fit(measured[window, k], estimated[window, k]).rms, unit)}"]
         if at is not None:
             rms.append(f"AT {number(signal_fit(measured[window, k], at.wrench[window, k]).rms, unit)}")
@@ -167,7 +169,7 @@ def wrench_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure
             axes.set_title(f"RMS difference: {', '.join(rms)}", loc="right", color=QUIET, weight="normal", fontsize=8)
         axes.set_xlim(float(estimate.time[0]), float(estimate.time[-1]))
     every[-1].set_xlabel("time, s")
-    _key(figure, every[0], measured=True, other=at)
+    _key(figure, every[0], measured=True, other=at, derived=bool(derived[:, shown].any()))
     return figure
 
 
@@ -177,17 +179,20 @@ def knee_moment_figure(estimate: Estimate, comparison: Trial | None = None) -> F
     if not is_planar(estimate):
         moved = {k for joint in joints_of(estimate) for k in joint.columns.values()}
         names = [name for name in names if estimate.coordinate_names.index(name) in moved]
+    known = np.isfinite(_by_coordinate(estimate, "moments")).any(axis=0)
+    names = [name for name in names if known[estimate.coordinate_names.index(name)]]
     if not names:
         return None
+    source = moment_sources(estimate.data)[:, [estimate.coordinate_names.index(name) for name in names]]
     figure = Figure(figsize=(4.6, 0.5 + 2.3 * len(names)), layout="constrained")
     every = figure.subplots(len(names), 1, sharex=True, squeeze=False).ravel()
     at = _reference(comparison, AT)
     differences = {row.coordinate: row for row in moment_differences([] if comparison is None else [comparison])}
-    for axes, name in zip(every, names, strict=True):
+    for axes, name, derived in zip(every, names, (source == DERIVED).T, strict=True):
         moment = estimate.data["moments"].sel(coordinate=name).values
-        axes.plot(estimate.time, moment, color=ESTIMATED, linewidth=1.2)
+        draw_sourced(axes, estimate.time, moment, derived, color=ESTIMATED, linewidth=1.2)
         if "moments_sd" in estimate.data:
-            sd = estimate.data["moments_sd"].sel(coordinate=name).values
+            sd = np.where(derived, np.nan, estimate.data["moments_sd"].sel(coordinate=name).values)
             axes.fill_between(estimate.time, moment - 2.0 * sd, moment + 2.0 * sd, color=ESTIMATED, alpha=0.2, lw=0)
         note = moment_note(estimate, name)
         axes.set_title(f"{sentence(words(name))} moment, N m{f' ({note})' if note else ''}")
@@ -201,7 +206,7 @@ def knee_moment_figure(estimate: Estimate, comparison: Trial | None = None) -> F
         else:
             axes.set_xlabel("time, s")
         axes.set_xlim(float(estimate.time[0]), float(estimate.time[-1]))
-    _key(figure, every[0], other=at)
+    _key(figure, every[0], other=at, derived=bool((source == DERIVED).any()))
     return figure
 
 
@@ -233,13 +238,22 @@ def _style(method: Method) -> LineStyle:
 
 
 def _key(
-    figure: Figure, axes: Axes, *, measured: bool = False, band: bool = False, other: Method | None = None
+    figure: Figure,
+    axes: Axes,
+    *,
+    measured: bool = False,
+    band: bool = False,
+    other: Method | None = None,
+    derived: bool = False,
 ) -> None:
     """One line of words above the panels, each with the line that it names."""
     handles: list[Artist] = []
     if measured:
         handles += axes.plot([], [], color=MEASURED, linewidth=2.8, label="measured")
     handles += axes.plot([], [], color=ESTIMATED, linewidth=1.4, label="EKF")
+    if derived:
+        pattern = DERIVED_LINE.pattern
+        handles += axes.plot([], [], color=ESTIMATED, linewidth=1.4, linestyle=pattern, label=DERIVED_LINE.label)
     if band:
         handles.append(axes.fill_between([], [], [], color=ESTIMATED, alpha=0.18, label="± 2 standard deviations"))
     if other is not None:

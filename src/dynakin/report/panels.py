@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from dynakin.report.labels import number
-from dynakin.report.plot import ESTIMATED, INK, LIMIT, MEASURED, QUIET, new_axes, thin, to_svg
+from dynakin.report.plot import ESTIMATED, INK, LIMIT, MEASURED, QUIET, draw_sourced, new_axes, thin, to_svg
 
 
 @dataclass(frozen=True)
@@ -30,21 +30,25 @@ def compared(
     *,
     note: str = "",
     sd: np.ndarray | None = None,
+    derived: np.ndarray | None = None,
 ) -> Panel:
     """Measured (wide, grey) with the estimate (thin, blue) over it; ``sd`` adds a band of two standard deviations.
 
-    A band that would press the line flat is not drawn; the note says how wide it is.
+    A band that would press the line flat is not drawn; the note says how wide it is. Where the estimate is ``derived``
+    (T,) bool from the motion the line is dashed, without a band.
     """
+    if sd is not None and derived is not None:
+        sd = np.where(derived, np.nan, sd)
     figure, axes = new_axes()
     if measured is not None:
         axes.plot(*thin(time, measured), color=MEASURED, linewidth=2.6, solid_capstyle="round")
     if sd is not None and band_is_too_wide(estimated, sd):
-        note = f"{note}, 2 sd {number(2.0 * float(np.median(sd)), unit, digits=2)}"
+        note = f"{note}, 2 sd {number(2.0 * float(np.nanmedian(sd)), unit, digits=2)}"
     elif sd is not None:
         t, low = thin(time, estimated - 2.0 * sd)
         high = np.interp(t, time, estimated + 2.0 * sd)
         axes.fill_between(t, low, high, color=ESTIMATED, alpha=0.18, linewidth=0)
-    axes.plot(*thin(time, estimated), color=ESTIMATED, linewidth=1.1)
+    draw_sourced(axes, time, estimated, derived, color=ESTIMATED, linewidth=1.1)
     axes.set_xlim(float(time[0]), float(time[-1]))
     axes.margins(y=0.08)
     _keep_apart(axes, estimated)
@@ -55,8 +59,10 @@ def compared(
 
 
 def band_is_too_wide(values: np.ndarray, sd: np.ndarray) -> bool:
-    """Whether a band of two standard deviations hides how the values move."""
-    return bool(2.0 * np.median(sd) > max(0.6 * float(np.nanmax(values) - np.nanmin(values)), 1e-12))
+    """Whether a band of two standard deviations hides how the values move; what is NaN has no band."""
+    if not np.isfinite(sd).any() or not np.isfinite(values).any():
+        return False
+    return bool(2.0 * np.nanmedian(sd) > max(0.6 * float(np.nanmax(values) - np.nanmin(values)), 1e-12))
 
 
 def parameter_path(

@@ -13,6 +13,7 @@ from markupsafe import Markup
 from dynakin.report.body import chain_of, colours_of, floor_height, marker_segments, reaction
 from dynakin.report.labels import is_planar, number, sentence, short_marker_names, words
 from dynakin.results import Estimate
+from dynakin.results.sources import DERIVED, moment_sources, wrench_sources
 
 _PICTURES_PER_SECOND = 30.0
 _MOST_BYTES = 750_000  # of base64 in the page
@@ -36,6 +37,7 @@ class Playback:
     last: int
     end_time: str
     has_reaction: bool
+    has_derived: bool
     segments: dict[str, str]
     note: str
     data: Markup
@@ -50,6 +52,7 @@ def playback(estimate: Estimate) -> Playback:
     angles = estimate.data["coordinates"].transpose("time", "coordinate").values
     angles = angles * np.where(estimate.is_rotation(), 180.0 / np.pi, 1000.0)
     moments = estimate.data["moments"].transpose("time", "coordinate").values
+    derived = np.column_stack([moment_sources(estimate.data), wrench_sources(estimate.data)[:, :2].max(axis=1)])
     points = _plane(chain.points)
     arrays = {
         "points": points,
@@ -59,6 +62,7 @@ def playback(estimate: Estimate) -> Playback:
         "forces": forces,
         "angles": angles,
         "moments": moments,
+        "derived": (derived == DERIVED).astype(float),
     }
     frames = frames_shown(estimate, sum(array.shape[1] for array in arrays.values()))
     view, followed = _view([points, measured, estimated, arrows], floor)
@@ -91,6 +95,7 @@ def playback(estimate: Estimate) -> Playback:
         has_reaction=bool(np.isfinite(arrows).any()),
         segments={words(name): colours[name] for name in dict.fromkeys(bone.segment for bone in chain.bones)},
         note="Moments of legs and arms are those of both sides together." if is_planar(estimate) else "",
+        has_derived=bool((derived == DERIVED).any()),
         data=Markup(json.dumps(content, separators=(",", ":")).replace("<", "\\u003c")),
     )
 

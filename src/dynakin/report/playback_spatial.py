@@ -17,7 +17,9 @@ from dynakin.report.playback import curve_of, frames_shown, packed
 from dynakin.report.plot import MEASURED
 from dynakin.report.sides import Joint, joints_of
 from dynakin.results import Estimate
+from dynakin.results.feet import foot_sources
 from dynakin.results.pressure import centre_of_pressure
+from dynakin.results.sources import DERIVED, moment_sources, wrench_sources
 
 Array = npt.NDArray[np.float64]
 
@@ -40,7 +42,9 @@ class SpatialPlayback:
     end_time: str
     feet: list[str]
     has_reaction: bool
+    has_measured: bool
     has_mass_centre: bool
+    has_derived: bool
     moment_unit: str
     sides: dict[str, str]
     data: Markup
@@ -93,7 +97,9 @@ def spatial_playback(estimate: Estimate) -> SpatialPlayback:
         end_time=f"{estimate.time[frames[-1]]:.2f} s",
         feet=estimate.foot_names,
         has_reaction=bool(len(load)),
+        has_measured=bool(np.isfinite(arrays["measured_forces"]).any()),
         has_mass_centre="mass_centre" in arrays,
+        has_derived=bool(arrays["derived"].any() or arrays["moments_derived"].any()),
         moment_unit="N m/kg" if estimate.mass_kg else "N m",
         sides=SIDE_COLOURS,
         data=Markup(json.dumps(content, separators=(",", ":")).replace("<", "\\u003c")),
@@ -131,6 +137,8 @@ def _arrows(estimate: Estimate, arrays: dict[str, Array]) -> list[dict[str, Any]
     """Adds points of action (mm) and forces (N) to ``arrays``; what to draw of them, measured ones behind."""
     entries: list[dict[str, Any]] = []
     feet = estimate.foot_names
+    derived = foot_sources(estimate.data) if feet else wrench_sources(estimate.data).max(axis=1, keepdims=True)
+    arrays["derived"] = (derived == DERIVED).astype(float)
     for kind in ("measured", "estimated"):
         if feet:
             name = "foot_wrench_measured" if kind == "measured" else "foot_wrench"
@@ -153,6 +161,7 @@ def _arrows(estimate: Estimate, arrays: dict[str, Array]) -> list[dict[str, Any]
                     "colour": MEASURED if kind == "measured" else colour,
                     "width": 6 if kind == "measured" else 2.5,
                     "behind": kind == "measured",
+                    "derived": kind == "estimated",
                 }
             )
     return entries
@@ -164,7 +173,8 @@ def _joint_values(estimate: Estimate, joints: list[Joint]) -> dict[str, Array]:
     values = estimate.data["coordinates"].transpose("time", "coordinate").values
     values = values * np.where(estimate.is_rotation(), 180.0 / np.pi, 1000.0)
     moments = estimate.data["moments"].transpose("time", "coordinate").values / (estimate.mass_kg or 1.0)
-    return {"angles": values[:, columns], "moments": moments[:, columns]}
+    derived = (moment_sources(estimate.data) == DERIVED).astype(float)
+    return {"angles": values[:, columns], "moments": moments[:, columns], "moments_derived": derived[:, columns]}
 
 
 def _rows(joints: list[Joint]) -> list[dict[str, Any]]:

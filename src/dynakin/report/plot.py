@@ -96,6 +96,24 @@ def thin(time: np.ndarray, values: np.ndarray, most: int = _MOST_POINTS) -> tupl
     return time[kept], values[kept]
 
 
+def with_next(part: np.ndarray) -> np.ndarray:
+    """Frames (T,) bool with the one after each stretch, so that solid and dashed stretches of a line meet."""
+    grown = part.copy()
+    grown[1:] |= part[:-1]
+    return grown
+
+
+def draw_sourced(
+    axes: Axes, time: np.ndarray, values: np.ndarray, derived: np.ndarray | None, *, color: str, linewidth: float
+) -> None:
+    """A line over time (T,) that is dashed where the values are ``derived`` (T,) bool from the motion."""
+    dashed = np.zeros(len(time), dtype=bool) if derived is None else derived
+    for part, pattern in ((~dashed, "-"), (dashed, (0.0, (3.6, 2.4)))):
+        own = np.where(with_next(part), values, np.nan)
+        if np.isfinite(own).any():
+            axes.plot(*thin(time, own), color=color, linewidth=linewidth, linestyle=pattern)
+
+
 def to_svg(figure: Figure, key: str, description: str) -> str:
     """The figure as an `<svg>` element that scales with its column.
 

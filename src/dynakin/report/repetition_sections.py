@@ -32,7 +32,8 @@ def repetition_section(
     what = "squat" if found.movement == "squat" else "gait cycle of each foot"
     about = (
         f"Each {what} from 0 to 100 % of its time: their mean, and one sample standard deviation as a band. Moments "
-        "and forces are divided by the body mass."
+        "and forces are divided by the body mass; a repetition in which one is not measured in every frame is left out "
+        "of its mean."
     )
     return Section(
         key,
@@ -87,7 +88,7 @@ def in_order(group: Sequence[MeanCurve]) -> list[MeanCurve]:
 def _panel(estimate: Estimate, key: str, group: list[MeanCurve], kind: str) -> Panel:
     first = group[0]
     styles = method_styles(curve.method for curve in group)
-    notes = [f"{int(first.n.max())} repetitions" if first.n.max() > 1 else "1 repetition, no standard deviation"]
+    notes = [first.times + ("" if first.n.max() > 1 else ", no standard deviation")]
     if kind == "moments" and (about := moment_note(estimate, first.quantity.removesuffix("/moment"))):
         notes.insert(0, about)
     name = f"{key}-{first.side}-{first.quantity.replace('/', '-')}"

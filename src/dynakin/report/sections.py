@@ -22,6 +22,7 @@ from dynakin.report.labels import (
     words,
 )
 from dynakin.report.method_sections import methods_section
+from dynakin.report.method_styles import DERIVED_LINE
 from dynakin.report.panels import Panel
 from dynakin.report.plot import ESTIMATED
 from dynakin.report.repetition_sections import repetition_section
@@ -46,6 +47,7 @@ from dynakin.results import (
     estimate_curves,
     repetitions_of,
 )
+from dynakin.results.sources import DERIVED, moment_sources, wrench_sources
 
 if TYPE_CHECKING:
     from dynakin.comparison import Trial
@@ -66,7 +68,7 @@ def sections(estimate: Estimate, metrics: dict[str, Any], comparison: Trial | No
         marker_section(estimate, metrics),
         wrench_section(estimate, metrics),
         angle_section(estimate),
-        moment_section(estimate),
+        moment_section(estimate, metrics),
         repetition_section(estimate, found, curves),
         *([] if comparison is None else [methods_section(comparison)]),
         length_section(estimate),
@@ -86,7 +88,7 @@ def spatial_sections(
     """Sections of a body in space: what is read most first."""
     return [
         spatial_angle_section(estimate),
-        spatial_moment_section(estimate),
+        spatial_moment_section(estimate, metrics),
         foot_section(estimate, metrics),
         power_section(estimate, metrics),
         asymmetry_section(estimate, metrics),
@@ -142,6 +144,7 @@ def wrench_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
     estimated = estimate.data["wrench_estimated"].values
     rms = metrics["wrench"]["rms"]
     panels = []
+    derived = wrench_sources(estimate.data) == DERIVED
     for k, component in enumerate(COMPONENTS):
         if not np.isfinite(estimated[:, k]).any():
             continue
@@ -149,7 +152,16 @@ def wrench_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
         seen = measured[:, k] if np.isfinite(measured[:, k]).any() else None
         note = f"{component}, RMS difference {number(rms[component], unit)}" if component in rms else component
         panels.append(
-            charts.compared(f"wrench-{component}", title, unit, estimate.time, seen, estimated[:, k], note=note)
+            charts.compared(
+                f"wrench-{component}",
+                title,
+                unit,
+                estimate.time,
+                seen,
+                estimated[:, k],
+                note=note,
+                derived=derived[:, k],
+            )
         )
     place = "the toe, where the model stands on the ground" if is_planar(estimate) else "the ground’s origin"
     return Section(
@@ -158,6 +170,7 @@ def wrench_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
         f"What the ground does to the person, in forces and the moment about {place}.",
         panels,
         key=("measured", "estimated"),
+        lines=(DERIVED_LINE,) if derived[:, np.isfinite(estimated).any(axis=0)].any() else (),
     )
 
 
@@ -185,13 +198,16 @@ def angle_section(estimate: Estimate) -> Section:
     )
 
 
-def moment_section(estimate: Estimate) -> Section:
-    """Moments, each with what it stands for."""
+def moment_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
+    """Moments, each with what it stands for; derived ones dashed, absent ones left out."""
     panels = []
+    sources = moment_sources(estimate.data)
     deviations = estimate.data["moments_sd"].values if "moments_sd" in estimate.data else None
     for index, name in enumerate(estimate.coordinate_names):
         unit = "N m" if estimate.is_rotation()[index] else "N"
         values = estimate.data["moments"].values[:, index]
+        if not np.isfinite(values).any():
+            continue
         panels.append(
             charts.compared(
                 f"moment-{name}",
@@ -202,16 +218,27 @@ def moment_section(estimate: Estimate) -> Section:
                 values,
                 note=moment_note(estimate, name),
                 sd=deviations[:, index] if deviations is not None else None,
+                derived=sources[:, index] == DERIVED,
             )
         )
-    text = "What the muscles and ligaments do about each joint, in the direction in which its coordinate grows."
-    if is_planar(estimate):
+    text = metrics["moments"]["verdict"]
+    if panels:
+        text += " What the muscles and ligaments do about each joint, in the direction in which its coordinate grows."
+    if panels and is_planar(estimate):
         text += (
             " The model has one leg and one arm for both sides, so theirs are the sums of both. At the toe there is no "
             "joint: its “moment” is the ground’s about the toe."
         )
     key = ("estimated",) if deviations is None else ("estimated", "band")
-    return Section("moments", "Joint moments", text, panels, key=key)
+    return Section(
+        "moments",
+        "Joint moments",
+        text,
+        panels,
+        key=key,
+        lines=(DERIVED_LINE,) if (sources == DERIVED).any() else (),
+        notes=tuple(metrics["moments"]["reasons"]),
+    )
 
 
 def length_section(estimate: Estimate) -> Section:

@@ -10,6 +10,7 @@ from dynakin.report.colours import side_of
 from dynakin.report.labels import sentence, words
 from dynakin.results import Estimate
 from dynakin.results.power import root_coordinates
+from dynakin.results.sources import legs_of
 from dynakin.results.symmetry import paired
 
 REGIONS = ("Legs", "Trunk and head", "Arms", "Whole body")
@@ -40,7 +41,7 @@ def joints_of(estimate: Estimate) -> list[Joint]:
     """All coordinates that move, right and left together, legs first and what places the whole body last."""
     names, rotation = estimate.coordinate_names, estimate.is_rotation()
     pairs = {k: (stem, right, left) for stem, right, left in paired(names) for k in (right, left)}
-    root, legs = root_coordinates(estimate), _leg_segments(estimate)
+    root, legs = root_coordinates(estimate), legs_of(estimate.data)
     moving = _moving(estimate)
     found: list[Joint] = []
     taken: set[int] = set()
@@ -56,7 +57,7 @@ def joints_of(estimate: Estimate) -> list[Joint]:
         taken.update(columns.values())
         columns = {side: column for side, column in columns.items() if moving[column]}
         if columns:
-            region = _region(estimate, k, bool(side_of(name)), name in root, legs)
+            region = _region(name, name in root, legs[k], any(legs))
             found.append(Joint(stem, columns, region, bool(rotation[k])))
     return sorted(found, key=lambda joint: REGIONS.index(joint.region))
 
@@ -68,30 +69,9 @@ def _moving(estimate: Estimate) -> np.ndarray:
     return np.asarray((np.nan_to_num(sd) > 0.0).any(axis=0) | (np.ptp(np.nan_to_num(values), axis=0) > 0.0))
 
 
-def _region(estimate: Estimate, k: int, sided: bool, is_root: bool, legs: set[str]) -> str:
+def _region(name: str, is_root: bool, leg: str, legs_known: bool) -> str:
     if is_root:
         return "Whole body"
-    if not sided:
+    if not side_of(name):
         return "Trunk and head"
-    if "coordinate_segment" not in estimate.data.coords or not legs:
-        return "Legs"
-    return "Legs" if str(estimate.data["coordinate_segment"].values[k]) in legs else "Arms"
-
-
-def _leg_segments(estimate: Estimate) -> set[str]:
-    """Segments from the feet up to, but without, the first that both share, and all that hangs on the feet."""
-    data = estimate.data
-    if "foot_segment" not in data.coords or "joint_segment" not in data.coords:
-        return set()
-    segments = [str(name) for name in data["joint_segment"].values]
-    parents = [int(parent) for parent in data["joint_parent"].values]
-    found: set[str] = set()
-    for foot in data["foot_segment"].values:
-        at = segments.index(str(foot))
-        while at >= 0 and side_of(segments[at]):
-            found.add(segments[at])
-            at = parents[at]
-    for k, parent in enumerate(parents):  # parents stand before their children
-        if parent >= 0 and segments[parent] in found:
-            found.add(segments[k])
-    return found
+    return "Legs" if leg or not legs_known else "Arms"

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from dynakin.report.chart import Line, chart
 from dynakin.report.colours import SIDE_COLOURS
-from dynakin.report.labels import COMPONENT_LABELS, number
+from dynakin.report.labels import COMPONENT_LABELS, listed
 from dynakin.report.method_panels import curve_unit, percent_label
 from dynakin.report.panels import Panel
 from dynakin.report.plot import ESTIMATED, MEASURED
@@ -26,13 +26,15 @@ def spatial_repetition_section(estimate: Estimate, found: Found, curves: Sequenc
         return Section("repetitions", "Repetitions", "", notes=(found.note,))
     joints = [joint for joint in joints_of(estimate) if joint.region in ("Legs", "Trunk and head")]
     angles = [panel for joint in joints if (panel := _panel(joint, own, ""))]
-    moments = [panel for joint in joints if (panel := _panel(joint, own, "/moment"))]
+    kinetic = {joint.name.lower(): _panel(joint, own, "/moment") for joint in joints}
+    moments = [panel for panel in kinetic.values() if panel]
+    missing = [name for name, panel in kinetic.items() if not panel]
     sides = list(dict.fromkeys(side for side, _ in own))
     wrench = [
         _wrench_panel(own[side, name], measured.get((side, name)), many=len(sides) > 1)
         for side in sides
         for name in COMPONENTS
-        if (side, name) in own
+        if (side, name) in own and own[side, name].n.any()
     ]
     what = "squat" if found.movement == "squat" else "gait cycle of each foot"
     parts = [
@@ -44,7 +46,9 @@ def spatial_repetition_section(estimate: Estimate, found: Found, curves: Sequenc
         "repetitions",
         "Repetitions",
         f"{found.note} Each {what} from 0 to 100 % of its time: their mean, and one sample standard deviation as a "
-        "band. Moments and forces are divided by the body mass. All curves are in repetitions.csv.",
+        "band. Moments and forces are divided by the body mass; a cycle in which one is not measured in every frame is "
+        "left out of its mean. All curves are in repetitions.csv."
+        + (f" No cycle is left of the moments of {listed(missing, 12)}." if missing else ""),
         parts=[part for part in parts if part.panels],
     )
 
@@ -64,11 +68,11 @@ def _panel(joint: Joint, curves: dict[tuple[str, str], MeanCurve], suffix: str) 
         cycle = next((c for c in ("both", side or "right", "right", "left") if (c, name) in curves), None)
         if cycle is not None:
             drawn.append((side, curves[cycle, name]))
-    if not drawn:
+    if not any(curve.n.any() for _, curve in drawn):
         return None
     first = drawn[0][1]
-    lines = [_line(curve, SIDE_COLOURS[side]) for side, curve in drawn][::-1]
-    note = "; ".join(f"{f'{side}: ' if side else ''}{_times(curve)}" for side, curve in drawn)
+    lines = [_line(curve, SIDE_COLOURS[side]) for side, curve in drawn if curve.n.any()][::-1]
+    note = "; ".join(f"{f'{side}: ' if side else ''}{curve.times}" for side, curve in drawn)
     least = {"deg": 2.0, "mm": 10.0}.get(first.unit, 0.02)
     label = percent_label(first.movement)
     return chart(joint.title, curve_unit(first), PERCENT, lines, note=note, least_range=least, x_label=label)
@@ -77,11 +81,7 @@ def _panel(joint: Joint, curves: dict[tuple[str, str], MeanCurve], suffix: str) 
 def _wrench_panel(curve: MeanCurve, measured: MeanCurve | None, *, many: bool) -> Panel:
     title = COMPONENT_LABELS[curve.quantity][0] + (f", {curve.side} cycle" if many else "")
     lines = [_line(curve, ESTIMATED)]
-    if measured is not None:
+    if measured is not None and measured.n.any():
         assert measured.mean_per_kg is not None
         lines.insert(0, Line(measured.mean_per_kg, MEASURED, 2.6))
-    return chart(title, curve_unit(curve), PERCENT, lines, note=_times(curve), x_label=percent_label(curve.movement))
-
-
-def _times(curve: MeanCurve) -> str:
-    return f"{number(float(curve.n.max()), digits=1)} repetitions" if curve.n.max() > 1 else "1 repetition"
+    return chart(title, curve_unit(curve), PERCENT, lines, note=curve.times, x_label=percent_label(curve.movement))

@@ -11,8 +11,8 @@ import numpy.typing as npt
 from dynakin.report.body import marker_segments
 from dynakin.report.chart import Line, chart
 from dynakin.report.colours import SIDE_COLOURS
-from dynakin.report.labels import COMPONENT_LABELS, number, sentence, short_marker_names, words
-from dynakin.report.method_styles import LineStyle
+from dynakin.report.labels import COMPONENT_LABELS, listed, number, sentence, short_marker_names, words
+from dynakin.report.method_styles import DERIVED_LINE, LineStyle
 from dynakin.report.panels import Panel, band_is_too_wide, rms_bars
 from dynakin.report.plot import ESTIMATED, MEASURED
 from dynakin.report.section import Section
@@ -20,14 +20,17 @@ from dynakin.report.sides import REGIONS, Joint, joints_of
 from dynakin.report.text_tables import TextTable
 from dynakin.results import AXES, COMPONENTS, Estimate
 from dynakin.results.angles import convention_of
-from dynakin.results.feet import DERIVED, NOT_MEASURED, UNKNOWN
+from dynakin.results.feet import ROUNDING, foot_sources
+from dynakin.results.metrics import evaluation_window
 from dynakin.results.power import root_coordinates
 from dynakin.results.pressure import centre_of_pressure
+from dynakin.results.sources import DERIVED, measured_only, moment_sources, wrench_sources
+from dynakin.results.sources import MEASURED as MOMENT_MEASURED
+from dynakin.results.stances import compared_stances
 
 Array = npt.NDArray[np.float64]
 
 SIDE_LINES = tuple(LineStyle(side, SIDE_COLOURS[side], 1.4) for side in ("right", "left"))
-_DERIVED = LineStyle("derived from the motion", "#5c6773", 1.2, "dashed")
 _DIRECTIONS = {"x": "forward", "y": "up", "z": "to the right"}
 _AXIS_COLOURS = {"x": "#0072B2", "y": "#009E73", "z": "#CC79A7"}
 
@@ -90,6 +93,7 @@ def _displacements(estimate: Estimate, metrics: dict[str, Any]) -> TextTable:
 def spatial_wrench_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
     """The total of all plates, measured and estimated."""
     measured, estimated = _of(estimate, "wrench_measured", "component"), _of(estimate, "wrench_estimated", "component")
+    derived = wrench_sources(estimate.data) == DERIVED
     panels = []
     for k, component in enumerate(COMPONENTS):
         if not np.isfinite(measured[:, k]).any():
@@ -97,7 +101,10 @@ def spatial_wrench_section(estimate: Estimate, metrics: dict[str, Any]) -> Secti
         title, unit = COMPONENT_LABELS[component]
         rms = metrics["wrench"]["rms"].get(component)
         note = f"{component}, RMS difference {number(rms, unit)}" if rms is not None else component
-        lines = [Line(measured[:, k], MEASURED, 2.6), Line(estimated[:, k], ESTIMATED, 1.0)]
+        lines = [
+            Line(measured[:, k], MEASURED, 2.6),
+            Line(estimated[:, k], ESTIMATED, 1.0, dashed=derived[:, k]),
+        ]
         panels.append(chart(title, unit, estimate.time, lines, note=note))
     return Section(
         "wrench",
@@ -106,6 +113,7 @@ def spatial_wrench_section(estimate: Estimate, metrics: dict[str, Any]) -> Secti
         "stands off the plates the total is not measured.",
         panels,
         key=("measured", "estimated"),
+        lines=(DERIVED_LINE,) if panels and derived.any() else (),
     )
 
 
@@ -114,12 +122,13 @@ def foot_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
     if not estimate.foot_names or metrics["feet"] is None:
         return Section("feet", "Feet", "")
     parts = [_foot_part(estimate, foot) for foot in estimate.foot_names]
+    derived = bool((foot_sources(estimate.data) == DERIVED).any())
     return Section(
         "feet",
         "Feet",
         metrics["feet"]["verdict"],
         key=("measured",),
-        lines=(*SIDE_LINES,),
+        lines=(*SIDE_LINES, *((DERIVED_LINE,) if derived else ())),
         tables=[adjustment for adjustment in (_adjustments(metrics["feet"]),) if adjustment.rows],
         parts=[part for part in parts if part.panels],
     )
@@ -144,7 +153,8 @@ def _foot_part(estimate: Estimate, foot: str) -> Section:
         for kind, name in (("measured", "foot_wrench_measured"), ("adjusted", "foot_wrench"))
     }
     contact = estimate.data["foot_contact"].sel(foot=foot).values
-    derived = contact == NOT_MEASURED
+    source = foot_sources(estimate.data)[:, estimate.foot_names.index(foot)]
+    derived = source == DERIVED
     panels = []
 
     def add(title: str, unit: str, measured: Array, adjusted: Array, note: str = "", least: float = 0.0) -> None:
@@ -154,9 +164,8 @@ def _foot_part(estimate: Estimate, foot: str) -> Section:
 
     for k, component in enumerate(COMPONENTS[:3]):
         title, unit = COMPONENT_LABELS[component]
-        peak = np.nanmax(np.abs(wrenches["adjusted"][~derived, k]), initial=0.0)
-        per_kg = f", {number(peak / estimate.mass_kg, 'N/kg')}" if estimate.mass_kg else ""
-        add(title, unit, wrenches["measured"][:, k], wrenches["adjusted"][:, k], f"peak {number(peak, unit)}{per_kg}")
+        note = _peak(estimate, foot, measured_only(wrenches["adjusted"][:, k], source), unit)
+        add(title, unit, wrenches["measured"][:, k], wrenches["adjusted"][:, k], note)
     pressed = {kind: centre_of_pressure(wrench, estimate.floor_height_m) for kind, wrench in wrenches.items()}
     for axis, k in (("forward", 0), ("to the right", 2)):
         each = {kind: 1000.0 * point[:, k] for kind, (point, _) in pressed.items()}
@@ -168,6 +177,19 @@ def _foot_part(estimate: Estimate, foot: str) -> Section:
         if (contact == code).any()
     ]
     return Section(f"foot-{foot}", f"{sentence(foot)} foot", sentence(", ".join(shares)) + ".", panels)
+
+
+def _peak(estimate: Estimate, foot: str, values: Array, unit: str) -> str:
+    """The largest of the whole measured stances, or, of who stays on the feet, of the time after the adaptation."""
+    window = evaluation_window(estimate.time)
+    stances = compared_stances(estimate, window)
+    parts = [values[window]] if stances is None else [values[part] for part in stances[foot]]
+    known = [part for part in parts if np.isfinite(part).all()]
+    if not known:
+        return "no stance measured from end to end, so no peak"
+    peak = max(float(np.abs(part).max()) for part in known)
+    per_kg = f", {number(peak / estimate.mass_kg, 'N/kg')}" if estimate.mass_kg else ""
+    return f"peak {number(peak, unit)}{per_kg}"
 
 
 def mass_centre_section(estimate: Estimate) -> Section:
@@ -231,70 +253,76 @@ def spatial_angle_section(estimate: Estimate) -> Section:
     )
 
 
-def spatial_moment_section(estimate: Estimate) -> Section:
-    """Moments over the body mass, right and left in one panel; what is derived is dashed, what is unknown left out."""
+def spatial_moment_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
+    """Moments over the body mass, right and left in one panel; what is derived is dashed, what is absent left out."""
     mass = estimate.mass_kg
     moments = _of(estimate, "moments", "coordinate") / (mass or 1.0)
     sd = _of(estimate, "moments_sd", "coordinate") / (mass or 1.0) if "moments_sd" in estimate.data else None
-    source = _of(estimate, "moment_source", "coordinate") if "moment_source" in estimate.data else 0.0 * moments
+    source, peaks = moment_sources(estimate.data), metrics["peak_moments_per_kg"]
 
     def draw(joint: Joint) -> Panel | None:
         unit = ("N m" if joint.rotation else "N") + ("/kg" if mass else "")
         notes, lines = [], []
         for side, k in joint.columns.items():
+            who = f"{side} " if side else ""
             if not np.isfinite(moments[:, k]).any():
+                notes.append(f"{who}absent")
                 continue
             derived = source[:, k] == DERIVED
             own_sd = None if sd is None else np.where(derived, np.nan, sd[:, k])
-            wide = own_sd is not None and band_is_too_wide(moments[:, k], np.nan_to_num(own_sd))
+            wide = own_sd is not None and band_is_too_wide(moments[:, k], own_sd)
             lines.append(Line(moments[:, k], SIDE_COLOURS[side], 1.2, None if wide else own_sd, derived))
-            sure = moments[:, k] if np.isnan(moments[~derived, k]).all() else moments[~derived, k]
-            low, high = (_two_digits(float(edge(sure))) for edge in (np.nanmin, np.nanmax))
-            notes.append(f"{f'{side} ' if side else ''}{low} to {high}")
+            if found := peaks.get(estimate.coordinate_names[k]):
+                notes.append(f"{who}{_two_digits(found['smallest'])} to {_two_digits(found['largest'])}")
+            elif mass:
+                notes.append(f"{who}no whole measured stance")
         return (
             chart(joint.name, unit, estimate.time, lines[::-1], note="; ".join(notes), least_range=0.02)
             if lines
             else None
         )
 
-    root = root_coordinates(estimate)
     joints = [joint for joint in joints_of(estimate) if joint.region != "Whole body"]
-    left_over = [
-        float(np.nanmax(np.abs(_of(estimate, "moments", "coordinate")[:, k]), initial=0.0))
-        for k, name in enumerate(estimate.coordinate_names)
-        if name in root
+    parts = _by_region("moments", joints, draw)
+    absent = [
+        f"{side} {joint.name.lower()}".strip()
+        for joint in joints
+        for side, k in joint.columns.items()
+        if not np.isfinite(moments[:, k]).any()
     ]
-    shares = [
-        f"{what} in {number(100.0 * share, '%', digits=2)} of the frames ({who})"
-        for code, what in ((DERIVED, "derived from the motion"), (UNKNOWN, "not known"))
-        if (share := float((source == code).any(axis=1).mean())) > 0.0
-        for who in (_sides_with(estimate, source == code),)
-    ]
-    text = "What muscles and ligaments do about each joint, in the direction in which its coordinate grows"
-    text += ", over the body mass." if mass else "."
-    if left_over:
-        text += f" At the root at most {number(max(left_over), 'N or N m', digits=2)} is left."
-    if shares:
-        text += f" Where a contact is not measured, moments that hang on it are {', or '.join(shares)}."
+    text = [metrics["moments"]["verdict"]]
+    if parts:
+        about = "What muscles and ligaments do about each joint, in the direction in which its coordinate grows"
+        text.append(f"{about}, over the body mass." if mass else f"{about}.")
+        text += _left_at_root(estimate, source)
+    if (source == DERIVED).any():
+        text.append("Derived moments are dashed, and no peak, work or mean curve holds them.")
+    if absent:
+        text.append(f"Absent in every frame: {listed(absent, 12)}.")
     return Section(
         "moments",
         "Joint moments",
-        text,
-        lines=(*SIDE_LINES, *((_DERIVED,) if (source == DERIVED).any() else ())),
-        band="" if sd is None else "± 2 standard deviations",
-        parts=_by_region("moments", joints, draw),
+        " ".join(text),
+        lines=(*SIDE_LINES, *((DERIVED_LINE,) if (source == DERIVED).any() else ())) if parts else (),
+        band="" if sd is None or not parts else "± 2 standard deviations",
+        notes=tuple(metrics["moments"]["reasons"]),
+        parts=parts,
     )
+
+
+def _left_at_root(estimate: Estimate, source: npt.NDArray[np.uint8]) -> list[str]:
+    """What the model needs at its root and nothing gives, in the frames in which that is measured; in words."""
+    root = [k for k, name in enumerate(estimate.coordinate_names) if name in root_coordinates(estimate)]
+    known = _of(estimate, "moments", "coordinate")[:, root][(source[:, root] == MOMENT_MEASURED).all(axis=1)]
+    if not known.size or not np.isfinite(known).any():
+        return []
+    most = float(np.nanmax(np.abs(known)))
+    left = "nothing" if most <= ROUNDING else f"at most {number(most, 'N or N m', digits=2)}"
+    return [f"At the root {left} is left in the {len(known)} frames in which every contact is measured."]
 
 
 def _two_digits(value: float) -> str:
     return f"{round(value, 2) + 0.0:.2f}".replace("-", "−")
-
-
-def _sides_with(estimate: Estimate, marked: npt.NDArray[np.bool_]) -> str:
-    """Which coordinates a mark touches, in a few words."""
-    touched = [joint for joint in joints_of(estimate) if any(marked[:, k].any() for k in joint.columns.values())]
-    regions = [region for region in REGIONS[:-1] if any(joint.region == region for joint in touched)]
-    return " and ".join(region.lower() for region in regions) or "joints that are held still"
 
 
 def _by_region(key: str, joints: list[Joint], draw: Callable[[Joint], Panel | None]) -> list[Section]:

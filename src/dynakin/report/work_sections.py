@@ -9,12 +9,14 @@ import numpy as np
 
 from dynakin.report.chart import Line, chart
 from dynakin.report.colours import SIDE_COLOURS
-from dynakin.report.labels import number
+from dynakin.report.labels import listed, number
+from dynakin.report.method_styles import DERIVED_LINE
 from dynakin.report.section import Section
 from dynakin.report.sides import Joint, joints_of
 from dynakin.report.spatial_sections import SIDE_LINES
 from dynakin.report.text_tables import TextTable
 from dynakin.results import Estimate
+from dynakin.results.sources import DERIVED, measured_moments, moment_sources
 
 _NOT_MEANT = 0.02
 """Below this share of the largest of its kind a quantity is too small for a ratio of the sides to say anything."""
@@ -23,18 +25,24 @@ _NOT_MEANT = 0.02
 def power_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
     """Power of the joints over the body mass, and the work of each coordinate."""
     work, mass = metrics["work"], estimate.mass_kg
-    joints = [joint for joint in joints_of(estimate) if any(_name(estimate, k) in work for k in joint.columns.values())]
+    powers = estimate.powers() / (mass or 1.0)
+    drawn = np.asarray((np.nan_to_num(powers) != 0.0).any(axis=0))
+    joints = [
+        joint
+        for joint in joints_of(estimate)
+        if joint.region != "Whole body" and any(drawn[k] for k in joint.columns.values())
+    ]
     if not joints:
         return Section("powers", "Powers and work", "")
-    powers = estimate.powers() / (mass or 1.0)
     unit = "W/kg" if mass else "W"
+    derived = moment_sources(estimate.data) == DERIVED
     panels = {"Legs": [], "": []}  # type: dict[str, list[Any]]
     for joint in joints:
-        lines = [Line(powers[:, k], SIDE_COLOURS[side]) for side, k in joint.columns.items()]
+        lines = [Line(powers[:, k], SIDE_COLOURS[side], dashed=derived[:, k]) for side, k in joint.columns.items()]
         note = "; ".join(
-            f"{f'{side} ' if side else ''}peak {number(np.nanmax(powers[:, k]), unit, digits=2)}"
+            f"{f'{side} ' if side else ''}peak {number(own['peak_w'] / (mass or 1.0), unit, digits=2)}"
             for side, k in joint.columns.items()
-            if np.isfinite(powers[:, k]).any()
+            if (own := work.get(_name(estimate, k)))
         )
         shown = chart(joint.name, unit, estimate.time, lines[::-1], note=note, least_range=0.05)
         panels["Legs" if joint.region == "Legs" else ""].append(shown)
@@ -44,17 +52,18 @@ def power_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
         "powers",
         "Powers and work",
         "Moment times speed: positive where energy is added to the body. Work is the sum of its positive and of its "
-        "negative parts.",
+        "negative parts. Peaks and work are those of measured moments: where a leg’s are not measured throughout, of "
+        "its stances and swings that are measured from end to end.",
         panels["Legs"] or panels[""],
         folded=panels[""] if panels["Legs"] else [],
         folded_title="Powers of trunk and arms",
-        lines=SIDE_LINES,
-        tables=[_work_table(estimate, joints, work, f"Work, {seconds}")],
+        lines=(*SIDE_LINES, *((DERIVED_LINE,) if derived.any() else ())),
+        tables=[table for table in (_work_table(estimate, joints, work, f"Work, {seconds}"),) if table.rows],
     )
 
 
 def _work_table(estimate: Estimate, joints: list[Joint], work: Mapping[str, Any], title: str) -> TextTable:
-    rows = []
+    rows: list[tuple[str, ...]] = []
     for joint in joints:
         for side, k in joint.columns.items():
             own = work.get(_name(estimate, k))
@@ -62,10 +71,11 @@ def _work_table(estimate: Estimate, joints: list[Joint], work: Mapping[str, Any]
                 continue
             cells = [number(own[key], digits=3) for key in ("positive_j", "negative_j")]
             cells += [number(own[key], digits=2) for key in ("positive_j_per_kg", "negative_j_per_kg")]
-            cells += [number(own[key], digits=3) for key in ("peak_w", "lowest_w")]
-            rows.append((joint.name if side in ("right", "") else "", side or "–", *cells))
+            cells += [number(own[key], digits=3) for key in ("peak_w", "lowest_w")] + [str(own["frames"])]
+            first = not rows or joint.name not in [row[0] for row in rows]
+            rows.append((joint.name if first else "", side or "–", *cells))
     headings = ("", "side", "positive, J", "negative, J", "positive, J/kg", "negative, J/kg", "peak, W", "lowest, W")
-    return TextTable(title, headings, rows, tuple(range(2, 8)), folded=len(rows) > 12)
+    return TextTable(title, (*headings, "frames"), rows, tuple(range(2, 9)), folded=len(rows) > 12)
 
 
 def asymmetry_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
@@ -93,15 +103,27 @@ def asymmetry_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
         "asymmetry",
         "Right and left",
         "Right less left over their mean, in per cent (Robinson, Herzog and Nigg 1987): positive where the right is "
-        "larger, 0 where they are alike. In brackets where both are small, so that the ratio says little.",
+        "larger, 0 where they are alike. In brackets where both are small, so that the ratio says little."
+        + _compared(found),
         tables=tables,
     )
+
+
+def _compared(found: Mapping[str, Any]) -> str:
+    """What the sides’ moments and forces were compared over, or why they were not."""
+    stances, reason = found["stances"], found["reason"]
+    how = ""
+    if stances is not None and all(stances.values()):
+        each = listed([f"{count} of the {foot} foot" for foot, count in stances.items()])
+        how = f" Moments, work and forces of the legs are means over whole measured stances: {each}."
+    return how + (f" {reason}" if reason else "")
 
 
 def _too_small(estimate: Estimate, metrics: dict[str, Any], joints: list[Joint]) -> set[tuple[str, str]]:
     """(stem, quantity) whose larger side is a small part of the body's largest."""
     values, moments = (
-        estimate.data[name].transpose("time", "coordinate").values for name in ("coordinates", "moments")
+        estimate.data["coordinates"].transpose("time", "coordinate").values,
+        measured_moments(estimate.data),
     )
     sizes: dict[str, dict[str, float]] = {"range": {}, "peak_moment": {}, "positive_work": {}, "negative_work": {}}
     for joint in joints:

@@ -8,7 +8,10 @@ import numpy as np
 
 from dynakin.results.angles import angle_columns
 from dynakin.results.estimate import AXES, COMPONENTS, Estimate
+from dynakin.results.feet import foot_sources
+from dynakin.results.motion_files import write_sources
 from dynakin.results.pressure import LOADED_N
+from dynakin.results.sources import joint_sources
 from dynakin.results.storage_file import write_storage
 
 _SIDES = {"right": "r", "left": "l"}
@@ -23,15 +26,20 @@ def write_body_files(estimate: Estimate, folder: Path) -> None:
         write_mass_centre(estimate, folder / "centre_of_mass.sto")
     if "joint_loads" in estimate.data:
         write_joint_reactions(estimate, folder / "joint_reactions.sto")
+        write_joint_sources(estimate, folder / "joint_reactions_source.sto")
     if "zero_offset" in estimate.data:
         write_angles(estimate, folder / "angles.sto")
     if estimate.foot_names:
         write_feet(estimate, folder / "feet.sto")
+        write_foot_sources(estimate, folder / "feet_source.sto")
 
 
 def write_powers(estimate: Estimate, path: Path) -> None:
     """``powers.sto``: W, a column a coordinate, ``knee_angle_r_power``."""
-    notes = ["Moment times speed in W, positive where energy is added to the body."]
+    notes = [
+        "Moment times speed in W, positive where energy is added to the body.",
+        "moments_source.sto says of each moment whether it is measured, derived or absent (nan).",
+    ]
     _write(
         path,
         "Joint powers",
@@ -75,6 +83,8 @@ def write_centre_of_pressure(estimate: Estimate, path: Path) -> None:
         "Centres of pressure in m on the plates' surface, free moments in N m about the vertical; "
         f"nan below {LOADED_N:g} N of vertical force. Frame: {estimate.ground.in_words}."
     ]
+    if estimate.foot_names:
+        notes.append("feet_source.sto says of each foot whether its force is measured, derived or absent (nan).")
     _write(path, "Centres of pressure", estimate, names, table, notes)
 
 
@@ -101,8 +111,23 @@ def write_joint_reactions(estimate: Estimate, path: Path) -> None:
         "Intersegmental loads: force in N and moment in N m about the joint's centre (px py pz, m), ground axes, of "
         "the parent on the named segment; muscles, ligaments and bones together.",
         f"Frame: {estimate.ground.in_words}.",
+        "joint_reactions_source.sto says of each joint whether its load is measured, derived or absent (nan).",
     ]
     _write(path, "Joint reactions", estimate, names, np.column_stack(columns), notes)
+
+
+def write_joint_sources(estimate: Estimate, path: Path) -> None:
+    """``joint_reactions_source.sto``: a column a joint, ``knee_on_shank_in_ground``, with the code of where its load
+    comes from."""
+    joints = zip(estimate.data["joint"].values, estimate.data["joint_segment"].values, strict=True)
+    names = [f"{joint}_on_{segment}_in_ground" for joint, segment in joints]
+    write_sources(path, "Sources of the joint reactions", estimate, names, joint_sources(estimate.data))
+
+
+def write_foot_sources(estimate: Estimate, path: Path) -> None:
+    """``feet_source.sto``: a column a foot, ``ground_force_r``, with the code of where its wrench comes from."""
+    names = [f"ground_force_{_SIDES.get(foot, foot)}" for foot in estimate.foot_names]
+    write_sources(path, "Sources of the feet's ground reaction", estimate, names, foot_sources(estimate.data))
 
 
 def write_feet(estimate: Estimate, path: Path) -> None:
@@ -123,10 +148,12 @@ def write_feet(estimate: Estimate, path: Path) -> None:
         side = _SIDES.get(foot, foot)
         names += [f"ground_force_{side}_v{a}" for a in AXES] + [f"ground_force_{side}_p{a}" for a in AXES]
         names += [f"ground_torque_{side}_{a}" for a in AXES]
-        columns += [wrench[:, :3], np.where(loaded[:, None], point, 0.0), torque]
+        unknown = np.isnan(wrench).any(axis=1)
+        columns += [wrench[:, :3], np.where(loaded[:, None], point, np.where(unknown, np.nan, 0.0)[:, None]), torque]
     notes = [
         "Forces in N at points in m, torques in N m, of the ground on the feet; adjusted.",
         f"Frame: {estimate.ground.in_words}.",
+        "feet_source.sto says of each foot whether its force is measured, derived or absent (nan).",
     ]
     _write(path, "Ground reaction of the feet", estimate, names, np.hstack(columns), notes)
 

@@ -6,16 +6,29 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
+import xarray as xr
 
+from dynakin.results import sources
 from dynakin.results.estimate import COMPONENTS
+from dynakin.results.naming import plural
 
 if TYPE_CHECKING:
     from dynakin.results.estimate import Estimate
 
 IN_THE_AIR, MEASURED, NOT_MEASURED = range(3)
 """Codes of ``foot_contact``: a foot's wrench is zero, is measured, or is not known."""
-DERIVED, UNKNOWN = 1, 2
-"""Codes of ``moment_source`` beside 0: the only unmeasured contact, or one of several, lies behind that axis."""
+ROUNDING = 1.0
+"""N or N m at the root up to which nothing is left there."""
+FLIGHT = 0.05
+"""Part of the weight up to which what is left in flight is an error of the motion; more carries the person."""
+
+
+def foot_sources(data: xr.Dataset) -> sources.Codes:
+    """(T, F) codes of `dynakin.results.sources` of the feet's wrenches: in the air they are known to be zero."""
+    contact = data["foot_contact"].transpose("time", "foot").values
+    known = np.isfinite(data["foot_wrench"].transpose("time", "foot", "component").values).all(axis=2)
+    codes = np.where(contact == NOT_MEASURED, sources.DERIVED, sources.MEASURED)
+    return np.where(known, codes, sources.ABSENT).astype(np.uint8)
 
 
 def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str, Any] | None:
@@ -25,9 +38,10 @@ def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str,
         ``adjustment_rms``: by foot and component, N and N m about the joint by which the foot hangs, over the frames
         in which all contacts are measured, this one too; ``remainder_rms``, about the ground's origin, over the
         ``flight_frames``, in which nothing touches the ground; ``derived_frames`` and ``unknown_frames``: those in
-        which one contact, or more, were not measured; ``verdict``.
+        which a foot's wrench is derived, or not known; ``left_at_root``: the largest force (N) and moment about the
+        root (N m) that no contact gives, ``grounded`` where all contacts are measured and in ``flight``; ``verdict``.
     """
-    if not estimate.foot_names:
+    if not estimate.foot_names or "foot_wrench" not in estimate.data:
         return None
     contact = estimate.data["foot_contact"].transpose("time", "foot").values[window]
     adjusted = estimate.data["foot_adjustment"].transpose("time", "foot", "component").values[window]
@@ -35,21 +49,28 @@ def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str,
         [adjusted[..., :3], adjusted[..., 3:] - np.cross(_joints(estimate)[window], adjusted[..., :3])], axis=-1
     )
     remainder = estimate.data["wrench_remainder"].transpose("time", "component").values[window]
-    unmeasured = (contact > MEASURED).sum(axis=1)
-    known = (contact == MEASURED) & (unmeasured == 0)[:, None]
+    codes = foot_sources(estimate.data)[window]
     flight = (contact == IN_THE_AIR).all(axis=1)
+    grounded = (contact != NOT_MEASURED).all(axis=1) & ~flight
+    known = (contact == MEASURED) & grounded[:, None]
     rms = {
         name: dict(zip(COMPONENTS, _rms(adjusted[known[:, k], k]), strict=True)) if known[:, k].any() else None
         for k, name in enumerate(estimate.foot_names)
     }
-    return {
+    about_root = np.concatenate(
+        [remainder[:, :3], remainder[:, 3:] - np.cross(_root(estimate)[window], remainder[:, :3])], axis=-1
+    )
+    left = {"grounded": _largest(about_root[grounded]), "flight": _largest(about_root[flight])}
+    figures = {
         "adjustment_rms": rms,
         "remainder_rms": dict(zip(COMPONENTS, _rms(remainder[flight]), strict=True)) if flight.any() else None,
         "flight_frames": int(flight.sum()),
-        "derived_frames": int((unmeasured == 1).sum()),
-        "unknown_frames": int((unmeasured > 1).sum()),
-        "verdict": _words(rms, unmeasured, len(contact)),
+        "derived_frames": int((codes == sources.DERIVED).any(axis=1).sum()),
+        "unknown_frames": int((codes == sources.ABSENT).any(axis=1).sum()),
+        "left_at_root": left,
     }
+    weight = 9.80665 * (estimate.mass_kg or 0.0)
+    return figures | {"verdict": _words(figures, int(grounded.sum()), len(contact), FLIGHT * weight)}
 
 
 def _joints(estimate: Estimate) -> np.ndarray:
@@ -59,27 +80,56 @@ def _joints(estimate: Estimate) -> np.ndarray:
     return np.asarray(estimate.data["joint_centres"].transpose("time", "joint", "axis").values[:, own])
 
 
+def _root(estimate: Estimate) -> np.ndarray:
+    """(T, 3) m: the joint by which the body hangs on the ground."""
+    root = int(np.flatnonzero(estimate.data["joint_parent"].values < 0)[0])
+    return np.asarray(estimate.data["joint_centres"].transpose("time", "joint", "axis").values[:, root])
+
+
 def _rms(values: np.ndarray) -> list[float]:
     return [float(v) for v in np.sqrt(np.mean(values**2, axis=0))]
 
 
-def _words(rms: dict[str, dict[str, float] | None], unmeasured: np.ndarray, frames: int) -> str:
-    told = [
-        f"{name} foot {max(own['fx'], own['fy'], own['fz']):.1f} N and "
-        f"{max(own['mx'], own['my'], own['mz']):.1f} N m (about its joint)"
-        for name, own in rms.items()
-        if own is not None
-    ]
-    text = "Nothing is left at the root: the plates' wrenches were changed instead"
-    text += f", RMS of the component that was changed most: {', '.join(told)}." if told else "."
-    if (unmeasured == 1).any():
-        text += (
-            f" In {int((unmeasured == 1).sum())} of {frames} frames one contact was not measured: what hangs on it "
-            "is derived from the motion."
-        )
-    if (unmeasured > 1).any():
-        text += (
-            f" In {int((unmeasured > 1).sum())} of {frames} frames several contacts were not measured: the moments "
-            "between them are not known."
-        )
-    return text
+def _largest(wrench: np.ndarray) -> dict[str, float] | None:
+    """Of wrenches (N, 6); None where none is known."""
+    known = wrench[np.isfinite(wrench).all(axis=1)]
+    if not len(known):
+        return None
+    force, moment = (float(np.linalg.norm(part, axis=1).max()) for part in (known[:, :3], known[:, 3:]))
+    return {"force_n": force, "moment_nm": moment}
+
+
+def _words(figures: dict[str, Any], grounded: int, frames: int, weight_n: float) -> str:
+    """What is said goes by the numbers: nothing is left only where nothing is."""
+    left, text = figures["left_at_root"], []
+    if left["grounded"] is None:
+        text.append("In no frame are all contacts with the ground measured: what is left at the root is not known.")
+    else:
+        where = f"in the {grounded} of {frames} frames in which every contact with the ground is measured"
+        if max(left["grounded"].values()) <= ROUNDING:
+            changed = [
+                f"{name} foot {max(own['fx'], own['fy'], own['fz']):.1f} N and "
+                f"{max(own['mx'], own['my'], own['mz']):.1f} N m (about its joint)"
+                for name, own in figures["adjustment_rms"].items()
+                if own is not None
+            ]
+            text.append(
+                f"Nothing is left at the root {where}: the plates' wrenches were changed instead, RMS of the component "
+                f"that was changed most: {', '.join(changed)}."
+            )
+        else:
+            text.append(f"{_up_to(left['grounded'])} are left at the root {where}: no contact accounts for them.")
+    if left["flight"] is not None:
+        flight = plural(figures["flight_frames"], "frame")
+        text.append(f"{_up_to(left['flight'])} are left in the {flight} in which no foot touches the ground.")
+        if left["flight"]["force_n"] > weight_n > 0.0:
+            text.append("That is no flight: something that is not measured carries the person.")
+    if count := figures["derived_frames"]:
+        text.append(f"In {count} of {frames} frames one contact was not measured: what hangs on it is derived.")
+    if count := figures["unknown_frames"]:
+        text.append(f"In {count} of {frames} frames the force on a foot is not known: what hangs on it is absent.")
+    return " ".join(text)
+
+
+def _up_to(left: dict[str, float]) -> str:
+    return f"Up to {left['force_n']:.0f} N and {left['moment_nm']:.0f} N m"

@@ -12,7 +12,9 @@ import numpy.typing as npt
 
 from dynakin.results.estimate import COMPONENTS, Estimate
 from dynakin.results.facing import facing
+from dynakin.results.naming import plural
 from dynakin.results.repetitions import Movement, Repetition, repetitions_of
+from dynakin.results.sources import measured_moments, measured_wrench
 
 Array = npt.NDArray[np.float64]
 
@@ -35,8 +37,9 @@ class Signal:
 class MeanCurve:
     """One quantity by one method over the repetitions of one side.
 
-    side: "both" (squats), "left" or "right". n, mean, sd: (101,) at `PERCENT`; n repetitions are known there. sd: the
-    sample's, NaN below two. mean_per_kg, sd_per_kg: over the body mass; None for coordinates, which have no such.
+    side: "both" (squats), "left" or "right". n, mean, sd: (101,) at `PERCENT`; n repetitions of ``of`` are known there;
+    of a moment or a force only those count that are measured in every frame. sd: the sample's, NaN below two.
+    mean_per_kg, sd_per_kg: over the body mass; None for coordinates, which have no such.
     """
 
     movement: Movement
@@ -45,16 +48,23 @@ class MeanCurve:
     quantity: str
     unit: str
     n: npt.NDArray[np.int64]
+    of: int
     mean: Array
     sd: Array
     mean_per_kg: Array | None
     sd_per_kg: Array | None
 
+    @property
+    def times(self) -> str:
+        """How many repetitions it is the mean of, in words."""
+        most = int(self.n.max())
+        return plural(most, "repetition") if most == self.of else f"{most} of {plural(self.of, 'repetition')}"
+
 
 @dataclass(frozen=True)
 class CurvePoint:
     """One point of a mean curve: a row of ``repetitions.csv``. None: not defined (one repetition has no sd, a
-    coordinate nothing per kg)."""
+    coordinate nothing per kg). ``repetitions``: how many there are, ``n`` of them known here."""
 
     trial: str
     movement: str
@@ -68,6 +78,7 @@ class CurvePoint:
     sd: float | None
     mean_per_kg: float | None
     sd_per_kg: float | None
+    repetitions: int
 
 
 def signals(
@@ -106,7 +117,10 @@ def normalised(time: Array, values: Array, first: int, last: int) -> Array:
 def mean_curves(
     time: Array, repetitions: Sequence[Repetition], methods: dict[str, list[Signal]], mass_kg: float
 ) -> list[MeanCurve]:
-    """Mean and sample standard deviation of each method's signals over the repetitions, each side on its own."""
+    """Mean and sample standard deviation of each method's signals over the repetitions, each side on its own.
+
+    A repetition in which a moment or force is not known in every frame is left out of the mean of that one.
+    """
     found = []
     for side in dict.fromkeys(repetition.side for repetition in repetitions):
         own = [repetition for repetition in repetitions if repetition.side == side]
@@ -118,30 +132,30 @@ def mean_curves(
 
 
 def _mean_curve(movement: Movement, side: str, method: str, signal: Signal, each: Array, mass_kg: float) -> MeanCurve:
+    kinetic = signal.unit in ("N", "N m")
     known = np.isfinite(each)
+    if kinetic:  # the mean of some cycles' beginnings and others' ends is nobody's
+        known &= known.all(axis=1, keepdims=True)
     n = known.sum(axis=0)
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = np.where(known, each, 0.0).sum(axis=0) / n
         sd = np.sqrt(np.where(known, (each - mean) ** 2, 0.0).sum(axis=0) / (n - 1))
     sd[n < 2] = np.nan
-    kinetic = signal.unit in ("N", "N m")
     per_kg = (mean / mass_kg, sd / mass_kg) if kinetic else (None, None)
-    return MeanCurve(movement, side, method, signal.quantity, signal.unit, n, mean, sd, *per_kg)
+    return MeanCurve(movement, side, method, signal.quantity, signal.unit, n, len(each), mean, sd, *per_kg)
 
 
 def estimate_curves(estimate: Estimate) -> list[MeanCurve]:
     """Mean curves of the filter's own quantities and of the plates'; nothing without a repetition."""
     estimate = facing(estimate)
     preset = estimate.config.get("preset")
-    arrays = {name: estimate.data[name].transpose("time", "coordinate").values for name in ("coordinates", "moments")}
-    wrench = {
-        name: estimate.data[f"wrench_{name}"].transpose("time", "component").values
-        for name in ("estimated", "measured")
-    }
+    data = estimate.data
+    coordinates = data["coordinates"].transpose("time", "coordinate").values
+    own = (coordinates, measured_moments(data), measured_wrench(data))
     names, rotation = estimate.coordinate_names, estimate.is_rotation()
     methods = {
-        f"EKF ({preset})" if preset else "EKF": signals(names, rotation, **arrays, wrench=wrench["estimated"]),
-        MEASURED: signals(names, rotation, wrench=wrench["measured"]),
+        f"EKF ({preset})" if preset else "EKF": signals(names, rotation, *own),
+        MEASURED: signals(names, rotation, wrench=data["wrench_measured"].transpose("time", "component").values),
     }
     repetitions = repetitions_of(estimate).items
     return mean_curves(estimate.time, repetitions, methods, float(estimate.config.get("mass_kg") or np.nan))
@@ -149,20 +163,25 @@ def estimate_curves(estimate: Estimate) -> list[MeanCurve]:
 
 def curve_points(trial: str, curves: Iterable[MeanCurve]) -> list[CurvePoint]:
     """Mean curves as rows, one a point."""
+
+    def known(values: Array | None, k: int) -> float | None:
+        return None if values is None or not np.isfinite(values[k]) else float(values[k])
+
     return [
         CurvePoint(
-            trial,
-            curve.movement,
-            curve.side,
-            curve.method,
-            curve.quantity,
-            curve.unit,
-            float(percent),
-            int(curve.n[k]),
-            *(
-                None if values is None or not np.isfinite(values[k]) else float(values[k])
-                for values in (curve.mean, curve.sd, curve.mean_per_kg, curve.sd_per_kg)
-            ),
+            trial=trial,
+            movement=curve.movement,
+            side=curve.side,
+            method=curve.method,
+            quantity=curve.quantity,
+            unit=curve.unit,
+            percent=float(percent),
+            n=int(curve.n[k]),
+            mean=known(curve.mean, k),
+            sd=known(curve.sd, k),
+            mean_per_kg=known(curve.mean_per_kg, k),
+            sd_per_kg=known(curve.sd_per_kg, k),
+            repetitions=curve.of,
         )
         for curve in curves
         for k, percent in enumerate(PERCENT)

@@ -19,6 +19,8 @@ from dynakin.results.kinematic_consistency import mismatch_in_words, speed_misma
 from dynakin.results.learned import learned
 from dynakin.results.power import work
 from dynakin.results.soft_tissue import soft_tissue
+from dynakin.results.sources import moment_figures
+from dynakin.results.stances import counted
 from dynakin.results.symmetry import asymmetry
 
 SCHEMA_VERSION = 1
@@ -60,6 +62,7 @@ def compute_metrics(estimate: Estimate) -> dict[str, Any]:
         "bounds": parameter_bounds(estimate, window),
         "soft_tissue": soft_tissue(estimate, window),
         "identifiability": learned(estimate),
+        "moments": moment_figures(estimate),
         "peak_moments_per_kg": _peak_moments(estimate, window),
         "work": work(estimate, window),
         "angles": _angles(estimate),
@@ -83,10 +86,16 @@ def _angles(estimate: Estimate) -> dict[str, Any] | None:
 
 
 def _peak_moments(estimate: Estimate, window: np.ndarray) -> dict[str, dict[str, float]]:
-    """Largest and smallest moment of each coordinate over the body mass; those that are not known are left out."""
-    values = estimate.moments_per_kg()[window]
+    """Largest and smallest moment of each coordinate over the body mass and over how many frames; those that are not
+    measured long enough (`counted`) are left out."""
+    taken = counted(estimate, window)
+    values = np.where(taken, estimate.moments_per_kg(), np.nan)
     return {
-        name: {"largest": float(np.nanmax(values[:, k])), "smallest": float(np.nanmin(values[:, k]))}
+        name: {
+            "largest": float(np.nanmax(values[:, k])),
+            "smallest": float(np.nanmin(values[:, k])),
+            "frames": int(taken[:, k].sum()),
+        }
         for k, name in enumerate(estimate.coordinate_names)
         if np.isfinite(values[:, k]).any()
     }

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from dynakin.results.estimate import COMPONENTS, Estimate
+from dynakin.results.sources import ABSENT, NOTES, moment_sources
 from dynakin.results.storage_file import write_storage
 
 
@@ -69,8 +70,21 @@ def write_moments(estimate: Estimate, path: Path) -> None:
         moment_columns(estimate),
         estimate.data["moments"].transpose("time", "coordinate").values,
         in_degrees=False,
-        notes=["Moments in N m, forces in N. In a model that lumps both sides, leg moments are the sum of both legs."],
+        notes=[
+            "Moments in N m, forces in N. In a model that lumps both sides, leg moments are the sum of both legs.",
+            "moments_source.sto says of each whether it is measured, derived or absent (nan).",
+        ],
     )
+
+
+def write_moment_sources(estimate: Estimate, path: Path) -> None:
+    """``moments_source.sto``: the rows and columns of ``moments.sto``, each with the code of where it comes from."""
+    write_sources(path, "Sources of the moments", estimate, moment_columns(estimate), moment_sources(estimate.data))
+
+
+def write_sources(path: Path, title: str, estimate: Estimate, names: list[str], codes: np.ndarray) -> None:
+    """A table of codes (T, N), 0 measured, 1 derived, 2 absent, which the header explains."""
+    write_storage(path, title, estimate.time, names, codes.astype(float), in_degrees=False, notes=NOTES)
 
 
 def write_deviations(estimate: Estimate, path: Path) -> None:
@@ -87,7 +101,8 @@ def write_deviations(estimate: Estimate, path: Path) -> None:
             columns.append(_in_degrees(estimate, f"{variable}_sd"))
     if "moments_sd" in estimate.data:
         names += moment_columns(estimate)
-        columns.append(estimate.data["moments_sd"].transpose("time", "coordinate").values)
+        deviations = estimate.data["moments_sd"].transpose("time", "coordinate").values
+        columns.append(np.where(moment_sources(estimate.data) == ABSENT, np.nan, deviations))
     if "wrench_sd" in estimate.data:
         values = estimate.data["wrench_sd"].transpose("time", "component").values
         known = np.isfinite(values).any(axis=0)
@@ -100,7 +115,10 @@ def write_deviations(estimate: Estimate, path: Path) -> None:
         names,
         np.hstack(columns) if columns else np.empty((len(estimate.time), 0)),
         in_degrees=True,
-        notes=["One standard deviation, as the filter believes. Degrees, metres, seconds, N, N m."],
+        notes=[
+            "One standard deviation, as the filter believes. Degrees, metres, seconds, N, N m.",
+            "Of moments that are derived or absent (moments_source.sto) too, nan where absent.",
+        ],
     )
 
 
@@ -127,7 +145,8 @@ def write_wrench(estimate: Estimate, path: Path) -> None:
         table,
         in_degrees=False,
         notes=[
-            "Forces in N, moments in N m about the origin of the frame, acting from the ground on the person.",
+            "Forces in N, moments in N m about the origin of the frame, acting from the ground on the person. "
+            "Estimated where it is not measured, derived from the motion.",
             _frame(estimate),
         ],
     )

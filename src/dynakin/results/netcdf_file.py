@@ -11,6 +11,7 @@ import xarray as xr
 from dynakin.absent import finite, with_nulls
 from dynakin.results.estimate import Estimate
 from dynakin.results.metrics import SCHEMA_VERSION
+from dynakin.results.sources import MEANINGS
 from dynakin.results.versions import versions
 
 _UNITS = {
@@ -22,14 +23,22 @@ _UNITS = {
     "mass_centre_velocity": "m/s",
     "mass_centre": "m",
     "joint_loads": "N for fx fy fz, N m for mx my mz",
-    "foot_contact": "0 in the air, 1 measured, 2 not measured",
-    "foot_": "N for fx fy fz, N m for mx my mz",
-    "moment_source": "0 measured, 1 derived from the motion, 2 unknown",
+    "foot_wrench": "N for fx fy fz, N m for mx my mz",
+    "foot_adjustment": "N for fx fy fz, N m for mx my mz",
     "wrench": "N for fx fy fz, N m for mx my mz",
     "nis": "1",
     "n_rows": "1",
     "log_likelihood": "1",
 }
+_FLAGS = {
+    "moment_source": (MEANINGS, "where each moment comes from; derived: from the motion"),
+    "joint_source": (MEANINGS, "where each joint's load comes from; derived: from the motion"),
+    "foot_contact": (("in_the_air", "measured", "not_measured"), "contact of each foot"),
+}
+"""Codes by CF's conventions for flags: what 0, 1 and 2 mean, and of what."""
+_FLAGGED = {"moments": "moment_source", "moments_sd": "moment_source", "joint_loads": "joint_source"} | dict.fromkeys(
+    ("foot_wrench", "foot_wrench_sd"), "foot_contact"
+)
 _PARAMETER_NUMBERS = ("value", "sd", "initial", "table", "lower", "upper")
 
 
@@ -42,6 +51,16 @@ def full_dataset(estimate: Estimate) -> xr.Dataset:
             variable.attrs["units"] = unit
     for name in [name for name, variable in data.data_vars.items() if variable.dtype.kind == "f"]:
         data[name] = data[name].copy(data=finite(data[name].values))
+    for name, (meanings, what) in _FLAGS.items():
+        if name in data:
+            data[name].attrs.update(
+                long_name=what,
+                flag_values=np.arange(len(meanings), dtype=data[name].dtype),
+                flag_meanings=" ".join(meanings),
+            )
+    for name, flag in _FLAGGED.items():
+        if name in data and flag in data:
+            data[name].attrs["ancillary_variables"] = flag
     data["time"].attrs["units"] = "s"
     parameters, events = estimate.parameters, estimate.events
     data = data.assign_coords(parameter=[p.name for p in parameters])

@@ -17,6 +17,7 @@ OUTPUT_FILES = (
     "speeds.sto",
     "accelerations.sto",
     "moments.sto",
+    "moments_source.sto",
     "markers.trc",
     "wrench.sto",
     "uncertainty.sto",
@@ -29,7 +30,14 @@ OUTPUT_FILES = (
     "config.toml",
     "report.html",
 )
-OPTIONAL_FILES = ("centre_of_mass.sto", "joint_reactions.sto", "feet.sto", "angles.sto")
+OPTIONAL_FILES = (
+    "centre_of_mass.sto",
+    "joint_reactions.sto",
+    "joint_reactions_source.sto",
+    "feet.sto",
+    "feet_source.sto",
+    "angles.sto",
+)
 """Written where an estimate holds what they are made of, or where they were asked for."""
 
 

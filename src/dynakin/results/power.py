@@ -7,6 +7,8 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.results.stances import counted
+
 if TYPE_CHECKING:
     from dynakin.results.estimate import Estimate
 
@@ -48,21 +50,23 @@ def root_coordinates(estimate: Estimate) -> set[str]:
 
 
 def work(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str, dict[str, float | None]]:
-    """Of each coordinate that a known moment acts along: work in J and J/kg, peaks in W, over the frames ``window``.
+    """Of each coordinate that a measured moment acts along: work in J and J/kg, peaks in W, over the frames ``window``.
 
-    Coordinates of the root are left out: the moment of a fixed one (a planar model's toe) is the ground's, and a
-    floating one has none.
+    Where a leg's moments are not measured throughout, over its whole measured stances and swings (`counted`);
+    ``frames`` says over how many. Coordinates of the root are left out: the moment of a fixed one (a planar model's
+    toe) is the ground's, and a floating one has none.
     """
     mass, root = estimate.mass_kg, root_coordinates(estimate)
+    taken = counted(estimate, window)
+    powers = np.where(taken, estimate.powers(), np.nan)
     found: dict[str, dict[str, float | None]] = {}
     for k, name in enumerate(estimate.coordinate_names):
-        power = estimate.powers()[window, k]
-        if name in root or not np.abs(np.nan_to_num(power)).any():  # locked, or never known
+        if name in root or not np.abs(np.nan_to_num(powers[:, k])).any():  # locked, or never known
             continue
-        own = work_of(estimate.time[window], power)
+        own = work_of(estimate.time, powers[:, k])
         per_kg = {
             "positive_j_per_kg": own.positive_j / mass if mass else None,
             "negative_j_per_kg": own.negative_j / mass if mass else None,
         }
-        found[name] = own._asdict() | per_kg
+        found[name] = own._asdict() | per_kg | {"frames": int(taken[:, k].sum())}
     return found

@@ -39,6 +39,7 @@ def save_estimate(
         motion_files.write_speeds(estimate, made / "speeds.sto")
         motion_files.write_accelerations(estimate, made / "accelerations.sto")
         motion_files.write_moments(estimate, made / "moments.sto")
+        motion_files.write_moment_sources(estimate, made / "moments_source.sto")
         motion_files.write_wrench(estimate, made / "wrench.sto")
         motion_files.write_deviations(estimate, made / "uncertainty.sto")
         body_files.write_body_files(estimate, made)

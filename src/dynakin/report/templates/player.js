@@ -4,7 +4,7 @@
   var data = JSON.parse(document.getElementById("player-data").textContent);
   var stage = root.querySelector(".stage"), unpack = dynakinPlayer.unpack, text = dynakinPlayer.text;
   var points = unpack(data.points), arrows = unpack(data.arrows), forces = unpack(data.forces);
-  var angles = unpack(data.angles), moments = unpack(data.moments);
+  var angles = unpack(data.angles), moments = unpack(data.moments), derived = unpack(data.derived);
   var kinds = [["measured", unpack(data.measured)], ["estimated", unpack(data.estimated)]];
   function all(selector) { return Array.prototype.slice.call(root.querySelectorAll(selector)); }
   var bones = all(".bone"), joints = all(".joint"), rows = all("tbody tr.coordinate"), sizes = all(".size");
@@ -39,6 +39,7 @@
     });
     lines.forEach(function (arrow, i) {
       line(arrow, arrows(frame, 4 * i), arrows(frame, 4 * i + 1), arrows(frame, 4 * i + 2), arrows(frame, 4 * i + 3));
+      arrow.classList.toggle("derived", i === 1 && derived(frame, rows.length) > 0.5);
     });
     if (data.follow && count) {
       stage.setAttribute("viewBox", [middle / count - data.view[2] / 2, data.view[1], data.view[2], data.view[3]].join(" "));
@@ -46,7 +47,7 @@
     rows.forEach(function (row, i) {
       var unit = data.units[i];
       row.cells[1].textContent = text(angles(frame, i), 1, unit[0]);
-      row.cells[2].textContent = text(moments(frame, i), 1, unit[1]);
+      row.cells[2].textContent = (derived(frame, i) > 0.5 ? "≈ " : "") + text(moments(frame, i), 1, unit[1]);
     });
     sizes.forEach(function (cell, i) { cell.textContent = text(forces(frame, i), 0, "N"); });
   });

@@ -47,7 +47,11 @@
     var g = data.view.mm_per_newton, a = project(x, y, z);
     var b = project(x + g * f(frame, k), y + g * f(frame, k + 1), z + g * f(frame, k + 2));
     var dx = b[0] - a[0], dy = b[1] - a[1], long = Math.hypot(dx, dy), head = Math.min(4 * entry.width + 4, long);
+    pen.setLineDash(entry.derived && arrays.derived(frame, entry.k) > 0.5 ? [7, 5] : []);
+    pen.lineCap = "butt";
     stroke(a, b, entry.colour, entry.width);
+    pen.setLineDash([]);
+    pen.lineCap = "round";
     if (long < 2) { return; }
     dx /= long; dy /= long;
     pen.fillStyle = entry.colour; pen.beginPath();
@@ -92,7 +96,8 @@
     }
     cells.forEach(function (cell) {
       var name = cell.getAttribute("data-array"), column = Number(cell.getAttribute("data-column"));
-      cell.textContent = text(arrays[name](frame, column), Number(cell.getAttribute("data-digits")), "");
+      var derived = name === "moments" && arrays.moments_derived(frame, column) > 0.5;
+      cell.textContent = (derived ? "≈ " : "") + text(arrays[name](frame, column), Number(cell.getAttribute("data-digits")), "");
     });
   }
   function fit() {

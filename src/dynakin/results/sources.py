@@ -1,0 +1,170 @@
+"""Where a moment or a force comes from: measured, derived from the motion, or absent; and what that says in words.
+
+A moment hangs on the ground's reaction at every contact that lies behind its joint. Where one of these is not measured,
+but all others are, it follows from the motion and is *derived*; where that cannot be said either, it is *absent* (NaN).
+"""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from dynakin.results.naming import listed
+
+if TYPE_CHECKING:
+    from dynakin.results.estimate import Estimate
+
+Array = npt.NDArray[np.float64]
+Codes = npt.NDArray[np.uint8]
+
+MEASURED, DERIVED, ABSENT = range(3)
+"""Codes of ``moment_source`` and ``joint_source``."""
+MEANINGS = ("measured", "derived", "absent")
+NOTES = (
+    "0 measured: the ground's reaction behind it is measured, or there is none (a foot in the air, an arm).",
+    "1 derived: from the motion, because one contact behind it is not measured.",
+    "2 absent: not known, the value is nan.",
+)
+"""What the codes say, for the headers of files."""
+REASON = re.compile(r"left out there|total wrench is left out|not used|set aside|no moments|nothing declares|absent")
+"""How the messages of a run that leaves out the ground's reaction, and with it moments, can be known."""
+
+
+def moment_sources(data: xr.Dataset) -> Codes:
+    """(T, C) of the moments; what has no codes is measured, what is NaN is absent."""
+    return _sources(data, "moment_source", "moments", "coordinate")
+
+
+def joint_sources(data: xr.Dataset) -> Codes:
+    """(T, J) of the loads of the joints; components out of a planar model's plane do not count."""
+    return _sources(data, "joint_source", "joint_loads", "joint")
+
+
+def wrench_sources(data: xr.Dataset) -> Codes:
+    """(T, 6) of the estimated total wrench: derived from the motion alone where the plates do not tell it."""
+    estimated = data["wrench_estimated"].transpose("time", "component").values
+    codes = np.zeros(estimated.shape, dtype=np.uint8)
+    if "wrench_measured" in data:
+        codes[np.isnan(data["wrench_measured"].transpose("time", "component").values)] = DERIVED
+    codes[np.isnan(estimated)] = ABSENT
+    return codes
+
+
+def measured_only(values: Array, sources: Codes) -> Array:
+    """Values, NaN where they are not measured: what peaks, work, symmetry and mean curves are made of."""
+    return np.where(sources == MEASURED, values, np.nan)
+
+
+def measured_moments(data: xr.Dataset) -> Array:
+    """(T, C) N m or N, NaN where they are not measured."""
+    return measured_only(data["moments"].transpose("time", "coordinate").values, moment_sources(data))
+
+
+def measured_wrench(data: xr.Dataset) -> Array:
+    """(T, 6) N and N m: the estimated total wrench, NaN where the plates do not tell it."""
+    return measured_only(data["wrench_estimated"].transpose("time", "component").values, wrench_sources(data))
+
+
+def legs_of(data: xr.Dataset) -> list[str]:
+    """(C,) name of the foot on whose leg each coordinate moves a segment, "" for trunk, arms and root.
+
+    A leg reaches from its foot up to, but without, the first segment that all feet share, and holds what hangs on it.
+    Of a model whose feet are not told, legs are the sided limbs that hang on the root: ``thigh_r``, not ``humerus_r``.
+    """
+    if "coordinate_segment" not in data.coords or "joint_parent" not in data.coords:
+        return [""] * data.sizes["coordinate"]
+    segments = [str(name) for name in data["joint_segment"].values]
+    parents = [int(parent) for parent in data["joint_parent"].values]
+    legs = [""] * len(segments)
+    if "foot_segment" in data.coords:
+        chains = {
+            str(foot): _up_from(segments.index(str(segment)), parents)
+            for foot, segment in zip(data["foot"].values, data["foot_segment"].values, strict=True)
+        }
+        for foot, chain in chains.items():
+            shared = {k for other, every in chains.items() if other != foot for k in every}
+            for k in chain:
+                if parents[k] >= 0 and k not in shared:
+                    legs[k] = foot
+    else:
+        for k, name in enumerate(segments):
+            if parents[k] >= 0 and parents[parents[k]] < 0:
+                legs[k] = _side(name)
+    for k, parent in enumerate(parents):  # parents stand before their children
+        if parent >= 0 and not legs[k]:
+            legs[k] = legs[parent]
+    carried = dict(zip(segments, legs, strict=True))
+    return [carried[str(name)] for name in data["coordinate_segment"].values]
+
+
+def _up_from(k: int, parents: list[int]) -> list[int]:
+    chain = []
+    while k >= 0:
+        chain.append(k)
+        k = parents[k]
+    return chain
+
+
+def _side(segment: str) -> str:
+    for side in ("right", "left"):
+        if segment.endswith((f"_{side[0]}", f"_{side}")) or segment.startswith(f"{side}_"):
+            return side
+    return ""
+
+
+def moment_figures(estimate: Estimate) -> dict[str, Any]:
+    """The block ``moments`` of ``metrics.json``: in how many frames of the recording the moments are measured, derived
+    and absent, by coordinate and by leg (where one of its moments is not measured, the leg is not), why, and in words.
+    """
+    data = estimate.data
+    sources = moment_sources(data)
+    groups = _groups(data)
+    legs = {name: _count(sources[:, columns].max(axis=1)) for name, columns in groups.items()}
+    reasons = []
+    if any(count["measured"] < len(sources) for count in legs.values()):
+        reasons = [text.removeprefix("Warning: ") for text in estimate.messages if REASON.search(text)]
+    return {
+        "what": "frames of the whole recording; derived: from the motion, because one contact behind the joint is not "
+        "measured; absent: not known",
+        "frames": len(sources),
+        "legs": legs,
+        "coordinates": {name: _count(sources[:, k]) for k, name in enumerate(estimate.coordinate_names)},
+        "reasons": reasons,
+        "verdict": _words(legs, len(sources)),
+    }
+
+
+def _groups(data: xr.Dataset) -> dict[str, list[int]]:
+    """Columns by leg; all of a model whose legs are not told apart."""
+    legs = legs_of(data)
+    groups = {leg: [k for k, own in enumerate(legs) if own == leg] for leg in dict.fromkeys(legs) if leg}
+    return groups or {"": list(range(len(legs)))}
+
+
+def _count(codes: Codes) -> dict[str, int]:
+    return {meaning: int((codes == code).sum()) for code, meaning in enumerate(MEANINGS)}
+
+
+def _words(legs: dict[str, dict[str, int]], frames: int) -> str:
+    what = "Moments" if "" in legs else "Leg moments"
+    for meaning, how in (("measured", "measured"), ("derived", "derived from the motion"), ("absent", "absent")):
+        if all(count[meaning] == frames for count in legs.values()):
+            return f"{what}: {how} in all {frames} frames."
+    each: list[str] = []
+    for leg, count in legs.items():
+        parts = [f"measured in {count['measured']}" + ("" if each else f" of {frames} frames")]
+        parts += [f"derived from the motion in {count['derived']}"] if count["derived"] else []
+        parts += [f"absent in {count['absent']}"] if count["absent"] else []
+        each.append(f"{leg} {listed(parts)}".strip())
+    return f"{what}: {'; '.join(each)}."
+
+
+def _sources(data: xr.Dataset, name: str, of: str, across: str) -> Codes:
+    values = data[of].transpose("time", across, ...).values
+    known = np.isfinite(values.reshape(*values.shape[:2], -1)).any(axis=2)
+    codes = data[name].transpose("time", across).values if name in data else np.zeros(known.shape)
+    return np.where(known, codes, ABSENT).astype(np.uint8)

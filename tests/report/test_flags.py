@@ -1,0 +1,192 @@
+"""Derived moments and forces are dashed wherever they are drawn, absent ones are not, and the page says so first."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from conftest import made_comparison
+from test_spatial import unpacked
+from walking_estimate import make_walker
+
+from dynakin.report import render_report, save_figures
+from dynakin.report.insights import in_short, insights
+from dynakin.report.method_sections import moment_part
+from dynakin.report.panels import Panel
+from dynakin.report.playback_spatial import spatial_playback
+from dynakin.report.sections import moment_section, wrench_section
+from dynakin.report.spatial_repetitions import spatial_repetition_section
+from dynakin.report.spatial_sections import foot_section, spatial_moment_section, spatial_wrench_section
+from dynakin.report.work_sections import asymmetry_section, power_section
+from dynakin.results import Estimate, Found, Repetition, compute_metrics
+from dynakin.results.mean_curves import mean_curves, signals
+from dynakin.results.sources import ABSENT, DERIVED, measured_moments
+
+DERIVED_WORDS = "derived from the motion"
+
+
+@pytest.fixture(scope="module")
+def walker() -> Estimate:
+    """The left foot's second whole stance is beside the plates."""
+    return make_walker((2,))
+
+
+@pytest.fixture(scope="module")
+def metrics(walker: Estimate) -> dict[str, Any]:
+    return compute_metrics(walker)
+
+
+def dashes(panel: Panel) -> int:
+    return panel.svg.count("stroke-dasharray")
+
+
+def titled(panels: list[Panel], start: str) -> Panel:
+    return next(panel for panel in panels if panel.title.startswith(start))
+
+
+def with_source(estimate: Estimate, code: int, frames: slice) -> Estimate:
+    """A planar estimate whose moments come from somewhere else for a time."""
+    source = np.zeros(estimate.data["moments"].shape, dtype=np.uint8)
+    source[frames, :4] = code
+    data = estimate.data.assign(moment_source=(("time", "coordinate"), source))
+    if code == ABSENT:
+        data["moments"] = data["moments"].where(source != ABSENT)
+    return replace(estimate, data=data)
+
+
+def test_derived_stretches_are_dashed_in_every_panel(walker: Estimate, metrics: dict[str, Any]) -> None:
+    whole = make_walker()
+    for section, sure in (
+        (
+            spatial_moment_section(walker, metrics).parts[0],
+            spatial_moment_section(whole, compute_metrics(whole)).parts[0],
+        ),
+        (power_section(walker, metrics), power_section(whole, compute_metrics(whole))),
+    ):
+        assert dashes(titled(section.panels, "Knee")) == 1 and dashes(titled(sure.panels, "Knee")) == 0
+    left = foot_section(walker, metrics).parts[1].panels
+    assert (
+        dashes(titled(left, "Vertical")) == 1
+        and dashes(titled(foot_section(walker, metrics).parts[0].panels, "V")) == 0
+    )
+    assert dashes(titled(spatial_wrench_section(walker, metrics).panels, "Vertical")) == 1
+    for section in (
+        spatial_moment_section(walker, metrics),
+        power_section(walker, metrics),
+        foot_section(walker, metrics),
+    ):
+        assert any(line.label == DERIVED_WORDS and line.dash == "dashed" for line in section.lines)
+    assert not any(line.label == DERIVED_WORDS for line in power_section(whole, compute_metrics(whole)).lines)
+
+
+def test_a_derived_stretch_has_no_band_and_no_peak(walker: Estimate, metrics: dict[str, Any]) -> None:
+    knee = titled(spatial_moment_section(walker, metrics).parts[0].panels, "Knee")
+    assert knee.note == "right 0.00 to 1.17; left 0.00 to 1.17"  # derived it would be 1.75
+    band = re.findall(r'<path d="([^"]+)" class="spread" fill="#D55E00"', knee.svg)
+    assert len(band) == 1 and band[0].count("M") == 2
+    assert titled(foot_section(walker, metrics).parts[1].panels, "Vertical").note.startswith("peak 700 N")
+    beside = make_walker((1, 2))
+    found = compute_metrics(beside)
+    assert "no peak" in titled(foot_section(beside, found).parts[1].panels, "Vertical").note
+    text = asymmetry_section(beside, found).text
+    assert "The left foot has no stance that is measured from touch-down to toe-off" in text
+    assert asymmetry_section(beside, found).tables[0].rows[0][1:] == ("–", "–")
+
+
+def test_absent_legs_are_not_drawn_and_the_page_says_so_first() -> None:
+    walker = make_walker((0, 1, 2, 3), absent=True)
+    data = walker.data.copy(deep=True)
+    data["moment_source"][:, :3] = ABSENT
+    data["moments"][:, :3] = np.nan
+    gone = replace(walker, data=data)
+    metrics = compute_metrics(gone)
+    section = spatial_moment_section(gone, metrics)
+    assert section.text.startswith("Leg moments: absent in all 301 frames.")
+    assert [panel.title for part in section.parts for panel in [*part.panels, *part.folded]] == ["Arm flex"]
+    assert "Absent in every frame: right knee and left knee." in section.text
+    assert section.notes == (gone.messages[-1],)
+    data["moment_source"][:], data["moments"][:] = ABSENT, np.nan
+    nothing = replace(walker, data=data)
+    found = compute_metrics(nothing)
+    assert "muscles" not in spatial_moment_section(nothing, found).text
+    assert spatial_moment_section(nothing, found).parts == [] and found["work"] == {}
+    html = render_report(gone)
+    summary = html[html.index('id="summary"') :]
+    assert summary.index("Leg moments: absent in all 301 frames.") < summary.index("findings to look at")
+    assert "joint moments" in in_short(insights(gone, metrics))
+
+
+def test_the_film_dashes_what_is_derived(walker: Estimate) -> None:
+    found = spatial_playback(walker)
+    content = json.loads(str(found.data))
+    frames = np.searchsorted(walker.time, np.array(content["time"]) - 1e-6)
+    derived = unpacked(content["arrays"]["derived"])
+    np.testing.assert_allclose(derived[:, 1], (frames >= 170) & (frames < 230), atol=1e-3)
+    assert not derived[:, 0].any() and found.has_derived
+    assert [entry["derived"] for entry in content["arrows"]] == [False, False, True, True]
+    html = render_report(walker)
+    assert "A dashed arrow, and a moment with ≈, is derived from the motion" in html
+    assert "setLineDash(entry.derived" in html
+    assert "A dashed arrow" not in render_report(make_walker())
+
+
+def test_mean_curves_say_how_many_cycles_are_left(walker: Estimate) -> None:
+    time = walker.time
+    cycles = tuple(Repetition("gait", "left", a, a + 99, float(time[a]), float(time[a + 99])) for a in (70, 170))
+    own = signals(
+        walker.coordinate_names, walker.is_rotation(), walker.data["coordinates"].values, measured_moments(walker.data)
+    )
+    curves = mean_curves(time, cycles, {"EKF": own}, 60.0)
+    section = spatial_repetition_section(walker, Found("gait", cycles, "2 gait cycles."), curves)
+    knee = titled(section.parts[1].panels, "Knee")
+    assert "left: 1 of 2 repetitions" in knee.note
+    gone = mean_curves(time, cycles[1:], {"EKF": [s for s in own if s.quantity != "knee_angle_r/moment"]}, 60.0)
+    section = spatial_repetition_section(walker, Found("gait", cycles[1:], "1 gait cycle."), gone)
+    assert "No cycle is left of the moments of knee." in section.text
+    assert all(not panel.title.startswith("Knee") for part in section.parts[1:] for panel in part.panels)
+
+
+def test_planar_panels_dash_what_is_derived_and_leave_out_what_is_absent(estimate: Estimate) -> None:
+    derived = with_source(estimate, DERIVED, slice(0, 300))
+    section = moment_section(derived, compute_metrics(derived))
+    knee, shoulder = titled(section.panels, "Knee"), titled(section.panels, "Shoulder")
+    assert dashes(knee) == 1 and dashes(shoulder) == 0
+    assert any(line.label == DERIVED_WORDS for line in section.lines)
+    assert "derived from the motion in 300" in section.text
+    absent = with_source(estimate, ABSENT, slice(None))
+    section = moment_section(absent, compute_metrics(absent))
+    assert "Knee" not in [panel.title for panel in section.panels]
+    assert "knee" not in compute_metrics(absent)["peak_moments_per_kg"]
+    data = estimate.data.copy(deep=True)
+    data["wrench_measured"][100:200] = np.nan
+    missing = replace(estimate, data=data)
+    assert dashes(titled(wrench_section(missing, compute_metrics(missing)).panels, "Vertical")) == 1
+
+
+def test_moments_by_method_are_compared_where_measured_and_dashed_elsewhere(jointed: Estimate) -> None:
+    derived = with_source(jointed, DERIVED, slice(0, 600))
+    data = derived.data.copy(deep=True)
+    data["moments"][:600, :4] *= 3.0
+    trial, plain = made_comparison(replace(derived, data=data)), made_comparison(jointed)
+    panels = moment_part(trial, "m").panels
+    assert dashes(panels[0]) > dashes(moment_part(plain, "m").panels[0])
+    knee = trial.methods[0].measured_moments()[:, trial.coordinate_names.index("knee")]
+    assert np.isnan(knee[:600]).all() and np.isfinite(knee[600:]).all()
+    assert "10.0 N m" in panels[0].note  # AT is 10 N m off where both are there, whatever is derived
+
+
+def test_figures_for_papers_dash_what_is_derived(walker: Estimate, tmp_path: Path) -> None:
+    written = {path.stem: path.read_text() for path in save_figures(walker, tmp_path / "a", ("svg",))}
+    whole = {path.stem: path.read_text() for path in save_figures(make_walker(), tmp_path / "b", ("svg",))}
+    for name in ("figure6_wrench", "figure7_knee_moment"):
+        assert DERIVED_WORDS in written[name] and "stroke-dasharray" in written[name]
+        assert DERIVED_WORDS not in whole[name]
+    data = walker.data.copy(deep=True)
+    data["moments"][:] = np.nan
+    gone = save_figures(replace(walker, data=data), tmp_path / "c", ("svg",))
+    assert "figure7_knee_moment" not in [path.stem for path in gone]

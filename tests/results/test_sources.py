@@ -1,0 +1,219 @@
+"""What is not measured stays out of the figures, and says in every file what it is."""
+
+from __future__ import annotations
+
+import csv
+import io
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from rich.console import Console
+from walking_estimate import MASS_KG, STANCE_S, make_walker
+
+from dynakin.cli import summary
+from dynakin.recordings import read_table
+from dynakin.results import Estimate, Repetition, compute_metrics
+from dynakin.results.feet import NOT_MEASURED
+from dynakin.results.mean_curves import curve_points, mean_curves, signals, write_curves
+from dynakin.results.sources import ABSENT, DERIVED, legs_of, measured_moments, moment_sources
+from dynakin.results.stances import counted, phases
+
+PEAK_N = 700.0
+ALL = (0, 1, 2, 3)
+"""Every stance of the left foot."""
+
+
+def test_phases_are_whole_between_touch_down_and_toe_off() -> None:
+    walker = make_walker((2,))
+    found = phases(walker, "left", np.ones(301, dtype=bool))
+    assert [(p.first, p.end, p.stance, p.whole, p.measured) for p in found] == [
+        (0, 30, True, False, True),
+        (30, 70, False, True, True),
+        (70, 130, True, True, True),
+        (130, 170, False, True, True),
+        (170, 230, True, True, False),
+        (230, 270, False, True, True),
+        (270, 301, True, False, True),
+    ]
+
+
+def test_a_symmetric_walker_is_symmetric_where_both_feet_have_a_whole_measured_stance() -> None:
+    found = compute_metrics(make_walker((2,)))["asymmetry"]
+    assert found["stances"] == {"right": 3, "left": 1} and found["reason"] is None
+    assert found["feet"] == pytest.approx({"peak_vertical_force": 0.0, "impulse": 0.0}, abs=1e-9)
+    assert found["coordinates"]["knee_angle"] == pytest.approx(
+        {"range": 0.0, "peak_moment": 0.0, "positive_work": 0.0, "negative_work": 0.0}, abs=0.5
+    )
+
+
+@pytest.mark.parametrize("absent", [False, True])
+def test_without_a_whole_measured_stance_of_one_foot_nothing_is_compared(absent: bool) -> None:
+    """A plate is missing under the left foot: today's +100 % and more are of the plates, not of the person."""
+    found = compute_metrics(make_walker((1, 2), absent=absent))["asymmetry"]
+    assert found["feet"] == {"peak_vertical_force": None, "impulse": None}
+    knee, arm = found["coordinates"]["knee_angle"], found["coordinates"]["arm_flex"]
+    assert knee["peak_moment"] is knee["positive_work"] is knee["negative_work"] is None
+    assert knee["range"] == pytest.approx(0.0, abs=0.5)
+    assert arm["peak_moment"] is not None and arm["negative_work"] is not None
+    assert "The left foot has no stance that is measured from touch-down to toe-off" in found["reason"]
+
+
+def test_peaks_and_work_are_of_whole_measured_stances_and_swings() -> None:
+    metrics = compute_metrics(make_walker((2,)))
+    peaks, work = metrics["peak_moments_per_kg"], metrics["work"]
+    assert peaks["knee_angle_l"]["largest"] == pytest.approx(0.1 * PEAK_N / MASS_KG, rel=0.01)  # derived: 1.5 times
+    assert peaks["knee_angle_r"]["frames"] == 301 and peaks["knee_angle_l"]["frames"] == 60 + 3 * 40
+    assert work["knee_angle_l"]["frames"] == 180 and work["arm_flex_l"]["frames"] == 301
+    assert work["knee_angle_l"]["positive_j"] == pytest.approx(work["knee_angle_r"]["positive_j"] / 3.0, rel=0.02)
+    nothing = compute_metrics(make_walker(ALL, absent=True))
+    for found in (nothing["peak_moments_per_kg"], nothing["work"]):  # swings alone have no peak of a leg
+        assert "knee_angle_l" not in found and {"knee_angle_r", "arm_flex_l"} <= set(found)
+
+
+def test_standing_on_a_plate_that_fails_for_a_frame_has_no_peak() -> None:
+    walker = make_walker()
+    data = walker.data.copy(deep=True)
+    data["foot_contact"][:] = 1
+    data["foot_contact"][100, 1] = NOT_MEASURED
+    data["moment_source"][100, 2] = DERIVED
+    standing = replace(walker, data=data)
+    assert counted(standing, np.ones(301, dtype=bool)).sum(axis=0).tolist() == [301, 301, 0, 301, 301]
+    found = compute_metrics(standing)["asymmetry"]
+    assert found["feet"]["impulse"] is None and found["stances"] is None
+    assert "not measured in every frame" in found["reason"]
+
+
+def test_frames_are_counted_by_leg_and_said_with_the_reason() -> None:
+    found = compute_metrics(make_walker((2,)))["moments"]
+    assert found["legs"] == {
+        "right": {"measured": 301, "derived": 0, "absent": 0},
+        "left": {"measured": 241, "derived": 60, "absent": 0},
+    }
+    assert found["coordinates"]["arm_flex_l"]["measured"] == 301
+    assert found["verdict"] == (
+        "Leg moments: right measured in 301 of 301 frames; left measured in 241 and derived from the motion in 60."
+    )
+    assert found["reasons"] == make_walker((2,)).messages[-1:]
+    whole = compute_metrics(make_walker())["moments"]
+    assert whole["verdict"] == "Leg moments: measured in all 301 frames." and whole["reasons"] == []
+
+
+def test_legs_are_found_without_feet_too() -> None:
+    data = make_walker().data
+    assert legs_of(data) == ["", "right", "left", "", ""]
+    assert legs_of(data.drop_dims("foot")) == ["", "right", "left", "", ""]
+
+
+def test_what_has_no_codes_is_measured_and_what_is_nan_is_absent(estimate: Estimate) -> None:
+    assert "moment_source" not in estimate.data and not moment_sources(estimate.data).any()
+    assert compute_metrics(estimate)["moments"]["verdict"] == "Moments: measured in all 1201 frames."
+    data = estimate.data.copy(deep=True)
+    data["moments"][5, 2] = np.nan
+    assert moment_sources(data)[5, 2] == ABSENT and moment_sources(data).sum() == ABSENT
+
+
+@pytest.fixture(scope="module", params=[False, True], ids=["derived", "absent"])
+def saved(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[Estimate, Path]:
+    walker = make_walker((2,), absent=request.param)
+    return walker, walker.save(tmp_path_factory.mktemp("walker") / "out")
+
+
+def test_every_table_has_its_flags(saved: tuple[Estimate, Path]) -> None:
+    walker, folder = saved
+    code = walker.data["moment_source"].values.max()
+    moments, sources = read_table(folder / "moments.sto"), read_table(folder / "moments_source.sto")
+    assert list(moments.names) == list(sources.names)
+    np.testing.assert_array_equal(sources.values, walker.data["moment_source"].values)
+    np.testing.assert_array_equal(np.isnan(moments.values), sources.values == ABSENT)
+    text = (folder / "moments_source.sto").read_text().split("endheader")[0]
+    assert "1 derived" in text and "2 absent" in text
+    powers = read_table(folder / "powers.sto")
+    np.testing.assert_array_equal(np.isnan(powers.values), sources.values == ABSENT)
+    deviations = read_table(folder / "uncertainty.sto")
+    knee = deviations.values[:, list(deviations.names).index("knee_angle_l_moment")]
+    np.testing.assert_array_equal(np.isnan(knee), sources.values[:, 2] == ABSENT)
+    joints, feet = read_table(folder / "joint_reactions_source.sto"), read_table(folder / "feet_source.sto")
+    columns = dict(zip(joints.names, joints.values.T, strict=True))
+    off_plate = slice(170, 230)
+    assert (columns["shank_l_on_shank_l_in_ground"][off_plate] == code).all()
+    assert not columns["shank_r_on_shank_r_in_ground"].any()
+    assert list(feet.names) == ["ground_force_r", "ground_force_l"] and (feet.values[off_plate, 1] == code).all()
+    force = read_table(folder / "feet.sto")
+    lacking = np.isnan(force.values[:, [str(n).startswith("ground_force_l_") for n in force.names]]).all(axis=1)
+    np.testing.assert_array_equal(lacking, feet.values[:, 1] == ABSENT)
+
+
+def test_netcdf_flags_follow_cf(saved: tuple[Estimate, Path]) -> None:
+    walker, folder = saved
+    with xr.open_dataset(folder / "estimate.nc") as stored:
+        for name in ("moment_source", "joint_source"):
+            assert list(stored[name].attrs["flag_values"]) == [0, 1, 2]
+            assert stored[name].attrs["flag_meanings"] == "measured derived absent"
+            np.testing.assert_array_equal(stored[name].values, walker.data[name].values)
+        assert stored["foot_contact"].attrs["flag_meanings"] == "in_the_air measured not_measured"
+        assert stored["moments"].attrs["ancillary_variables"] == "moment_source"
+        assert stored["joint_loads"].attrs["ancillary_variables"] == "joint_source"
+
+
+def test_a_cycle_that_is_not_measured_throughout_is_left_out_of_the_mean(tmp_path: Path) -> None:
+    walker = make_walker((2,))
+    time, data = walker.time, walker.data
+    cycles = [Repetition("gait", "left", a, a + 99, float(time[a]), float(time[a + 99])) for a in (70, 170)]
+    own = signals(
+        walker.coordinate_names,
+        walker.is_rotation(),
+        data["coordinates"].values,
+        measured_moments(data),
+    )
+    curves = {c.quantity: c for c in mean_curves(time, cycles, {"EKF": own}, MASS_KG)}
+    knee = curves["knee_angle_l/moment"]
+    assert (knee.n == 1).all() and knee.of == 2 and knee.times == "1 of 2 repetitions"
+    assert knee.mean.max() == pytest.approx(0.1 * PEAK_N, rel=0.01)
+    assert (curves["knee_angle_l"].n == 2).all() and (curves["arm_flex_l/moment"].n == 2).all()
+    write_curves(tmp_path / "r.csv", curve_points("walk", [knee]))
+    with (tmp_path / "r.csv").open() as file:
+        row = next(csv.DictReader(file))
+    assert (row["n"], row["repetitions"]) == ("1", "2")
+
+
+def test_impulse_is_the_stances() -> None:
+    """Twice the load on the right: its index is that of the stances, whatever their number."""
+    walker = make_walker((2,))
+    data = walker.data.copy(deep=True)
+    data["foot_wrench"].loc[{"foot": "right"}] *= 2.0
+    found = compute_metrics(replace(walker, data=data))["asymmetry"]["feet"]
+    assert found["impulse"] == pytest.approx(200.0 / 3.0, abs=0.01)
+    assert found["peak_vertical_force"] == pytest.approx(200.0 / 3.0, abs=0.01)
+    stance = data["foot_wrench"].values[20:80, 0, 1]
+    assert np.trapezoid(stance, walker.time[20:80]) == pytest.approx(2.0 * PEAK_N * STANCE_S * 2.0 / np.pi, rel=0.01)
+
+
+def test_nothing_left_at_the_root_is_said_by_the_numbers_only() -> None:
+    walker = make_walker((2,))
+    feet = compute_metrics(walker)["feet"]
+    assert feet["verdict"].startswith("Nothing is left at the root in the 241 of 301 frames in which every contact")
+    data = walker.data.copy(deep=True)
+    data["wrench_remainder"][50, 1] = 718.0
+    contradicted = compute_metrics(replace(walker, data=data))["feet"]
+    assert contradicted["left_at_root"]["grounded"]["force_n"] == pytest.approx(718.0)
+    assert "Nothing is left" not in contradicted["verdict"]
+    assert "Up to 718 N and 0 N m are left at the root" in contradicted["verdict"]
+    data["foot_contact"][:] = 0  # both feet "in the air" for three seconds
+    flying = compute_metrics(replace(walker, data=data))["feet"]["verdict"]
+    assert "Nothing is left" not in flying and "That is no flight" in flying
+    data["foot_contact"][:] = NOT_MEASURED
+    unknown = compute_metrics(replace(walker, data=data))["feet"]
+    assert unknown["left_at_root"] == {"grounded": None, "flight": None}
+    assert "Nothing is left" not in unknown["verdict"]
+
+
+def test_the_console_says_first_what_is_measured(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = io.StringIO()
+    monkeypatch.setattr(summary, "out", lambda: Console(file=text, width=200))
+    summary.print_summary(make_walker((2,)), Path("out"))
+    first, second = text.getvalue().splitlines()[:2]
+    assert first.startswith("Leg moments: right measured in 301 of 301 frames")
+    assert "off the plates from 1.70 to 2.30 s" in second
