@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from dynakin.config import make_config, read_config
-from dynakin.errors import ConfigError, DynakinError, ModelError, RecordingError
+from dynakin.errors import ConfigError, DynakinError, ModelError, OutputError, RecordingError
 from dynakin.filter import Estimator, Sample, presets
 from dynakin.model import Subject, load_marker_set, load_model, load_table
 from dynakin.model.validation import read_toml
 from dynakin.recordings import Plate, Recording, read, read_table, read_trc
+from dynakin.results import check_output_writable
 from dynakin.simulation import SimulatedTrial, simulate_squat
 from dynakin.stream.packets import MarkerPacket, PlatePacket
 from dynakin.stream.record_format import packet_record, text_record
@@ -145,6 +146,19 @@ def test_a_preset_that_starts_from_itself(tmp_path: Path) -> None:
     path = tmp_path / "own.toml"
     path.write_text(f'base = "{path}"\n')
     refused(lambda: presets.preset(str(path)), ConfigError, "base: preset")
+
+
+def test_a_slash_in_the_name_of_a_coordinate(whole: Path, tmp_path: Path) -> None:
+    osim, toml = tmp_path / "a.osim", tmp_path / "a.toml"
+    osim.write_text(OSIM_4.replace("flexion", "marker/x"))
+    refused(lambda: load_model(osim), ModelError, "a coordinate's name has no /")
+    toml.write_text((whole / "model_sagittal7.toml").read_text().replace('"knee"', '"marker/x"'))
+    refused(lambda: load_model(toml), ModelError, "found 'marker/x', expected a name without /")
+
+
+@pytest.mark.parametrize("name", ["a\0b", "a\udcff", "y" * 5000])
+def test_an_output_that_no_folder_can_be_called(tmp_path: Path, name: str) -> None:
+    refused(lambda: check_output_writable(tmp_path / name), OutputError, "cannot write results there")
 
 
 # --- recordings
