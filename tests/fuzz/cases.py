@@ -75,6 +75,14 @@ def _with_forces(path: Path, corpus: Path) -> Recording:
     return read(corpus / "markers_squat.trc", path)
 
 
+def _study(path: Path, corpus: Path) -> Any:
+    dataset = read_dataset(path)
+    for session in dataset.sessions:
+        if dataset.output.resolve() not in Path(session.content["output"]).resolve().parents:
+            raise Unclean(f"{session.name} is written to {session.content['output']}")
+    return [make_config(session.content, session.name) for session in dataset.sessions]
+
+
 READERS: Mapping[str, Callable[[Path, Path], Any]] = {
     "markers": _recording,
     "c3d": _recording,
@@ -85,7 +93,7 @@ READERS: Mapping[str, Callable[[Path, Path], Any]] = {
     "table": lambda path, _: load_table(path, None),
     "preset": lambda path, _: presets.preset(str(path)),
     "config": lambda path, _: make_config(read_config(path), str(path)),
-    "study": lambda path, _: read_dataset(path),
+    "study": _study,
     "subject": lambda path, _: read_identified(path),
     "known": lambda path, _: (read_known(path), read_values(path)),
 }

@@ -29,7 +29,7 @@ class Outcome:
     def __str__(self) -> str:
         return (
             f"{self.errors} clean errors, {self.results} clean results, {len(self.failed)} failed {self.failed}; "
-            f"longest {self.longest_s[0]:.2f} s (seed {self.longest_s[1]}), most memory {self.most_mb:.0f} MB"
+            f"longest {self.longest_s[0]:.2f} s (seed {self.longest_s[1]}), largest process {self.most_mb:.0f} MB"
         )
 
 
@@ -82,4 +82,4 @@ def _count(row: dict[str, object], found: Outcome) -> None:
     if row["outcome"] == "failed":
         found.failed[seed] = str(row["said"])
     found.longest_s = max(found.longest_s, (seconds, seed))
-    found.most_mb = max(found.most_mb, float(str(row["more_mb"])))
+    found.most_mb = max(found.most_mb, float(str(row["peak_mb"])))

@@ -44,7 +44,6 @@ def main(kind: str, start: int, count: int, corpus: Path, work: Path) -> None:
     signal.signal(signal.SIGALRM, _ring)
     resource.setrlimit(resource.RLIMIT_AS, (_now() + BYTES, resource.RLIM_INFINITY))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-    before = _peak_mb()
     for seed in range(start, start + count):
         print(json.dumps({"begins": seed}), flush=True)
         begun, said = time.perf_counter(), ""
@@ -58,7 +57,7 @@ def main(kind: str, start: int, count: int, corpus: Path, work: Path) -> None:
         finally:
             signal.alarm(0)
         seconds = time.perf_counter() - begun
-        row = {"seed": seed, "outcome": outcome, "said": said, "seconds": seconds, "more_mb": _peak_mb() - before}
+        row = {"seed": seed, "outcome": outcome, "said": said, "seconds": seconds, "peak_mb": _peak_mb()}
         print(json.dumps(row), flush=True)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from dynakin.model.mirroring import SUFFIXES, mirrored
-from dynakin.model.validation import Name, Strict, nearest
+from dynakin.model.validation import CoordinateName, Name, Strict, nearest
 
 Vector3 = Annotated[tuple[float, float, float], Field(description="three numbers")]
 LandmarkPair = tuple[str, str]
@@ -109,7 +109,7 @@ class Coordinate(Strict):
     """A generalised coordinate: limits of (9), start or locked value; degrees for rotations, metres
     otherwise."""
 
-    name: Name
+    name: CoordinateName
     description: str = ""
     minimum_deg: float | None = None
     maximum_deg: float | None = None

@@ -35,7 +35,7 @@ _POINTS = ("axis_from", "axis_to", "origin", "length_from", "length_to")
 _RADII = ("rxx", "ryy", "rzz", "rxy", "rxz", "ryz")
 _NUMBERS = ("mass_percent", "com_x", "com_y", "com_z", *_RADII)
 _COLUMNS = (*_TEXT, *_NUMBERS, "length_per_height")
-_ON_LINE = re.compile(r"^(\w+)>(\w+):([0-9]*\.?[0-9]{1,17})$")
+_ON_LINE = re.compile(r"^(\w+)>(\w+):([0-9]?\.?[0-9]{1,17})$")
 _LARGEST = 1e4  # percent: a hundred lengths or body masses; what is larger is damaged
 
 

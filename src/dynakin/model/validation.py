@@ -28,6 +28,13 @@ def _printable(name: str) -> str:
     return name
 
 
+def _without_slash(name: str) -> str:
+    if "/" in name:
+        raise ValueError(f"found {name!r}, expected a name without /, which parts a coordinate from its derivatives")
+    return _printable(name)
+
+
+CoordinateName = Annotated[str, AfterValidator(_without_slash)]
 Name = Annotated[str, AfterValidator(_printable)]
 """What something is called: it becomes a column of text files, which a line end or tab would break."""
 

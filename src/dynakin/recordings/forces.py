@@ -65,7 +65,7 @@ def _plate(group: PlateColumns, table: Table) -> tuple[Plate, list[str]]:
         notes.append(f"{name} has no free moment columns: 0 taken.")
     force, point = (_three(table, group.columns[quantity]) for quantity in ("force", "point"))
     free = _three(table, torque) if torque else np.zeros_like(force)
-    quiet = np.linalg.norm(force, axis=1) == 0.0
+    quiet = (force == 0.0).all(axis=1)
     point[quiet & np.isnan(point).any(axis=1)] = 0.0  # a blank point of no force
     with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused
         moment = np.cross(point, force) + free

@@ -217,6 +217,9 @@ def read_known(path: Path) -> dict[str, tuple[float, float]]:
     """
     try:
         entries = json.loads(read_bytes(path, ModelError, LARGEST_TEXT))["parameters"]
-        return {str(e["name"]): (float(e["value"]), float(e["sd"])) for e in entries if e["estimated"]}
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        found = {str(e["name"]): (float(e["value"]), float(e["sd"])) for e in entries if e["estimated"]}
+        if not np.isfinite(list(found.values())).all():
+            raise ValueError("a number is not finite")
+        return found
+    except (ValueError, KeyError, TypeError, ArithmeticError, RecursionError) as error:
         raise ModelError(f"{path}: no parameters.json of a run ({error})") from None

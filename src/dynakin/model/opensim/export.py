@@ -5,6 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
+
 from dynakin.elements import element
 from dynakin.errors import ModelError
 from dynakin.model.initial import InitialModel
@@ -25,8 +27,11 @@ def read_values(path: Path) -> dict[str, float]:
     """
     try:
         entries = json.loads(read_bytes(path, ModelError, LARGEST_TEXT))["parameters"]
-        return {str(entry["name"]): float(entry["value"]) for entry in entries}
-    except (ValueError, KeyError, TypeError, RecursionError) as error:
+        found = {str(entry["name"]): float(entry["value"]) for entry in entries}
+        if not np.isfinite(list(found.values())).all():
+            raise ValueError("a number is not finite")
+        return found
+    except (ValueError, KeyError, TypeError, ArithmeticError, RecursionError) as error:
         raise ModelError(f"{path}: no parameters.json of a run ({error})") from None
 
 
