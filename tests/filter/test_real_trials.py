@@ -9,6 +9,7 @@ import pytest
 
 import dynakin
 from dynakin.errors import ModelError
+from dynakin.results.feet import UNKNOWN
 
 
 @pytest.fixture(scope="module")
@@ -16,7 +17,7 @@ def squats1(data_dir: Path) -> dynakin.Estimate:
     folder = data_dir / "opencap_subject4"
     recording = dynakin.read(folder / "squats1.trc", forces=folder / "squats1_grf.mot")
     model = dynakin.load_model("sagittal7", subject=dynakin.Subject(mass_kg=60.05), markers="opencap")
-    return dynakin.Estimator(model).run(recording)
+    return dynakin.Estimator(model).run(recording, smooth=False)  # the paper filters
 
 
 def test_squats1_follows_markers_and_plates_as_the_paper_does(squats1: dynakin.Estimate) -> None:
@@ -60,7 +61,11 @@ def test_flywheel_squat_runs_to_the_end_without_preparation(data_dir: Path, mass
             values = values[..., :2]
         if name == "wrench_estimated":
             values = values[:, [0, 1, 5]]
-        assert np.isfinite(values).all(), name
+        known = np.ones(values.shape, dtype=bool)
+        if name == "moments":  # the cable's force is in the plates and in no segment
+            known = result.data["moment_source"].values != UNKNOWN
+            assert not known.all()
+        assert np.array_equal(np.isfinite(values), known), name
     if side != "auto":  # the right shoulder is lost for 68 frames
         assert any(event.kind == "missing" and event.subject == "RSHO" for event in result.events)
         assert np.isnan(result.data["markers_measured"].sel(marker="RSHO").values[:, 0]).sum() == 68

@@ -24,6 +24,7 @@ from dynakin.cli.options import (
     PlateFilter,
     Sex,
     Side,
+    Smooth,
     Static,
     TableName,
     Trials,
@@ -64,6 +65,7 @@ def compare(
     height: Height = None,
     sex: Sex = None,
     preset: Annotated[list[str] | None, typer.Option(help="Noise settings: default, paper. May be repeated.")] = None,
+    smooth: Smooth = None,
     cutoff: Annotated[float, typer.Option("--cutoff-hz", help="Low-pass of AT and classical, Hz.")] = CUTOFF_HZ,
     side: Side = None,
     vertical: Vertical = None,
@@ -88,6 +90,7 @@ def compare(
     given = given_keys(
         model, markers, static, mass, height, sex, side, vertical, forward, table, plate_filter, force_threshold
     )
+    given["smooth"] = smooth
     chosen = chosen_trials(trials or [], identify_trial, test_trial, halved or not_seen)
     cases = cases_of(chosen, forces or [], preset or [], cutoff, given)
     console = out()

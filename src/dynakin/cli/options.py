@@ -19,6 +19,10 @@ Mass = Annotated[float | None, typer.Option("--mass", help="Body mass, kg; else 
 Height = Annotated[float | None, typer.Option("--height", help="Body height, m; else from the markers.")]
 Sex = Annotated[str | None, typer.Option("--sex", help="male or female, for the table; else the mean of both.")]
 Preset = Annotated[str | None, typer.Option(help="Noise settings: default, paper or a .toml file.")]
+Smooth = Annotated[
+    bool | None,
+    typer.Option("--smooth/--live-like", help="Each frame from all frames (default), or as it would be live."),
+]
 Side = Annotated[str | None, typer.Option(help="Markers of a one-legged model: auto, right, left, both.")]
 Vertical = Annotated[str | None, typer.Option(help="Laboratory axis that points up: auto, +Y, +Z, ...")]
 Forward = Annotated[

@@ -10,6 +10,7 @@ from rich.table import Table
 from dynakin.cli.console import out, table
 from dynakin.results import Estimate
 from dynakin.results.bounds import counts_in_words
+from dynakin.results.records import NOT_SMOOTHED
 
 
 def print_summary(estimate: Estimate, folder: Path) -> None:
@@ -21,7 +22,7 @@ def print_summary(estimate: Estimate, folder: Path) -> None:
     for message in estimate.messages:
         if message.startswith("Warning:"):
             console.print(message, style="yellow")
-        elif message.endswith("brought into step."):
+        elif message.startswith(NOT_SMOOTHED) or message.endswith("brought into step."):
             console.print(message)
     console.print(f"Verdict: {' '.join(filter(None, verdicts))}", style="dim")
     console.print()
@@ -50,7 +51,8 @@ def _figures(estimate: Estimate, metrics: dict[str, Any]) -> Table:
             f"wrench {name}, RMS", f"{value:.2f} {unit}", "" if share is None else f"{share:.1f} % of measured"
         )
     after = metrics["adaptation"]["after_s"]
-    rows.add_row("settled after", "-" if after is None else f"{after:.1f} s", "")
+    if not estimate.smoothed:
+        rows.add_row("settled after", "-" if after is None else f"{after:.1f} s", "")
     stuck = metrics["events"]["parameters_at_bound"]
     free = sum(p.estimated and p.lower is not None for p in estimate.parameters)
     by_kind = counts_in_words(metrics["bounds"]["by_kind"], "at_end")

@@ -131,7 +131,7 @@ def trial_of(
     """
     methods = [_filtered(preset, estimate) for preset, estimate in estimates.items()]
     first = facing(next(iter(estimates.values())))
-    notes: list[str] = []
+    notes = how_estimated(estimates)
     options: tuple[tuple[str, Lengths], ...] = ((AT, "constant"), (CLASSICAL, "frame"))
     try:
         for kind, lengths in options:
@@ -159,6 +159,16 @@ def trial_of(
         notes=tuple(notes),
         estimates=dict(estimates),
     )
+
+
+def how_estimated(estimates: Mapping[str, Estimate]) -> list[str]:
+    """Which filters are smoothed and which are as live, where they stand beside each other and differ."""
+    if len({estimate.smoothed for estimate in estimates.values()}) < 2:
+        return []
+    return [
+        f"EKF ({preset}): " + ("each frame from all frames." if e.smoothed else "each frame as it would be live.")
+        for preset, e in estimates.items()
+    ]
 
 
 def _filtered(preset: str, estimate: Estimate) -> Method:

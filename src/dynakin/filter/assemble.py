@@ -14,6 +14,8 @@ from dynakin.absent import finite
 from dynakin.filter.events import events_of
 from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.filter.parameters import parameters_of
+from dynakin.filter.sources import with_sources
+from dynakin.filter.total_wrench import ELSEWHERE
 from dynakin.model import InitialModel
 from dynakin.recordings import Recording
 from dynakin.results import AXES, COMPONENTS, Estimate, Timing
@@ -33,6 +35,7 @@ def assemble(
     notes: Sequence[str],
     covariances: tuple[Array, Array],
     feet: FootWrenches | None = None,
+    undeclared: npt.NDArray[np.bool_] | None = None,
 ) -> Estimate:
     """Label what `Filter.run` returned and keep what is needed to judge it.
 
@@ -43,8 +46,12 @@ def assemble(
         notes: sentences of the plates' check.
         covariances: P (n, n) before the first frame and after the last.
         feet: the wrenches that the moments were made with, None where there were none.
+        undeclared: (T,) frames in which something bears the person that no plate measures.
     """
     data = _dataset(arrays, model, initial, recording, measured, feet)
+    data = with_sources(data, feet, np.zeros(len(recording.time), dtype=bool) if undeclared is None else undeclared)
+    if feet is not None:
+        data = data.isel(foot=[name != ELSEWHERE for name in feet.names])
     for name, covariance in zip(("initial_covariance", "final_covariance"), covariances, strict=True):
         data[name] = (("element", "element_"), covariance)
     prior_sd = np.sqrt(np.diag(covariances[0]))

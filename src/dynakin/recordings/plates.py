@@ -98,7 +98,7 @@ def check_plates(
     if not recording.plates:
         return PlateCheck(False, None, None, (), "no force plates in this recording, expected at least one")
     findings = _Findings()
-    standing = standing_window(recording)
+    standing = _on_plates(standing_window(recording), recording, ground)
     frames = standing if standing is not None else slice(None)
     mass = _check_vertical(recording, ground, mass_kg, standing, findings)
     feet = _feet(recording, ground, foot_markers or DEFAULT_FOOT_MARKERS, findings)
@@ -124,6 +124,13 @@ def check_plates(
     ok = refusal is None and not any(text.startswith("Warning:") for text in findings.messages)
     standing_mass, mean_mass = (mass, None) if standing is not None else (None, mass)
     return PlateCheck(ok, standing_mass, mean_mass, tuple(findings.messages), refusal)
+
+
+def _on_plates(standing: slice | None, recording: Recording, ground: GroundFrame) -> slice | None:
+    """The frames of standing, unless the plates are loaded at other times only: who stands is on a box then, say."""
+    total = ground.vectors_to_ground(np.sum([plate.force for plate in recording.plates], axis=0))
+    loaded = np.abs(np.nan_to_num(total[:, 1])) > LOADED_N
+    return None if standing is not None and loaded.any() and not loaded[standing].any() else standing
 
 
 def _check_vertical(

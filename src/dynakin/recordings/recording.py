@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import RecordingError
+from dynakin.recordings.limits import check_recording
 
 Array = npt.NDArray[np.float64]
 
@@ -51,6 +52,9 @@ class Plate:
 class Recording:
     """A trial as read: SI, laboratory frame of the file, a missing marker is NaN.
 
+    Made with times that do not increase, or values that nobody can have measured (`limits`), it raises a
+    RecordingError.
+
     Attributes:
         name: stem of the file's name.
         path: where it was read from, None if made in memory.
@@ -85,6 +89,7 @@ class Recording:
                 raise RecordingError(
                     f"{self.name}: {plate.name} has arrays of shapes {sorted(shapes)}, expected ({len(self.time)}, 3)"
                 )
+        check_recording(self)
 
     @property
     def n_frames(self) -> int:

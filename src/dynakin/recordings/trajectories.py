@@ -14,13 +14,13 @@ def clean_markers(names: tuple[str, ...], markers: Array) -> tuple[Array, list[s
     Several systems export an occluded marker as the laboratory's origin; no marker is ever there to the last
     bit.
     """
-    markers = markers.copy()
+    markers = markers.copy()  # infinite stays: `Recording` refuses it
     notes: list[str] = []
     origin = (markers == 0.0).all(axis=2)
     if origin.any():
         who = ", ".join(name for name, hit in zip(names, origin.any(axis=0), strict=True) if hit)
         notes.append(f"Markers at exactly 0, 0, 0 taken as missing ({int(origin.sum())} samples: {who}).")
-    partial = ~np.isfinite(markers).all(axis=2)
+    partial = np.isnan(markers).any(axis=2)
     markers[origin | partial] = np.nan
     missing = np.isnan(markers[:, :, 0]) if markers.size else np.zeros(markers.shape[:2], dtype=bool)
     if missing.any():

@@ -47,7 +47,7 @@ ADVICE = {
     ),
     "speeds": (
         "Smaller noise.coordinate and noise.speed tie each speed to its coordinate.",
-        "A live estimate steps where a measurement corrects it; smoothing (--smooth) does not.",
+        "A live estimate steps where a measurement corrects it; a smoothed one (without --live-like) does not.",
     ),
 }
 
@@ -71,7 +71,7 @@ def what_was_run(estimate: Estimate) -> str:
     return (
         f"{number(float(time[-1] - time[0]), 's')}{person}: {plural(len(time), 'frame')} at "
         f"{recording.rate:.4g} Hz, {len(estimate.marker_names)} of {len(recording.marker_names)} "
-        f"markers, {plates}."
+        f"markers, {plates}; each frame estimated {'from all frames' if estimate.smoothed else 'as it would be live'}."
     )
 
 
@@ -168,6 +168,8 @@ def _prediction(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
             f"{text} At worst that is {ratio[worst]:.1f} times as far as after it is seen "
             f"({COMPONENT_LABELS[worst][0].lower()}).",
         )
+    if estimate.smoothed:  # follows no single measurement
+        return Insight("note", "One frame ahead", text)
     return Insight(
         "warning",
         "One frame ahead",
@@ -187,7 +189,9 @@ def _consistency(estimate: Estimate, metrics: dict[str, Any]) -> Insight:
         advice = _advice(estimate, "cautious")
     elif ratio is not None and ratio > CONSISTENT[1]:
         advice = _advice(estimate, "overconfident")
-    return Insight("good" if good else "warning", "Uncertainty", found.verdict + figure, advice)
+    cautious = found.judgement == "conservative" and "not white" not in found.verdict
+    level: Level = "good" if good else "note" if cautious else "warning"
+    return Insight(level, "Uncertainty", found.verdict + figure, advice)
 
 
 def _speeds(estimate: Estimate) -> Insight | None:
@@ -223,7 +227,8 @@ def _constants(estimate: Estimate) -> list[Insight]:
             advice = "" if group.title == "lengths" else "A livelier movement, with the arms too; then smaller noise."
             found.append(Insight("note", title, text, advice))
         else:
-            text = f"Settled: {group.count}, changed from the start by up to {change} %; {shrunk}."
+            how = "Estimated from all frames" if estimate.smoothed else "Settled"
+            text = f"{how}: {group.count}, changed from the start by up to {change} %; {shrunk}."
             found.append(Insight("good", title, text))
     return found
 
@@ -253,9 +258,11 @@ def _bounds(estimate: Estimate, metrics: dict[str, Any]) -> Insight:
     )
 
 
-def _adaptation(metrics: dict[str, Any]) -> Insight:
+def _adaptation(metrics: dict[str, Any]) -> Insight | None:
     """When the estimate settled, beside the time from which the figures are taken."""
     found = metrics["adaptation"]
+    if not found["verdict"]:
+        return None
     if found["after_s"] is None:
         lost = any(misfit["after_s"] is None for misfit in found["misfits"].values())
         return Insight("warning" if lost else "note", "Adaptation", found["verdict"])

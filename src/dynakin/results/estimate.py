@@ -102,6 +102,11 @@ class Estimate:
         return [str(name) for name in self.data["foot"].values] if "foot" in self.data.coords else []
 
     @property
+    def smoothed(self) -> bool:
+        """Whether each frame was estimated from all frames; else from those until then, as it would be live."""
+        return bool(self.config.get("smooth"))
+
+    @property
     def mass_kg(self) -> float | None:
         """Body mass as used, kg."""
         mass = self.config.get("mass_kg")

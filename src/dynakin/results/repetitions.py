@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.signal import find_peaks
 
+from dynakin.elements import element
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.recordings import DEFAULT_PAIRS, GroundFrame, Recording, find_marker
 from dynakin.recordings.smoothing import smooth, stretches
@@ -96,7 +97,7 @@ def body_paths(recording: Recording, ground: GroundFrame, pelvis: Iterable[str] 
 
 def repetitions_of(estimate: Estimate, movement: Movement | None = None) -> Found:
     """Whole repetitions of an estimate that lie after the adaptation; as `find_repetitions`."""
-    carriers = {p.name.split("/")[1]: p.segment for p in estimate.parameters if p.kind == "marker"}
+    carriers = {element(p.name).owner: p.segment for p in estimate.parameters if p.kind == "marker"}
     pelvis = [name for name in estimate.marker_names if carriers.get(name) == "pelvis"]
     paths = body_paths(estimate.recording, estimate.ground, pelvis)
     return find_repetitions(paths, movement, evaluation_window(estimate.time))

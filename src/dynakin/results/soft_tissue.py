@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from dynakin.elements import element
 from dynakin.recordings.landmarks import plain_name
 from dynakin.results.estimate import AXES, Estimate
 from dynakin.results.naming import words
@@ -51,7 +52,7 @@ def displacements(estimate: Estimate, window: np.ndarray) -> dict[str, MarkerDis
     """
     blocks = [_paths(estimate, block) for block in ("marker", "soft_tissue")]
     initial = {p.name: p.initial for p in estimate.parameters}
-    segments = {p.name.split("/")[1]: p.segment for p in estimate.parameters if p.kind == "marker"}
+    segments = {element(p.name).owner: p.segment for p in estimate.parameters if p.kind == "marker"}
     measured = estimate.data["markers_measured"].transpose("time", "marker", "axis").values
     seen = np.isfinite(measured[:, :, estimate.modelled_axes()]).all(axis=2)
     found = {}
@@ -117,7 +118,7 @@ def _sites(estimate: Estimate) -> list[tuple[str, str]]:
     """Recorded name and name in the state of each marker, both in the model's order; the same where they differ in
     number (a filter that does not estimate every place)."""
     names = estimate.marker_names
-    sites = list(dict.fromkeys(p.name.split("/")[1] for p in estimate.parameters if p.kind == "marker"))
+    sites = list(dict.fromkeys(element(p.name).owner for p in estimate.parameters if p.kind == "marker"))
     if len(sites) == len(names):
         return list(zip(names, sites, strict=True))
     plain = {plain_name(site): site for site in sites}
@@ -141,8 +142,7 @@ def _paths(estimate: Estimate, block: str) -> dict[str, dict[str, np.ndarray]]:
     state = estimate.data["state"].transpose("time", "element").values
     paths: dict[str, dict[str, np.ndarray]] = {}
     for k, name in enumerate(str(name) for name in estimate.data["element"].values):
-        first, _, rest = name.partition("/")
-        site, _, axis = rest.rpartition("/")
-        if first == block and axis in AXES:
+        kind, site, axis = element(name)
+        if kind == block and axis in AXES:
             paths.setdefault(site, {})[axis] = state[:, k]
     return paths

@@ -15,6 +15,7 @@ import numpy as np
 
 from dynakin.errors import OutputError, RecordingError
 from dynakin.recordings import Recording
+from dynakin.recordings.limits import FASTEST_HZ, SLOWEST_HZ
 from dynakin.results import Estimate, check_output_writable
 from dynakin.stream.fusion import DELAY_S, Fused, Fusion
 from dynakin.stream.packets import MarkerPacket, Packet, PlatePacket, StreamInfo
@@ -122,9 +123,13 @@ def read_recorded(folder: str | Path) -> tuple[list[Fused], StreamInfo, StreamIn
                 fusion.push(record)
                 found += fusion.poll(record.arrived_s)
         elif "streams" in record:
-            streams = {kind: info and _info(info) for kind, info in record["streams"].items()}
-            fusion = Fusion(streams["markers"], streams["plates"], delay_s=record.get("delay_s", DELAY_S))
-            begun = record
+            if begun and record["streams"] != begun["streams"]:
+                raise RecordingError(f"{path}: holds two sessions with other markers or plates, expected one")
+            try:
+                fusion = fusion or _fusion(record)
+            except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
+                raise RecordingError(f"{path}: its streams are not told as expected ({error!r})") from None
+            begun = begun or record
     if fusion is None:
         raise RecordingError(f"{path}: holds no recorded session")
     return found + fusion.poll(np.inf), fusion.markers, fusion.plates, begun
@@ -154,5 +159,15 @@ def finish(folder: str | Path, output: str | Path) -> Estimate:
     return estimate
 
 
+def _fusion(record: Mapping[str, Any]) -> Fusion:
+    streams = {kind: info and _info(info) for kind, info in record["streams"].items()}
+    if not all(isinstance(record.get(key, {}), dict) for key in ("settings", "subject")):
+        raise ValueError("settings and subject, expected tables")
+    return Fusion(streams["markers"], streams["plates"], delay_s=float(record.get("delay_s", DELAY_S)))
+
+
 def _info(told: dict[str, Any]) -> StreamInfo:
-    return StreamInfo(tuple(told["names"]), float(told["rate_hz"]), str(told["clock"]), bool(told.get("ordered")))
+    rate = float(told["rate_hz"])
+    if not SLOWEST_HZ <= rate <= FASTEST_HZ:
+        raise ValueError(f"{rate:g} Hz, expected {SLOWEST_HZ:g} to {FASTEST_HZ:g} Hz")
+    return StreamInfo(tuple(map(str, told["names"])), rate, str(told["clock"]), bool(told.get("ordered")))

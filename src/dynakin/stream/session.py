@@ -275,8 +275,8 @@ class Live:
         plates = self.fusion.plates is not None
         self._monitor = Monitor(initial, self.fusion.markers.rate_hz, plates, plates and self._use_plates)
         self._feet = None
-        if initial.feet and self.fusion.plates is not None:
-            names = self.fusion.plates.names
+        if initial.feet:  # without plates too: what hangs on the ground is then absent
+            names = () if self.fusion.plates is None else self.fusion.plates.names
             self._feet = LiveFeet(initial, self.estimator.noise, names, self.estimator.plates)
         self._running = True
         self._ready_s = time.monotonic()
