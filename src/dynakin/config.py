@@ -65,7 +65,8 @@ class RunConfig(Strict):
     vertical: str = "auto"
     """Axis of the laboratory that points up: auto (found), or one of +X -X +Y -Y +Z -Z."""
     forward: str | tuple[float, float, float] = "auto"
-    """Direction in which the person faces, in the laboratory: auto (found), an axis, or three numbers."""
+    """Direction in which the person faces, in the laboratory: auto (found), an axis, or three numbers. Given, X of all
+    results is along it; else a floating model is estimated in the laboratory's own frame."""
     plate_filter_hz: float | None = Field(default=None, examples=[20.0])
     """Low-pass filter on the plates. Not given: only what resampling to the marker rate needs."""
     force_threshold_n: float | None = Field(default=None, examples=[10.0])

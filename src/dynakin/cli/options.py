@@ -25,7 +25,10 @@ Smooth = Annotated[
 ]
 Side = Annotated[str | None, typer.Option(help="Markers of a one-legged model: auto, right, left, both.")]
 Vertical = Annotated[str | None, typer.Option(help="Laboratory axis that points up: auto, +Y, +Z, ...")]
-Forward = Annotated[str | None, typer.Option(help="Facing direction: auto, an axis or three numbers (0,1,0).")]
+Forward = Annotated[
+    str | None,
+    typer.Option(help="Facing direction: auto, an axis or three numbers (0,1,0); given, X of the results is along it."),
+]
 Estimated = Annotated[
     str | None, typer.Option("--estimate", help="Parameters: some of lengths,markers,soft_tissue,inertia; or none.")
 ]

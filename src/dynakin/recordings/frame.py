@@ -10,6 +10,7 @@ import numpy.typing as npt
 
 from dynakin.errors import ConfigError
 from dynakin.recordings.facing import find_forward, horizontal
+from dynakin.recordings.handedness import refuse_mirrored
 from dynakin.recordings.landmarks import DEFAULT_PAIRS, FacingPairs
 from dynakin.recordings.recording import Array, Recording
 from dynakin.recordings.vertical import axis_vector, find_vertical
@@ -120,7 +121,7 @@ def find_ground_frame(
         pairs: markers that show the facing direction; ``find_marker``'s rules for their spelling.
 
     Raises:
-        RecordingError: not given and not to be found.
+        RecordingError: not given and not to be found, or the person is seen in a mirror (`handedness`).
         ConfigError: an unknown axis, or a forward direction that is vertical.
     """
     if vertical.casefold() == "auto":
@@ -130,6 +131,7 @@ def find_ground_frame(
         up = axis_vector(vertical)
         axis = ("+" if up.sum() > 0 else "-") + "XYZ"[int(np.argmax(np.abs(up)))]
         how = [f"Vertical {axis}: given."]
+    refuse_mirrored(recording, up, axis)
     if isinstance(forward, str) and forward.casefold() == "auto":
         ahead, found = find_forward(recording, up, pairs)
         how += found
