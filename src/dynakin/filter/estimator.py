@@ -27,6 +27,7 @@ from dynakin.model.validation import nearest
 from dynakin.recordings import Recording
 from dynakin.recordings.foot_loads import FootLoads
 from dynakin.results import Estimate
+from dynakin.results.tracking import without_lost
 
 Array = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]
@@ -104,6 +105,9 @@ class Estimator:
     ) -> Estimate:
         """Estimate a whole recording.
 
+        Frames in which the filter lost the person are NaN (`Estimate.lost`), and a message names them; of a trial that
+        was lost as a whole `Estimate.why_lost` gives the reason.
+
         Args:
             recording: markers and plates, as `read` gives them.
             static: the same person and markers, standing: lengths and marker places are taken from it.
@@ -146,7 +150,9 @@ class Estimator:
         assert self._filter is not None
         covariances = (initial_covariance(initial, self.noise), self._filter.covariance)
         measured = (markers, wrench)
-        return assemble(arrays, self._core_model, initial, recording, measured, config, notes, covariances, on_feet)
+        return without_lost(
+            assemble(arrays, self._core_model, initial, recording, measured, config, notes, covariances, on_feet)
+        )
 
     def _measured(
         self, recording: Recording, initial: InitialModel

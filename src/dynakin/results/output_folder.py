@@ -28,8 +28,8 @@ OUTPUT_FILES = (
     "config.toml",
     "report.html",
 )
-OPTIONAL_FILES = ("centre_of_mass.sto", "joint_reactions.sto", "feet.sto", "angles.sto")
-"""Written where an estimate holds what they are made of, or where they were asked for."""
+OPTIONAL_FILES = ("centre_of_mass.sto", "joint_reactions.sto", "feet.sto", "angles.sto", "failures.log")
+"""Written where an estimate holds what they are made of, where they were asked for, or where something failed."""
 
 
 @dataclass(frozen=True)
