@@ -51,3 +51,8 @@ class StreamError(DynakinError):
 class DivergenceError(DynakinError):
     """The filter lost its estimate: non-finite state or indefinite covariance; the message names the
     frame."""
+
+
+class LostError(DynakinError):
+    """The filter lost the person in too many frames for the trial to be an estimate; the message names them. The
+    command line exits with code 1."""

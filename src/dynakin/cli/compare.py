@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.padding import Padding
 
 from dynakin.cli.compare_inputs import cases_of, chosen_trials, given_keys, halves_of
-from dynakin.cli.console import as_table, busy, out, progress_bar
+from dynakin.cli.console import as_table, busy, out, print_error, progress_bar
 from dynakin.cli.options import (
     ForceEach,
     ForceThreshold,
@@ -116,6 +116,11 @@ def compare(
             save_comparison(output, tables, more, page)
         console.print(f"Tables  {output}", soft_wrap=True)
         console.print(f"Report  {output / 'report.html'}", soft_wrap=True)
+    lost = [f"{trial.name}, EKF ({preset}): {why}" for trial in compared for preset, why in trial.lost.items()]
+    for reason in lost:
+        print_error(reason)
+    if lost:
+        raise typer.Exit(1)
 
 
 def compare_cases(cases: Sequence[Case]) -> list[Trial]:

@@ -20,7 +20,8 @@ def print_summary(estimate: Estimate, folder: Path) -> None:
     metrics = estimate.metrics()
     _print_moments(console, metrics["moments"])
     console.print(_figures(estimate, metrics))
-    verdicts = [metrics[block]["verdict"] for block in ("consistency", "adaptation", "soft_tissue")]
+    blocks = (metrics[block] for block in ("tracking", "consistency", "adaptation", "soft_tissue"))
+    verdicts = [block["verdict"] for block in blocks if block]
     for message in estimate.messages:
         if message.startswith("Warning:"):
             console.print(message, style="yellow")
@@ -29,7 +30,8 @@ def print_summary(estimate: Estimate, folder: Path) -> None:
     console.print(f"Verdict: {' '.join(filter(None, verdicts))}", style="dim")
     console.print()
     console.print(f"Results  {folder}", soft_wrap=True)
-    console.print(f"Report   {folder / 'report.html'}", soft_wrap=True)
+    if (folder / "report.html").exists():
+        console.print(f"Report   {folder / 'report.html'}", soft_wrap=True)
 
 
 def _print_moments(console: Console, moments: dict[str, Any]) -> None:

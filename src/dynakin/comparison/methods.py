@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
 from dynakin.comparison.setup import Setup
-from dynakin.errors import DynakinError, ModelError
+from dynakin.errors import DynakinError, LostError, ModelError
 from dynakin.filter.zero import asked_angles
 from dynakin.model import Definition, InitialModel
 from dynakin.recordings import Recording
@@ -64,7 +64,7 @@ class Trial:
         axes: (3,) bool, ground axes that the model explains. rotation: (C,) bool.
         repetitions: squats or gait cycles after the adaptation.
         notes: what was left out and why.
-        estimates: of each preset, for whoever wants more.
+        estimates: of each preset, for whoever wants more. lost: presets that lost the person, and why.
     """
 
     name: str
@@ -81,6 +81,7 @@ class Trial:
     methods: tuple[Method, ...]
     notes: tuple[str, ...]
     estimates: dict[str, Estimate]
+    lost: dict[str, str] = field(default_factory=dict)
 
     def of_kind(self, kind: str) -> list[Method]:
         """The methods of one kind, in order."""
@@ -109,15 +110,42 @@ def compare_trial(
     moves with it. The markers of both are carried rigidly from where they were while standing.
 
     Raises:
-        DynakinError: as `Estimator.run`.
+        LostError: no filter followed the person. DynakinError: as `Estimator.run`.
     """
-    estimates = {}
+    estimates, lost, initial = estimate_each(recording, setup, static=static, progress=progress)
+    trial = trial_of(estimates, initial, setup.definition, setup.cutoff_hz)
+    return with_lost(trial, lost)
+
+
+def with_lost(trial: Trial, lost: Mapping[str, str]) -> Trial:
+    """The trial with the filters that lost the person, which are left out, in its notes."""
+    notes = [f"Warning: EKF ({preset}) is left out: {reason}." for preset, reason in lost.items()]
+    return replace(trial, notes=(*trial.notes, *notes), lost=dict(lost))
+
+
+def estimate_each(
+    recording: Recording, setup: Setup, *, static: Recording | None = None, progress: Progress | None = None
+) -> tuple[dict[str, Estimate], dict[str, str], InitialModel]:
+    """Run every preset: the estimates, why others lost the person, and what they started from.
+
+    Raises:
+        LostError: no filter followed the person. DynakinError: as `Estimator.run`.
+    """
+    estimates: dict[str, Estimate] = {}
+    lost: dict[str, str] = {}
     for preset in setup.noise:
         estimator = setup.estimator(preset)
         estimate = estimator.run(recording, static=static, smooth=setup.smooth, progress=progress)
-        estimates[preset] = asked_angles(estimator, estimate, static, setup.zero, setup.signs)
+        reason = estimate.why_lost
+        if reason is None:
+            estimates[preset] = asked_angles(estimator, estimate, static, setup.zero, setup.signs)
+        else:
+            lost[preset] = reason
     assert estimator.initial is not None
-    return trial_of(estimates, estimator.initial, setup.definition, setup.cutoff_hz)
+    if not estimates:
+        where = recording.path or recording.name
+        raise LostError(f"{where}: {'; '.join(f'EKF ({preset}): {reason}' for preset, reason in lost.items())}")
+    return estimates, lost, estimator.initial
 
 
 def trial_of(

@@ -27,6 +27,7 @@ from dynakin.model.identified import IdentifiedSubject, with_identified
 from dynakin.model.validation import nearest
 from dynakin.recordings import Recording
 from dynakin.results import Estimate
+from dynakin.results.tracking import without_lost
 
 Array = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]
@@ -110,6 +111,9 @@ class Estimator:
     ) -> Estimate:
         """Estimate a whole recording.
 
+        Frames in which the filter lost the person are NaN (`Estimate.lost`), and a message names them; of a trial that
+        was lost as a whole `Estimate.why_lost` gives the reason.
+
         Args:
             recording: markers and plates, as `read` gives them.
             static: the same person and markers, standing: lengths and marker places are taken from it.
@@ -152,17 +156,11 @@ class Estimator:
         assert self._filter is not None
         covariances = (initial_covariance(initial, self.noise), self._filter.covariance)
         measured = (markers, wrench)
-        return assemble(
-            arrays,
-            self._core_model,
-            initial,
-            recording,
-            measured,
-            config,
-            notes,
-            covariances,
-            on_feet,
-            ground.undeclared,
+        lacking = ground.undeclared
+        return without_lost(
+            assemble(
+                arrays, self._core_model, initial, recording, measured, config, notes, covariances, on_feet, lacking
+            )
         )
 
     def _measured(self, recording: Recording, initial: InitialModel) -> tuple[Array, Array, Ground]:

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ModelError
-from dynakin.model.body import find_height, find_mass
+from dynakin.model.body import check_body_mass, find_height, find_mass
 from dynakin.model.checks import check_masses, fixed_lengths, reach, refuse_moving_origin, report
 from dynakin.model.definition import ModelDefinition
 from dynakin.model.frames import Trial, choose_side
@@ -103,6 +103,7 @@ def measure(
     messages.append(how)
     height_m, how = find_height(subject, [r for r in (static, recording) if r is not None], source)
     messages.append(how)
+    check_body_mass(subject, mass_kg, height_m)
     if subject.sex is None:
         messages.append(
             "Sex not given: regressions and table are the mean of both sexes (masses, centres, signed tensors)."

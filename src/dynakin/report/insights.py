@@ -19,6 +19,7 @@ from dynakin.report.labels import (
 from dynakin.results import Estimate
 from dynakin.results.bounds import counts_in_words
 from dynakin.results.consistency import CONSISTENT
+from dynakin.results.failures import FAILED, LOG
 from dynakin.results.metrics import ADAPTATION_S, evaluation_window, speed_consistency, window_consistency
 from dynakin.results.soft_tissue import excess_in_words
 
@@ -86,6 +87,8 @@ def in_short(found: list[Insight]) -> str:
 def insights(estimate: Estimate, metrics: dict[str, Any]) -> list[Insight]:
     """All findings, in the order of the report."""
     found = [
+        _failed(estimate),
+        _tracking(metrics),
         _moments(metrics),
         _markers(estimate, metrics),
         _wrench(estimate, metrics),
@@ -120,6 +123,23 @@ def _moments(metrics: dict[str, Any]) -> Insight | None:
         text.append(f"{plural(len(found['reasons']) - 3, 'more reason')} under Joint moments.")
     advice = "Give the forces of every contact (--forces), and plates under every step that is to be judged."
     return Insight("warning", "Joint moments", " ".join(text), advice)
+
+
+def _failed(estimate: Estimate) -> Insight | None:
+    told = [message.removeprefix(FAILED).strip() for message in estimate.messages if message.startswith(FAILED)]
+    if not told:
+        return None
+    return Insight("warning", "Not made", " ".join(told), f"{LOG} has the details; please report them.")
+
+
+def _tracking(metrics: dict[str, Any]) -> Insight | None:
+    """Frames that are no estimate; nothing is said where there are none."""
+    found = metrics["tracking"]
+    if not found or not found["lost_frames"]:
+        return None
+    whole = " The trial as a whole is no estimate." if found["trial_lost"] else ""
+    advice = "Look at the first of these times: markers swapped or off, or a movement that the start does not fit."
+    return Insight("warning", "Lost", found["verdict"] + whole, advice)
 
 
 def _markers(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
@@ -197,7 +217,9 @@ def _prediction(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     )
 
 
-def _consistency(estimate: Estimate, metrics: dict[str, Any]) -> Insight:
+def _consistency(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
+    if estimate.why_lost is not None:
+        return None
     found = window_consistency(estimate, evaluation_window(estimate.time))
     ratio = metrics["consistency"]["mean_nis_per_dof"]
     good = ratio is not None and CONSISTENT[0] <= ratio <= CONSISTENT[1] and "not white" not in found.verdict

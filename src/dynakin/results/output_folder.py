@@ -37,8 +37,9 @@ OPTIONAL_FILES = (
     "feet.sto",
     "feet_source.sto",
     "angles.sto",
+    "failures.log",
 )
-"""Written where an estimate holds what they are made of, or where they were asked for."""
+"""Written where an estimate holds what they are made of, where they were asked for, or where something failed."""
 
 
 @dataclass(frozen=True)

@@ -105,7 +105,7 @@ class Monitor:
             return []
         self._lost = False
         return [
-            f"The motion is found again at {at:.2f} s, {at - before:.1f} s after it was last followed; the markers used "
+            f"The motion is found again at {at:.2f} s, {at - before:.1f} s after it was last followed: markers used "
             f"are {1e3 * self._distance(estimate, fused):.0f} mm off (RMS)."
         ]
 
