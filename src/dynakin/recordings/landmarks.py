@@ -24,10 +24,18 @@ class FacingPairs:
 
 
 DEFAULT_PAIRS = FacingPairs(
-    heel_toe=(("LHEE", "LTOE"), ("RHEE", "RTOE"), ("L_calc", "L_toe"), ("r_calc", "r_toe")),
-    pelvis=(("LPSI", "LASI"), ("RPSI", "RASI"), ("L.PSIS", "L.ASIS"), ("r.PSIS", "r.ASIS")),
-)
-"""Plug-in-Gait, and the marker set of OpenCap's laboratory recordings."""
+    heel_toe=(
+        ("LHEE", "LTOE"), ("RHEE", "RTOE"), ("L_calc", "L_toe"), ("r_calc", "r_toe"),
+        ("LCAL", "LTOE"), ("RCAL", "RTOE"), ("LCAL", "LTT2"), ("RCAL", "RTT2"),
+        ("L.Heel", "L.Toe"), ("R.Heel", "R.Toe"), ("L.Heel", "L.Toe.Tip"), ("R.Heel", "R.Toe.Tip"),
+    ),
+    pelvis=(
+        ("LPSI", "LASI"), ("RPSI", "RASI"), ("L.PSIS", "L.ASIS"), ("r.PSIS", "r.ASIS"),
+        ("V.Sacral", "L.ASIS"), ("V.Sacral", "R.ASIS"),
+    ),
+)  # fmt: skip
+"""Plug-in-Gait, the marker set of OpenCap's laboratory recordings, OpenSim's examples, Qualisys' full body. What a
+recording does not have in pairs is not used; a middle marker behind both sides of the front is one of each pair."""
 
 
 @lru_cache(maxsize=4096)
