@@ -199,7 +199,7 @@ def _offset_note(raw: _Raw) -> list[str]:
 def _at_marker_times(raw: _Raw, time_in: Array, time: Array, options: ReadOptions, path: Path) -> Plate:
     wrench = np.hstack([raw.force, raw.moment])
     check_wrench(raw.name, time_in, raw.force, raw.moment, str(path))
-    missing = np.isnan(wrench).any(axis=1)
+    missing = np.asarray(np.isnan(wrench).any(axis=1))
     wrench = filled(wrench, missing)
     rate = 1 / (time_in[1] - time_in[0]) if len(time_in) > 1 else np.inf
     if options.plate_filter_hz is not None and len(time_in) > 1:

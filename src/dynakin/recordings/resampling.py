@@ -58,15 +58,13 @@ def touched(missing: npt.NDArray[np.bool_], time_in: Array, time_out: Array, rea
     if not len(lost):
         return np.zeros(len(time_out), dtype=bool)
     k = np.searchsorted(lost, time_out)
-    nearest = np.minimum(
-        np.abs(time_out - lost[np.maximum(k - 1, 0)]), np.abs(lost[np.minimum(k, len(lost) - 1)] - time_out)
-    )
-    return np.asarray(nearest <= reach_s)
+    before, after = lost[np.maximum(k - 1, 0)], lost[np.minimum(k, len(lost) - 1)]
+    return np.asarray(np.minimum(np.abs(time_out - before), np.abs(after - time_out)) <= reach_s)
 
 
 def reach_s(rate_in: float, rate_out: float, cutoff_hz: float | None) -> float:
-    """How far from a sample `resample`, and a `low_pass` before it, still use it: half the length of the first's kernel,
-    and where the second's answer to an impulse has come down to a ten thousandth."""
+    """How far from a sample `resample`, and a `low_pass` before it, still use it: half the length of the first's
+    kernel, and where the second's answer to an impulse has come down to a ten thousandth."""
     kernel = 0.0
     if rate_in > 1.01 * rate_out:
         kernel = 0.5 * signal.kaiserord(_STOP_DB, (_STOP - _PASS) * rate_out / (0.5 * rate_in))[0] / rate_in
