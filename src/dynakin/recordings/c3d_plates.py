@@ -22,7 +22,7 @@ from dynakin.recordings.limits import check_wrench
 from dynakin.recordings.options import ReadOptions
 from dynakin.recordings.pressure import DEFAULT_THRESHOLD_N, Surface, plate_from_wrench
 from dynakin.recordings.recording import Array, Plate
-from dynakin.recordings.resampling import CausalLowPass, check_whole, low_pass, resample, same_times
+from dynakin.recordings.resampling import CausalLowPass, filled, low_pass, reach_s, resample, touched
 from dynakin.units import force_factor, moment_factor
 
 _CERTAIN_LOAD_N = 50.0  # a push that no offset of an idle plate reaches: from it the sign is judged
@@ -199,12 +199,14 @@ def _offset_note(raw: _Raw) -> list[str]:
 def _at_marker_times(raw: _Raw, time_in: Array, time: Array, options: ReadOptions, path: Path) -> Plate:
     wrench = np.hstack([raw.force, raw.moment])
     check_wrench(raw.name, time_in, raw.force, raw.moment, str(path))
-    if options.plate_filter_hz is not None or not same_times(time_in, time):
-        check_whole(raw.name, time_in, wrench, path)
+    missing = np.asarray(np.isnan(wrench).any(axis=1))
+    wrench = filled(wrench, missing)
+    rate = 1 / (time_in[1] - time_in[0]) if len(time_in) > 1 else np.inf
     if options.plate_filter_hz is not None and len(time_in) > 1:
-        rate = 1 / (time_in[1] - time_in[0])
         wrench = low_pass(wrench, rate, options.plate_filter_hz, causal=options.causal)
-    wrench = resample(wrench, time_in, time, causal=options.causal)
+    wrench = resample(wrench, time_in, time, causal=options.causal).copy()
+    rate_out = 1 / (time[1] - time[0]) if len(time) > 1 else np.inf
+    wrench[touched(missing, time_in, time, reach_s(rate, rate_out, options.plate_filter_hz))] = np.nan
     threshold = DEFAULT_THRESHOLD_N if options.force_threshold_n is None else options.force_threshold_n
     return plate_from_wrench(
         raw.name,

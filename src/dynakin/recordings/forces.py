@@ -13,7 +13,7 @@ from dynakin.recordings.mot import Table
 from dynakin.recordings.options import ReadOptions
 from dynakin.recordings.pressure import DEFAULT_THRESHOLD_N, Surface, plate_from_wrench
 from dynakin.recordings.recording import Array, Plate, Recording
-from dynakin.recordings.resampling import check_whole, low_pass, resample, same_times
+from dynakin.recordings.resampling import low_pass, resample, same_times
 
 _MIN_RATE_RATIO = 0.99
 
@@ -126,7 +126,10 @@ def _check_cover(recording: Recording, table: Table) -> None:
 
 def _resampled(plate: Plate, table: Table, recording: Recording, options: ReadOptions) -> Plate:
     wrench = np.hstack([plate.force, plate.moment])
-    check_whole(plate.name, table.time, wrench, table.path)
+    for row in np.flatnonzero(np.isnan(wrench).any(axis=1))[:1]:
+        raise RecordingError(
+            f"{table.path}: {plate.name} has no force at {table.time[row]:g} s, cannot be resampled or filtered"
+        )
     if options.plate_filter_hz is not None:
         rate = float(1 / np.median(np.diff(table.time)))
         wrench = low_pass(wrench, rate, options.plate_filter_hz, causal=options.causal)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 import numpy.typing as npt
 from scipy import interpolate, signal
@@ -48,10 +46,32 @@ class CausalLowPass:
         return np.asarray(out)
 
 
-def check_whole(name: str, time: Array, wrench: Array, path: Path) -> None:
-    """Raise RecordingError where a sample of a plate's wrench (N, 6) is missing: a filter would spread it over all."""
-    for k in np.flatnonzero(np.isnan(wrench).any(axis=1))[:1]:
-        raise RecordingError(f"{path}: {name} has no force at {time[k]:g} s, cannot be resampled or filtered")
+def filled(samples: Array, missing: npt.NDArray[np.bool_]) -> Array:
+    """Samples (N, k) with those that are missing (N,) on the lines between their neighbours, so that a filter does not
+    spread NaN over all; what it makes of them goes again by `touched`."""
+    if not missing.any() or missing.all():
+        return samples
+    at = np.arange(len(samples))
+    return np.column_stack([np.interp(at, at[~missing], column[~missing]) for column in samples.T])
+
+
+def touched(missing: npt.NDArray[np.bool_], time_in: Array, time_out: Array, reach_s: float) -> npt.NDArray[np.bool_]:
+    """Which of ``time_out`` (T,) a filter of this reach makes of missing samples (N,), too."""
+    lost = time_in[missing]
+    if not len(lost):
+        return np.zeros(len(time_out), dtype=bool)
+    k = np.searchsorted(lost, time_out)
+    before, after = lost[np.maximum(k - 1, 0)], lost[np.minimum(k, len(lost) - 1)]
+    return np.asarray(np.minimum(np.abs(time_out - before), np.abs(after - time_out)) <= reach_s)
+
+
+def reach_s(rate_in: float, rate_out: float, cutoff_hz: float | None) -> float:
+    """How far from a sample `resample`, and a `low_pass` before it, still use it: half the length of the first's
+    kernel, and where the second's answer to an impulse has come down to a ten thousandth."""
+    kernel = 0.0
+    if rate_in > 1.01 * rate_out:
+        kernel = 0.5 * signal.kaiserord(_STOP_DB, (_STOP - _PASS) * rate_out / (0.5 * rate_in))[0] / rate_in
+    return kernel + (0.0 if cutoff_hz is None else 2.0 / cutoff_hz)
 
 
 def low_pass(samples: Array, rate_hz: float, cutoff_hz: float, *, causal: bool = False) -> Array:

@@ -90,7 +90,9 @@ def _header(lines: list[str]) -> dict[str, str]:
     filled = [split_cells(line) for line in lines if line.strip()]
     for keys, values in pairwise(filled):
         if any(key.casefold() in ("datarate", "units", "numframes") for key in keys):
-            return {key.casefold(): value for key, value in zip(keys, values, strict=False) if key}
+            given = [value for value in values if value]  # some programs part them by two tabs
+            told = given if len(given) == len([key for key in keys if key]) else values
+            return {key.casefold(): value for key, value in zip(keys, told, strict=False) if key}
     return {}
 
 
