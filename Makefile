@@ -10,7 +10,7 @@ CPP_TESTS := $(shell find cpp/tests -type f)
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 
-.PHONY: all demo live test test-python test-cpp lint stubs bench peers clean prerequisites
+.PHONY: all demo live test test-python test-cpp lint stubs bench peers nightly clean prerequisites
 all: $(VENV)/.built
 
 prerequisites:
@@ -87,6 +87,10 @@ peers: $(VENV)/.dev
 	$(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[dev,peers]"
 	$(BIN)/python -m pytest -m peers
 	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/peers.py
+
+# Thousands of mutated inputs (tests/fuzz), a quarter of an hour.
+nightly: $(VENV)/.dev
+	$(BIN)/python -m pytest -m nightly -s
 
 clean:
 	rm -rf build out $(VENV)

@@ -27,7 +27,7 @@ def one_trial(seed: int) -> dict[str, tuple[float, ...]]:
     recording = trial.recording
     window = recording.time >= START_S
     estimator = dynakin.Estimator(dynakin.load_model("sagittal7", subject=SUBJECT, markers="opencap"))
-    data = {"EKF, `paper`": estimator.run(recording).data}
+    data = {"EKF, `paper`": estimator.run(recording, smooth=False).data}
     initial = estimator.initial
     assert initial is not None
     at = reference_methods(recording, initial, estimator.model)

@@ -139,7 +139,7 @@ def residuals(peer: Kinematics) -> None:
             title = f"{'the file' if mass is None else f'{mass:g} kg'}, {'unfiltered' if cutoff is None else '6 Hz'}"
             print(f"| OpenSim, mass of {title} | {size[0]:.1f} | {size[1]:.1f} |")
     for name, definition in models("squats1").items():
-        left_over(f"dynakin, {name}", dynakin.Estimator(definition).run(recorded("squats1")))
+        left_over(f"dynakin, {name}", dynakin.Estimator(definition).run(recorded("squats1"), smooth=False))
 
 
 GROUPS = (("flexions", FLEXION, 4), ("others of the legs", OTHERS, 6), ("pelvis", PELVIS, 6))
@@ -165,7 +165,7 @@ def angles() -> None:
         estimators = {name: dynakin.Estimator(definition) for name, definition in definitions.items()}
         held = dynakin.Estimator(definitions[".osim"], without_plates(), estimate=())
         for name, estimator in {**estimators, ".osim, held as in OpenSim, markers only": held}.items():
-            estimate = estimator.run(recording)
+            estimate = estimator.run(recording, smooth=False)
             ours = Angles(estimate.coordinate_names, estimate.time, estimate.data["coordinates"].values)
             print(
                 f"\n### `{trial}`, {name}\n\n| what | beside the recording's own | with equal weights | goal |\n"

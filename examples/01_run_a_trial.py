@@ -18,7 +18,7 @@ else:
     subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
 
 model = dynakin.load_model("sagittal7", subject=subject, markers="opencap")
-result = dynakin.Estimator(model).run(recording, smooth=True)  # smooth: each frame from all frames
+result = dynakin.Estimator(model).run(recording)  # smooth=False: each frame as it would be live
 
 for message in result.messages:  # what was found, left out, assumed
     print("-", message)

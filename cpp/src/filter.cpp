@@ -64,13 +64,17 @@ void Filter::reset(const Eigen::VectorXd& x, const Eigen::MatrixXd& P) {
   x_ = x0_ = x_before_ = x_ahead_ = x;
   P_ = P0_ = P_before_ = P;
   unbelieved_s_ = 0.0;
+  shortest_step_s_ = k_infinity;
+  held_ = false;
   last_ = StepReport{};
 }
 
 void Filter::predict(double dt) {
   if (!(dt >= 0.0) || !std::isfinite(dt))
     throw std::invalid_argument("dt: expected 0 s or more, found " + std::to_string(dt));
-  dynakin::predict(model_, settings_, dt, step_, x_, P_);
+  const double carried = settings_.recovery.enabled ? carried_on(dt) : dt;
+  if (carried == dt || carried > 0.0) dynakin::predict(model_, settings_, carried, step_, x_, P_);
+  if (carried < dt) decay(model_, settings_, dt - carried, step_, x_, P_);
   unbelieved_s_ += dt;
 }
 
@@ -83,13 +87,19 @@ StepReport Filter::update(const Eigen::Ref<const MarkerMatrix>& markers, const V
   if (last_.diverged()) return last_;
   StepReport report;
   if (tape_) tape_->clear();
-  if (settings_.recovery.enabled) hold_unseen();
+  if (held_)
+    hold_motion();
+  else if (settings_.recovery.enabled)
+    hold_unseen();
   measurement_.admit_all();
   measurement_.linearise(x_, markers, wrench);
   predicted_ = measurement_.predicted();
   gate_.judge(settings_, measurement_.blocks(), P_);
   if (settings_.recovery.enabled) report.tracking = believe(markers);
-  if (report.tracking != Tracking::found) sums_ = correct(markers, wrench);
+  if (report.tracking == Tracking::following && settings_.recovery.enabled)
+    report.tracking = fit(markers, wrench);
+  else if (report.tracking != Tracking::found)
+    sums_ = correct(markers, wrench);
   report.rows = sums_.rows;
   report.nis = sums_.nis;
   report.log_likelihood = -0.5 * (sums_.nis + sums_.log_determinant + sums_.rows * std::log(2.0 * std::numbers::pi));
@@ -106,6 +116,7 @@ StepReport Filter::update(const Eigen::Ref<const MarkerMatrix>& markers, const V
     x_ = x0_;
     P_ = P0_;
     unbelieved_s_ = k_infinity;
+    held_ = true;
     report.tracking = Tracking::restarted;
     if (tape_) tape_->cut = true;
   }
@@ -204,6 +215,8 @@ void Filter::save(Checkpoint& out) const {
   out.P = P_;
   projection_.save(out.projection);
   out.unbelieved_s = unbelieved_s_;
+  out.shortest_step_s = shortest_step_s_;
+  out.held = held_;
   out.last = last_;
 }
 
@@ -212,6 +225,8 @@ void Filter::restore(const Checkpoint& checkpoint) {
   P_ = checkpoint.P;
   projection_.restore(checkpoint.projection);
   unbelieved_s_ = checkpoint.unbelieved_s;
+  shortest_step_s_ = checkpoint.shortest_step_s;
+  held_ = checkpoint.held;
   last_ = checkpoint.last;
 }
 

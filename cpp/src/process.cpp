@@ -36,6 +36,20 @@ void move_chain(int n, double dt, Eigen::VectorXd& x) {
   x.segment(n, n) += dt * x.segment(2 * n, n);
 }
 
+// Scales what decays, in mean and covariance; the corner of P above the diagonal is left to the caller.
+void scale_decaying(const FilterSettings& settings, int first, double dt, Eigen::VectorXd& scratch, Eigen::VectorXd& x,
+                    Eigen::MatrixXd& P) {
+  const int size = static_cast<int>(x.size()), rest = size - first;
+  if (!settings.decay_rate.tail(rest).any()) return;
+  auto kept = scratch.tail(rest);
+  for (int i = 0; i < rest; ++i) {
+    const double rate = settings.decay_rate(first + i);
+    kept(i) = rate == 0.0 ? 1.0 : std::exp(-rate * dt);
+  }
+  x.tail(rest).array() *= kept.array();
+  for (int c = 0; c < size; ++c) P.col(c).tail(rest).array() *= kept.array() * (c < first ? 1.0 : kept(c - first));
+}
+
 }  // namespace
 
 void predict_mean(const Model& model, const FilterSettings& settings, double dt, Eigen::VectorXd& x) {
@@ -60,21 +74,22 @@ void predict(const Model& model, const FilterSettings& settings, double dt, Eige
   top.middleRows(0, n) += dt * top.middleRows(n, n) + half * top.middleRows(2 * n, n);
   top.middleRows(n, n) += dt * top.middleRows(2 * n, n);
   for (int j = 1; j < 3 * n; ++j) top.col(j).head(j) = top.row(j).head(j).transpose();
-  if (settings.decay_rate.tail(rest).any()) {
-    auto kept = scratch.tail(rest);
-    for (int i = 0; i < rest; ++i) {
-      const double rate = settings.decay_rate(3 * n + i);
-      kept(i) = rate == 0.0 ? 1.0 : std::exp(-rate * dt);
-    }
-    x.tail(rest).array() *= kept.array();
-    for (int c = 0; c < size; ++c)  // the corner above is made from the one below
-      P.col(c).tail(rest).array() *= kept.array() * (c < 3 * n ? 1.0 : kept(c - 3 * n));
-  }
+  scale_decaying(settings, 3 * n, dt, scratch, x, P);
   P.topRightCorner(3 * n, rest) = P.bottomLeftCorner(rest, 3 * n).transpose();
   P.diagonal() += settings.process_variance;
   add_chain_noise(settings.process_density, n, dt, P);
   for (int i = 3 * n; i < size; ++i)
     if (settings.process_density(i) > 0.0)
+      P(i, i) += decayed_noise(settings.process_density(i), settings.decay_rate(i), dt);
+}
+
+void decay(const Model& model, const FilterSettings& settings, double dt, Eigen::VectorXd& scratch, Eigen::VectorXd& x,
+           Eigen::MatrixXd& P) {
+  const int first = 3 * model.n_free(), size = model.state_size();
+  scale_decaying(settings, first, dt, scratch, x, P);
+  P.topRightCorner(first, size - first) = P.bottomLeftCorner(size - first, first).transpose();
+  for (int i = first; i < size; ++i)
+    if (settings.decay_rate(i) != 0.0)
       P(i, i) += decayed_noise(settings.process_density(i), settings.decay_rate(i), dt);
 }
 

@@ -79,7 +79,8 @@ void FilterSettings::check(const Model& model) const {
       if (!(limit > 0.0)) fail("gate", "is " + std::to_string(limit) + ", expected more than 0");
   if (!(iterate_beyond > 0.0))
     fail("iterate_beyond", "is " + std::to_string(iterate_beyond) + ", expected more than 0");
-  for (double value : {recovery.blind_s, recovery.coordinate_sd, recovery.speed_sd, recovery.acceleration_sd})
+  for (double value :
+       {recovery.blind_s, recovery.fit_m, recovery.coordinate_sd, recovery.speed_sd, recovery.acceleration_sd})
     if (!(value > 0.0) || std::isinf(value))
       fail("recovery", "holds " + std::to_string(value) + ", expected more than 0");
   if (!(recovery.unseen_sd > 0.0))

@@ -16,6 +16,7 @@ from dynakin.model.identified import IdentifiedSubject, read_identified
 from dynakin.model.subject import Sex
 from dynakin.model.validation import Strict, nearest, read_toml, validate
 from dynakin.recordings import PlateLoad
+from dynakin.recordings.textfile import is_file
 
 # Keys that name files: relative to the configuration file that they stand in.
 _PATHS = ("trial", "forces", "static", "parameters", "output")
@@ -51,8 +52,9 @@ class RunConfig(Strict):
 
     preset: str = "default"
     """Noise settings to start from (default, paper, or a .toml file that `tune` wrote); [noise] changes single ones."""
-    smooth: bool = False
-    """Estimate each frame from all frames, those after it too. Not given: as it would be live."""
+    smooth: bool | None = Field(default=None, examples=[True])
+    """Estimate each frame from all frames, those after it too; false: as it would be live. Not given: true wherever the
+    noise settings have a smoother (preset paper has none)."""
     side: Literal["auto", "right", "left", "both"] = "auto"
     """Which side's markers a model uses that has one leg for both: auto (fewest gaps), right, left, both."""
     estimate: tuple[Quantity, ...] = QUANTITIES
@@ -63,7 +65,8 @@ class RunConfig(Strict):
     vertical: str = "auto"
     """Axis of the laboratory that points up: auto (found), or one of +X -X +Y -Y +Z -Z."""
     forward: str | tuple[float, float, float] = "auto"
-    """Direction in which the person faces, in the laboratory: auto (found), an axis, or three numbers."""
+    """Direction in which the person faces, in the laboratory: auto (found), an axis, or three numbers. Given, X of all
+    results is along it; else a floating model is estimated in the laboratory's own frame."""
     plate_filter_hz: float | None = Field(default=None, examples=[20.0])
     """Low-pass filter on the plates. Not given: only what resampling to the marker rate needs."""
     force_threshold_n: float | None = Field(default=None, examples=[10.0])
@@ -194,7 +197,7 @@ def read_config(path: Path, paths: Sequence[str] = _PATHS) -> dict[str, Any]:
             content[key] = str(path.parent / content[key])
     for key in ("model", "markers", "table", "preset"):  # a name, or a file beside the configuration
         value = content.get(key)
-        if isinstance(value, str) and (path.parent / value).is_file():
+        if isinstance(value, str) and is_file(path.parent / value):
             content[key] = str(path.parent / value)
     return content
 

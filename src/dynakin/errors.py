@@ -7,11 +7,23 @@ dynakin.
 
 from __future__ import annotations
 
+import re
+
+_LONGEST = 1000  # characters that somebody reads; a damaged file can bring a name of a hundred thousand
+_UNPRINTABLE = re.compile("[\x00-\x1f\x7f\x85\u2028\u2029\ud800-\udfff]")
+
 
 class DynakinError(Exception):
-    """Root of every error that dynakin raises on purpose; ``str(error)`` is the one line for the user."""
+    """Root of every error that dynakin raises on purpose; ``str(error)`` is the one line for the user.
+
+    Names out of damaged files can hold anything: what cannot be printed in a line is written as Python writes it, and
+    the middle of what is too long is left out.
+    """
 
     def __init__(self, message: str) -> None:
+        message = _UNPRINTABLE.sub(lambda found: ascii(found[0])[1:-1], message)
+        if len(message) > _LONGEST:
+            message = f"{message[: _LONGEST // 2]} ... {message[-_LONGEST // 2 :]}"
         super().__init__(message)
         self.message = message
 
@@ -39,3 +51,8 @@ class StreamError(DynakinError):
 class DivergenceError(DynakinError):
     """The filter lost its estimate: non-finite state or indefinite covariance; the message names the
     frame."""
+
+
+class LostError(DynakinError):
+    """The filter lost the person in too many frames for the trial to be an estimate; the message names them. The
+    command line exits with code 1."""

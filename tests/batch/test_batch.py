@@ -115,6 +115,20 @@ def test_results_of_each_trial_are_written(study: Path, tmp_path: Path) -> None:
         ("output = 'o'\n[[subjects]]\nname = 'a'\n", "no file *.c3d in"),
         ("output = 'o'\n[[subjects]]\nname = 'a'\ntrials = [{file = 'x'}]\n", "expected a pattern"),
         ("output = 'o'\n[[subjects]]\nname = 'a'\ntrials = [{trial = 'x.c3d'}, {trial = 'x.trc'}]\n", "two trials"),
+        ("output = 'o'\n[[subjects]]\nname = '..'\n", "subject 1: name is '..', expected the name of a folder"),
+        ("output = 'o'\n[[subjects]]\nname = 'a/b'\n", "subject 1: name is 'a/b', expected the name of a folder"),
+        *(
+            (f"output = 'o'\n[[subjects]]\nname = 'a'\ntrials = [{{trial = 'x.c3d', name = {name!r}}}]\n", said)
+            for name, said in (
+                ("../../../x", "trial 'x.c3d': name is '../../../x', expected the name of a folder"),
+                ("..", "trial 'x.c3d': name is '..', expected the name of a folder"),
+                ("", "trial 'x.c3d': name is '', expected the name of a folder"),
+                ("n" * 300, "of at most 200 bytes"),
+            )
+        ),
+        ("output = 'o'\ntrials = '/etc/*'\n[[subjects]]\nname = 'a'\n", "subject 'a': trials is '/etc/*'"),
+        ("output = 'o'\n[[subjects]]\nname = 'a'\ntrials = '**x/*.trc'\n", "subject 'a': trials is '**x/*.trc'"),
+        ("output = 'o'\n[[subjects]]\nname = 'a'\ntrials = ''\n", "subject 'a': trials is '', expected a pattern"),
     ],
 )
 def test_a_bad_dataset_is_said_in_one_line(tmp_path: Path, text: str, expected: str) -> None:

@@ -132,6 +132,29 @@ def test_run_on_real_data_and_again_from_its_own_configuration(data_dir: Path, t
         assert repeated["wrench"][key] == pytest.approx(metrics["wrench"][key], rel=1e-3)
 
 
+def test_run_smooths_unless_told_otherwise_and_says_where_it_cannot(
+    data_dir: Path, tmp_path: Path, capsys: Said
+) -> None:
+    trial = str(data_dir / "plugin_gait" / "S1_FlywheelSquat.c3d")
+    options = ["--model", "squat7", "--mass", "78.6", "-o"]
+
+    def used(name: str, *more: str) -> tuple[bool, str]:
+        out = tmp_path / name
+        assert main(["run", trial, *options, str(out), *more]) == 0
+        told = " ".join(capsys.readouterr().out.split())
+        return tomllib.loads((out / "config.toml").read_text())["smooth"], told
+
+    smooth, told = used("default")
+    assert smooth and "settled after" not in told and "does not settle" not in told
+    smooth, told = used("live", "--live-like")
+    assert not smooth and "settled after" in told and "Not smoothed" not in told
+    smooth, told = used("paper", "--preset", "paper")
+    assert not smooth and "Not smoothed: bounds are kept by constraint 'gain'" in told
+    assert "Not smoothed: bounds" in (tmp_path / "paper" / "report.html").read_text()
+    assert main(["run", trial, *options, str(tmp_path / "no"), "--preset", "paper", "--smooth"]) == 2
+    assert "smooth: bounds are kept by constraint 'gain'" in capsys.readouterr().err
+
+
 def test_run_replaces_its_own_output_and_draws_figures(data_dir: Path, tmp_path: Path, capsys: Said) -> None:
     trial = str(data_dir / "plugin_gait" / "S1_FlywheelSquat.c3d")
     options = ["--model", "squat7", "--mass", "78.6", "-o", str(tmp_path / "out")]

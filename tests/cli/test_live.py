@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -9,6 +12,7 @@ import pytest
 from dynakin.cli import main
 from dynakin.recordings import Recording
 from dynakin.simulation import simulate_squat
+from dynakin.stream.recorder import recorded
 
 Said = pytest.CaptureFixture[str]
 PERSON = ["--model", "sagittal7", "--markers", "opencap", "--mass", "70", "--height", "1.75", "--sex", "male"]
@@ -37,6 +41,25 @@ def test_live_estimates_records_and_finishes(tmp_path: Path, capsys: Said) -> No
     known = str(tmp_path / "o" / "parameters.json")
     assert main(["live", "--source", source, *PERSON, "--parameters", known, "--lag", "10"]) == 0
     assert "go on from" in capsys.readouterr().out
+
+
+@pytest.mark.skipif(os.name != "posix", reason="limits of processes are set by POSIX calls")
+def test_a_recording_that_the_disk_cannot_take_is_no_success(tmp_path: Path) -> None:
+    """A limit on the size of files stands for the end of the disk; what was written before it can be read."""
+    folder = tmp_path / "r"
+    source = "simulate:squat,model=sagittal7,duration=8,speed=4"
+    limited = (
+        "import resource, sys; resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, 400_000)); "
+        "from dynakin.cli import main; sys.exit(main(sys.argv[1:]))"
+    )
+    command = [sys.executable, "-c", limited, "live", "--source", source, *PERSON, "--record", str(folder)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=120.0)
+    assert done.returncode == 1, done.stdout + done.stderr
+    assert done.stdout.count("the recording has ended") == 1 and "Recorded in" not in done.stdout
+    assert "stream.dkr takes no more (File too large)" in done.stdout and "Traceback" not in done.stderr
+    assert done.stdout.index("the recording has ended") > done.stdout.index("Stand still")
+    kept = recorded(folder)
+    assert 0.5 < kept.time[-1] < 7.0 and (folder / "stream.dkr").stat().st_size <= 400_000
 
 
 def test_an_identified_subject_is_refused_where_it_is_another_models(tmp_path: Path, capsys: Said) -> None:

@@ -11,6 +11,7 @@ from filter.test_estimator import estimator, samples, with_markers
 import dynakin
 from dynakin.errors import ConfigError
 from dynakin.filter.samples import recording_arrays
+from dynakin.report.insights import insights
 from dynakin.results import Estimate
 from dynakin.simulation import SensorNoise, SimulatedTrial, simulate_squat
 
@@ -24,7 +25,7 @@ def trial() -> SimulatedTrial:
 
 @pytest.fixture(scope="module")
 def plain(trial: SimulatedTrial) -> Estimate:
-    return estimator().run(trial.recording)
+    return estimator().run(trial.recording, smooth=False)
 
 
 @pytest.fixture(scope="module")
@@ -75,6 +76,33 @@ def test_smoothing_comes_closer_to_the_truth_and_is_surer(
 def test_smoothing_needs_bounds_that_have_a_smoother(trial: SimulatedTrial) -> None:
     with pytest.raises(ConfigError, match="smooth: bounds are kept by constraint 'gain'"):
         estimator(noise=dynakin.presets.paper()).run(trial.recording, smooth=True)
+
+
+def test_a_recording_is_smoothed_unless_the_settings_have_no_smoother(
+    smoothed: Estimate, trial: SimulatedTrial, tmp_path
+) -> None:
+    by_default = estimator().run(trial.recording)
+    np.testing.assert_array_equal(by_default.data["state"].values, smoothed.data["state"].values)
+    assert not any(message.startswith("Not smoothed") for message in by_default.messages)
+    paper = estimator(noise=dynakin.presets.paper())
+    refused, live = paper.run(trial.recording), paper.again().run(trial.recording, smooth=False)
+    np.testing.assert_array_equal(refused.data["state"].values, live.data["state"].values)
+    assert refused.config["smooth"] is False
+    (said,) = [message for message in refused.messages if message.startswith("Not smoothed")]
+    assert "'gain', which has no smoother" in said and "as it would be live" in said
+    assert not any(message.startswith("Not smoothed") for message in live.messages)  # it was asked for
+
+
+def test_what_only_describes_live_estimates_is_no_headline_of_a_smoothed_one(
+    plain: Estimate, smoothed: Estimate
+) -> None:
+    live, after = ({i.title: i for i in insights(e, e.metrics())} for e in (plain, smoothed))
+    assert live["Adaptation"].text and plain.metrics()["adaptation"]["verdict"]
+    assert "Adaptation" not in after and smoothed.metrics()["adaptation"]["verdict"] == ""
+    assert "Speeds" not in after and after["One frame ahead"].level in ("good", "note")
+    for found in (live, after):  # true of both: it is the filter's covariance
+        assert found["Uncertainty"].text.startswith("The standard deviations are larger than needed")
+    assert "Settled" not in " ".join(i.text for i in after.values())
 
 
 def test_the_delayed_frame_is_the_smoothers_of_what_was_seen(trial: SimulatedTrial) -> None:
@@ -178,12 +206,14 @@ def test_a_joint_that_nobody_sees_is_held_and_comes_back(trial: SimulatedTrial) 
         markers[400:700, wrist] = np.nan
 
     without = with_markers(trial.recording, hidden)
-    result = estimator(side="right").run(without)
+    result = estimator(side="right").run(without, smooth=False)
     elbow = result.data["coordinates"].sel(coordinate="elbow").values
     sd = result.data["coordinates_sd"].sel(coordinate="elbow").values
     assert (sd[480:700] > 0.2).all() and sd[720] < 0.1
     assert any(event.subject == "elbow" and "held" in event.message for event in result.events)
-    whole = estimator(side="right").run(trial.recording).data["coordinates"].sel(coordinate="elbow").values
+    whole = (
+        estimator(side="right").run(trial.recording, smooth=False).data["coordinates"].sel(coordinate="elbow").values
+    )
     assert np.degrees(np.abs(elbow - whole)[400:700]).max() < 60.0  # carried on, it would be at its joint limit
     later = np.abs(elbow - whole)[750:]
     assert (later < 3.0 * sd[750:]).all()

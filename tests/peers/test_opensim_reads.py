@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,6 +10,7 @@ import numpy as np
 import pytest
 
 from dynakin.results import Estimate, laboratory_markers
+from dynakin.results.motion_files import write_moments
 
 opensim: Any = pytest.importorskip("opensim", reason="OpenSim is not installed (pip install opensim)")
 pytestmark = pytest.mark.peers
@@ -40,6 +42,19 @@ def test_moments(folder: Path, estimate: Estimate) -> None:
     table = opensim.TimeSeriesTable(str(folder / "moments.sto"))
     assert list(table.getColumnLabels())[2] == "knee_moment"
     np.testing.assert_allclose(table.getMatrix().to_numpy(), estimate.data["moments"].values, rtol=1e-12, atol=1e-12)
+
+
+def test_moments_that_are_not_known_are_gaps(estimate: Estimate, tmp_path: Path) -> None:
+    data = estimate.data.copy(deep=True)
+    data["moments"][10:20, 1] = np.nan
+    data["moments"][5, 2] = np.inf
+    write_moments(replace(estimate, data=data), tmp_path / "moments.sto")
+    table = opensim.TimeSeriesTable(str(tmp_path / "moments.sto"))
+    expected = data["moments"].values.copy()
+    expected[5, 2] = np.nan
+    np.testing.assert_allclose(table.getMatrix().to_numpy(), expected, rtol=1e-12, atol=1e-12, equal_nan=True)
+    # The older Storage class has no word for a gap: it ends at the first one, whatever stands there (docs/formats.md).
+    assert opensim.Storage(str(tmp_path / "moments.sto")).getSize() < len(estimate.time)
 
 
 def test_wrench(folder: Path, estimate: Estimate) -> None:

@@ -66,7 +66,7 @@ def test_a_standing_trial_gives_the_zero() -> None:
     trial = simulate_squat(seed=3, duration_s=6.0)
     subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
     estimator = dynakin.Estimator(dynakin.load_model("sagittal7", subject=subject, markers="opencap"))
-    estimate = estimator.run(trial.recording)
+    estimate = estimator.run(trial.recording, smooth=False)
     window = standing_window(trial.recording)
     assert window is not None
     still = trial.recording.window(float(trial.recording.time[0]), float(trial.recording.time[window.stop - 1]))

@@ -16,8 +16,9 @@ import pytest
 from dynakin.errors import OutputError, RecordingError
 from dynakin.recordings import Recording
 from dynakin.simulation import simulate_squat
-from dynakin.stream import Packet, PlatePacket, Replay
+from dynakin.stream import Callback, Live, LiveFrame, Packet, PlatePacket, Replay, Sink
 from dynakin.stream.recorder import FILE, Recorder, finish, recorded
+from dynakin.stream.settings import estimator_of
 
 from .made import MARKERS, PLATES, block, frame
 
@@ -27,7 +28,7 @@ SESSION = """
 import sys, time
 sys.path.insert(0, {tests!r})
 from dynakin.simulation import simulate_squat
-from dynakin.stream import Packet, PlatePacket, Replay
+from dynakin.stream import Callback, Live, LiveFrame, Packet, PlatePacket, Replay, Sink
 from dynakin.stream.recorder import Recorder
 from dataclasses import replace
 source = Replay(simulate_squat(seed=1, duration_s=8.0).recording, loop=True)
@@ -135,6 +136,42 @@ def test_a_file_cut_anywhere_is_read_up_to_there(tmp_path: Path) -> None:
     damaged[len(whole) // 2] ^= 255
     (tmp_path / "r" / FILE).write_bytes(damaged)
     assert len(recorded_times(tmp_path / "r")) == 19
+
+
+def test_a_disk_that_is_full_ends_the_recording_at_once_and_says_so(tmp_path: Path) -> None:
+    """/dev/full takes no byte; the file is there already, as a link to it."""
+    recorder = Recorder(tmp_path / "r")
+    os.kill(recorder.pid, signal.SIGKILL)  # before it has opened its file for good
+    (tmp_path / "r" / FILE).unlink(missing_ok=True)
+    (tmp_path / "r" / FILE).symlink_to("/dev/full")
+    deadline = time.monotonic() + 20.0
+    while recorder.failure() is None and time.monotonic() < deadline:
+        recorder.packet(frame(0.0))
+        time.sleep(0.01)
+    failure = recorder.failure()
+    assert failure is not None and "No space left on device" in failure and FILE in failure
+    assert recorder.restarts == 1  # the one that was killed
+    recorder.close()
+
+
+def test_a_session_whose_recorder_fails_goes_on_and_is_no_success(squat: Recording) -> None:
+    class Full(Sink):
+        frames, closed = 0, 0
+
+        def frame(self, frame: LiveFrame) -> None:
+            self.frames += 1
+
+        def failure(self) -> str | None:
+            return "the disk is full" if self.frames >= 20 else None
+
+        def close(self) -> None:
+            self.closed += 1
+
+    full, frames, said = Full(), list[LiveFrame](), list[str]()
+    live = Live(estimator_of(SETTINGS), [Replay(squat, speed=4.0)], [full, Callback(frames.append)], say=said.append)
+    live.run()
+    assert said.count("the disk is full") == 1 and live.failures == ["the disk is full"]
+    assert full.closed == 1 and len(frames) > full.frames >= 20
 
 
 def test_a_folder_that_holds_something_is_refused(tmp_path: Path) -> None:

@@ -247,8 +247,12 @@ def test_silent_markers_are_told_with_what_happens_then(squat: Recording) -> Non
         return [] if isinstance(packet, MarkerPacket) and 4.0 < packet.time_s < 5.0 else [packet]
 
     _, said, _ = run(Edited(squat, no_markers))
-    assert "The markers are silent; going on with plates alone." in said and "The markers are back." in said
+    assert "The markers are silent; the motion is held until they are back." in said
+    assert "The markers are back." in said
     _, said, live = run(Replay(squat.window(0.0, 3.0), speed=0.0))
-    monitor = Monitor(live.estimator.initial, 100.0, plates=False, used=False)  # type: ignore[arg-type]
-    told = monitor.changes(Fusion(live.fusion.markers, None), 1e9)
-    assert told == ["The markers are silent; the estimate waits for them."]
+    for holds, what in ((True, "the motion is held until they are back"), (False, "the estimate waits for them")):
+        monitor = Monitor(live.estimator.initial, 100.0, plates=False, used=False, holds=holds)  # type: ignore[arg-type]
+        monitor.last = replace(monitor.last, tracking="following")
+        told = monitor.changes(Fusion(live.fusion.markers, None), 1e9)
+        assert told == [f"The markers are silent; {what}."]
+        assert monitor.last.tracking == ("lost" if holds else "following")

@@ -17,9 +17,10 @@ namespace dynakin {
 enum class StepStatus { ok, no_measurement, innovation_not_definite, not_finite, variance_not_positive };
 const char* describe(StepStatus status);
 
-// What the filter makes of its own estimate. doubtful: most markers were refused, so nothing of the frame was used;
-// lost: so for longer than recovery.blind_s, the motion is held until it is found; found: sought anew in this frame,
-// and found; restarted: the numbers had broken down, everything starts again from x0, and the motion is to be found.
+// What the filter makes of its own estimate. doubtful: most markers were refused, or those used would still be further
+// than recovery.fit_m from the estimate, so nothing of the frame was used; lost: so, or unseen, for longer than
+// recovery.blind_s, the motion is held until it is found; found: sought anew in this frame, and the markers fit;
+// restarted: the numbers had broken down, everything starts again from x0, and the motion is to be found.
 enum class Tracking : std::uint8_t { following, doubtful, lost, found, restarted };
 const char* describe(Tracking tracking);
 
@@ -49,6 +50,8 @@ class Filter {
   Filter(const Filter&) = delete;
   Filter& operator=(const Filter&) = delete;
 
+  // With recovery the motion is carried on for recovery.blind_s without a marker that is believed, over a long dt as
+  // over many short ones; after that it is held.
   void predict(double dt);
   // markers (3, M) m and wrench (N, N m about the ground origin), NaN where missing. After a step that diverged the
   // state is not to be used; further updates report the same until reset().
@@ -68,7 +71,8 @@ class Filter {
     Eigen::VectorXd x;
     Eigen::MatrixXd P;
     Projection::Memory projection;
-    double unbelieved_s = 0.0;
+    double unbelieved_s = 0.0, shortest_step_s = k_infinity;
+    bool held = false;
     StepReport last;
   };
   void save(Checkpoint& out) const;
@@ -89,7 +93,13 @@ class Filter {
 
  private:
   using MarkerRef = Eigen::Ref<const MarkerMatrix>;
+  double carried_on(double dt);
   Tracking believe(const MarkerRef& markers);
+  Tracking doubt();
+  Tracking seek(const MarkerRef& markers);
+  double distance(const MarkerRef& markers) const;
+  double distance_within_bounds(const MarkerRef& markers);
+  Tracking fit(const MarkerRef& markers, const Vector6& wrench);
   void leave_out_refused();
   double uncertainty_seen() const;
   UpdateSums correct(const MarkerRef& markers, const Vector6& wrench);
@@ -99,8 +109,9 @@ class Filter {
   void hold_coordinate(int i);
   void hold_unseen();
   void hold_motion();
-  bool seek_motion(const MarkerRef& markers);
-  bool seek_motion_from_start(const MarkerRef& markers);
+  bool seek_motion(const MarkerRef& markers, int refused);
+  bool turn_towards(const MarkerRef& markers);
+  bool seek_better(const MarkerRef& markers, const Vector6& wrench, int refused);
   bool judge_by_distance(const MarkerRef& markers);
   StepStatus check() const;
 
@@ -116,6 +127,8 @@ class Filter {
   Projection projection_;
   UpdateSums sums_;
   double unbelieved_s_ = 0.0;  // since a frame whose markers were believed
+  double shortest_step_s_ = k_infinity;
+  bool held_ = false;  // the motion is lost, and to be found before anything is believed
   StepReport last_;
   FrameTape* tape_ = nullptr;
 };

@@ -15,6 +15,10 @@ namespace dynakin {
 void predict(const Model& model, const FilterSettings& settings, double dt, Eigen::VectorXd& scratch,
              Eigen::VectorXd& x, Eigen::MatrixXd& P);
 
+// The same of what decays alone, over a time in which nothing is seen: coordinates and constants stay as they are.
+void decay(const Model& model, const FilterSettings& settings, double dt, Eigen::VectorXd& scratch, Eigen::VectorXd& x,
+           Eigen::MatrixXd& P);
+
 // x <- f(x) over dt alone: where the state is expected to be then, whatever is measured meanwhile.
 void predict_mean(const Model& model, const FilterSettings& settings, double dt, Eigen::VectorXd& x);
 

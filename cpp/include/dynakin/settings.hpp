@@ -21,6 +21,7 @@ inline constexpr GateLimits no_gate = {k_infinity, k_infinity, k_infinity, k_inf
 struct RecoverySettings {
   bool enabled = false;
   double blind_s = 0.2;        // s without a marker that is believed until the motion counts as lost
+  double fit_m = 0.03;         // RMS distance of the markers used from the estimate that is still called a fit
   double coordinate_sd = 0.5;  // rad or m: the motion's standard deviations when it is sought anew
   double speed_sd = 2.0;       // rad/s or m/s
   double acceleration_sd = 20.0;

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,12 +10,16 @@ from typing import Any
 from dynakin.config import RunConfig, read_config
 from dynakin.errors import ConfigError
 from dynakin.model.validation import nearest
+from dynakin.recordings.textfile import is_file
 
 # Keys of their own; all others are those of a run's configuration and hold for everything below them.
 _OF_DATASET = ("subjects", "trials", "presets")
 _OF_SUBJECT = ("name", "folder", "trials")
 _NOT_HERE = ("trial", "ground", "identified", "versions", "grid")
 _PATTERN = "*.c3d"
+# Subjects and trials name folders of the results.
+_NO_FOLDER = re.compile(r"[/\\\x00-\x1f\x7f\ud800-\udfff]")
+_LONGEST_NAME = 200  # bytes; file systems take 255, with what is put before it while results are written
 
 
 @dataclass(frozen=True)
@@ -88,22 +93,23 @@ def _sessions(
     path: Path, number: int, entry: dict[str, Any], common: dict[str, Any], pattern: Any, output: Path
 ) -> list[Session]:
     name = entry.get("name")
-    if not isinstance(name, str) or not name or "/" in name:
+    if not isinstance(name, str):
         raise ConfigError(f"{path}: subject {number} has no name, expected a text without /")
+    _check_name(f"{path}: subject {number}: name", name)
     where = f"{path}: subject {name!r}"
     keys = common | _run_keys(entry, _OF_SUBJECT, where)
     folder = path.parent / str(entry.get("folder", name))
     trials = entry.get("trials", pattern)
     if isinstance(trials, str):
         static = folder / str(keys["static"]) if "static" in keys else None
-        files = sorted(file for file in folder.glob(trials) if file.is_file() and file != static)
+        files = [file for file in _matching(folder, trials, f"{where}: trials") if file != static]
         if not files:
             raise ConfigError(f"{where}: no file {trials} in {folder}, expected at least one trial")
         # trials in folders of their own are called by these
-        inner = [str(file.parent.relative_to(folder)) for file in files]
+        inner = ["_".join(file.parent.relative_to(folder).parts) for file in files]
         alike = len({file.name for file in files}) < len(files)
         trials = [
-            {"trial": str(file.relative_to(folder)), "name": where_in.replace("/", "_") if alike else file.stem}
+            {"trial": str(file.relative_to(folder)), "name": (alike and where_in) or file.stem}
             for file, where_in in zip(files, inner, strict=True)
         ]
     if not isinstance(trials, list) or not all(isinstance(t, dict) and isinstance(t.get("trial"), str) for t in trials):
@@ -111,11 +117,39 @@ def _sessions(
     return [_session(where, name, folder, dict(trial), keys, output) for trial in trials]
 
 
+def _matching(folder: Path, pattern: str, where: str) -> list[Path]:
+    """Files of a subject's folder, sorted; ``where`` names the key.
+
+    Raises:
+        ConfigError: a pattern that is none, or begins at the root.
+    """
+    if not pattern or Path(pattern).is_absolute():
+        raise ConfigError(f'{where} is {pattern!r}, expected a pattern inside {folder}, such as "*.c3d"')
+    try:
+        return sorted(file for file in folder.glob(pattern) if is_file(file))
+    except (OSError, ValueError, NotImplementedError, RuntimeError) as error:
+        raise ConfigError(f'{where} is {pattern!r} ({error}), expected a pattern such as "*.c3d"') from None
+
+
+def _check_name(where: str, name: str) -> None:
+    """
+    Raises:
+        ConfigError: a name that is no folder's inside another: results would be written elsewhere, or nowhere.
+    """
+    if not name.strip() or name in (".", "..") or _NO_FOLDER.search(name) or len(name.encode()) > _LONGEST_NAME:
+        raise ConfigError(
+            f"{where} is {name!r}, expected the name of a folder for results: text without / and \\, not . or .., "
+            f"of at most {_LONGEST_NAME} bytes"
+        )
+
+
 def _session(
     where: str, subject: str, folder: Path, entry: dict[str, Any], keys: dict[str, Any], output: Path
 ) -> Session:
-    file = folder / entry.pop("trial")
+    entry_file = entry.pop("trial")
+    file = folder / entry_file
     name = str(entry.pop("name", file.stem))
+    _check_name(f"{where}, trial {entry_file!r}: name", name)
     content = keys | _run_keys(entry, (), f"{where}, trial {name!r}")
     if "forces" in content:  # beside the trial; {trial} stands for its name
         content["forces"] = str(file.parent / str(content["forces"]).replace("{trial}", file.stem))

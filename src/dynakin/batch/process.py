@@ -8,14 +8,18 @@ from pathlib import Path
 from typing import Any
 
 from dynakin.batch.dataset import Dataset, Session
-from dynakin.comparison import Row, compare_trial
+from dynakin.comparison import Row, trial_of
 from dynakin.comparison.case import case_of
+from dynakin.comparison.methods import estimate_each, with_lost
 from dynakin.comparison.table2 import MARKERS, mean_fit, table2_of, trial_fits
 from dynakin.config import make_config
 from dynakin.engine import Failure, Journal, Pool, Task, work
 from dynakin.engine.work import Progress
+from dynakin.errors import DynakinError
+from dynakin.filter import presets
 from dynakin.reference import CUTOFF_HZ
 from dynakin.results import COMPONENTS, SignalFit
+from dynakin.results.failures import Failures
 from dynakin.results.versions import versions
 
 Fits = dict[tuple[str, str], SignalFit]
@@ -74,16 +78,24 @@ def work_on(options: Options, payload: Session) -> dict[str, Any]:
     """One trial: read, estimated, compared with the reference methods, and written where files are wanted."""
     config = make_config(payload.content, payload.name)
     case = case_of(config, options.presets, options.cutoff_hz)
-    trial = compare_trial(case.recording, case.setup, static=case.static)
-    estimates = list(trial.estimates.values())
+    estimates, lost, initial = estimate_each(case.recording, case.setup, static=case.static)
+    failures, trial = Failures(), None
+    with failures.stage("comparison with the reference methods"):
+        trial = with_lost(trial_of(estimates, initial, case.setup.definition, options.cutoff_hz), lost)
+    title, first = next(iter(estimates.items()))
     if options.files:
         Path(config.output).parent.mkdir(parents=True, exist_ok=True)
-        used = config.model_copy(update={"preset": (options.presets or [config.preset])[0]}).as_used()
-        replace(estimates[0], config=used | estimates[0].config).save(config.output, comparison=trial)
-    metrics = {name: estimate.metrics() for name, estimate in trial.estimates.items()}
+        preset = next(name for name in (options.presets or [config.preset]) if presets.title(name) == title)
+        used = config.model_copy(update={"preset": preset}).as_used()
+        replace(first, config=used | first.config).save(config.output, comparison=trial, failures=failures)
+    if trial is None or failures.found:
+        saved = "the results are saved. " if options.files else ""
+        raise DynakinError(f"{saved}{' '.join(failures.messages())}")
+    metrics = {name: estimate.metrics() for name, estimate in estimates.items()}
     return {
         "fits": [[*key, *fit] for key, fit in trial_fits(trial).items()],
-        "notes": [*trial.notes, *estimates[0].messages],
+        "notes": [*trial.notes, *first.messages],
+        "lost": lost,
         "nis_per_dof": {name: m["consistency"]["mean_nis_per_dof"] for name, m in metrics.items()},
         "events": {
             name: {key: m["events"][key] for key in ("gated", "missing", "resets")} for name, m in metrics.items()

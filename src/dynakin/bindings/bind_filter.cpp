@@ -38,13 +38,13 @@ void bind_filter(nb::module_& m) {
       .def(
           "__init__",
           [](RecoverySettings* self, double blind_s, double coordinate_sd, double speed_sd, double acceleration_sd,
-             double unseen_sd) {
-            new (self) RecoverySettings{true, blind_s, coordinate_sd, speed_sd, acceleration_sd, unseen_sd};
+             double unseen_sd, double fit_m) {
+            new (self) RecoverySettings{true, blind_s, fit_m, coordinate_sd, speed_sd, acceleration_sd, unseen_sd};
           },
           nb::arg("blind_s") = RecoverySettings{}.blind_s, nb::arg("coordinate_sd") = RecoverySettings{}.coordinate_sd,
           nb::arg("speed_sd") = RecoverySettings{}.speed_sd,
           nb::arg("acceleration_sd") = RecoverySettings{}.acceleration_sd,
-          nb::arg("unseen_sd") = RecoverySettings{}.unseen_sd);
+          nb::arg("unseen_sd") = RecoverySettings{}.unseen_sd, nb::arg("fit_m") = RecoverySettings{}.fit_m);
 
   nb::class_<FilterSettings>(m, "FilterSettings", "Noise, bounds and constraints of a Filter, SI units.")
       .def(

@@ -22,7 +22,7 @@ from dynakin.cli.print_config import print_config
 from dynakin.cli.run import run
 from dynakin.cli.simulate import simulate
 from dynakin.cli.tune import tune
-from dynakin.errors import DynakinError
+from dynakin.errors import DynakinError, LostError
 
 # Typer carries its own copy of click or uses click's, depending on its version; its own name leads to either.
 _USAGE_ERROR: type[Exception] = typer.BadParameter.__mro__[1]
@@ -57,7 +57,8 @@ def _root(
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run a command and give its exit code: 0, or 2 with one line on stderr for anything wrong with the input.
+    """Run a command and give its exit code: 0, 1 where what came out may not be used, or 2 with one line on stderr for
+    anything wrong with the input.
 
     DYNAKIN_DEBUG=1 in the environment lets the traceback through.
     """
@@ -67,7 +68,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if os.environ.get("DYNAKIN_DEBUG") == "1":
             raise
         print_error(error.message)
-        return 2
+        return 1 if isinstance(error, LostError) else 2
     except _USAGE_ERROR as error:
         if type(error).__name__ == "NoArgsIsHelpError":  # its message is the help text
             typer.echo(str(getattr(error, "message", error)))

@@ -32,8 +32,8 @@ def batch(
 ) -> None:
     """Work on all trials of all subjects, each by itself: Table II over them, and those that failed by name.
 
-    The exit code is 1 where some failed. A batch that was stopped goes on where it was; those that failed are tried
-    again.
+    The exit code is 1 where some failed, or a filter lost the person. A batch that was stopped goes on where it was;
+    those that failed are tried again.
     """
     if backend == "threads":
         raise ConfigError("batch: --backend threads, expected processes or dask: a crash would take all trials with it")
@@ -60,7 +60,10 @@ def batch(
                 console.print(f"Warned  {name}: {note.removeprefix('Warning: ')}", soft_wrap=True)
     for name, failure in result.failures.items():
         console.print(f"Failed  {name}: {failure.message}", soft_wrap=True)
+    lost = [(name, *entry) for name, row in result.rows.items() for entry in row["lost"].items()]
+    for name, preset_name, reason in lost:
+        console.print(f"Lost    {name}, EKF ({preset_name}): {reason}", soft_wrap=True)
     if not result.rows:
         raise DynakinError(f"{dataset}: none of {len(found.sessions)} trials could be worked on")
-    if result.failures:
+    if result.failures or lost:
         raise typer.Exit(1)

@@ -12,7 +12,7 @@ from rich.console import Console
 from rich.padding import Padding
 
 from dynakin.cli.compare_inputs import cases_of, chosen_trials, given_keys, halves_of
-from dynakin.cli.console import as_table, busy, out, progress_bar
+from dynakin.cli.console import as_table, busy, out, print_error, progress_bar
 from dynakin.cli.options import (
     ForceEach,
     ForceThreshold,
@@ -24,6 +24,7 @@ from dynakin.cli.options import (
     PlateFilter,
     Sex,
     Side,
+    Smooth,
     Static,
     TableName,
     Trials,
@@ -64,6 +65,7 @@ def compare(
     height: Height = None,
     sex: Sex = None,
     preset: Annotated[list[str] | None, typer.Option(help="Noise settings: default, paper. May be repeated.")] = None,
+    smooth: Smooth = None,
     cutoff: Annotated[float, typer.Option("--cutoff-hz", help="Low-pass of AT and classical, Hz.")] = CUTOFF_HZ,
     side: Side = None,
     vertical: Vertical = None,
@@ -88,6 +90,7 @@ def compare(
     given = given_keys(
         model, markers, static, mass, height, sex, side, vertical, forward, table, plate_filter, force_threshold
     )
+    given["smooth"] = smooth
     chosen = chosen_trials(trials or [], identify_trial, test_trial, halved or not_seen)
     cases = cases_of(chosen, forces or [], preset or [], cutoff, given)
     console = out()
@@ -113,6 +116,11 @@ def compare(
             save_comparison(output, tables, more, page)
         console.print(f"Tables  {output}", soft_wrap=True)
         console.print(f"Report  {output / 'report.html'}", soft_wrap=True)
+    lost = [f"{trial.name}, EKF ({preset}): {why}" for trial in compared for preset, why in trial.lost.items()]
+    for reason in lost:
+        print_error(reason)
+    if lost:
+        raise typer.Exit(1)
 
 
 def compare_cases(cases: Sequence[Case]) -> list[Trial]:

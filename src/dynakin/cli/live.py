@@ -81,7 +81,10 @@ def live(
     ] = None,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="With --finish: folder for results.")] = None,
 ) -> None:
-    """Estimate while it is measured: from a capture system, or a recording played as if it were one."""
+    """Estimate while it is measured: from a capture system, or a recording played as if it were one.
+
+    Exit code 1 where a recording could not be written to its end.
+    """
     if finish_folder is not None:
         if output is None:
             raise typer.BadParameter("--finish needs -o OUT, the folder for the results")
@@ -136,6 +139,8 @@ def live(
         session.run()
     except KeyboardInterrupt:
         out().print("Stopped.")
+    if session.failures:
+        raise typer.Exit(1)
     if record is not None:
         out().print(f"Recorded in {record}; results from it: dynakin live --finish {record} -o OUT", soft_wrap=True)
 

@@ -19,9 +19,16 @@ Mass = Annotated[float | None, typer.Option("--mass", help="Body mass, kg; else 
 Height = Annotated[float | None, typer.Option("--height", help="Body height, m; else from the markers.")]
 Sex = Annotated[str | None, typer.Option("--sex", help="male or female, for the table; else the mean of both.")]
 Preset = Annotated[str | None, typer.Option(help="Noise settings: default, paper or a .toml file.")]
+Smooth = Annotated[
+    bool | None,
+    typer.Option("--smooth/--live-like", help="Each frame from all frames (default), or as it would be live."),
+]
 Side = Annotated[str | None, typer.Option(help="Markers of a one-legged model: auto, right, left, both.")]
 Vertical = Annotated[str | None, typer.Option(help="Laboratory axis that points up: auto, +Y, +Z, ...")]
-Forward = Annotated[str | None, typer.Option(help="Facing direction: auto, an axis or three numbers (0,1,0).")]
+Forward = Annotated[
+    str | None,
+    typer.Option(help="Facing direction: auto, an axis or three numbers (0,1,0); given, X of the results is along it."),
+]
 Estimated = Annotated[
     str | None, typer.Option("--estimate", help="Parameters: some of lengths,markers,soft_tissue,inertia; or none.")
 ]

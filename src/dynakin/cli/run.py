@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 
-from dynakin.cli.console import busy, out, progress_bar
+from dynakin.cli.console import busy, out, print_error, progress_bar
 from dynakin.cli.options import (
     Estimated,
     Force,
@@ -23,6 +24,7 @@ from dynakin.cli.options import (
     Preset,
     Sex,
     Side,
+    Smooth,
     Static,
     TableName,
     Vertical,
@@ -38,6 +40,8 @@ from dynakin.identifiability import Identifiability, identifiability
 from dynakin.recordings import read, without_plate_loads
 from dynakin.report import read_sensitivity, save_figures
 from dynakin.results import Estimate, check_output_writable
+from dynakin.results.failures import Failures
+from dynakin.results.tracking import refuse_lost
 
 LARGEST_BENCH = 250
 """States up to which a run also tells what the recording says of the constants: it filters a dozen motions more."""
@@ -56,7 +60,7 @@ def run(
     height: Height = None,
     sex: Sex = None,
     preset: Preset = None,
-    smooth: Annotated[bool | None, typer.Option("--smooth", help="Estimate each frame from all frames.")] = None,
+    smooth: Smooth = None,
     side: Side = None,
     estimate: Estimated = None,
     vertical: Vertical = None,
@@ -70,6 +74,9 @@ def run(
     figures: Annotated[
         Path | None, typer.Option(help="Also write figures for papers (SVG, PDF, PNG) into this folder.")
     ] = None,
+    keep_lost: Annotated[
+        bool, typer.Option("--keep-lost", help="Save a trial that was lost too, its lost frames empty.")
+    ] = False,
     sensitivity: Annotated[
         Path | None, typer.Option(help="Criterion over the gains (.csv, .nc): draw it too, the paper's Figure 3.")
     ] = None,
@@ -102,15 +109,26 @@ def run(
     if sensitivity is not None and figures is None:
         raise typer.BadParameter("--sensitivity is a figure for papers, expected --figures FOLDER with it")
     grid = None if sensitivity is None else read_sensitivity(sensitivity)
+    failures = Failures()
     with progress_bar("estimating") as progress:
-        found, comparison, told = estimate_from(config, progress)
+        found, comparison, told = estimate_from(config, failures, progress, keep_lost=keep_lost)
+    save = partial(found.save, config.output, comparison=comparison, identifiability=told, keep_lost=keep_lost)
     with busy("writing results and report"):
-        folder = found.save(config.output, comparison=comparison, identifiability=told)
-    print_summary(found, folder)
+        folder = save(failures=failures)
+    saved = len(failures.found)
+    with failures.stage("summary"):
+        print_summary(found, folder)
     if figures is not None:
         with busy("drawing figures"):
-            written = save_figures(found, figures, comparison=comparison, sensitivity=grid)
+            written = save_figures(found, figures, comparison=comparison, sensitivity=grid, failures=failures)
         out().print(f"Figures  {figures} ({len(written)} files)", soft_wrap=True)
+    if len(failures.found) > saved:  # what failed since then is to stand in the files too
+        save(failures=failures)
+    wrong = [*failures.messages(), *filter(None, [found.why_lost])]
+    for message in wrong:
+        print_error(message)
+    if wrong:
+        raise typer.Exit(1)
 
 
 def configure(trial: Path, given: dict[str, Any]) -> RunConfig:
@@ -122,13 +140,20 @@ def configure(trial: Path, given: dict[str, Any]) -> RunConfig:
 
 
 def estimate_from(
-    config: RunConfig, progress: Callable[[int, int], None] | None = None
-) -> tuple[Estimate, Trial, Identifiability | None]:
+    config: RunConfig,
+    failures: Failures,
+    progress: Callable[[int, int], None] | None = None,
+    *,
+    keep_lost: bool = False,
+) -> tuple[Estimate, Trial | None, Identifiability | None]:
     """Read, load, estimate: what a configuration asks for, with it kept in the result; the same recording by the
     reference methods; and what it tells of the constants, None with a note in the estimate where that cannot be said.
 
+    Args:
+        failures: takes what fails once the estimate is there. keep_lost: go on with a trial that was lost.
+
     Raises:
-        DynakinError: anything that is wrong with the input, in one line.
+        DynakinError: anything that is wrong with the input, in one line. LostError: the person was lost.
     """
     estimator = config.estimator()
     recording = read(
@@ -140,22 +165,32 @@ def estimate_from(
     recording = without_plate_loads(recording, config.plate_loads, config.vertical)
     static = None if config.static is None else read(config.static)
     estimate = estimator.run(recording, static=static, smooth=config.smooth, progress=progress)
-    estimate = asked_angles(estimator, estimate, static, config.zero, config.signs)
     estimate = replace(estimate, config=config.as_used() | estimate.config)
+    if not keep_lost:
+        refuse_lost(estimate)
+    with failures.stage("joint angles of angles.sto"):
+        estimate = asked_angles(estimator, estimate, static, config.zero, config.signs)
     assert estimator.initial is not None
     n_states = len(estimator.initial.names)
-    comparison = trial_of({presets.title(config.preset): estimate}, estimator.initial, estimator.model, whatever=True)
+    comparison = None
+    with failures.stage("comparison with the reference methods"):
+        comparison = trial_of(
+            {presets.title(config.preset): estimate}, estimator.initial, estimator.model, whatever=True
+        )
     if n_states > LARGEST_BENCH:
         note = (
             f"What the recording tells of the constants is left out: with {n_states} states it takes many minutes; "
             "dynakin model --identifiability tells."
         )
         return replace(estimate, messages=[*estimate.messages, note]), comparison, None
-    try:
-        return estimate, comparison, identifiability(estimator, estimate)
-    except DynakinError as error:  # a trial of a few frames, say: no reason to lose the estimate
-        note = f"What the recording tells of the constants is left out: {error.message}"
-        return replace(estimate, messages=[*estimate.messages, note]), comparison, None
+    told = None
+    with failures.stage("what the recording tells of the constants"):
+        try:
+            told = identifiability(estimator, estimate)
+        except DynakinError as error:  # a trial of a few frames, say: no failure
+            note = f"What the recording tells of the constants is left out: {error.message}"
+            estimate = replace(estimate, messages=[*estimate.messages, note])
+    return estimate, comparison, told
 
 
 def estimated(text: str | None) -> list[str] | None:

@@ -11,6 +11,7 @@ from rich.table import Table
 from dynakin.cli.console import out, table
 from dynakin.results import Estimate
 from dynakin.results.bounds import counts_in_words
+from dynakin.results.records import NOT_SMOOTHED
 
 
 def print_summary(estimate: Estimate, folder: Path) -> None:
@@ -19,16 +20,18 @@ def print_summary(estimate: Estimate, folder: Path) -> None:
     metrics = estimate.metrics()
     _print_moments(console, metrics["moments"])
     console.print(_figures(estimate, metrics))
-    verdicts = [metrics[block]["verdict"] for block in ("consistency", "adaptation", "soft_tissue")]
+    blocks = (metrics[block] for block in ("tracking", "consistency", "adaptation", "soft_tissue"))
+    verdicts = [block["verdict"] for block in blocks if block]
     for message in estimate.messages:
         if message.startswith("Warning:"):
             console.print(message, style="yellow")
-        elif message.endswith("brought into step."):
+        elif message.startswith(NOT_SMOOTHED) or message.endswith("brought into step."):
             console.print(message)
     console.print(f"Verdict: {' '.join(filter(None, verdicts))}", style="dim")
     console.print()
     console.print(f"Results  {folder}", soft_wrap=True)
-    console.print(f"Report   {folder / 'report.html'}", soft_wrap=True)
+    if (folder / "report.html").exists():
+        console.print(f"Report   {folder / 'report.html'}", soft_wrap=True)
 
 
 def _print_moments(console: Console, moments: dict[str, Any]) -> None:
@@ -60,7 +63,8 @@ def _figures(estimate: Estimate, metrics: dict[str, Any]) -> Table:
             f"wrench {name}, RMS", f"{value:.2f} {unit}", "" if share is None else f"{share:.1f} % of measured"
         )
     after = metrics["adaptation"]["after_s"]
-    rows.add_row("settled after", "-" if after is None else f"{after:.1f} s", "")
+    if not estimate.smoothed:
+        rows.add_row("settled after", "-" if after is None else f"{after:.1f} s", "")
     stuck = metrics["events"]["parameters_at_bound"]
     free = sum(p.estimated and p.lower is not None for p in estimate.parameters)
     by_kind = counts_in_words(metrics["bounds"]["by_kind"], "at_end")

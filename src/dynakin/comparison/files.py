@@ -8,6 +8,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
+from dynakin.absent import with_nulls
 from dynakin.comparison.statistics import Spread
 from dynakin.results.json_files import write_metrics
 from dynakin.results.output_folder import FolderKind, check_output_writable, replacing
@@ -84,4 +85,4 @@ def _write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
         writer.writeheader()
-        writer.writerows(rows)
+        writer.writerows(with_nulls(dict(row)) for row in rows)

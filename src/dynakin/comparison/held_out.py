@@ -14,7 +14,7 @@ from dynakin.comparison.statistics import spread
 from dynakin.comparison.table2 import Row, unit_of
 from dynakin.errors import ModelError, RecordingError
 from dynakin.filter.smoothing import can_smooth
-from dynakin.filter.total_wrench import known_total
+from dynakin.filter.total_wrench import known_ground
 from dynakin.model import Bounds, Definition, InitialModel, Priors, initialise
 from dynakin.recordings import GroundFrame, Recording
 from dynakin.reference import identify, predicted_wrench, reference_methods
@@ -86,7 +86,8 @@ def identify_on(
     estimates = {}
     for preset in setup.noise:
         estimator = setup.estimator(preset)
-        estimates[preset] = estimator.run(recording, static=static)
+        # only what it ends with is used, which smoothing does not change
+        estimates[preset] = estimator.run(recording, static=static, smooth=False)
     assert estimator.initial is not None
     wrench = measured_wrench(recording, estimator.initial, setup.plates)
     ground = estimator.initial.ground if same_recording else None
@@ -165,7 +166,7 @@ def measured_wrench(recording: Recording, initial: InitialModel, plates: Mapping
             "(--forces)"
         )
     wrench = initial.ground.wrench_to_ground(recording.total_wrench())
-    known_total(recording, initial, wrench, plates)
+    known_ground(recording, initial, marker_paths(recording, initial, initial.ground), wrench, plates)
     if not np.isfinite(wrench).all(axis=1).any():
         where = recording.path or recording.name
         raise RecordingError(f"{where}: in no frame do the plates tell the whole wrench, expected a second of them")

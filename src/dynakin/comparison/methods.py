@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
 from dynakin.comparison.setup import Setup
-from dynakin.errors import DynakinError, ModelError
+from dynakin.errors import DynakinError, LostError, ModelError
 from dynakin.filter.zero import asked_angles
 from dynakin.model import Definition, InitialModel
 from dynakin.recordings import Recording
 from dynakin.reference import CUTOFF_HZ, Reference, reference_methods
 from dynakin.reference.methods import Lengths
 from dynakin.results import COMPONENTS, Estimate, evaluation_window
+from dynakin.results.facing import facing
 from dynakin.results.mean_curves import MEASURED, MeanCurve, mean_curves, signals
 from dynakin.results.repetitions import Found, repetitions_of
 from dynakin.results.sources import measured_only, moment_sources, wrench_sources
@@ -63,7 +64,7 @@ class Trial:
         axes: (3,) bool, ground axes that the model explains. rotation: (C,) bool.
         repetitions: squats or gait cycles after the adaptation.
         notes: what was left out and why.
-        estimates: of each preset, for whoever wants more.
+        estimates: of each preset, for whoever wants more. lost: presets that lost the person, and why.
     """
 
     name: str
@@ -80,6 +81,7 @@ class Trial:
     methods: tuple[Method, ...]
     notes: tuple[str, ...]
     estimates: dict[str, Estimate]
+    lost: dict[str, str] = field(default_factory=dict)
 
     def of_kind(self, kind: str) -> list[Method]:
         """The methods of one kind, in order."""
@@ -108,15 +110,42 @@ def compare_trial(
     moves with it. The markers of both are carried rigidly from where they were while standing.
 
     Raises:
-        DynakinError: as `Estimator.run`.
+        LostError: no filter followed the person. DynakinError: as `Estimator.run`.
     """
-    estimates = {}
+    estimates, lost, initial = estimate_each(recording, setup, static=static, progress=progress)
+    trial = trial_of(estimates, initial, setup.definition, setup.cutoff_hz)
+    return with_lost(trial, lost)
+
+
+def with_lost(trial: Trial, lost: Mapping[str, str]) -> Trial:
+    """The trial with the filters that lost the person, which are left out, in its notes."""
+    notes = [f"Warning: EKF ({preset}) is left out: {reason}." for preset, reason in lost.items()]
+    return replace(trial, notes=(*trial.notes, *notes), lost=dict(lost))
+
+
+def estimate_each(
+    recording: Recording, setup: Setup, *, static: Recording | None = None, progress: Progress | None = None
+) -> tuple[dict[str, Estimate], dict[str, str], InitialModel]:
+    """Run every preset: the estimates, why others lost the person, and what they started from.
+
+    Raises:
+        LostError: no filter followed the person. DynakinError: as `Estimator.run`.
+    """
+    estimates: dict[str, Estimate] = {}
+    lost: dict[str, str] = {}
     for preset in setup.noise:
         estimator = setup.estimator(preset)
         estimate = estimator.run(recording, static=static, smooth=setup.smooth, progress=progress)
-        estimates[preset] = asked_angles(estimator, estimate, static, setup.zero, setup.signs)
+        reason = estimate.why_lost
+        if reason is None:
+            estimates[preset] = asked_angles(estimator, estimate, static, setup.zero, setup.signs)
+        else:
+            lost[preset] = reason
     assert estimator.initial is not None
-    return trial_of(estimates, estimator.initial, setup.definition, setup.cutoff_hz)
+    if not estimates:
+        where = recording.path or recording.name
+        raise LostError(f"{where}: {'; '.join(f'EKF ({preset}): {reason}' for preset, reason in lost.items())}")
+    return estimates, lost, estimator.initial
 
 
 def trial_of(
@@ -139,8 +168,8 @@ def trial_of(
         RecordingError: uneven time steps, or a cut-off that is not below half the rate; not with ``whatever``.
     """
     methods = [_filtered(preset, estimate) for preset, estimate in estimates.items()]
-    first = next(iter(estimates.values()))
-    notes: list[str] = []
+    first = facing(next(iter(estimates.values())))
+    notes = how_estimated(estimates)
     options: tuple[tuple[str, Lengths], ...] = ((AT, "constant"), (CLASSICAL, "frame"))
     try:
         for kind, lengths in options:
@@ -170,8 +199,18 @@ def trial_of(
     )
 
 
+def how_estimated(estimates: Mapping[str, Estimate]) -> list[str]:
+    """Which filters are smoothed and which are as live, where they stand beside each other and differ."""
+    if len({estimate.smoothed for estimate in estimates.values()}) < 2:
+        return []
+    return [
+        f"EKF ({preset}): " + ("each frame from all frames." if e.smoothed else "each frame as it would be live.")
+        for preset, e in estimates.items()
+    ]
+
+
 def _filtered(preset: str, estimate: Estimate) -> Method:
-    data = estimate.data
+    data = facing(estimate).data
     return Method(
         f"EKF ({preset})",
         "EKF",

@@ -39,7 +39,7 @@ class Setup:
     plates: Mapping[str, str] | None = None
     loads: tuple[CarriedLoad, ...] = ()
     parameters: IdentifiedSubject | None = None
-    smooth: bool = False
+    smooth: bool | None = None
     zero: Zero = "model"
     signs: Signs = "opensim"
 

@@ -8,6 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from dynakin.absent import with_nulls
 from dynakin.errors import OutputError
 
 ROWS = "rows.jsonl"
@@ -35,7 +36,7 @@ def open_folder(folder: Path, own: Sequence[str]) -> Path:
 
 
 def write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Rows of the same columns; None is a blank cell, numbers keep all their digits.
+    """Rows of the same columns; what is None or no finite number is a blank cell, numbers keep all their digits.
 
     Raises:
         OutputError: the file cannot be written.
@@ -44,7 +45,7 @@ def write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
         with path.open("w", encoding="utf-8", newline="") as file:
             writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
             writer.writeheader()
-            writer.writerows(rows)
+            writer.writerows(with_nulls(dict(row)) for row in rows)
     except OSError as error:
         raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from None
 
@@ -55,7 +56,7 @@ def write_json(path: Path, content: Any) -> None:
         OutputError: the file cannot be written.
     """
     try:
-        text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
+        text = json.dumps(with_nulls(content), indent=2, ensure_ascii=False, allow_nan=False)
         path.write_text(text + "\n", encoding="utf-8", newline="\n")
     except OSError as error:
         raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from None

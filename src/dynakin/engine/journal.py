@@ -7,6 +7,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from dynakin.absent import with_nulls
 from dynakin.engine.tasks import Row
 from dynakin.errors import OutputError
 
@@ -20,7 +21,7 @@ class Journal:
 
     Args:
         path: the file; made when the first row comes, in a folder that exists.
-        belongs_to: plain data: everything on which the rows depend. Its digest stands in the heading.
+        belongs_to: with_nulls data: everything on which the rows depend. Its digest stands in the heading.
 
     Raises:
         OutputError: the file cannot be read, is none of ours, or belongs to something else.
@@ -69,7 +70,7 @@ class Journal:
             with self.path.open("a", encoding="utf-8", newline="\n") as file:
                 if fresh:
                     file.write(json.dumps(self._heading) + "\n")
-                file.write(json.dumps({"key": key, "row": row}, allow_nan=False) + "\n")
+                file.write(json.dumps(with_nulls({"key": key, "row": row}), allow_nan=False) + "\n")
         except OSError as error:
             raise OutputError(f"{self.path}: cannot be written ({error.strerror or error})") from None
 

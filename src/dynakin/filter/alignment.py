@@ -45,3 +45,13 @@ def in_words(shift_s: float, delay: tuple[float, float] | None) -> list[str]:
     ahead = "behind" if total >= 0.0 else "ahead of"
     text = f"The plates are {1000.0 * abs(total):.1f} ms {ahead} the markers (standard deviation {1000.0 * sd:.1f} ms)"
     return [f"{text}; they were brought into step." if shift_s else f"{text}."]
+
+
+def contradicted(delay_s: float, misfit_n: float, misfit_then_n: float) -> str:
+    """That a delay which the fit asks for is not taken off, because the motion of the centre of mass is against it."""
+    where = "behind" if delay_s >= 0.0 else "ahead of"
+    return (
+        f"Warning: the fit asks for plates that are {1000.0 * abs(delay_s):.0f} ms {where} the markers, but the motion "
+        f"of the centre of mass does not: their sum would be {misfit_then_n:.0f} N off it, not {misfit_n:.0f} N. "
+        "No more was taken off."
+    )

@@ -10,12 +10,16 @@ import numpy.typing as npt
 import xarray as xr
 
 from dynakin import _core
+from dynakin.absent import finite
 from dynakin.filter.events import events_of
 from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.filter.parameters import parameters_of
+from dynakin.filter.sources import with_sources
+from dynakin.filter.total_wrench import ELSEWHERE
 from dynakin.model import InitialModel
 from dynakin.recordings import Recording
 from dynakin.results import AXES, COMPONENTS, Estimate, Timing
+from dynakin.results.facing import nearly_singular
 from dynakin.results.feet import MEASURED
 
 Array = npt.NDArray[np.float64]
@@ -31,6 +35,7 @@ def assemble(
     notes: Sequence[str],
     covariances: tuple[Array, Array],
     feet: FootWrenches | None = None,
+    undeclared: npt.NDArray[np.bool_] | None = None,
 ) -> Estimate:
     """Label what `Filter.run` returned and keep what is needed to judge it.
 
@@ -41,8 +46,12 @@ def assemble(
         notes: sentences of the plates' check.
         covariances: P (n, n) before the first frame and after the last.
         feet: the wrenches that the moments were made with, None where there were none.
+        undeclared: (T,) frames in which something bears the person that no plate measures.
     """
     data = _dataset(arrays, model, initial, recording, measured, feet)
+    data = with_sources(data, feet, np.zeros(len(recording.time), dtype=bool) if undeclared is None else undeclared)
+    if feet is not None:
+        data = data.isel(foot=[name != ELSEWHERE for name in feet.names])
     for name, covariance in zip(("initial_covariance", "final_covariance"), covariances, strict=True):
         data[name] = (("element", "element_"), covariance)
     prior_sd = np.sqrt(np.diag(covariances[0]))
@@ -60,7 +69,7 @@ def assemble(
             "origin_m": initial.ground.origin_L.tolist(),
         },
     }
-    return Estimate(
+    estimate = Estimate(
         data=data,
         parameters=parameters,
         events=events_of(data, parameters, initial, noise.get("unseen_sd")),
@@ -71,6 +80,19 @@ def assemble(
         model_name=initial.spec.name,
         messages=[*recording.notes, *initial.messages, *notes],
     )
+    estimate.messages.extend([*_without_infinities(data), *nearly_singular(estimate)])
+    return estimate
+
+
+def _without_infinities(data: xr.Dataset) -> list[str]:
+    """Takes infinite numbers for what they are, not known; a sentence on each variable that has any."""
+    said = []
+    for name, variable in data.data_vars.items():
+        count = int(np.isinf(variable.values).sum()) if variable.dtype.kind == "f" else 0
+        if count:
+            variable.values = finite(variable.values)
+            said.append(f"Warning: {name}: {count} numbers are infinite and left out.")
+    return said
 
 
 def _dataset(

@@ -11,26 +11,31 @@ import numpy.typing as npt
 from dynakin import _core
 from dynakin.errors import ConfigError, DivergenceError, RecordingError
 from dynakin.filter import presets
-from dynakin.filter.alignment import PASSES, delay_of, in_step, in_words, is_late
+from dynakin.filter.alignment import PASSES, contradicted, delay_of, in_step, in_words, is_late
 from dynakin.filter.assemble import assemble
+from dynakin.filter.closure import plates_misfit
 from dynakin.filter.core_filter import core_filter, filter_settings
 from dynakin.filter.extend import QUANTITIES, Quantity, initial_covariance
 from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.filter.live import StepEstimate, deviations_of, step_estimate
 from dynakin.filter.noise import Noise
 from dynakin.filter.samples import Sample, recording_arrays, sample_arrays
-from dynakin.filter.smoothing import check_can_smooth, smoothed
-from dynakin.filter.total_wrench import doubtful_mass, foot_wrenches, known_total, leave_out_foreign
+from dynakin.filter.smoothing import check_can_smooth, smoothed, whether_to_smooth
+from dynakin.filter.total_wrench import Ground, doubtful_mass, foot_wrenches, known_ground
 from dynakin.model import Bounds, CarriedLoad, Definition, InitialModel, Priors, initialise, with_loads
 from dynakin.model.identified import IdentifiedSubject, with_identified
 from dynakin.model.validation import nearest
 from dynakin.recordings import Recording
-from dynakin.recordings.foot_loads import FootLoads
 from dynakin.results import Estimate
+from dynakin.results.tracking import without_lost
 
 Array = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]
 Feet = Callable[[InitialModel], FootWrenches | None]
+
+LARGEST_LAG = 1000
+"""Frames. Each step goes back over all of them and each keeps its covariance: a whole body's take half a gigabyte, and
+no camera's frame is so long that a step would end within it."""
 
 
 class Estimator:
@@ -70,8 +75,10 @@ class Estimator:
             if kind not in QUANTITIES:
                 known = ", ".join(QUANTITIES)
                 raise ConfigError(f"estimate: {kind!r} is unknown{nearest(kind, QUANTITIES)}; expected some of {known}")
-        if lag < 0:
-            raise ConfigError(f"lag is {lag}, expected 0 frames or more")
+        if not (isinstance(lag, int) and 0 <= lag <= LARGEST_LAG):
+            raise ConfigError(
+                f"lag is {lag!r}, expected 0 to {LARGEST_LAG} frames (all of a recording: run with smooth=True)"
+            )
         if loads and model.subject.mass_kg is None:
             raise ConfigError("loads: the plates carry them too, expected the person's own mass beside them (mass_kg)")
         self.model = model
@@ -98,16 +105,20 @@ class Estimator:
         recording: Recording,
         *,
         static: Recording | None = None,
-        smooth: bool = False,
+        smooth: bool | None = None,
         feet: Feet | None = None,
         progress: Progress | None = None,
     ) -> Estimate:
         """Estimate a whole recording.
 
+        Frames in which the filter lost the person are NaN (`Estimate.lost`), and a message names them; of a trial that
+        was lost as a whole `Estimate.why_lost` gives the reason.
+
         Args:
             recording: markers and plates, as `read` gives them.
             static: the same person and markers, standing: lengths and marker places are taken from it.
-            smooth: whether each frame is estimated from all frames, those after it too (`filter.smoothing`).
+            smooth: whether each frame is estimated from all frames, those after it too (`filter.smoothing`); False: as
+                it would be live. None: smoothed wherever the noise settings have a smoother, else a message says so.
             feet: for models with a floating root: gives the wrench of each foot once the model is measured and its
                 ground frame known, instead of the plates' own division by `foot_loads`. Moments are those that the
                 feet's wrenches leave, adjusted so that nothing is left at the root; the state does not depend on it.
@@ -115,47 +126,47 @@ class Estimator:
 
         Raises:
             ModelError, RecordingError: model, markers, plates and recording do not fit.
+            ConfigError: smoothing was asked for, and the noise settings have no smoother.
             DivergenceError: the filter lost its estimate; the message names the frame.
         """
-        if smooth:
-            check_can_smooth(self.noise)
+        smooth, unsmoothed = whether_to_smooth(smooth, self.noise)
         initial = self.start(recording, static=static)
         assert self._core_model is not None
-        markers, wrench, notes, loads = self._measured(recording, initial)
-        foreign = bool(np.isnan(wrench).all())
+        markers, wrench, ground = self._measured(recording, initial)
+        notes = list(ground.notes)
         on_feet = None
-        if feet is not None and not foreign:
+        if feet is not None:
             on_feet = feet(initial)
-        elif loads is not None and not foreign:
-            on_feet = foot_wrenches(loads, initial, self.noise)
+        elif ground.loads is not None:
+            on_feet = foot_wrenches(ground.loads, initial, self.noise)
         try:
-            doubt = doubtful_mass(wrench, initial.weighed_kg)
+            doubt = doubtful_mass(wrench, initial.weighed_kg, ground.load_ratio)
             passes = 0 if doubt else PASSES
-            arrays, shift, clock = self.run_in_step(initial, recording.time, markers, wrench, progress, on_feet, passes)
+            there, back = _shares(progress, recording.n_frames) if smooth else (progress, None)
+            arrays, shift, clock = self.run_in_step(initial, recording.time, markers, wrench, there, on_feet, passes)
             wrench = in_step(recording.time, wrench, shift) if shift else wrench
             on_feet = on_feet and on_feet.in_step(recording.time, shift)
             if smooth:
                 self.start_from(initial)
-                arrays = self.run_smoothed_arrays(recording.time, markers, wrench, progress, on_feet)
+                arrays = self.run_smoothed_arrays(recording.time, markers, wrench, back, on_feet)
         except ValueError as error:  # a frame that the core refuses, named by it
             raise RecordingError(f"{recording.path or recording.name}: {error}") from None
         config = self.settings() | {"smooth": smooth}
-        notes += [doubt] if doubt else [] if foreign else clock
+        notes += [*([doubt] if doubt else clock if ground.usable else []), *unsmoothed]
         assert self._filter is not None
         covariances = (initial_covariance(initial, self.noise), self._filter.covariance)
         measured = (markers, wrench)
-        return assemble(arrays, self._core_model, initial, recording, measured, config, notes, covariances, on_feet)
+        lacking = ground.undeclared
+        return without_lost(
+            assemble(
+                arrays, self._core_model, initial, recording, measured, config, notes, covariances, on_feet, lacking
+            )
+        )
 
-    def _measured(
-        self, recording: Recording, initial: InitialModel
-    ) -> tuple[Array, Array, list[str], FootLoads | None]:
+    def _measured(self, recording: Recording, initial: InitialModel) -> tuple[Array, Array, Ground]:
         markers, wrench = recording_arrays(recording, initial, gaps=self.noise.recover)
-        if not recording.plates:  # of a floating model: others need them
-            text = "No force plates: the total wrench is left out; inertial parameters stay as the table has them."
-            return markers, wrench, [text], None
-        check, loads, notes = known_total(recording, initial, wrench, self.plates)
-        notes += leave_out_foreign(check, wrench, initial, self.noise.plate_load_tolerance)
-        return markers, wrench, notes, loads
+        tolerance = self.noise.plate_load_tolerance
+        return markers, wrench, known_ground(recording, initial, markers, wrench, self.plates, tolerance)
 
     def measured(self, recording: Recording, initial: InitialModel) -> tuple[Array, Array, list[str]]:
         """What the filter takes of a recording: markers (T, M, 3) m, wrench (T, 6), NaN where it is not known (all of
@@ -164,7 +175,8 @@ class Estimator:
         Raises:
             RecordingError: markers or plates do not fit the model.
         """
-        return self._measured(recording, initial)[:3]
+        markers, wrench, ground = self._measured(recording, initial)
+        return markers, wrench, list(ground.notes)
 
     def run_in_step(
         self,
@@ -182,12 +194,16 @@ class Estimator:
             The arrays, the seconds by which the last run took the plates earlier, and what there is to say of that.
         """
         arrays, shift = self.run_arrays(time, markers, wrench, progress, feet), 0.0
+        misfit = plates_misfit(initial, time, markers, wrench)
         for _ in range(passes):
             delay = self._delay(arrays)
             if delay is None or not is_late(delay):
                 break
-            shift += delay[0]
-            taken = in_step(time, wrench, shift)
+            taken = in_step(time, wrench, shift + delay[0])
+            fits = plates_misfit(initial, time, markers, taken)
+            if misfit is not None and fits is not None and fits > misfit:
+                return arrays, shift, [contradicted(shift + delay[0], misfit, fits)]
+            shift, misfit = shift + delay[0], fits
             self.start_from(initial)
             arrays = self.run_arrays(time, markers, taken, progress, feet and feet.in_step(time, shift))
         return arrays, shift, in_words(shift, self._delay(arrays))
@@ -308,15 +324,16 @@ class Estimator:
                 `dynakin.stream.Live`, which finds the feet's wrenches. The state does not depend on it.
 
         Raises:
-            RecordingError: the sample is older than the one before. ModelError: feet that do not fit the model.
+            RecordingError: the sample is older than the one before, or holds something else than numbers in the shapes
+                of `Sample`. ModelError: feet that do not fit the model.
             DivergenceError: the filter lost its estimate.
         """
         if self._filter is None or self._core_model is None or self.initial is None:
             raise ConfigError("step: the estimator has not been started; call start(recording) first")
+        markers, wrench = sample_arrays(sample, self.initial)
         dt = 0.0 if self._time is None else sample.time_s - self._time
         if dt < 0.0:
             raise RecordingError(f"sample at {sample.time_s} s: older than the one before, at {self._time} s")
-        markers, wrench = sample_arrays(sample, self.initial)
         loads = self._loads(feet)
         if self._lag is not None:
             report = self._lag.step(dt, markers, wrench)
@@ -416,3 +433,10 @@ class Estimator:
         """The core's settings for a measured model: this noise, the marker set's variances, the bounds of (9)."""
         assert self._core_model is not None
         return filter_settings(initial, self.noise, self._core_model.layout, self.estimate)
+
+
+def _shares(progress: Progress | None, frames: int) -> tuple[Progress | None, Progress | None]:
+    """One progress for a run forwards and the smoothing after it, which goes over the frames twice."""
+    if progress is None:
+        return None, None
+    return lambda done, total: progress(done, 3 * frames), lambda done, total: progress(frames + done, 3 * frames)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.elements import element
 from dynakin.model import InitialModel
 from dynakin.results import Parameter
 from dynakin.results.records import ParameterKind
@@ -29,17 +30,17 @@ def parameters_of(
     skin = length_skin_sd(initial, length_skin)
     found = []
     for k, name in enumerate(initial.names):
-        first, *rest = name.split("/")
-        if first not in _KINDS or not rest:
+        word, owner, last = element(name)
+        if word not in _KINDS:
             continue  # a coordinate, speed or acceleration
-        kind = _KINDS[first]
-        unseen = skin.get(rest[0], 0.0) if kind == "length" else 0.0
+        kind = _KINDS[word]
+        unseen = skin.get(owner, 0.0) if kind == "length" else 0.0
         found.append(
             Parameter(
                 name=name,
                 kind=kind,
-                segment=segments[rest[0]] if kind == "marker" else "plates" if kind == "plates" else rest[0],
-                unit="1" if rest[0] in initial.dimensionless else _unit(kind, rest[-1]),
+                segment=segments[owner] if kind == "marker" else "plates" if kind == "plates" else owner,
+                unit="1" if owner in initial.dimensionless else _unit(kind, last or owner),
                 value=float(state[k]),
                 sd=float(np.hypot(sd[k], unseen)),
                 initial=float(initial.x0[k]),

@@ -64,9 +64,18 @@ def preset(name: str) -> Noise:
         ConfigError: there is none; the message lists those that there are. As `read_preset`.
     """
     if is_file(name):
-        return read_preset(Path(name), preset)
+        return read_preset(Path(name), built_in)  # not another file, which could name this one
+    return built_in(name, " or a .toml file")
+
+
+def built_in(name: str, otherwise: str = "") -> Noise:
+    """The preset of that name that comes with dynakin.
+
+    Raises:
+        ConfigError: there is none; ``otherwise`` ends the list of those that there are.
+    """
     if name not in PRESETS:
-        raise ConfigError(f"preset {name!r} is unknown; expected {', '.join(PRESETS)} or a .toml file")
+        raise ConfigError(f"preset {name!r} is unknown; expected {', '.join(PRESETS)}{otherwise}")
     return PRESETS[name]()
 
 

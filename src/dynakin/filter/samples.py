@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -11,6 +12,7 @@ import numpy.typing as npt
 from dynakin.errors import RecordingError
 from dynakin.model import InitialModel
 from dynakin.recordings import Recording
+from dynakin.recordings.limits import FARTHEST_M, LARGEST_MOMENT_NM
 
 Array = npt.NDArray[np.float64]
 
@@ -73,11 +75,34 @@ def recording_arrays(recording: Recording, initial: InitialModel, *, gaps: bool 
 
 
 def sample_arrays(sample: Sample, initial: InitialModel) -> tuple[Array, Array]:
-    """Markers (M, 3) and total wrench (6,) of one live sample; what it lacks is NaN."""
+    """Markers (M, 3) and total wrench (6,) of one live sample; what it lacks is NaN.
+
+    Raises:
+        RecordingError: a time, marker or plate that is not made of numbers in the expected shape, or is too large.
+    """
+    if not np.isfinite(_numbers(sample.time_s, (), "sample: time", np.inf)):
+        raise RecordingError(f"sample: time is {sample.time_s} s, expected a number")
+    where = f"sample at {sample.time_s} s"
     missing = np.full(3, np.nan)
-    measured = [np.asarray(sample.markers.get(name, missing), float) for name in initial.recorded_markers]
+    measured = [
+        _numbers(sample.markers.get(name, missing), (3,), f"{where}: marker {name!r}", FARTHEST_M)
+        for name in initial.recorded_markers
+    ]
     markers = initial.ground.points_to_ground(np.stack(measured))
     if not sample.plates:
         return np.ascontiguousarray(markers), np.full(6, np.nan)
-    total = np.sum([np.asarray(plate, float) for plate in sample.plates.values()], axis=0)
+    plates = [_numbers(plate, (6,), f"{where}: {name}", LARGEST_MOMENT_NM) for name, plate in sample.plates.items()]
+    total = np.sum(plates, axis=0)
     return np.ascontiguousarray(markers), initial.ground.wrench_to_ground(total)
+
+
+def _numbers(given: npt.ArrayLike, shape: tuple[int, ...], what: str, most: float) -> Array:
+    try:
+        found = np.asarray(given, float)
+    except (TypeError, ValueError):
+        raise RecordingError(f"{what} is {given!r}, expected {math.prod(shape)} numbers") from None
+    if found.shape != shape:
+        raise RecordingError(f"{what} has shape {found.shape}, expected {shape}")
+    if (np.abs(found) > most).any():
+        raise RecordingError(f"{what} is {found}, expected numbers up to {most:g}, or NaN where it is missing")
+    return found

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 from dynakin.errors import ConfigError
 from dynakin.filter.noise import Noise
+from dynakin.results.records import NOT_SMOOTHED
 
 Array = npt.NDArray[np.float64]
 
@@ -41,6 +42,22 @@ def smoothed(arrays: dict[str, Array]) -> dict[str, Array]:
 def can_smooth(noise: Noise) -> bool:
     """Whether bounds are kept in a way that has a smoother."""
     return noise.constraint in ("projection", "none")
+
+
+def whether_to_smooth(asked: bool | None, noise: Noise) -> tuple[bool, list[str]]:
+    """Whether a recording is smoothed: as asked, else wherever these settings have a smoother; a sentence where not.
+
+    Raises:
+        ConfigError: it was asked for, and these settings have no smoother.
+    """
+    if asked:
+        check_can_smooth(noise)
+    if asked is not None or can_smooth(noise):
+        return asked is not False, []
+    return False, [
+        f"{NOT_SMOOTHED} bounds are kept by constraint {noise.constraint!r}, which has no smoother; each frame is "
+        "estimated from the frames until then, as it would be live."
+    ]
 
 
 def check_can_smooth(noise: Noise) -> None:

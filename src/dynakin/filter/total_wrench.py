@@ -1,25 +1,31 @@
-"""When the plates tell the total external wrench of a body that is fixed nowhere, and when they do not."""
+"""What is known of the ground: when the plates carry all of the person, and which foot's wrench is measured."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import RecordingError
+from dynakin.filter.closure import EXCESS, Closure, closure
 from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.filter.noise import Noise
 from dynakin.model import InitialModel
 from dynakin.recordings import PlateCheck, Recording, check_plates
 from dynakin.recordings import foot_loads as on_plates
-from dynakin.recordings.foot_loads import LOADED_N, FootLoads, foot_loads
+from dynakin.recordings.feet import distance_to_hull
+from dynakin.recordings.foot_contact import runs
+from dynakin.recordings.foot_loads import LOADED_N, NEAR_M, FootLoads, foot_loads
 from dynakin.results.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
 
-
+ELSEWHERE = "elsewhere"
+"""Name of the contact that stands for whatever bears the person and is no foot; it acts on the root."""
 MASS_APART = 0.05
 """Part of the weight by which the plates' mean may differ before the mass is doubted: movement explains 2 or 3 %."""
 
@@ -30,6 +36,8 @@ _CONTACT = {
     on_plates.OFF_PLATE: NOT_MEASURED,
     on_plates.UNKNOWN: NOT_MEASURED,
 }
+_NEARLY_ALL = 0.8
+"""Part of the judged frames from which an excess is said of the whole recording: its mass may be wrong."""
 _SHARED_PART = 0.2
 """Part of a foot's load by which the division of a shared plate may err."""
 _SHARED_REACH_M = 0.1
@@ -37,59 +45,177 @@ _SHARED_REACH_M = 0.1
 
 
 def foot_wrenches(loads: FootLoads, initial: InitialModel, noise: Noise) -> FootWrenches:
-    """Each foot's wrench with its uncertainty: the plates' noise at the foot's centre of pressure.
+    """Each foot's wrench with its uncertainty: the plates' noise at the foot's centre of pressure. Last comes the
+    contact `ELSEWHERE`, not measured in the frames in which something else may bear the person.
 
     On a shared plate the division is known to a fifth of the load, and to the feet's distance.
     """
     contact = np.vectorize(_CONTACT.get, otypes=[np.uint8])(loads.reason)
-    wrench = np.nan_to_num(loads.wrench)
-    push = np.maximum(wrench[..., 1], LOADED_N)
-    zero = np.zeros_like(push)
-    pressure = np.stack([wrench[..., 5] / push, zero, -wrench[..., 3] / push], axis=-1)
-    shared = np.where(loads.reason == on_plates.SHARED, _SHARED_PART * push, 0.0)[..., None]
-    force = np.hypot(np.sqrt(noise.force / 2.0), shared)  # the noise declared is that of both together
-    moment = np.hypot(np.sqrt(noise.moment / 2.0), _SHARED_REACH_M * shared)
-    segments = [initial.feet[foot] for foot in loads.feet]
-    return FootWrenches.of(loads.feet, segments, loads.wrench, contact, force, moment, pressure)
+    contact = np.column_stack([contact, np.where(loads.elsewhere, NOT_MEASURED, IN_THE_AIR)])
+    wrench = np.concatenate([loads.wrench, np.zeros((len(contact), 1, 6))], axis=1)
+    known = np.nan_to_num(wrench)
+    push = np.maximum(known[..., 1], LOADED_N)
+    pressure = np.stack([known[..., 5] / push, np.zeros_like(push), -known[..., 3] / push], axis=-1)
+    shared = np.pad(loads.reason == on_plates.SHARED, ((0, 0), (0, 1))) * _SHARED_PART * push
+    force = np.hypot(np.sqrt(noise.force / 2.0), shared[..., None])  # the noise declared is that of both together
+    moment = np.hypot(np.sqrt(noise.moment / 2.0), _SHARED_REACH_M * shared[..., None])
+    root = next(s.name for s in initial.spec.segments if s.parent == "ground")
+    names, segments = (*loads.feet, ELSEWHERE), [*(initial.feet[foot] for foot in loads.feet), root]
+    return FootWrenches.of(names, segments, wrench, contact, force, moment, pressure)
 
 
-def known_total(
-    recording: Recording, initial: InitialModel, wrench: Array, assigned: Mapping[str, str] | None = None
-) -> tuple[PlateCheck, FootLoads | None, list[str]]:
-    """Check the plates, and leave out (NaN, in place) the frames in which they do not tell the total wrench (T, 6) of a
-    floating model.
+@dataclass(frozen=True, eq=False)
+class Ground:
+    """What is known of the ground reaction over a recording.
+
+    Attributes:
+        loads: of each foot; None of a model that stands on its root.
+        undeclared: (T,) frames in which something bears or pulls the person that no plate measures (a seat, a rail, a
+            cable), wherever it acts: of the moments only those between the plates and the thighs are known.
+        usable: whether the plates are used at all.
+        load_ratio: what they carry over what the declared mass needs (`Closure`); None where that is not known.
+        notes: what there is to say.
+    """
+
+    loads: FootLoads | None
+    undeclared: Flags
+    usable: bool
+    load_ratio: float | None
+    notes: tuple[str, ...]
+
+
+def foot_markers(initial: InitialModel) -> dict[str, list[str]]:
+    """Foot -> the recording's names of the markers on its segment, and on those that hang on that (toes)."""
+    parents = {segment.name: segment.parent for segment in initial.spec.segments}
+
+    def on(segment: str, foot: str) -> bool:
+        return segment == foot or (segment in parents and on(parents[segment], foot))
+
+    pairs = list(zip(initial.recorded_markers, initial.spec.markers, strict=True))
+    return {side: [name for name, m in pairs if on(m.segment, foot)] for side, foot in initial.feet.items()}
+
+
+def known_ground(
+    recording: Recording,
+    initial: InitialModel,
+    markers: Array,
+    wrench: Array,
+    assigned: Mapping[str, str] | None = None,
+    tolerance: float | None = None,
+) -> Ground:
+    """Find what is known of the ground, and leave out (NaN, in place) the frames in which the plates do not carry all
+    of the person from the total wrench (T, 6).
 
     Args:
-        recording: with plates. assigned: plate -> foot, as for `foot_loads`.
-
-    Returns:
-        What the check found, the load of each foot (None for a model that stands fixed), and what there is to say.
+        markers: (T, M, 3) m, of the model, ground frame. assigned: plate -> foot, as for `foot_loads`.
+        tolerance: part of the weight by which the plates' mean may differ; None: the total is used as it is, and only
+            the moments say what they lack.
 
     Raises:
         RecordingError: the plates are refused.
     """
-    loads = foot_loads(recording, initial.ground, assigned=assigned) if initial.feet else None
+    n = recording.n_frames
+    loads = None
+    if initial.feet:
+        loads = foot_loads(recording, initial.ground, foot_markers=foot_markers(initial), assigned=assigned)
+    if not recording.plates:
+        text = (
+            "No force plates: the ground reaction is not known, so the moments of a leg that may stand are absent; "
+            "inertial parameters stay as the table has them."
+        )
+        return Ground(loads, np.zeros(n, dtype=bool), False, None, (text,))
     # steps beside the plates: their mean load is no mass
-    check = check_plates(recording, initial.ground, None if initial.feet else initial.weighed_kg)
+    mass, feet = (None, foot_markers(initial)) if initial.feet else (initial.weighed_kg, None)
+    check = check_plates(recording, initial.ground, mass, feet)
     if check.refusal:
         raise RecordingError(f"{recording.path or recording.name}: {check.refusal}")
-    return check, loads, [*check.messages, *(leave_out_unknown(loads, wrench) if loads is not None else [])]
-
-
-def leave_out_unknown(loads: FootLoads, wrench: Array) -> list[str]:
-    """Make the rows of the total wrench (T, 6) NaN, in place, where the plates do not tell all of it.
-
-    Returns:
-        What there is to say, with times.
-    """
-    wrench[~loads.total_known] = np.nan
+    notes = list(check.messages)
+    claimed: Flags = np.asarray(np.isfinite(wrench).all(axis=1)) if loads is None else loads.total_known
+    found = closure(initial, recording.time, markers, wrench, claimed)
+    undeclared = np.zeros(n, dtype=bool) if found is None else found.undeclared.copy()
+    if loads is not None:
+        notes += loads.messages
+        undeclared |= loads.elsewhere
+        loads = loads.with_undeclared(undeclared)
+    if found is None:
+        foreign = _foreign_load(check, wrench, claimed, initial, tolerance)
+        if foreign is not None:
+            notes.append(foreign)
+            undeclared[:] = True
+            loads = loads and loads.with_undeclared(undeclared)
+    elif found.undeclared.any():
+        said, beside = _undeclared_in_words(found, recording, initial, markers, wrench)
+        notes += said
+        if _nearly_all(found):
+            undeclared[:] = True
+            loads = loads and loads.with_undeclared(undeclared)
+        loads = loads and loads.without(beside)
+    if loads is not None:
+        wrench[~loads.total_known] = np.nan
+    elif tolerance is not None:
+        wrench[undeclared] = np.nan
     used = int(np.count_nonzero(np.isfinite(wrench).all(axis=1)))
-    return [*loads.messages, f"The total wrench is measured in {used} of {len(wrench)} frames."]
+    if loads is not None or used < n:
+        notes.append(f"The total wrench is measured in {used} of {n} frames.")
+    return Ground(loads, undeclared, used > 0, None if found is None else found.load_ratio, tuple(notes))
 
 
-def doubtful_mass(wrench: Array, mass_kg: float) -> str | None:
-    """A sentence where the mean vertical force of the known frames of the wrench (T, 6) contradicts the mass."""
-    load = _mean_load_kg(wrench, least=50)
+def _nearly_all(found: Closure) -> bool:
+    judged = np.isfinite(found.excess[:, 1])
+    return bool(np.count_nonzero(found.undeclared & judged) > _NEARLY_ALL * np.count_nonzero(judged))
+
+
+def _undeclared_in_words(
+    found: Closure, recording: Recording, initial: InitialModel, markers: Array, wrench: Array
+) -> tuple[list[str], Flags]:
+    """Sentences on what the plates lack, with times, and the feet (T, F) under whose plates it acts."""
+    time, feet = recording.time, foot_markers(initial)
+    beside = np.zeros((len(time), len(feet)), dtype=bool)
+    judged = np.isfinite(found.excess[:, 1])
+    weight = initial.weighed_kg * GRAVITY_M_S2
+    if _nearly_all(found):
+        load = float(np.nanmean(wrench[judged, 1])) / GRAVITY_M_S2
+        return [
+            f"Warning: the plates carry {load:.1f} kg on average where the person weighs {initial.weighed_kg:.1f} kg "
+            f"(by the motion {load + float(np.nanmean(found.excess[judged, 1])) / GRAVITY_M_S2:.1f} kg): the mass is "
+            "wrong, a plate is missing, or something that no plate measures bears or pulls the person (a seat, a "
+            "weight, a cable, a rail). The plates are not used for the total."
+        ], beside
+    spans, sizes, away = [], [], []
+    for first, end in runs(found.undeclared):
+        excess = found.excess[first:end]
+        if not np.isfinite(excess).any():
+            continue
+        spans.append(f"{time[first]:.2f} to {time[end - 1]:.2f} s")
+        worst = np.unravel_index(int(np.nanargmax(np.abs(excess))), excess.shape)
+        sizes.append((float(excess[worst]), int(worst[1])))
+        if sizes[-1][1] != 1:
+            continue
+        place = np.broadcast_to(found.place(slice(first, end)), (end - first, 2))
+        for k, names in enumerate(feet.values()):
+            own = [initial.recorded_markers.index(name) for name in names]
+            if not own:
+                continue
+            distance = distance_to_hull(place, markers[first:end][:, own][:, :, [0, 2]])
+            if np.isfinite(distance).any():
+                away.append(float(np.nanmedian(distance)))
+                beside[first:end, k] = sizes[-1][0] > 0.0 and away[-1] < NEAR_M
+    if not spans:
+        return [], beside
+    size, axis = max(sizes, key=lambda pair: abs(pair[0]))
+    near = f", {min(away):.2f} m or more from the feet" if away and not beside.any() else ""
+    return [
+        f"Warning: the plates carry up to {abs(size):.0f} N {'less' if size > 0.0 else 'more'} "
+        f"{'upwards' if axis == 1 else 'sideways'} than the motion needs ({abs(size) / weight:.0%} of the weight, "
+        f"expected within {EXCESS:.0%}): something that no plate measures bears or pulls the person there (a seat, a "
+        f"rail, a box, a foot beside its plate){near}, from {', '.join(spans)}. The total wrench is left out there."
+    ], beside
+
+
+def doubtful_mass(wrench: Array, mass_kg: float, load_ratio: float | None) -> str | None:
+    """A sentence where the plates contradict the mass: by `Ground.load_ratio`, or, where that is not known, by the mean
+    vertical force of the known frames of the wrench (T, 6)."""
+    load = _mean_load_kg(wrench, least=50) if load_ratio is None else load_ratio * mass_kg
     if load is None or abs(load - mass_kg) <= MASS_APART * mass_kg:
         return None
     return (
@@ -100,26 +226,26 @@ def doubtful_mass(wrench: Array, mass_kg: float) -> str | None:
     )
 
 
-def leave_out_foreign(check: PlateCheck, wrench: Array, initial: InitialModel, tolerance: float | None) -> list[str]:
-    """Make the wrench (T, 6) NaN, in place, where the plates' load is not the person's weight; a sentence then.
+def _foreign_load(
+    check: PlateCheck, wrench: Array, claimed: Flags, initial: InitialModel, tolerance: float | None
+) -> str | None:
+    """A sentence where the plates' mean load is not the person's weight, for recordings that `closure` cannot judge.
 
     Args:
         tolerance: part of the weight by which they may differ; None: nobody asks.
     """
     mass_kg = initial.weighed_kg
     if initial.feet:
-        load, mean, bears = _mean_load_kg(wrench, least=10), " on average", "a weight, a cable, a rail"
+        load, mean = _mean_load_kg(wrench[claimed], least=10), " on average"
     else:
-        load = check.mass_kg_from_plates if check.mass_kg_from_plates is not None else check.mean_mass_kg
-        mean, bears = "", "a weight, a cable, a rail, a foot beside a plate"
+        load, mean = check.mass_kg_from_plates if check.mass_kg_from_plates is not None else check.mean_mass_kg, ""
     if tolerance is None or load is None or abs(load - mass_kg) <= tolerance * mass_kg:
-        return []
-    wrench[:] = np.nan
-    return [
+        return None
+    return (
         f"Warning: the plates carry {load:.1f} kg{mean} where the person weighs {mass_kg:.1f} kg (more than "
         f"{100.0 * tolerance:.0f} % apart): the mass is wrong, or something that the model does not have bears on them "
-        f"({bears}). The plates are not used."
-    ]
+        "(a weight, a cable, a rail, a foot beside a plate). The plates are not used for the total."
+    )
 
 
 def _mean_load_kg(wrench: Array, least: int) -> float | None:

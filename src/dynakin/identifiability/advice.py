@@ -8,6 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin import _core
+from dynakin.elements import element
 from dynakin.identifiability.element_words import INERTIA, inertia_words, is_planar
 from dynakin.identifiability.excitation import Bench, Excitation
 from dynakin.results.learned import KNOWN, NOTHING
@@ -82,15 +83,15 @@ def _silence(bench: Bench, silent: list[str], alone: frozenset[str], planar: boo
     said = []
     turned = turns(bench)
     grounded = {s.name: s.parent == "ground" for s in bench.measured.initial.spec.segments}
-    still = {s for s, deg in turned.items() if deg < STILL_DEG and any(n.split("/")[1] == s for n in silent)}
+    still = {s for s, deg in turned.items() if deg < STILL_DEG and any(element(n).owner == s for n in silent)}
     for segment in sorted(still, key=list(turned).index):
-        numbers = [INERTIA[n.split("/")[2]] for n in silent if n.split("/")[1] == segment]
+        numbers = [INERTIA[element(n).number] for n in silent if element(n).owner == segment]
         why = "nor can any movement that leaves it on the ground tell them" if grounded[segment] else "it would have to"
         said.append(
             f"The data say nothing about the {words(segment)}'s {listed(numbers, 10)}: it does not move (it turns by "
             f"{turned[segment]:.1f} deg), {why}."
         )
-    rest = [n for n in silent if n.split("/")[1] not in still]
+    rest = [n for n in silent if element(n).owner not in still]
     sums = [n for n in rest if n not in alone]
     weak = [n for n in rest if n in alone]
     if sums:
@@ -125,5 +126,5 @@ def _angle(path: Array, reference: Array) -> Array:
 
 def _called(name: str, planar: bool) -> str:
     if name.startswith("length/"):
-        return f"{words(name.split('/')[1])} length"
+        return f"{words(element(name).owner)} length"
     return inertia_words(name, planar=planar)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from dynakin import _core
+from dynakin.elements import element
 from dynakin.reference import BaseParameters
 from dynakin.results.naming import listed, number, words
 
@@ -25,7 +26,7 @@ _PLANE = frozenset({"mass", "mx", "my", "izz"})
 
 def inertia_words(name: str, *, planar: bool) -> str:
     """`inertia/thigh/izz` -> `thigh moment of inertia`."""
-    _, segment, number_name = name.split("/")
+    _, segment, number_name = element(name)
     said = INERTIA[number_name] + (" zz" if number_name == "izz" and not planar else "")
     return f"{words(segment)} {said}"
 
@@ -43,15 +44,15 @@ def base_words(base: BaseParameters, spec: _core.ModelSpec) -> list[str]:
     for entry in spec.segments:
         if entry.parent in children:
             children[entry.parent].append(entry.name)
-    massive = {name.split("/")[1] for name in base.over if name.endswith("/mass")}
+    massive = {element(name).owner for name in base.over if name.endswith("/mass")}
     said = []
     for name, row in zip(base.names, base.K, strict=True):
         head = inertia_words(name, planar=planar)
-        carried = _carried(name.split("/")[1], children) & massive
+        carried = _carried(element(name).owner, children) & massive
         terms: dict[tuple[str, float], list[str]] = {}
         for factor, other in zip(row, base.over, strict=True):
             if other != name and abs(factor) > 1e-6:
-                _, segment, kind = other.split("/")
+                _, segment, kind = element(other)
                 terms.setdefault((kind, float(f"{factor:.5g}")), []).append(segment)
         for (kind, factor), segments in terms.items():
             every = set(segments) == carried and len(segments) > 1

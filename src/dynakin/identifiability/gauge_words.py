@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 
 from dynakin import _core
+from dynakin.elements import element
 from dynakin.identifiability.element_words import INERTIA
 from dynakin.identifiability.gauges import ZERO, Gauge
 from dynakin.results.naming import listed, plural, words
@@ -16,7 +17,7 @@ def gauges_in_words(gauges: tuple[Gauge, ...], spec: _core.ModelSpec) -> list[st
     alike = Counter(gauge_in_words(gauge, spec) for gauge in gauges if not _is_skin(gauge))
     said = [text if count == 1 else f"{text}, in {count} directions" for text, count in alike.items()]
     if len(skin) > 1:
-        markers = {name.split("/")[1] for gauge in skin for name in gauge.direction}
+        markers = {element(name).owner for gauge in skin for name in gauge.direction}
         said.append(
             f"{plural(len(markers), 'marker')} ({plural(len(skin), 'direction')}): the mean displacement of the skin "
             "under each against its place on the segment"
@@ -33,12 +34,12 @@ def gauge_in_words(gauge: Gauge, spec: _core.ModelSpec) -> str:
     parents = {segment.name: segment.parent for segment in spec.segments}
     homes = {marker.name: marker.segment for marker in spec.markers}
     zeros = [name.removeprefix(ZERO) for name in names if name.startswith(ZERO)]
-    masses = {name.split("/")[1]: gauge.direction[name] for name in names if name.endswith("/mass")}
+    masses = {element(name).owner: gauge.direction[name] for name in names if name.endswith("/mass")}
     segments = {_segment(name, homes) for name in names if not name.startswith((ZERO, "length/", "plates/"))}
     if len(names) == 1:
         return f"{_element(names[0], homes)}: nothing that is measured depends on it"
     if _is_skin(gauge):
-        marker = names[0].split("/")[1]
+        marker = element(names[0]).owner
         return f"{marker}: the mean displacement of the skin under it against its place on the {words(homes[marker])}"
     if all(name.startswith("inertia/") for name in names):
         if len(masses) == 2:
@@ -59,7 +60,7 @@ def gauge_in_words(gauge: Gauge, spec: _core.ModelSpec) -> str:
             against.append("its first moments" if not masses else "its inertia")
         return f"{words(segment)}: a turn about the {words(zeros[0])}: the angle's zero against {listed(against)}"
     if any(name.startswith("plates/") for name in names) and masses:
-        errors = listed([name.split("/")[1] for name in names if name.startswith("plates/")])
+        errors = listed([element(name).owner for name in names if name.startswith("plates/")])
         return f"{listed([words(s) for s in masses])} mass against a constant error of the plates ({errors})"
     lengths = [name for name in names if name.startswith("length/")]
     rest = _summary([name for name in names if name not in lengths], homes)
@@ -69,8 +70,8 @@ def gauge_in_words(gauge: Gauge, spec: _core.ModelSpec) -> str:
 
 
 def _is_skin(gauge: Gauge) -> bool:
-    kinds = {name.split("/")[0] for name in gauge.direction}
-    return kinds == {"marker", "soft_tissue"} and len({name.split("/")[1] for name in gauge.direction}) == 1
+    kinds = {element(name).kind for name in gauge.direction}
+    return kinds == {"marker", "soft_tissue"} and len({element(name).owner for name in gauge.direction}) == 1
 
 
 def _joint(segment: _core.SegmentSpec) -> str:
@@ -79,35 +80,35 @@ def _joint(segment: _core.SegmentSpec) -> str:
 
 
 def _segment(name: str, homes: dict[str, str]) -> str:
-    kind, owner, _ = name.split("/")
+    kind, owner, _ = element(name)
     return owner if kind == "inertia" else homes[owner]
 
 
 def _element(name: str, homes: dict[str, str]) -> str:
-    kind, *rest = name.split("/")
+    kind, owner, number = element(name)
     if kind == "zero":
-        return f"{words(rest[0])} zero"
+        return f"{words(owner)} zero"
     if kind == "length":
-        return f"{words(rest[0])} length"
+        return f"{words(owner)} length"
     if kind == "plates":
-        return f"plates' error of {rest[0]}"
+        return f"plates' error of {owner}"
     if kind == "inertia":
-        return f"{words(rest[0])} {INERTIA[rest[1]]}"
+        return f"{words(owner)} {INERTIA[number]}"
     what = "place" if kind == "marker" else "skin"
-    return f"{what} of {rest[0]} on the {words(homes[rest[0]])}, {rest[1]}"
+    return f"{what} of {owner} on the {words(homes[owner])}, {number}"
 
 
 def _summary(names: list[str], homes: dict[str, str]) -> list[str]:
     """The elements, those of a kind and a segment in one."""
     found: dict[str, None] = {}
     for name in names:
-        kind, *rest = name.split("/")
+        kind, owner, _ = element(name)
         if kind in ("marker", "soft_tissue"):
-            found[f"the markers' places on the {words(homes[rest[0]])}"] = None
+            found[f"the markers' places on the {words(homes[owner])}"] = None
         elif kind == "inertia":
-            found[f"the {words(rest[0])}'s inertia"] = None
+            found[f"the {words(owner)}'s inertia"] = None
         elif kind == "zero":
-            found[f"the zero of the {words(rest[0])}"] = None
+            found[f"the zero of the {words(owner)}"] = None
         else:
             found[f"the {_element(name, homes)}"] = None
     return list(found)

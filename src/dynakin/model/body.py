@@ -14,7 +14,14 @@ from dynakin.recordings import GroundFrame, Recording, check_plates
 from dynakin.recordings.foot_loads import foot_loads
 from dynakin.units import GRAVITY_M_S2
 
-_LEAST_FRAMES = 25
+_LEAST_S = 5.0
+"""Of a movement that is to weigh a person: its mean force is the weight but for the momentum gained, and 2 m/s gained
+over 5 s are 4 %."""
+_STEADY = 0.3
+"""Part of its mean by which the load may vary: squats do by a quarter. Running, a seat that bears part of the weight,
+a step beside the plates or a box beside them do by more."""
+_BODY_MASS_INDEX = (10.0, 60.0)
+"""kg/m2; what lies beyond is no weight of a person of that height who stood on the plates."""
 
 
 class OnPlates(Protocol):
@@ -27,11 +34,11 @@ class OnPlates(Protocol):
 
 
 def find_mass(subject: Subject, trials: Sequence[OnPlates]) -> tuple[float, str]:
-    """Mass (kg) and where it comes from: told, from the plates while standing still, from the file, or, with a
-    warning, from the plates' mean over a movement.
+    """Mass (kg) and where it comes from: given, from the plates while standing still, from the file, or, with a
+    warning, from the plates' mean over a movement that is long and steady enough.
 
     Raises:
-        ModelError: none of these; the message says why the plates do not tell.
+        ModelError: none of these; the message says why the plates do not show it.
     """
     if subject.mass_kg is not None:
         return subject.mass_kg, f"Mass {subject.mass_kg:.2f} kg: given."
@@ -45,9 +52,10 @@ def find_mass(subject: Subject, trials: Sequence[OnPlates]) -> tuple[float, str]
         if check.refusal is not None:
             reasons.append(f"{recording.name}: {check.refusal}")
         elif check.mass_kg_from_plates is None:
-            reasons.append(f"nobody stands still on the plates of {recording.name}")
-            if check.mean_mass_kg is not None:
-                means.append((_of_whole_load(recording, trial.ground) or check.mean_mass_kg, recording.name))
+            mean, why = _steady_load(recording, trial.ground)
+            reasons.append(f"nobody stands still on the plates of {recording.name}, and {why}")
+            if mean is not None:
+                means.append((mean, recording.name))
         else:
             mass = float(check.mass_kg_from_plates)
             return mass, f"Mass {mass:.2f} kg: from the plates of {recording.name} while standing still."
@@ -58,20 +66,41 @@ def find_mass(subject: Subject, trials: Sequence[OnPlates]) -> tuple[float, str]
     for mass, name in means:
         return mass, (
             f"Warning: mass {mass:.2f} kg from the mean vertical force of {name}, in which nobody stands still; wrong "
-            "by several percent in a walk of few steps, and where anything but the plates bears the person. Give the "
-            "mass if it is known."
+            "where anything but the plates bears the person. Give the mass if it is known."
         )
     raise ModelError(
-        f"mass_kg is not given and cannot be found ({'; '.join(reasons)}); expected mass_kg of the subject"
+        f"mass_kg is not given and cannot be found ({'; '.join(reasons)}); expected mass_kg of the subject (--mass)"
     )
 
 
-def _of_whole_load(recording: Recording, ground: GroundFrame) -> float | None:
-    """Mean load (kg) of the frames in which every foot that stands is on a plate; None where these are few."""
+def _steady_load(recording: Recording, ground: GroundFrame) -> tuple[float | None, str]:
+    """Mean load (kg) of the frames in which every foot that stands is on a plate, and why it is no weight; None where
+    these are few, or it varies too much."""
     loads = foot_loads(recording, ground)
     push = loads.wrench[..., 1].sum(axis=1)[loads.total_known]
     push = push[np.isfinite(push)]
-    return float(push.mean()) / GRAVITY_M_S2 if len(push) >= _LEAST_FRAMES else None
+    seconds = len(push) / recording.rate
+    if seconds < _LEAST_S or not push.mean() > 0.0:
+        return None, f"{seconds:.1f} s of a movement on them weigh nobody, expected {_LEAST_S:g} s"
+    low, high = np.percentile(push, (5.0, 95.0)) / push.mean()
+    if low < 1.0 - _STEADY or high > 1.0 + _STEADY:
+        return None, f"their load goes from {100.0 * low:.0f} to {100.0 * high:.0f} % of its mean, which is no weight"
+    return float(push.mean()) / GRAVITY_M_S2, "its mean is used"
+
+
+def check_body_mass(subject: Subject, mass_kg: float, height_m: float | None) -> None:
+    """
+    Raises:
+        ModelError: a mass that was not given is none of a person of that height.
+    """
+    if subject.mass_kg is not None or height_m is None:
+        return
+    index, (low, high) = mass_kg / height_m**2, _BODY_MASS_INDEX
+    if not low <= index <= high:
+        raise ModelError(
+            f"mass_kg is not given, and {mass_kg:.1f} kg by plates or file is no mass of a person of {height_m:.2f} m "
+            f"({index:.0f} kg/m2, expected {low:g} to {high:g}); expected mass_kg of the subject (--mass)"
+        )
 
 
 def find_height(subject: Subject, recordings: list[Recording], trial: Trial) -> tuple[float | None, str]:

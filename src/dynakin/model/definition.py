@@ -14,6 +14,7 @@ from dynakin.model.schema import ModelFile
 from dynakin.model.subject import Subject
 from dynakin.model.table import BodyTable, load_table
 from dynakin.model.validation import nearest, read_toml, validate
+from dynakin.recordings.textfile import is_file
 
 _FOLDER = resources.files("dynakin.model") / "builtin"
 
@@ -85,7 +86,7 @@ def load_built_in_or_toml(
     """``load_model`` of what is no OpenSim model."""
     known = available_models()
     path = Path(str(_FOLDER / f"{name}.toml")) if name in known else Path(name)
-    if name not in known and (path.suffix != ".toml" or not path.exists()):
+    if name not in known and (path.suffix != ".toml" or not is_file(path)):
         raise ModelError(
             f"model {name!r}: unknown{nearest(name, known)}; expected {', '.join(known)}, or a .toml or .osim file "
             "that exists"

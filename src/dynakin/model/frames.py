@@ -34,6 +34,10 @@ class Trial:
         paths = {key: ground.points_to_ground(recording.marker(name)) for key, name in match.names.items()}
         return cls(recording, match, ground, paths)
 
+    def facing(self) -> Trial:
+        """The same trial with X in the direction in which the person faces."""
+        return Trial.of(self.recording, self.match, self.ground.facing())
+
     def about(self, origin_L: Array) -> Trial:
         """The same trial with the ground origin at ``origin_L`` (3,) m, laboratory frame."""
         return Trial.of(self.recording, self.match, self.ground.with_origin(origin_L))

@@ -11,7 +11,7 @@ from pydantic import Field
 
 from dynakin.errors import ModelError
 from dynakin.model.initial import InitialModel
-from dynakin.model.validation import Strict, nearest
+from dynakin.model.validation import Name, Strict, nearest
 
 Positive = Annotated[float, Field(gt=0.0)]
 NotNegative = Annotated[float, Field(ge=0.0)]
@@ -28,7 +28,7 @@ class CarriedLoad(Strict):
     """Its centre of mass in the segment's frame, m."""
     inertia_kg_m2: tuple[NotNegative, NotNegative, NotNegative] = (0.0, 0.0, 0.0)
     """Moments of inertia about its own centre, along the segment's axes; not given: all of it in one point."""
-    name: str = "load"
+    name: Name = "load"
     """Its own name among the segments."""
 
 

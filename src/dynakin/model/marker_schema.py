@@ -3,12 +3,13 @@ recipes."""
 
 from __future__ import annotations
 
+from graphlib import CycleError, TopologicalSorter
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from dynakin.model.subject import Sex
-from dynakin.model.validation import Strict, nearest
+from dynakin.model.validation import Name, Strict, nearest
 
 Vector3 = tuple[float, float, float]
 
@@ -17,7 +18,7 @@ class Marker(Strict):
     """One marker of the set: where it sits, under which names recordings know it, how far its place is
     trusted."""
 
-    name: str
+    name: Name
     segment: str = ""  # a part of the body or a segment of the model; unused for landmark_only
     right: tuple[str, ...] = ()
     left: tuple[str, ...] = ()
@@ -178,15 +179,15 @@ class MarkerSetFile(Strict):
     """A whole marker set."""
 
     schema_version: Literal[1]
-    name: str
+    name: Name
     description: str = ""
     heel_toe: tuple[str, str] | None = None  # markers that tell where the person faces: foot,
     pelvis_back_front: tuple[str, str] | None = None  # and pelvis
     height_marker: str = ""  # marker whose height over the floor gives the body height if none is told
     height_fraction: Annotated[float, Field(gt=0.0, lt=1.5)] | None = None
     height_source: str = ""
-    markers: Annotated[tuple[Marker, ...], Field(min_length=1)]
-    landmarks: dict[str, tuple[Recipe, ...]]
+    markers: Annotated[tuple[Marker, ...], Field(min_length=1, max_length=1000)]  # what cameras tell apart
+    landmarks: Annotated[dict[str, tuple[Recipe, ...]], Field(max_length=300)]  # six times those of the largest set
     in_space: dict[str, tuple[Recipe, ...]] = Field(default={})  # landmarks of models in space
 
     def recipes(self, planar: bool) -> dict[str, tuple[Recipe, ...]]:
@@ -222,15 +223,11 @@ class MarkerSetFile(Strict):
                             f"landmarks.{landmark}: {source!r} is neither marker nor landmark{nearest(source, known)}"
                         )
 
-        def visit(name: str, above: tuple[str, ...]) -> None:
-            if name in above:
-                raise ValueError(f"landmarks: {' -> '.join((*above, name))} is a circle")
-            for recipe in landmarks.get(name, ()):
-                for source in recipe.inputs:
-                    visit(source, (*above, name))
-
-        for name in landmarks:
-            visit(name, ())
+        needs = {name: {s for recipe in recipes for s in recipe.inputs} for name, recipes in landmarks.items()}
+        try:
+            TopologicalSorter(needs).prepare()
+        except CycleError as error:
+            raise ValueError(f"landmarks: {' -> '.join(reversed(error.args[1]))} is a circle") from None
 
     @property
     def usual(self) -> tuple[Marker, ...]:

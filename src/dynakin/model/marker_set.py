@@ -11,6 +11,7 @@ from dynakin.errors import ModelError
 from dynakin.model.marker_schema import Marker, MarkerSetFile
 from dynakin.model.validation import nearest, read_toml, validate
 from dynakin.recordings.landmarks import FacingPairs, plain_name
+from dynakin.recordings.textfile import is_file
 
 MarkerKey = tuple[str, str]
 """(name of the marker in its set, "right", "left" or "centre")."""
@@ -32,7 +33,7 @@ def load_marker_set(name_or_path: str | Path) -> MarkerSetFile:
     name = str(name_or_path)
     known = available_marker_sets()
     path = Path(str(_FOLDER / f"{name}.toml")) if name in known else Path(name)
-    if name not in known and (path.suffix != ".toml" or not path.exists()):
+    if name not in known and (path.suffix != ".toml" or not is_file(path)):
         raise ModelError(
             f"marker set {name!r}: unknown{nearest(name, known)}; expected {', '.join(known)} or a .toml "
             "file that exists"

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ModelError
-from dynakin.model.body import find_height, find_mass
+from dynakin.model.body import check_body_mass, find_height, find_mass
 from dynakin.model.checks import check_masses, fixed_lengths, reach, refuse_moving_origin, report
 from dynakin.model.definition import ModelDefinition
 from dynakin.model.frames import Trial, choose_side
@@ -20,7 +20,7 @@ from dynakin.model.plan import ModelPlan
 from dynakin.model.posture import Geometry, Posture, find_geometry, find_posture, frame_landmarks
 from dynakin.model.schema import ModelFile
 from dynakin.model.sites import Candidate, candidates, find_locks, place_sites
-from dynakin.recordings import GroundFrame, Recording, find_ground_frame, standing_window
+from dynakin.recordings import GroundFrame, Recording, find_ground_frame, find_laboratory_frame, standing_window
 from dynakin.recordings.foot_contact import foot_contact
 
 Array = npt.NDArray[np.float64]
@@ -60,11 +60,13 @@ def measure(
     def matched(entry: Recording, frame: GroundFrame | None) -> Trial:
         seen = [bool(np.isfinite(entry.marker(name)).all(axis=1).any()) for name in entry.marker_names]
         match = match_markers(marker_set, entry.marker_names, seen, str(entry.path or entry.name))
-        found = frame or find_ground_frame(entry, vertical=vertical, forward=forward, pairs=match.facing_pairs)
+        find = find_laboratory_frame if model.floating else find_ground_frame
+        found = frame or find(entry, vertical=vertical, forward=forward, pairs=match.facing_pairs)
         return Trial.of(entry, match, found)
 
-    trial = matched(recording, ground)
-    messages += trial.ground.how
+    as_asked = matched(recording, ground)
+    messages += as_asked.ground.how
+    trial = as_asked.facing() if model.floating else as_asked  # what is measured on landmarks takes X for forward
     if not model.sided:
         side, how = choose_side(trial.match, recording, side)
         messages.append(how)
@@ -74,7 +76,9 @@ def measure(
     locks, bare, locked = find_locks(model, trial.match, chosen)
     messages += left_out + locked
 
-    source = trial if static is None else matched(static, None)
+    source = trial
+    if static is not None:
+        source = matched(static, None).facing() if model.floating else matched(static, None)
     # A planar model starts from the trial's own landmarks; in space it starts from markers (pose_start).
     common = source.match if model.sided else _common(trial.match, source.match)
     finder = LandmarkFinder(common, side, subject.sex, model.planar, in_space=model.sided)
@@ -99,6 +103,7 @@ def measure(
     messages.append(how)
     height_m, how = find_height(subject, [r for r in (static, recording) if r is not None], source)
     messages.append(how)
+    check_body_mass(subject, mass_kg, height_m)
     if subject.sex is None:
         messages.append(
             "Sex not given: regressions and table are the mean of both sexes (masses, centres, signed tensors)."
@@ -122,6 +127,7 @@ def measure(
     window = standing_window(source.recording)
     still = window is not None and window.start <= frames[0] < window.stop
     left = tuple(c for c in chosen if c.recorded not in placed_names)
+    trial = as_asked if model.floating else trial
     return plan, Measured(trial.ground, side, mass_kg, height_m, parts, tuple(messages), trial, left, still)
 
 

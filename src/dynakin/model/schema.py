@@ -13,10 +13,11 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from dynakin.model.mirroring import SUFFIXES, mirrored
-from dynakin.model.validation import Strict, nearest
+from dynakin.model.validation import CoordinateName, Name, Strict, nearest
 
 Vector3 = Annotated[tuple[float, float, float], Field(description="three numbers")]
 LandmarkPair = tuple[str, str]
+_MOST = 1000  # segments, lengths, coordinates: five times those of a whole body with fingers and vertebrae
 
 
 class Axis(Strict):
@@ -76,7 +77,7 @@ class WithoutMarkers(Strict):
 class Segment(Strict):
     """A rigid segment, the joint by which it hangs on its parent, and the parts of the body in it."""
 
-    name: str
+    name: Name
     parent: str = "ground"
     origin: str | None = None  # landmark of the joint by which it hangs
     frame: Literal["ground"] | Frame = "ground"  # "ground": axes of the ground frame while standing
@@ -108,7 +109,7 @@ class Coordinate(Strict):
     """A generalised coordinate: limits of (9), start or locked value; degrees for rotations, metres
     otherwise."""
 
-    name: str
+    name: CoordinateName
     description: str = ""
     minimum_deg: float | None = None
     maximum_deg: float | None = None
@@ -146,7 +147,7 @@ class Coordinate(Strict):
 class Length(Strict):
     """A geometry parameter: the distance between two landmarks, or a value."""
 
-    name: str
+    name: Name
     between: LandmarkPair | None = None
     shared: bool = False  # the same for both sides: measured on each, the mean is taken
     value_m: Annotated[float, Field(gt=0.0)] | None = None
@@ -178,19 +179,27 @@ class ModelFile(Strict):
     """A whole model file."""
 
     schema_version: Literal[1]
-    name: str
+    name: Name
     description: str = ""
     planar: bool = False
     gravity: Vector3 = (0.0, -9.80665, 0.0)
     ground: Ground = Ground()
-    lengths: tuple[Length, ...] = ()
-    coordinates: tuple[Coordinate, ...]
-    segments: Annotated[tuple[Segment, ...], Field(min_length=1)]
+    lengths: Annotated[tuple[Length, ...], Field(max_length=_MOST)] = ()
+    coordinates: Annotated[tuple[Coordinate, ...], Field(max_length=_MOST)]
+    segments: Annotated[tuple[Segment, ...], Field(min_length=1, max_length=_MOST)]
 
     @property
     def sided(self) -> bool:
         """Whether right and left limbs are modelled apart."""
         return any(segment.side is not None for segment in self.segments)
+
+    @property
+    def floating(self) -> bool:
+        """Whether the body may be anywhere and head anywhere: one root with six free coordinates without limits."""
+        roots = [segment for segment in self.segments if segment.parent == "ground"]
+        own = {axis.coordinate for segment in roots for axis in segment.axes}
+        free = {c.name for c in self.coordinates if not c.locked and not np.isfinite(c.limits).any()}
+        return self.sided and self.ground.origin is None and len(roots) == 1 and len(own & free) == len(own) == 6
 
     @model_validator(mode="before")
     @classmethod

@@ -23,6 +23,7 @@ import numpy.typing as npt
 from dynakin.errors import ModelError
 from dynakin.model.subject import Sex
 from dynakin.model.validation import nearest
+from dynakin.recordings.textfile import LARGEST_TEXT, is_file, read_bytes
 
 Array = npt.NDArray[np.float64]
 BUILTIN = ("dumas", "deleva")
@@ -34,7 +35,8 @@ _POINTS = ("axis_from", "axis_to", "origin", "length_from", "length_to")
 _RADII = ("rxx", "ryy", "rzz", "rxy", "rxz", "ryz")
 _NUMBERS = ("mass_percent", "com_x", "com_y", "com_z", *_RADII)
 _COLUMNS = (*_TEXT, *_NUMBERS, "length_per_height")
-_ON_LINE = re.compile(r"^(\w+)>(\w+):([0-9.]+)$")
+_ON_LINE = re.compile(r"^(\w+)>(\w+):([0-9]?\.?[0-9]{1,17})$")
+_LARGEST = 1e4  # percent: a hundred lengths or body masses; what is larger is damaged
 
 
 @dataclass(frozen=True)
@@ -47,8 +49,10 @@ class Point:
 
     @classmethod
     def parse(cls, text: str) -> Point:
-        """From "hip" or "c7>hip:0.40"."""
+        """From "hip" or "c7>hip:0.40"; ValueError where it is neither."""
         match = _ON_LINE.match(text)
+        if match is None and (">" in text or ":" in text):
+            raise ValueError(f"is {text!r}, expected a landmark, or a point on a line such as c7>hip:0.40")
         return cls(match[1], match[2], float(match[3])) if match else cls(text, text)
 
     def at(self, landmarks: dict[str, Array]) -> Array | None:
@@ -109,13 +113,16 @@ def _tensor(radii: list[float]) -> Array:
 
 def _read_rows(path: Path) -> list[tuple[int, dict[str, str]]]:
     try:
-        lines = path.read_text(encoding="utf-8-sig").splitlines()
-    except (OSError, UnicodeDecodeError) as error:
-        raise ModelError(f"{path}: table cannot be read ({getattr(error, 'strerror', None) or error})") from None
+        lines = read_bytes(path, ModelError, LARGEST_TEXT).decode("utf-8-sig").splitlines()
+    except UnicodeDecodeError as error:
+        raise ModelError(f"{path}: table cannot be read ({error})") from None
     kept = [(k, line) for k, line in enumerate(lines, start=1) if line.strip() and not line.startswith("#")]
     if not kept:
         raise ModelError(f"{path}: the table is empty; expected a header with {', '.join(_COLUMNS)}")
-    header, *rows = [(k, next(csv.reader([line]))) for k, line in kept]
+    try:
+        header, *rows = [(k, next(csv.reader([line]))) for k, line in kept]
+    except csv.Error as error:  # a cell of more than 131072 characters
+        raise ModelError(f"{path}: table cannot be read ({error})") from None
     names = [name.strip() for name in header[1]]
     for name in names:
         if name not in _COLUMNS:
@@ -138,8 +145,8 @@ def _part(row: dict[str, str], where: str) -> Part:
             numbers[key] = float(row[key]) if row[key] or key in _NUMBERS else np.nan
         except ValueError:
             raise ModelError(f"{where}: {key} is {row[key]!r}, expected a number") from None
-        if key in _NUMBERS and not np.isfinite(numbers[key]):
-            raise ModelError(f"{where}: {key} is {row[key]!r}, expected a finite number")
+        if (key in _NUMBERS or row[key]) and not abs(numbers[key]) <= _LARGEST:
+            raise ModelError(f"{where}: {key} is {row[key]!r}, expected a number up to {_LARGEST:g}")
     if numbers["mass_percent"] <= 0.0:
         raise ModelError(f"{where}: mass_percent is {row['mass_percent']}, expected more than 0")
     tensor = _tensor([numbers[key] for key in _RADII])
@@ -150,7 +157,12 @@ def _part(row: dict[str, str], where: str) -> Part:
             "products "
             "of inertia)"
         )
-    points = {key: Point.parse(row[key]) for key in _POINTS}
+    points = {}
+    for key in _POINTS:
+        try:
+            points[key] = Point.parse(row[key])
+        except ValueError as error:
+            raise ModelError(f"{where}: {key} {error}") from None
     length = numbers["length_per_height"]
     return Part(
         name=row["part"],
@@ -195,7 +207,7 @@ def load_table(name_or_path: str | Path, sex: Sex | None) -> BodyTable:
     """
     name = str(name_or_path)
     path = Path(str(resources.files("dynakin.model") / "tables" / f"{name}.csv")) if name in BUILTIN else Path(name)
-    if name not in BUILTIN and not path.exists():
+    if name not in BUILTIN and not is_file(path):
         raise ModelError(f"table {name!r}: no such table{nearest(name, BUILTIN)}; expected dumas, deleva or a CSV file")
     found: dict[tuple[str, str], Part] = {}
     for line, row in _read_rows(path):

@@ -4,14 +4,39 @@ was expected."""
 from __future__ import annotations
 
 import difflib
+import re
 import tomllib
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Annotated, Any, TypeVar
 
-from pydantic import BaseModel, ConfigDict, ValidationError, model_validator
+from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, model_validator
 
 from dynakin.errors import DynakinError, ModelError
+from dynakin.recordings.textfile import LARGEST_TEXT, read_bytes
+
+_MOST_PARTS = 64  # of a dotted key: ours have three; the standard library's reader needs their square in time
+_LONG_KEY = re.compile(
+    r"""(?<![\w."'-])(?:(?:"[^"\n]*+"|'[^'\n]*+'|[\w-]++)[ \t]*+\.[ \t]*+)""" f"{{{_MOST_PARTS}}}", re.ASCII
+)
+_CONTROL = re.compile(r"[\x00-\x1f\x7f]")
+
+
+def _printable(name: str) -> str:
+    if _CONTROL.search(name):
+        raise ValueError(f"found {name!r}, expected a name without control characters (line ends, tabs, NUL)")
+    return name
+
+
+def _without_slash(name: str) -> str:
+    if "/" in name:
+        raise ValueError(f"found {name!r}, expected a name without /, which parts a coordinate from its derivatives")
+    return _printable(name)
+
+
+CoordinateName = Annotated[str, AfterValidator(_without_slash)]
+Name = Annotated[str, AfterValidator(_printable)]
+"""What something is called: it becomes a column of text files, which a line end or tab would break."""
 
 
 def nearest(word: str, known: Iterable[str]) -> str:
@@ -53,10 +78,17 @@ def read_toml(path: Path, raises: type[DynakinError] = ModelError) -> dict[str, 
         ModelError (or ``raises``): no such file, not readable, or not TOML (with the line).
     """
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError) as error:
-        raise raises(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
-    except tomllib.TOMLDecodeError as error:
+        text = read_bytes(path, raises, LARGEST_TEXT).decode()
+        long = _LONG_KEY.search(text)
+        if long:
+            line = text.count("\n", 0, long.start()) + 1
+            raise raises(f"{path}, line {line}: found a key of {_MOST_PARTS} parts or more, expected fewer")
+        return tomllib.loads(text)
+    except UnicodeDecodeError as error:
+        raise raises(f"{path}: cannot be read ({error})") from None
+    except RecursionError:
+        raise raises(f"{path}: not a TOML file for this program: tables or lists lie too deep in one another") from None
+    except ValueError as error:  # TOMLDecodeError, or Python's own: a whole number of 4,300 digits
         raise raises(f"{path}: not a TOML file: {error}") from None
 
 

@@ -9,7 +9,7 @@ from dynakin.recordings.c3d import read_c3d
 from dynakin.recordings.csv import read_csv, read_csv_table
 from dynakin.recordings.feet import DEFAULT_FOOT_MARKERS
 from dynakin.recordings.forces import attach_forces, plates_from_table
-from dynakin.recordings.frame import GroundFrame, find_ground_frame
+from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_laboratory_frame
 from dynakin.recordings.landmarks import DEFAULT_PAIRS, FacingPairs, find_marker, plain_name
 from dynakin.recordings.mot import Table, read_table
 from dynakin.recordings.options import ReadOptions
@@ -42,6 +42,7 @@ __all__ = [
     "centre_of_pressure",
     "check_plates",
     "find_ground_frame",
+    "find_laboratory_frame",
     "find_marker",
     "low_pass",
     "marker_speeds",

@@ -13,16 +13,16 @@ from dynakin.errors import RecordingError
 from dynakin.recordings.c3d_layout import check_c3d_file
 from dynakin.recordings.c3d_parameters import Parameters
 from dynakin.recordings.c3d_plates import read_plates
+from dynakin.recordings.limits import FASTEST_HZ, SLOWEST_HZ
 from dynakin.recordings.options import ReadOptions
 from dynakin.recordings.recording import Recording
-from dynakin.recordings.textfile import check_unique
+from dynakin.recordings.textfile import check_unique, trial_name
 from dynakin.recordings.trajectories import clean_markers
 from dynakin.units import length_factor
 
 _UNLABELLED = re.compile(r"^\*\d+$|^(unlabell?ed|uname)\W*\d*$", re.IGNORECASE)
 # POINT parameters that list what a model computed
 _COMPUTED = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
-_FASTEST_HZ = 1e5  # no camera comes near: a damaged rate
 
 
 def read_c3d(path: Path, options: ReadOptions | None = None) -> Recording:
@@ -55,8 +55,8 @@ def read_c3d(path: Path, options: ReadOptions | None = None) -> Recording:
 def _recording(data: Any, path: Path, options: ReadOptions, notes: list[str]) -> Recording:
     parameters = Parameters(data["parameters"])
     rate = parameters.number("POINT", "RATE") or float(data["header"]["points"]["frame_rate"])
-    if not 0 < rate < _FASTEST_HZ:
-        raise RecordingError(f"{path}: found point rate {rate:g} Hz, expected more than 0, less than {_FASTEST_HZ:g}")
+    if not SLOWEST_HZ <= rate <= FASTEST_HZ:
+        raise RecordingError(f"{path}: found point rate {rate:g} Hz, expected {SLOWEST_HZ:g} to {FASTEST_HZ:g} Hz")
     factor, unit = _unit(parameters, path)
 
     points = np.asarray(data["data"]["points"], dtype=float)[:3]  # (3, N, T)
@@ -75,7 +75,7 @@ def _recording(data: Any, path: Path, options: ReadOptions, notes: list[str]) ->
     time = np.arange(frames) / rate
     plates, plate_notes = read_plates(parameters, analog, time, markers, unit, path, options)
     return Recording(
-        name=path.stem,
+        name=trial_name(path),
         path=path,
         time=time,
         marker_names=names,

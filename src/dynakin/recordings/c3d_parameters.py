@@ -61,7 +61,9 @@ class Parameters:
 
 
 def _printable(text: str) -> str:
-    """A text that is not UTF-8 comes with its bytes as lone surrogates, which nothing can print: Latin-1 then."""
+    """A text that is not UTF-8 comes with its bytes as lone surrogates, which nothing can print: Latin-1 then. Some
+    systems fill up with NUL."""
+    text = text.strip("\0")
     try:
         text.encode()
     except UnicodeEncodeError:

@@ -18,10 +18,11 @@ import numpy as np
 from dynakin.errors import RecordingError
 from dynakin.recordings.c3d_channels import plate_wrench
 from dynakin.recordings.c3d_parameters import Parameters
+from dynakin.recordings.limits import check_wrench
 from dynakin.recordings.options import ReadOptions
 from dynakin.recordings.pressure import DEFAULT_THRESHOLD_N, Surface, plate_from_wrench
 from dynakin.recordings.recording import Array, Plate
-from dynakin.recordings.resampling import CausalLowPass, low_pass, resample
+from dynakin.recordings.resampling import CausalLowPass, check_whole, low_pass, resample, same_times
 from dynakin.units import force_factor, moment_factor
 
 _CERTAIN_LOAD_N = 50.0  # a push that no offset of an idle plate reaches: from it the sign is judged
@@ -85,7 +86,7 @@ def read_plates(
     plates = []
     for raw in raws:
         notes += _offset_note(raw)
-        plates.append(_at_marker_times(raw, np.arange(analog.shape[1]) * step + time[0], time, options))
+        plates.append(_at_marker_times(raw, np.arange(analog.shape[1]) * step + time[0], time, options, path))
     if per_frame > 1 and plates:
         how = "zero-phase FIR low-pass"
         if options.causal and len(time) > 1:
@@ -195,8 +196,11 @@ def _offset_note(raw: _Raw) -> list[str]:
     return [f"{raw.name} reads {np.median(push[idle]):.3g} N where nobody stands on it (not taken off)."]
 
 
-def _at_marker_times(raw: _Raw, time_in: Array, time: Array, options: ReadOptions) -> Plate:
+def _at_marker_times(raw: _Raw, time_in: Array, time: Array, options: ReadOptions, path: Path) -> Plate:
     wrench = np.hstack([raw.force, raw.moment])
+    check_wrench(raw.name, time_in, raw.force, raw.moment, str(path))
+    if options.plate_filter_hz is not None or not same_times(time_in, time):
+        check_whole(raw.name, time_in, wrench, path)
     if options.plate_filter_hz is not None and len(time_in) > 1:
         rate = 1 / (time_in[1] - time_in[0])
         wrench = low_pass(wrench, rate, options.plate_filter_hz, causal=options.causal)

@@ -23,7 +23,7 @@ from dynakin.recordings.grf_columns import parse_column
 from dynakin.recordings.mot import Table
 from dynakin.recordings.options import ReadOptions
 from dynakin.recordings.recording import Recording
-from dynakin.recordings.textfile import check_time, check_unique, parse_row, read_lines, split_cells
+from dynakin.recordings.textfile import check_time, check_unique, parse_row, read_lines, split_cells, trial_name
 from dynakin.recordings.trajectories import clean_markers, timing_notes
 
 
@@ -71,7 +71,7 @@ def read_csv(path: Path, options: ReadOptions | None = None) -> Recording:
     shape = (len(table.time), len(names), 3)
     markers, notes = clean_markers(names, np.empty(shape) if raw is None else raw.reshape(shape))
     recording = Recording(
-        name=table.path.stem,
+        name=trial_name(table.path),
         path=table.path,
         time=table.time,
         marker_names=names,

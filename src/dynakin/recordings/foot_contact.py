@@ -20,6 +20,8 @@ SLOW_M_S = 0.5
 """Speed up to which a foot stands. A swinging toe passes the floor within 2 cm too, but at 1.5 to 5 m/s."""
 GAP_S = 0.08
 """Shorter interruptions of a stance, or stances, are none: a foot takes 0.2 s and more for a step."""
+ALOFT_M = 0.05
+"""Height from which a moving foot surely touches nothing: twice what the skin of a standing foot rises by."""
 BEFORE_S, AFTER_S = 0.05, 0.15
 """A foot may bear load that long before its markers are slow (heel strike), and after the last one has left the floor
 (push-off: the toe rolls on while the marker over it rises)."""
@@ -34,12 +36,19 @@ class FootContact:
         touching: (T, K) markers that are near the floor and slow.
         stands: (T,) in a stance; short gaps closed.
         stances: frames [first, end) of each stance, not padded.
+        low: (T,) one of its markers is not high over its own lowest place.
+        moves: (T,) all of its markers seen move.
+        aloft: (T,) surely in the air, whatever it might stand on: it moves, and all of its markers seen are high. A
+            foot on a belt is low, one on a step or a box stands still.
     """
 
     outline: Array
     touching: Flags
     stands: Flags
     stances: tuple[tuple[int, int], ...]
+    low: Flags
+    moves: Flags
+    aloft: Flags
 
     def padded(self, stance: tuple[int, int], rate: float) -> slice:
         """The frames in which this stance may bear load, as far as markers tell."""
@@ -59,9 +68,14 @@ def foot_contact(recording: Recording, ground: GroundFrame, names: list[str]) ->
     height = places[:, :, 1] - np.nanpercentile(places[:, :, 1], 5.0, axis=0)
     with np.errstate(invalid="ignore"):
         touching = (height < NEAR_FLOOR_M) & (speed < SLOW_M_S)
+        low = np.asarray((height < ALOFT_M).any(axis=1))
+        high, fast = height > ALOFT_M, speed > SLOW_M_S
+    seen = np.isfinite(height)
+    moves = np.asarray(seen.any(axis=1) & (fast | ~seen).all(axis=1))
+    aloft = np.asarray(moves & (high | ~seen).all(axis=1))
     gap = max(1, round(GAP_S * recording.rate)) if recording.n_frames > 1 else 1
     stands = _closed(np.asarray(touching.any(axis=1)), gap)
-    return FootContact(places[:, :, [0, 2]], touching, stands, tuple(runs(stands)))
+    return FootContact(places[:, :, [0, 2]], touching, stands, tuple(runs(stands)), low, moves, aloft)
 
 
 def runs(flags: Flags) -> list[tuple[int, int]]:

@@ -8,7 +8,7 @@ it may bear load, the total external wrench is not known. Floors that are not le
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -33,6 +33,8 @@ BETWEEN_M = 0.03
 """How far from both feet a centre of pressure lies that neither bears alone, where a plate's edges are not told."""
 BEYOND_M = 0.04
 """How far a touching marker may lie beyond the plates' edges: it sits on the shoe, not on its sole."""
+MOST = 0.8
+"""Part of a press for which a moving foot must be low and near the centre of pressure to be what presses."""
 FLAT_FRAMES = 5
 """A loaded plate that stays at its own extreme to 1e-6 for so many frames is at the end of its range."""
 
@@ -54,6 +56,9 @@ class FootLoads:
         total_known: (T,) frames in which all that the ground does to the person is measured: the sum over the plates
             is then the total external wrench (in flight: about 0).
         all_measured: (T,) frames in which that holds and no plate is shared: each foot's wrench is a measurement.
+        elsewhere: (T,) frames in which something else may bear the person: no plate measures at all, a plate carries
+            what no foot puts on it, or (`with_undeclared`) the motion needs what the plates do not have.
+        aloft: (T, F) feet that are surely in the air, by their markers alone.
         messages: sentences with times.
     """
 
@@ -62,7 +67,39 @@ class FootLoads:
     reason: npt.NDArray[np.int8]
     total_known: Flags
     all_measured: Flags
+    elsewhere: Flags
+    aloft: Flags
     messages: tuple[str, ...]
+
+    def with_undeclared(self, frames: Flags) -> FootLoads:
+        """The same where something bears the person in these frames (T,) that no plate measures: the total is not
+        known there, and a foot that is on no plate, or on one that reads nothing, may be what it bears, unless it is
+        surely in the air."""
+        reason = self.reason.copy()
+        light = (reason == SWING) | (np.nan_to_num(self.wrench[..., 1]) < LOADED_N)
+        reason[frames[:, None] & light & (reason <= SHARED) & ~self.aloft] = UNKNOWN
+        wrench = np.where((reason == UNKNOWN)[..., None], np.nan, self.wrench)
+        return replace(
+            self,
+            wrench=wrench,
+            reason=reason,
+            total_known=self.total_known & ~frames,
+            all_measured=self.all_measured & ~frames,
+            elsewhere=self.elsewhere | frames,
+        )
+
+    def without(self, feet: Flags) -> FootLoads:
+        """The same where these feet (T, F) may reach beyond their plates: what these measure is not all of them."""
+        reason = np.where(feet, np.int8(UNKNOWN), self.reason)
+        wrench = np.where(feet[..., None], np.nan, self.wrench)
+        known = ~feet.any(axis=1)
+        return replace(
+            self,
+            wrench=wrench,
+            reason=reason,
+            total_known=self.total_known & known,
+            all_measured=self.all_measured & known,
+        )
 
 
 def foot_loads(
@@ -82,14 +119,17 @@ def foot_loads(
     Raises:
         ConfigError: `assigned` names a plate or foot that there is not.
     """
-    markers = foot_markers or {foot: DEFAULT_FOOT_MARKERS[foot] for foot in ("right", "left")}
+    # ankles are on the shank: they do not touch the floor
+    markers = foot_markers or {
+        foot: [name for name in DEFAULT_FOOT_MARKERS[foot] if "an" not in name.casefold()] for foot in ("right", "left")
+    }
     feet = tuple(markers)
     told = dict(assigned or {})
     _check_assigned(told, recording, feet)
     contacts = {
         foot: found
         for foot, names in markers.items()
-        if (found := foot_contact(recording, ground, [n for n in names if "an" not in n.casefold()])) is not None
+        if (found := foot_contact(recording, ground, list(names))) is not None
     }
     plates = [PlateLoad.of(plate, ground) for plate in recording.plates]
     work = _Assignment(recording, feet, contacts, plates, told)
@@ -164,15 +204,19 @@ def divided(
     outlines: Sequence[Array | None],
     on: Flags,
     off: Flags,
+    aloft: Flags,
     messages: tuple[str, ...] = (),
 ) -> FootLoads:
     """The plates' wrenches given to the feet that stand on them.
 
     Args:
         outlines: (T, K, 2) m of each foot's markers; None: the foot has none.
-        on: (T, F, P) this foot stands on this plate. off: (T, F) it may stand beside the plates.
+        on: (T, F, P) this foot stands on this plate. off: (T, F) it may stand beside the plates. aloft: (T, F) it is
+            surely in the air.
     """
     n, F = off.shape
+    seen = np.array([outline is not None for outline in outlines], dtype=bool)
+    elsewhere = np.full(n, not plates)
     wrench, reason = np.zeros((n, F, 6)), np.full((n, F), SWING, dtype=np.int8)
     total_known = np.full(n, bool(plates))
     for p, plate in enumerate(plates):
@@ -189,14 +233,16 @@ def divided(
             reason[both[owners[both, k]], k] = SHARED
         total_known &= plate.known
         reason[~plate.known[:, None] & owners] = UNKNOWN
-        if all(outline is not None for outline in outlines):
-            foreign = (count == 0) & (np.nan_to_num(plate.wrench[:, 1]) > FOREIGN_N)
-            total_known &= ~foreign
+        nobodys = (count == 0) & (np.nan_to_num(plate.wrench[:, 1]) > FOREIGN_N)
+        elsewhere |= nobodys & seen.all()
+        reason[nobodys[:, None] & ~seen & (reason == SWING)] = UNKNOWN  # a foot that nobody sees may be on it
+    total_known &= ~elsewhere
     reason[off] = OFF_PLATE
     total_known &= ~off.any(axis=1)
     wrench[(reason == OFF_PLATE) | (reason == UNKNOWN)] = np.nan
     all_measured = total_known & (reason != SHARED).all(axis=1)
-    return FootLoads(feet, wrench, reason, total_known, all_measured, messages)
+    loads = FootLoads(feet, wrench, reason, total_known, all_measured, np.zeros(n, dtype=bool), aloft, messages)
+    return loads.with_undeclared(elsewhere)
 
 
 def _shares(plate: PlateLoad, frames: npt.NDArray[np.intp], owners: Flags, outlines: Sequence[Array | None]) -> Array:
@@ -235,6 +281,7 @@ class _Assignment:
             if foot in contacts:
                 self.stances(k, contacts[foot])
         for p, plate in enumerate(plates):
+            self.presses(p, plate)
             self.on[:, :, p] = to_the_end(self.on[:, :, p], np.nan_to_num(plate.wrench[:, 1]) > EMPTY_N)
             if plate.name in told:
                 self.on[:, :, p] = False
@@ -273,6 +320,23 @@ class _Assignment:
                 "the total wrench is left out there."
             )
 
+    def presses(self, p: int, plate: PlateLoad) -> None:
+        """Presses of a plate on which no foot stands still: a belt carries the feet along. They are the foot's that is
+        low and near for most of the press."""
+        pressed = np.nan_to_num(plate.wrench[:, 1]) > EMPTY_N
+        for first, end in runs(pressed):
+            press = slice(first, end)
+            loaded = plate.loaded[press]
+            if plate.name in self.told or self.on[press, :, p].any() or not loaded.any():
+                continue
+            for k, name in enumerate(self.feet):
+                foot = self.contacts.get(name)
+                if foot is None:
+                    continue
+                under = (distance_to_hull(plate.cop[press], foot.outline[press]) < NEAR_M) & foot.low[press]
+                if np.count_nonzero(under & loaded) > MOST * np.count_nonzero(loaded):
+                    self.on[press, k, p] = True
+
     def between(self, k: int, p: int) -> Flags:
         """Frames in which a plate's centre of pressure lies between two standing feet, and under neither."""
         others = [c for name, c in self.contacts.items() if name != self.feet[k]]
@@ -309,7 +373,22 @@ class _Assignment:
         for p, plate in enumerate(self.plates):
             self.say(plate, ~plate.known, np.flatnonzero(self.on[:, :, p].sum(axis=1) > 1), self.on[:, :, p])
         outlines = [self.contacts[foot].outline if foot in self.contacts else None for foot in self.feet]
-        return divided(self.feet, self.plates, outlines, self.on, self.off, tuple(self.messages))
+        return divided(self.feet, self.plates, outlines, self.on, self.off, self.aloft(), tuple(self.messages))
+
+    def aloft(self) -> Flags:
+        """(T, F) feet that are surely in the air: high and moving, or moving while another one stands still, so that
+        what they might touch does not move with them."""
+        found = np.zeros(self.off.shape, dtype=bool)
+        for k, name in enumerate(self.feet):
+            foot = self.contacts.get(name)
+            if foot is None:
+                continue
+            others = [other.stands for at, other in self.contacts.items() if at != name]
+            bears = np.zeros(len(found), dtype=bool)
+            for stance in foot.stances:
+                bears[foot.padded(stance, self.recording.rate)] = True
+            found[:, k] = foot.aloft | (np.any(others, axis=0) & foot.moves & ~bears)
+        return found
 
     def say(self, plate: PlateLoad, lost: Flags, both: npt.NDArray[np.intp], owners: Flags) -> None:
         time = self.recording.time

@@ -8,11 +8,12 @@ import numpy as np
 
 from dynakin.errors import RecordingError
 from dynakin.recordings.grf_columns import PlateColumns, group_columns
+from dynakin.recordings.limits import check_wrench
 from dynakin.recordings.mot import Table
 from dynakin.recordings.options import ReadOptions
 from dynakin.recordings.pressure import DEFAULT_THRESHOLD_N, Surface, plate_from_wrench
 from dynakin.recordings.recording import Array, Plate, Recording
-from dynakin.recordings.resampling import low_pass, resample, same_times
+from dynakin.recordings.resampling import check_whole, low_pass, resample, same_times
 
 _MIN_RATE_RATIO = 0.99
 
@@ -64,9 +65,13 @@ def _plate(group: PlateColumns, table: Table) -> tuple[Plate, list[str]]:
         notes.append(f"{name} has no free moment columns: 0 taken.")
     force, point = (_three(table, group.columns[quantity]) for quantity in ("force", "point"))
     free = _three(table, torque) if torque else np.zeros_like(force)
-    quiet = np.linalg.norm(force, axis=1) == 0.0
+    quiet = (force == 0.0).all(axis=1)
     point[quiet & np.isnan(point).any(axis=1)] = 0.0  # a blank point of no force
-    moment = np.cross(point, force) + free
+    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused
+        moment = np.cross(point, force) + free
+    lost = np.isnan(moment).any(axis=1) & ~np.isnan(np.hstack([point, force, free])).any(axis=1)
+    moment[lost] = np.inf
+    check_wrench(name, table.time, force, moment, str(table.path))
     unloaded = np.linalg.norm(force, axis=1) < DEFAULT_THRESHOLD_N
     cop = np.where(unloaded[:, None], np.nan, point)
     return Plate(name, force, moment, cop, free), notes
@@ -121,11 +126,7 @@ def _check_cover(recording: Recording, table: Table) -> None:
 
 def _resampled(plate: Plate, table: Table, recording: Recording, options: ReadOptions) -> Plate:
     wrench = np.hstack([plate.force, plate.moment])
-    if np.isnan(wrench).any():
-        row = int(np.flatnonzero(np.isnan(wrench).any(axis=1))[0])
-        raise RecordingError(
-            f"{table.path}: {plate.name} has no force at {table.time[row]:g} s, cannot be resampled or filtered"
-        )
+    check_whole(plate.name, table.time, wrench, table.path)
     if options.plate_filter_hz is not None:
         rate = float(1 / np.median(np.diff(table.time)))
         wrench = low_pass(wrench, rate, options.plate_filter_hz, causal=options.causal)

@@ -1,4 +1,4 @@
-"""The ground frame of every model (X forward, Y up, Z right) in the laboratory of a recording."""
+"""The ground frames of models in the laboratory of a recording: Y up; X forward (planar), or the laboratory's own."""
 
 from __future__ import annotations
 
@@ -10,9 +10,21 @@ import numpy.typing as npt
 
 from dynakin.errors import ConfigError
 from dynakin.recordings.facing import find_forward, horizontal
+from dynakin.recordings.handedness import refuse_mirrored
 from dynakin.recordings.landmarks import DEFAULT_PAIRS, FacingPairs
 from dynakin.recordings.recording import Array, Recording
 from dynakin.recordings.vertical import axis_vector, find_vertical
+
+UPRIGHT = {
+    "+Y": (((1, 0, 0), (0, 1, 0), (0, 0, 1)), ""),
+    "-Y": (((1, 0, 0), (0, -1, 0), (0, 0, -1)), "X, Y, Z are x, -y, -z"),
+    "+Z": (((1, 0, 0), (0, 0, 1), (0, -1, 0)), "X, Y, Z are x, z, -y"),
+    "-Z": (((1, 0, 0), (0, 0, -1), (0, 1, 0)), "X, Y, Z are x, -z, y"),
+    "+X": (((0, -1, 0), (1, 0, 0), (0, 0, 1)), "X, Y, Z are -y, x, z"),
+    "-X": (((0, 1, 0), (-1, 0, 0), (0, 0, 1)), "X, Y, Z are y, -x, z"),
+}
+"""R_GL of the laboratory's own frame with Y up, by its vertical axis: a quarter or half turn about its x, or about its
+z where x is vertical. OpenSim's gravity is along -Y."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,10 +32,11 @@ class GroundFrame:
     """Ground frame G in the laboratory L: p_G = R_GL (p_L - origin_L).
 
     Attributes:
-        rotation: R_GL (3, 3); its rows are forward, up and right in the laboratory.
+        rotation: R_GL (3, 3); its rows are the ground's X, Y and Z in the laboratory. Y is up; X is forward, or, of
+            `upright`, the laboratory's own.
         origin_L: (3,) m, the ground's origin in the laboratory.
         vertical: laboratory axis that points up, "+Y", "+Z", ...
-        forward: (3,) unit vector in the laboratory, horizontal.
+        forward: (3,) unit vector in the laboratory, horizontal: the way the person faces.
         how: sentences on how each was found.
     """
 
@@ -36,6 +49,30 @@ class GroundFrame:
     def with_origin(self, origin_L: npt.ArrayLike) -> GroundFrame:
         """The same directions about another origin (3,) m, laboratory frame (a model's toe landmark)."""
         return replace(self, origin_L=np.asarray(origin_L, dtype=float))
+
+    def facing(self) -> GroundFrame:
+        """The same ground with X forward, Y up and Z to the right of the person."""
+        up = axis_vector(self.vertical)
+        return replace(self, rotation=np.vstack([self.forward, up, np.cross(self.forward, up)]))
+
+    def upright(self) -> GroundFrame:
+        """The laboratory's own axes, turned so that Y is up where they are not (`UPRIGHT`)."""
+        turned = replace(self, rotation=np.array(UPRIGHT[self.vertical][0], dtype=float))
+        return replace(turned, how=(*self.how, f"Coordinates, markers, wrenches: {turned.in_words}."))
+
+    @property
+    def in_words(self) -> str:
+        """What these axes are, and where their origin is, for the headers of files."""
+        rows, axes = UPRIGHT[self.vertical]
+        if np.allclose(self.rotation, rows, atol=1e-9):
+            words = "laboratory frame" + (f" with Y up ({axes} of the laboratory)" if axes else "")
+        else:
+            ahead = ", ".join(f"{value:.4f}" for value in self.rotation[0] + 0.0)
+            words = f"ground frame with X along ({ahead}) of the laboratory, Y up ({self.vertical}), Z to the right"
+        if not self.origin_L.any():
+            return words
+        place = ", ".join(f"{value:.4f}" for value in self.origin_L + 0.0)
+        return f"{words}, its origin at ({place}) m of the laboratory"
 
     def vectors_to_ground(self, vectors: Array) -> Array:
         """Free vectors (..., 3) from laboratory to ground."""
@@ -75,7 +112,7 @@ def find_ground_frame(
     origin_L: npt.ArrayLike | None = None,
     pairs: FacingPairs = DEFAULT_PAIRS,
 ) -> GroundFrame:
-    """Find up and forward in a recording, or take what is given.
+    """Find up and forward in a recording, or take what is given; the frame has X forward.
 
     Args:
         vertical: "auto" or a laboratory axis ("+Y", "-Z", ...).
@@ -84,7 +121,7 @@ def find_ground_frame(
         pairs: markers that show the facing direction; ``find_marker``'s rules for their spelling.
 
     Raises:
-        RecordingError: not given and not to be found.
+        RecordingError: not given and not to be found, or the person is seen in a mirror (`handedness`).
         ConfigError: an unknown axis, or a forward direction that is vertical.
     """
     if vertical.casefold() == "auto":
@@ -94,6 +131,7 @@ def find_ground_frame(
         up = axis_vector(vertical)
         axis = ("+" if up.sum() > 0 else "-") + "XYZ"[int(np.argmax(np.abs(up)))]
         how = [f"Vertical {axis}: given."]
+    refuse_mirrored(recording, up, axis)
     if isinstance(forward, str) and forward.casefold() == "auto":
         ahead, found = find_forward(recording, up, pairs)
         how += found
@@ -107,3 +145,20 @@ def find_ground_frame(
     rotation = np.vstack([ahead, up, np.cross(ahead, up)])
     origin = np.zeros(3) if origin_L is None else np.asarray(origin_L, dtype=float)
     return GroundFrame(rotation, origin, axis, ahead, tuple(how))
+
+
+def find_laboratory_frame(
+    recording: Recording,
+    *,
+    vertical: str = "auto",
+    forward: str | Sequence[float] | Array = "auto",
+    pairs: FacingPairs = DEFAULT_PAIRS,
+) -> GroundFrame:
+    """The ground frame of a model that is fixed nowhere: the laboratory's own, Y up, about its origin.
+
+    Such a model may head anywhere, so that nothing has to be turned back. With ``forward`` given X is forward, as in
+    `find_ground_frame`, whose arguments and errors these are.
+    """
+    found = find_ground_frame(recording, vertical=vertical, forward=forward, pairs=pairs)
+    asked = not isinstance(forward, str) or forward.casefold() != "auto"
+    return found if asked else found.upright()

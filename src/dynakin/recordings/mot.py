@@ -111,13 +111,21 @@ def _names_line(lines: list[str], path: Path) -> int:
 def _count_notes(header: dict[str, str], rows: int, columns: int, path: Path) -> list[str]:
     notes = []
     said_rows, said_columns = header.get("nrows", ""), header.get("ncolumns", "")
-    if said_columns.isdigit() and int(said_columns) != columns:
+    if said_columns and _count(said_columns) not in (None, columns):
         notes.append(f"{path.name}: the header says {said_columns} columns, the file names {columns}.")
-    if said_rows.isdigit() and int(said_rows) > rows:
+    said = _count(said_rows)
+    if said is not None and said > rows:
         raise RecordingError(f"{path}: found {rows} rows, expected the {said_rows} of its header (truncated?)")
-    if said_rows.isdigit() and int(said_rows) < rows:
+    if said is not None and said < rows:
         notes.append(f"{path.name}: the header says {said_rows} rows, the file holds {rows}: all are used.")
     return notes
+
+
+def _count(word: str) -> float | None:
+    """A whole number, infinite where no file is so long; None for what is none ("²", say)."""
+    if not (word.isascii() and word.isdigit()):
+        return None
+    return int(word) if len(word) < 18 else float("inf")
 
 
 def _in_degrees(header: dict[str, str], path: Path) -> bool | None:

@@ -33,7 +33,7 @@ class PlateLoad:
     point_m: Vector3
     moment_nm: Vector3 = (0.0, 0.0, 0.0)
 
-    __pydantic_config__: ClassVar = {"extra": "forbid"}  # a misspelt key of a configuration is refused
+    __pydantic_config__: ClassVar = {"extra": "forbid", "allow_inf_nan": False}  # of a configuration
 
 
 def without_plate_loads(recording: Recording, loads: Sequence[PlateLoad], vertical: str = "auto") -> Recording:

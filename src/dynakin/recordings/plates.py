@@ -10,6 +10,7 @@ import numpy as np
 
 from dynakin.recordings.feet import DEFAULT_FOOT_MARKERS, distance_to_hull, foot_outline
 from dynakin.recordings.frame import GroundFrame
+from dynakin.recordings.plate_limits import beyond_limits
 from dynakin.recordings.recording import Array, Plate, Recording
 from dynakin.recordings.standing import standing_window
 from dynakin.units import GRAVITY_M_S2
@@ -84,6 +85,8 @@ def check_plates(
     centre of pressure lies under a foot, the force is near vertical, the free moment acts about the vertical
     and is small.
 
+    Over all frames, no plate may be beyond the limits of friction or of its own edges (`plate_limits`).
+
     Where nobody stands still, the mean over all loaded frames takes its place for all but the mass, which is
     only told.
 
@@ -95,12 +98,14 @@ def check_plates(
     if not recording.plates:
         return PlateCheck(False, None, None, (), "no force plates in this recording, expected at least one")
     findings = _Findings()
-    standing = standing_window(recording)
+    standing = _on_plates(standing_window(recording), recording, ground)
     frames = standing if standing is not None else slice(None)
     mass = _check_vertical(recording, ground, mass_kg, standing, findings)
     feet = _feet(recording, ground, foot_markers or DEFAULT_FOOT_MARKERS, findings)
     under: dict[str, str] = {}
     for plate in recording.plates:
+        if (beyond := beyond_limits(plate, recording, ground)) is not None:
+            findings.refuse(beyond)
         push = ground.vectors_to_ground(plate.force)[frames, 1]
         loaded = np.flatnonzero(np.abs(np.nan_to_num(push)) > LOADED_N) + (frames.start or 0)
         if not len(loaded):
@@ -119,6 +124,13 @@ def check_plates(
     ok = refusal is None and not any(text.startswith("Warning:") for text in findings.messages)
     standing_mass, mean_mass = (mass, None) if standing is not None else (None, mass)
     return PlateCheck(ok, standing_mass, mean_mass, tuple(findings.messages), refusal)
+
+
+def _on_plates(standing: slice | None, recording: Recording, ground: GroundFrame) -> slice | None:
+    """The frames of standing, unless the plates are loaded at other times only: who stands is on a box then, say."""
+    total = ground.vectors_to_ground(np.sum([plate.force for plate in recording.plates], axis=0))
+    loaded = np.abs(np.nan_to_num(total[:, 1])) > LOADED_N
+    return None if standing is not None and loaded.any() and not loaded[standing].any() else standing
 
 
 def _check_vertical(

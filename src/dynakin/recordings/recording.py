@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import RecordingError
+from dynakin.recordings.limits import check_recording
 
 Array = npt.NDArray[np.float64]
 
@@ -47,9 +48,24 @@ class Plate:
         )
 
 
+def rate_of(time: Array) -> float:
+    """Rate of times (T,) s in Hz: the mean one of an even grid, whose steps files round, else that of the median step;
+    NaN of fewer than two."""
+    if len(time) < 2:
+        return float("nan")
+    step = float(np.median(np.diff(time)))
+    even = np.linspace(time[0], time[-1], len(time))
+    if np.abs(time - even).max() < 0.1 * step:
+        return float((len(time) - 1) / (time[-1] - time[0]))
+    return 1.0 / step
+
+
 @dataclass(frozen=True, eq=False)
 class Recording:
     """A trial as read: SI, laboratory frame of the file, a missing marker is NaN.
+
+    Made with times that do not increase, or values that nobody can have measured (`limits`), it raises a
+    RecordingError.
 
     Attributes:
         name: stem of the file's name.
@@ -85,6 +101,7 @@ class Recording:
                 raise RecordingError(
                     f"{self.name}: {plate.name} has arrays of shapes {sorted(shapes)}, expected ({len(self.time)}, 3)"
                 )
+        check_recording(self)
 
     @property
     def n_frames(self) -> int:
@@ -93,8 +110,8 @@ class Recording:
 
     @property
     def rate(self) -> float:
-        """Frames per second, from the median time step (NaN for a single frame)."""
-        return float(1.0 / np.median(np.diff(self.time))) if self.n_frames > 1 else float("nan")
+        """Frames per second (NaN for a single frame); see `rate_of`."""
+        return rate_of(self.time)
 
     @cached_property
     def _columns(self) -> dict[str, int]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import numpy.typing as npt
 from scipy import interpolate, signal
@@ -9,6 +11,9 @@ from scipy import interpolate, signal
 from dynakin.errors import RecordingError
 from dynakin.recordings.recording import Array
 
+UNEVEN = 0.1
+"""Part of a step by which a sample's time may be off an even rate: files round their times, and a lost sample moves
+all others by half a step and more."""
 _PASS = 0.4  # end of the pass band, times the marker rate
 _STOP = 0.6  # begin of the stop band: what lies between folds back only above the pass band
 _STOP_DB = 60.0
@@ -43,6 +48,12 @@ class CausalLowPass:
         return np.asarray(out)
 
 
+def check_whole(name: str, time: Array, wrench: Array, path: Path) -> None:
+    """Raise RecordingError where a sample of a plate's wrench (N, 6) is missing: a filter would spread it over all."""
+    for k in np.flatnonzero(np.isnan(wrench).any(axis=1))[:1]:
+        raise RecordingError(f"{path}: {name} has no force at {time[k]:g} s, cannot be resampled or filtered")
+
+
 def low_pass(samples: Array, rate_hz: float, cutoff_hz: float, *, causal: bool = False) -> Array:
     """Butterworth low-pass of (N, k) samples, -3 dB at ``cutoff_hz``: 4th-order zero-lag (2nd order both
     ways, its cutoff corrected for the two passes as in Winter, Biomechanics and Motor Control, 2009), or 2nd
@@ -74,9 +85,10 @@ def resample(samples: Array, time_in: Array, time_out: Array, *, causal: bool = 
     """
     if same_times(time_in, time_out):
         return samples
-    rate_in, rate_out = _rate(time_in), _rate(time_out)
+    rate_in, rate_out = _mean_rate(time_in), _rate(time_out)
     step = 1 / rate_in
-    if np.abs(np.diff(time_in) * rate_in - 1).max() > 0.05:
+    even = time_in[0] + (time_in[-1] - time_in[0]) * np.linspace(0.0, 1.0, len(time_in))
+    if np.abs(time_in - even).max() > UNEVEN * step:
         raise RecordingError("the forces are sampled unevenly, expected a constant rate to resample from")
     # The last marker frame may lie up to one marker step after the last analog sample of the frame before.
     if time_out[0] < time_in[0] - 0.5 * step or time_out[-1] > time_in[-1] + max(step, 0.5 / rate_out):
@@ -128,6 +140,11 @@ def _antialias(samples: Array, rate_in: float, rate_out: float) -> Array:
 
 def _rate(time: Array) -> float:
     return float(1 / np.median(np.diff(time))) if len(time) > 1 else float("inf")
+
+
+def _mean_rate(time: Array) -> float:
+    """Of rounded times: their steps are all wrong, the whole is not."""
+    return (len(time) - 1) / float(time[-1] - time[0]) if len(time) > 1 else float("inf")
 
 
 def _check_cutoff(rate_hz: float, cutoff_hz: float) -> None:

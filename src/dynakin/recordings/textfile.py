@@ -2,33 +2,84 @@
 
 from __future__ import annotations
 
+import re
+import stat
 from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
-from dynakin.errors import RecordingError
+from dynakin.errors import DynakinError, RecordingError
+from dynakin.recordings.limits import LONGEST_GAP_S, rate_problem
 from dynakin.recordings.recording import Array
 
+LARGEST_TEXT = 64 * 2**20
+"""Bytes of a model, table or configuration: the largest known (whole bodies with muscles) have a tenth."""
 
-def require_file(path: Path) -> None:
-    """Raise RecordingError unless ``path`` is a readable file."""
-    if not path.exists():
-        raise RecordingError(f"{path}: no such file")
-    if not path.is_file():
-        raise RecordingError(f"{path}: is a folder, expected a recording")
+
+_CONTROL = re.compile(r"[\x00-\x1f\x7f]+")
+
+
+def is_text(name: str) -> bool:
+    """Whether a name can be written as UTF-8; one of a file need not."""
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
+def trial_name(path: Path) -> str:
+    """What a recording is called: its file's name without ending; a line end in it is a blank."""
+    return _CONTROL.sub(" ", path.stem)
+
+
+def is_file(path: Path) -> bool:
+    """Whether there is such a file; a name that no file can have (5,000 characters, a NUL) is none."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def require_file(path: Path, raises: type[DynakinError] = RecordingError) -> None:
+    """Raise RecordingError (or ``raises``) unless ``path`` is a file: a pipe would be waited for for ever."""
+    if not is_text(str(path)):
+        raise raises(f"{path}: its name is no UTF-8 text, which outputs could not tell; rename it")
+    try:
+        mode = path.stat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        raise raises(f"{path}: cannot be read (no such file)") from None
+    except (OSError, ValueError) as error:
+        raise raises(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
+    if stat.S_ISDIR(mode):
+        raise raises(f"{path}: is a folder, expected a file")
+    if not stat.S_ISREG(mode):
+        raise raises(f"{path}: is a pipe or device, expected a file")
+
+
+def read_bytes(path: Path, raises: type[DynakinError] = RecordingError, largest: float = float("inf")) -> bytes:
+    """What is in a file.
+
+    Raises:
+        RecordingError (or ``raises``): no such file, not readable, or of more than ``largest`` bytes.
+    """
+    require_file(path, raises)
+    try:
+        size = path.stat().st_size
+        if size > largest:
+            raise raises(f"{path}: found {size} bytes, expected at most {largest:.0f}")
+        return path.read_bytes()
+    except OSError as error:
+        raise raises(f"{path}: cannot be read ({error.strerror or error})") from None
 
 
 def read_lines(path: Path) -> list[str]:
     """All lines without their ends (LF, CRLF or CR), byte order mark removed; Latin-1 where it is not
     UTF-8."""
-    require_file(path)
-    try:
-        raw = path.read_bytes()
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot be read ({error.strerror})") from error
-    if b"\0" in raw[:4096]:
+    raw = read_bytes(path)
+    if b"\0" in raw:
         raise RecordingError(f"{path}: is not a text file")
     try:
         text = raw.decode("utf-8-sig")
@@ -71,7 +122,8 @@ def parse_row(cells: Sequence[str], names: Sequence[str], path: Path, line: int)
 
 
 def check_time(time: Array, lines: Sequence[int], path: Path) -> None:
-    """Raise RecordingError at the first time that is missing or not later than the one before."""
+    """Raise RecordingError at the first time that is missing, not later than the one before, or an hour after it, and
+    where the rate is none of a measurement."""
     for k in np.flatnonzero(~np.isfinite(time))[:1]:
         raise RecordingError(f"{path}, line {lines[k]}: no time given, expected a number")
     for k in np.flatnonzero(np.diff(time) <= 0)[:1]:
@@ -79,10 +131,20 @@ def check_time(time: Array, lines: Sequence[int], path: Path) -> None:
             f"{path}, line {lines[k + 1]}: time {time[k + 1]:g} s does not come after {time[k]:g} s, "
             "expected a strictly increasing time"
         )
+    if problem := rate_problem(time):
+        raise RecordingError(f"{path}: {problem}")
+    for k in np.flatnonzero(np.diff(time) > LONGEST_GAP_S)[:1]:
+        raise RecordingError(
+            f"{path}, line {lines[k + 1]}: time {time[k + 1]:g} s comes after {time[k]:g} s, expected gaps of at most "
+            f"{LONGEST_GAP_S:g} s"
+        )
 
 
 def check_unique(names: Sequence[str], what: str, path: Path) -> None:
-    """Raise RecordingError where a name appears more than once."""
+    """Raise RecordingError where a name appears more than once, or would break the lines of a file."""
+    for name in names:
+        if _CONTROL.search(name):
+            raise RecordingError(f"{path}: found {what} {name!r}, expected a name without control characters")
     twice = [name for name, count in Counter(names).items() if count > 1]
     if twice:
         raise RecordingError(f"{path}: {what} {', '.join(map(repr, twice))} appears more than once")

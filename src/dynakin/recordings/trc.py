@@ -24,7 +24,7 @@ import numpy as np
 from dynakin.errors import RecordingError
 from dynakin.recordings.options import ReadOptions
 from dynakin.recordings.recording import Array, Recording
-from dynakin.recordings.textfile import check_time, check_unique, parse_row, read_lines, split_cells
+from dynakin.recordings.textfile import check_time, check_unique, parse_row, read_lines, split_cells, trial_name
 from dynakin.recordings.trajectories import clean_markers, timing_notes
 from dynakin.units import length_factor
 
@@ -70,7 +70,7 @@ def read_trc(path: Path, options: ReadOptions | None = None) -> Recording:
     factor, unit, unit_notes = _unit(header.get("units", ""), raw, path)
     markers, marker_notes = clean_markers(names, raw * factor)
     return Recording(
-        name=path.stem,
+        name=trial_name(path),
         path=path,
         time=time,
         marker_names=names,

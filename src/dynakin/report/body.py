@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dynakin.elements import element
 from dynakin.report.colours import segment_colours
 from dynakin.results import Estimate
 
@@ -32,7 +33,7 @@ class Chain:
 
 def marker_segments(estimate: Estimate) -> dict[str, str]:
     """Marker -> the segment that carries it, where the marker's place is estimated."""
-    return {p.name.split("/")[1]: p.segment for p in estimate.parameters if p.kind == "marker"}
+    return {element(p.name).owner: p.segment for p in estimate.parameters if p.kind == "marker"}
 
 
 def segment_names(estimate: Estimate) -> list[str]:

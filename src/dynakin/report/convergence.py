@@ -46,7 +46,8 @@ def _judge(estimate: Estimate, title: str, group: list[Parameter]) -> Convergenc
         path = estimate.data["state"].sel(element=p.name).values
         sd = estimate.data["state_sd"].sel(element=p.name).values
         late = path[3 * len(path) // 4 :]
-        if np.ptp(late) > MOVING * abs(p.initial) and not p.at_bound:
+        # smoothed, a constant that moves does so by the drift it was given
+        if not estimate.smoothed and np.ptp(late) > MOVING * abs(p.initial) and not p.at_bound:
             moving.append(p)
         first = p.prior_sd or float(sd[0])  # a smoothed estimate knows at its first frame what it learnt later
         left.append(float(sd[-1]) / first if first > 0.0 else 1.0)

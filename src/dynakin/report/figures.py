@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
 from functools import partial
 from pathlib import Path
 
@@ -17,6 +18,8 @@ from dynakin.report.plot import FILE_STYLE
 from dynakin.report.repetition_figure import repetitions_figure
 from dynakin.report.sensitivity import Sensitivity, read_sensitivity, sensitivity_figure
 from dynakin.results import Estimate
+from dynakin.results.facing import facing
+from dynakin.results.failures import Failures
 
 FORMATS = ("svg", "pdf", "png")
 _DATES: dict[str, dict[str, None]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {}}
@@ -42,6 +45,7 @@ def save_figures(
     *,
     comparison: Trial | None = None,
     sensitivity: Sensitivity | None = None,
+    failures: Failures | None = None,
 ) -> list[Path]:
     """Write Figures 4 to 9 of the paper for this run and its repetitions' mean curves, 300 dots an inch where dots
     are needed.
@@ -52,6 +56,7 @@ def save_figures(
         comparison: this estimate beside the reference methods (`dynakin.comparison.trial_of`): classical angles (Figure
             5), the table's wrench (6) and moments (7) and their mean curves are drawn too.
         sensitivity: a criterion over the gains (`read_sensitivity`): Figure 3 is drawn too.
+        failures: takes the figures that fail; the others are drawn.
 
     Returns:
         The files written, in the order of the paper; a figure without anything to show is left out.
@@ -65,13 +70,14 @@ def save_figures(
             f"comparison has {len(comparison.time)} frames, expected the estimate's {len(estimate.time)}: "
             "make it from the same recording"
         )
+    estimate = facing(estimate)
     draws: dict[str, Callable[[], Figure | None]] = {
         name: lambda draw=draw: draw(estimate, comparison)  # type: ignore[misc]
         for name, draw in FIGURES.items()
     }
     if sensitivity is not None:
         draws = {SENSITIVITY_FIGURE: lambda: sensitivity_figure(sensitivity), **draws}
-    return _write(draws, Path(folder), formats)
+    return _write(draws, Path(folder), formats, failures)
 
 
 def save_sensitivity_figure(path: str | Path, folder: str | Path, formats: Sequence[str] = FORMATS) -> list[Path]:
@@ -95,7 +101,12 @@ def save_sensitivity_figures(
     return _write({name: partial(sensitivity_figure, grid) for name, grid in grids.items()}, Path(folder), formats)
 
 
-def _write(draws: dict[str, Callable[[], Figure | None]], folder: Path, formats: Sequence[str]) -> list[Path]:
+def _write(
+    draws: dict[str, Callable[[], Figure | None]],
+    folder: Path,
+    formats: Sequence[str],
+    failures: Failures | None = None,
+) -> list[Path]:
     unknown = [name for name in formats if name not in FORMATS]
     if unknown:
         raise ConfigError(f"formats: {unknown[0]!r} is not known, expected some of {', '.join(FORMATS)}")
@@ -103,7 +114,8 @@ def _write(draws: dict[str, Callable[[], Figure | None]], folder: Path, formats:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, draw in draws.items():
-            with mpl.rc_context({**FILE_STYLE, "svg.hashsalt": name}):
+            guarded = nullcontext() if failures is None else failures.stage(f"figure {name}")
+            with guarded, mpl.rc_context({**FILE_STYLE, "svg.hashsalt": name}):
                 figure = draw()
                 for form in formats if figure is not None else ():
                     assert figure is not None

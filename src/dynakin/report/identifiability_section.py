@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from dynakin.elements import element
 from dynakin.report.labels import is_planar, number, parameter_label, sentence, short_marker_names, words
 from dynakin.report.panels import Panel
 from dynakin.report.plot import ESTIMATED, GRID, INK, MEASURED, QUIET, new_axes, to_svg
@@ -92,7 +93,7 @@ def _groups(estimate: Estimate, entries: Mapping[str, Mapping[str, Any]]) -> dic
             continue
         entry = entries[p.name]
         if group == "marker places":
-            of_marker.setdefault(p.name.split("/")[1], []).append(entry)
+            of_marker.setdefault(element(p.name).owner, []).append(entry)
         else:
             sizes = _sizes(entry["prior_sd"], entry["sd"], p.unit)
             found.setdefault(sentence(group), []).append(ShareRow(_label(p, names), entry["share"], sizes))
@@ -105,7 +106,7 @@ def _groups(estimate: Estimate, entries: Mapping[str, Mapping[str, Any]]) -> dic
 
 def _recorded(estimate: Estimate) -> dict[str, str]:
     """The model's marker names and the recording's, which stand in the same order."""
-    of_model = list(dict.fromkeys(p.name.split("/")[1] for p in estimate.parameters if p.kind == "marker"))
+    of_model = list(dict.fromkeys(element(p.name).owner for p in estimate.parameters if p.kind == "marker"))
     return dict(zip(of_model, estimate.marker_names, strict=False))
 
 
@@ -121,7 +122,7 @@ def _sizes(prior: float, after: float, unit: str) -> str:
 
 
 def _base_label(name: str) -> str:
-    _, segment, kind = name.split("/")
+    _, segment, kind = element(name)
     short = {"mass": "mass", "mx": "forward", "my": "up", "mz": "right"}.get(kind, kind.replace("i", "inertia ", 1))
     return f"{words(segment)} {short.replace('inertia zz', 'inertia')}"
 

@@ -19,6 +19,7 @@ from dynakin.report.labels import (
 from dynakin.results import Estimate
 from dynakin.results.bounds import counts_in_words
 from dynakin.results.consistency import CONSISTENT
+from dynakin.results.failures import FAILED, LOG
 from dynakin.results.metrics import ADAPTATION_S, evaluation_window, speed_consistency, window_consistency
 from dynakin.results.soft_tissue import excess_in_words
 
@@ -47,7 +48,7 @@ ADVICE = {
     ),
     "speeds": (
         "Smaller noise.coordinate and noise.speed tie each speed to its coordinate.",
-        "A live estimate steps where a measurement corrects it; smoothing (--smooth) does not.",
+        "A live estimate steps where a measurement corrects it; a smoothed one (without --live-like) does not.",
     ),
 }
 
@@ -71,7 +72,7 @@ def what_was_run(estimate: Estimate) -> str:
     return (
         f"{number(float(time[-1] - time[0]), 's')}{person}: {plural(len(time), 'frame')} at "
         f"{recording.rate:.4g} Hz, {len(estimate.marker_names)} of {len(recording.marker_names)} "
-        f"markers, {plates}."
+        f"markers, {plates}; each frame estimated {'from all frames' if estimate.smoothed else 'as it would be live'}."
     )
 
 
@@ -86,6 +87,8 @@ def in_short(found: list[Insight]) -> str:
 def insights(estimate: Estimate, metrics: dict[str, Any]) -> list[Insight]:
     """All findings, in the order of the report."""
     found = [
+        _failed(estimate),
+        _tracking(metrics),
         _moments(metrics),
         _markers(estimate, metrics),
         _wrench(estimate, metrics),
@@ -120,6 +123,23 @@ def _moments(metrics: dict[str, Any]) -> Insight | None:
         text.append(f"{plural(len(found['reasons']) - 3, 'more reason')} under Joint moments.")
     advice = "Give the forces of every contact (--forces), and plates under every step that is to be judged."
     return Insight("warning", "Joint moments", " ".join(text), advice)
+
+
+def _failed(estimate: Estimate) -> Insight | None:
+    told = [message.removeprefix(FAILED).strip() for message in estimate.messages if message.startswith(FAILED)]
+    if not told:
+        return None
+    return Insight("warning", "Not made", " ".join(told), f"{LOG} has the details; please report them.")
+
+
+def _tracking(metrics: dict[str, Any]) -> Insight | None:
+    """Frames that are no estimate; nothing is said where there are none."""
+    found = metrics["tracking"]
+    if not found or not found["lost_frames"]:
+        return None
+    whole = " The trial as a whole is no estimate." if found["trial_lost"] else ""
+    advice = "Look at the first of these times: markers swapped or off, or a movement that the start does not fit."
+    return Insight("warning", "Lost", found["verdict"] + whole, advice)
 
 
 def _markers(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
@@ -186,6 +206,8 @@ def _prediction(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
             f"{text} At worst that is {ratio[worst]:.1f} times as far as after it is seen "
             f"({COMPONENT_LABELS[worst][0].lower()}).",
         )
+    if estimate.smoothed:  # follows no single measurement
+        return Insight("note", "One frame ahead", text)
     return Insight(
         "warning",
         "One frame ahead",
@@ -195,7 +217,9 @@ def _prediction(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     )
 
 
-def _consistency(estimate: Estimate, metrics: dict[str, Any]) -> Insight:
+def _consistency(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
+    if estimate.why_lost is not None:
+        return None
     found = window_consistency(estimate, evaluation_window(estimate.time))
     ratio = metrics["consistency"]["mean_nis_per_dof"]
     good = ratio is not None and CONSISTENT[0] <= ratio <= CONSISTENT[1] and "not white" not in found.verdict
@@ -205,7 +229,9 @@ def _consistency(estimate: Estimate, metrics: dict[str, Any]) -> Insight:
         advice = _advice(estimate, "cautious")
     elif ratio is not None and ratio > CONSISTENT[1]:
         advice = _advice(estimate, "overconfident")
-    return Insight("good" if good else "warning", "Uncertainty", found.verdict + figure, advice)
+    cautious = found.judgement == "conservative" and "not white" not in found.verdict
+    level: Level = "good" if good else "note" if cautious else "warning"
+    return Insight(level, "Uncertainty", found.verdict + figure, advice)
 
 
 def _speeds(estimate: Estimate) -> Insight | None:
@@ -241,7 +267,8 @@ def _constants(estimate: Estimate) -> list[Insight]:
             advice = "" if group.title == "lengths" else "A livelier movement, with the arms too; then smaller noise."
             found.append(Insight("note", title, text, advice))
         else:
-            text = f"Settled: {group.count}, changed from the start by up to {change} %; {shrunk}."
+            how = "Estimated from all frames" if estimate.smoothed else "Settled"
+            text = f"{how}: {group.count}, changed from the start by up to {change} %; {shrunk}."
             found.append(Insight("good", title, text))
     return found
 
@@ -271,9 +298,11 @@ def _bounds(estimate: Estimate, metrics: dict[str, Any]) -> Insight:
     )
 
 
-def _adaptation(metrics: dict[str, Any]) -> Insight:
+def _adaptation(metrics: dict[str, Any]) -> Insight | None:
     """When the estimate settled, beside the time from which the figures are taken."""
     found = metrics["adaptation"]
+    if not found["verdict"]:
+        return None
     if found["after_s"] is None:
         lost = any(misfit["after_s"] is None for misfit in found["misfits"].values())
         return Insight("warning" if lost else "note", "Adaptation", found["verdict"])

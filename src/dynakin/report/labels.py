@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dynakin.elements import element
 from dynakin.results import Estimate, Parameter
 from dynakin.results.naming import INERTIA_WORDS, listed, number, plural, sentence, words
 
@@ -57,12 +58,13 @@ def moment_note(estimate: Estimate, coordinate: str) -> str:
 
 def parameter_label(parameter: Parameter, marker_names: dict[str, str]) -> str:
     """`inertia/thigh/mass` -> `thigh mass`, `marker/RKNE/x` -> `RKNE on the shank, x`."""
-    parts = parameter.name.split("/")
+    _, owner, last = element(parameter.name)
     if parameter.kind == "length":
-        return words(parts[-1]) if parameter.unit == "1" else f"{words(parts[-1])} length"
+        return words(owner) if parameter.unit == "1" else f"{words(owner)} length"
     if parameter.kind == "marker":
-        return f"{marker_names.get(parts[1], parts[1])} on the {words(parameter.segment)}, {parts[-1]}"
-    return f"{words(parameter.segment)} {INERTIA_WORDS.get(parts[-1], parts[-1])}"
+        return f"{marker_names.get(owner, owner)} on the {words(parameter.segment)}, {last}"
+    last = last or owner
+    return f"{words(parameter.segment)} {INERTIA_WORDS.get(last, last)}"
 
 
 def signed_percent(value: float) -> str:

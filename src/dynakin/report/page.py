@@ -15,6 +15,7 @@ from dynakin.report.playback_spatial import spatial_playback
 from dynakin.report.sections import sections
 from dynakin.results import Estimate, compute_metrics
 from dynakin.results.config_file import plain
+from dynakin.results.facing import facing
 from dynakin.results.versions import versions
 
 if TYPE_CHECKING:
@@ -46,6 +47,7 @@ def render_report(estimate: Estimate, *, metrics: dict[str, Any] | None = None, 
     Args:
         comparison: this estimate beside the reference methods (`dynakin.comparison.trial_of`).
     """
+    estimate = facing(estimate)
     metrics = metrics or compute_metrics(estimate)
     found = insights(estimate, metrics)
     preset, planar = estimate.config.get("preset"), is_planar(estimate)

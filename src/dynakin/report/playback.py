@@ -20,6 +20,7 @@ _MOST_BYTES = 750_000  # of base64 in the page
 _MISSING = -32768
 _FOLLOWED_FROM_M = 2.6  # a person who covers more ground than this is followed
 _MARGIN_MM = 90.0
+_MOST_TICKS = 200  # half a metre apart: no person is followed for longer than that in one page
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,7 @@ def playback(estimate: Estimate) -> Playback:
     }
     curve, curve_label = curve_of(estimate, angles)
     left, right = _extent([points, measured, estimated], 0)
-    half = 500.0
+    half = 500.0 * max(1.0, np.ceil((right - left) / (500.0 * _MOST_TICKS)))
     return Playback(
         bones=[{"segment": words(bone.segment), "colour": colours[bone.segment]} for bone in chain.bones],
         markers=[
@@ -130,7 +131,8 @@ def frames_shown(estimate: Estimate, columns: int) -> np.ndarray:
     """Frames that are shown: thirty a second, fewer where the page would become heavy."""
     frames = len(estimate.time)
     bytes_in_all = frames * columns * 2 * 4 / 3
-    step = max(round(estimate.recording.rate / _PICTURES_PER_SECOND), int(np.ceil(bytes_in_all / _MOST_BYTES)), 1)
+    rate = estimate.recording.rate if frames > 1 else 0.0  # one frame has none
+    step = max(round(rate / _PICTURES_PER_SECOND), int(np.ceil(bytes_in_all / _MOST_BYTES)), 1)
     return np.arange(0, frames, step)
 
 
@@ -138,7 +140,9 @@ def packed(values: np.ndarray) -> dict[str, Any]:
     """(N, C) as little-endian 16-bit numbers in base64: value = scale x number, -32768 missing."""
     finite = values[np.isfinite(values)]
     scale = float(np.max(np.abs(finite), initial=0.0)) / 32000.0 or 1.0
-    numbers = np.where(np.isfinite(values), np.round(np.nan_to_num(values) / scale), _MISSING).astype("<i2")
+    numbers = np.where(
+        np.isfinite(values), np.round(np.nan_to_num(values, posinf=0.0, neginf=0.0) / scale), _MISSING
+    ).astype("<i2")
     return {
         "scale": float(f"{scale:.6g}"),
         "columns": values.shape[1],

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from dynakin.elements import element
 from dynakin.report import panels as charts
 from dynakin.report.chart import Bound, Line, chart
 from dynakin.report.identifiability_section import identifiability_section
@@ -244,7 +245,7 @@ def length_section(estimate: Estimate) -> Section:
     """Segment lengths over time between their bounds."""
     panels = [
         _parameter_panel(
-            estimate, p, sentence(words(p.name.split("/")[-1])), *((1.0, "") if p.unit == "1" else (1000.0, "mm"))
+            estimate, p, sentence(words(element(p.name).owner)), *((1.0, "") if p.unit == "1" else (1000.0, "mm"))
         )
         for p in estimate.parameters
         if p.kind == "length" and p.estimated

@@ -88,15 +88,20 @@ def constant_groups(parameters: Sequence[Parameter]) -> dict[str, list[Parameter
 
 
 def adaptation(estimate: Estimate) -> dict[str, Any]:
-    """The block ``adaptation`` of ``metrics.json``: each constant and misfit, the latest of them, and a sentence."""
+    """The block ``adaptation`` of ``metrics.json``: each constant and misfit, the latest of them, and a sentence.
+
+    Of a smoothed run there is nothing to tell: the sentence is empty.
+    """
     time = estimate.time
     short = bool(time[-1] - time[0] < SHORTEST_S)
-    groups = {} if short else constant_groups(estimate.parameters)
+    untimed = short or estimate.smoothed  # all frames then have the constants of the last one
+    groups = {} if untimed else constant_groups(estimate.parameters)
     constants = {title: _group(estimate, group) for title, group in groups.items()}
-    misfits = {} if short else {name: misfit_settling(time, path) for name, path in _misfits(estimate).items()}
+    misfits = {} if untimed else {name: misfit_settling(time, path) for name, path in _misfits(estimate).items()}
     found = {**constants, **{_misfit_title(name): settling.after_s for name, settling in misfits.items()}}
     times = [value["after_s"] if isinstance(value, dict) else value for value in found.values()]
     known = [value for value in times if value is not None]
+    nothing = "" if estimate.smoothed else "The recording is too short to tell an adaptation time."
     return {
         "what": f"s after the first frame from which on constants move by no more than {100.0 * BAND:g} % in all and "
         f"the running RMS misfit ({RUNNING_S:g} s) stays below {FACTOR:g} times that of the second half; null: not "
@@ -104,7 +109,7 @@ def adaptation(estimate: Estimate) -> dict[str, Any]:
         "after_s": max(known) if known and len(known) == len(times) else None,
         "constants": constants,
         "misfits": {name: {"after_s": s.after_s, "growth": s.growth} for name, s in misfits.items()},
-        "verdict": _verdict(constants, misfits) if found else "The recording is too short to tell an adaptation time.",
+        "verdict": _verdict(constants, misfits) if found else nothing,
     }
 
 

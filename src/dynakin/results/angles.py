@@ -80,7 +80,13 @@ def with_angles(estimate: Estimate, zero: Mapping[str, float], signs: Signs) -> 
 
 
 def angle_columns(estimate: Estimate) -> tuple[list[str], Array, list[str]]:
-    """Names, degrees (T, N) and a line on each of the joint angles that `with_angles` asked for: all rotations."""
+    """Names, degrees (T, N) and a line on each of the joint angles that `with_angles` asked for: all rotations.
+
+    Those of the pelvis are against the way the person faces, not against the laboratory.
+    """
+    from dynakin.results.facing import facing
+
+    estimate = facing(estimate)
     values = np.degrees(estimate.data["coordinates"].transpose("time", "coordinate").values)
     offset = np.degrees(estimate.data["zero_offset"].values)
     clinical = estimate.data.attrs["angle_signs"] == "clinical"

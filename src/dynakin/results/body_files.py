@@ -64,7 +64,7 @@ def write_mass_centre(estimate: Estimate, path: Path) -> None:
         for k in np.flatnonzero(estimate.modelled_axes()):
             names.append(prefix + AXES[k])
             columns.append(values[:, k])
-    notes = ["Whole-body centre of mass in m and its velocity in m/s, ground frame (X forward, Y up, Z right)."]
+    notes = [f"Whole-body centre of mass in m and its velocity in m/s, {estimate.ground.in_words}."]
     _write(path, "Centre of mass", estimate, names, np.column_stack(columns), notes)
 
 
@@ -80,8 +80,8 @@ def write_centre_of_pressure(estimate: Estimate, path: Path) -> None:
                 columns.append(values)
     table = np.column_stack(columns) if columns else np.empty((len(estimate.time), 0))
     notes = [
-        "Centres of pressure in m on the plates' surface, free moments in N m about the vertical, ground frame; "
-        f"nan below {LOADED_N:g} N of vertical force."
+        "Centres of pressure in m on the plates' surface, free moments in N m about the vertical; "
+        f"nan below {LOADED_N:g} N of vertical force. Frame: {estimate.ground.in_words}."
     ]
     if estimate.foot_names:
         notes.append("feet_source.sto says of each foot whether its force is measured, derived or absent (nan).")
@@ -110,6 +110,7 @@ def write_joint_reactions(estimate: Estimate, path: Path) -> None:
     notes = [
         "Intersegmental loads: force in N and moment in N m about the joint's centre (px py pz, m), ground axes, of "
         "the parent on the named segment; muscles, ligaments and bones together.",
+        f"Frame: {estimate.ground.in_words}.",
         "joint_reactions_source.sto says of each joint whether its load is measured, derived or absent (nan).",
     ]
     _write(path, "Joint reactions", estimate, names, np.column_stack(columns), notes)
@@ -150,7 +151,8 @@ def write_feet(estimate: Estimate, path: Path) -> None:
         unknown = np.isnan(wrench).any(axis=1)
         columns += [wrench[:, :3], np.where(loaded[:, None], point, np.where(unknown, np.nan, 0.0)[:, None]), torque]
     notes = [
-        "Forces in N at points in m, torques in N m, of the ground on the feet, ground frame; adjusted.",
+        "Forces in N at points in m, torques in N m, of the ground on the feet; adjusted.",
+        f"Frame: {estimate.ground.in_words}.",
         "feet_source.sto says of each foot whether its force is measured, derived or absent (nan).",
     ]
     _write(path, "Ground reaction of the feet", estimate, names, np.hstack(columns), notes)

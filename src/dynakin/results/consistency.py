@@ -111,9 +111,9 @@ def _verdict(ratio: float | None, judgement: Judgement | None, markers: float | 
         )
     elif judgement == "conservative":
         text = (
-            f"The filter is too cautious: its innovations are {_times(1.0 / max(ratio, 1e-300))} times smaller "
-            "than its covariances say. Q or R are larger than this recording needs, and the standard deviations it "
-            "reports are too large."
+            "The standard deviations are larger than needed: the filter is too cautious, its innovations are "
+            f"{_times(1.0 / max(ratio, 1e-300))} times smaller than its covariances say. Q or R are larger than this "
+            "recording needs."
         )
     else:
         text = "The filter is consistent: its innovations are as large as its covariances say."

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from dynakin.comparison import Trial
     from dynakin.identifiability import Identifiability
     from dynakin.recordings import GroundFrame, Recording
+    from dynakin.results.failures import Failures
+    from dynakin.results.tracking import Tracking
 
 AXES = ("x", "y", "z")
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
@@ -26,7 +28,8 @@ COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
 class Estimate:
     """What one run estimated. Do not change it: every file of `save` and the report are made from it.
 
-    ``data`` holds, in the ground frame (X forward, Y up, Z right), SI units and radians:
+    ``data`` holds, in the ground frame (Y up; the laboratory's own of a body that is fixed nowhere, with X forward of a
+    planar model), SI units and radians:
 
     ============================================================  ==========================  =====================
     variable                                                      dimensions                  unit
@@ -62,6 +65,9 @@ class Estimate:
     the motion, because one of them is not, and 2 where it is absent (NaN); where they are missing all is measured
     (`dynakin.results.sources`).
 
+    ``lost`` (time,) is true in frames in which the filter lost the person: everything that was estimated there is NaN,
+    but for ``state`` and ``state_sd``, which keep what the filter held.
+
     ``recording`` is the recording as read (laboratory frame), ``ground`` the frame that carries it to the model's.
     """
 
@@ -74,6 +80,8 @@ class Estimate:
     config: dict[str, Any]
     model_name: str
     messages: list[str] = field(default_factory=list)
+    tracking: Tracking | None = None
+    """How the person was followed (`results.tracking`), as judged when it was estimated."""
 
     @property
     def time(self) -> np.ndarray:
@@ -102,6 +110,25 @@ class Estimate:
     def foot_names(self) -> list[str]:
         """The feet whose wrenches the moments were made with; none in a model that stands on its root."""
         return [str(name) for name in self.data["foot"].values] if "foot" in self.data.coords else []
+
+    @property
+    def smoothed(self) -> bool:
+        """Whether each frame was estimated from all frames; else from those until then, as it would be live."""
+        return bool(self.config.get("smooth"))
+
+    @property
+    def lost(self) -> np.ndarray:
+        """(T,) bool: frames in which the person was lost (`results.tracking`). What was estimated there is NaN."""
+        if "lost" not in self.data:
+            return np.zeros(len(self.time), dtype=bool)
+        return np.asarray(self.data["lost"].values, dtype=bool)
+
+    @property
+    def why_lost(self) -> str | None:
+        """Why the trial as a whole is no estimate, with times; None where it is one. `Estimator.run` does not raise."""
+        from dynakin.results.tracking import why_lost
+
+        return why_lost(self)
 
     @property
     def mass_kg(self) -> float | None:
@@ -175,6 +202,8 @@ class Estimate:
         overwrite: bool = True,
         comparison: Trial | None = None,
         identifiability: Identifiability | None = None,
+        keep_lost: bool = False,
+        failures: Failures | None = None,
     ) -> Path:
         """Write every output file into ``folder`` and return it.
 
@@ -187,12 +216,25 @@ class Estimate:
                 for ``repetitions.csv``.
             identifiability: what this trial tells and what would tell more (`dynakin.identifiability`), for the report
                 and for ``metrics.json``.
+            keep_lost: write a trial that was lost too, its lost frames empty.
+            failures: takes the stages that fail (a figure, the page); all else is written, and `failures.log`.
 
         Raises:
-            OutputError: the folder cannot be written or holds something else.
+            LostError: the person was lost for so long that the trial is no estimate, and ``keep_lost`` is false:
+                nothing is written.
+            OutputError: the folder cannot be written or holds something else; or some stage failed and ``failures`` is
+                not given: all else is saved then.
         """
         from dynakin.results.save import save_estimate
+        from dynakin.results.tracking import refuse_lost
 
+        if not keep_lost:
+            refuse_lost(self)
         return save_estimate(
-            self, Path(folder), overwrite=overwrite, comparison=comparison, identifiability=identifiability
+            self,
+            Path(folder),
+            overwrite=overwrite,
+            comparison=comparison,
+            identifiability=identifiability,
+            failures=failures,
         )

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-import math
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from dynakin.absent import with_nulls
 from dynakin.results.estimate import Estimate
 from dynakin.results.metrics import SCHEMA_VERSION
 
@@ -30,16 +30,5 @@ def write_metrics(metrics: dict[str, Any], path: Path) -> None:
 
 
 def _write(path: Path, content: dict[str, Any]) -> None:
-    text = json.dumps(_finite(content), indent=2, ensure_ascii=False, allow_nan=False)
+    text = json.dumps(with_nulls(content), indent=2, ensure_ascii=False, allow_nan=False)
     path.write_text(text + "\n", encoding="utf-8", newline="\n")
-
-
-def _finite(value: Any) -> Any:
-    """The same with NaN and infinity as None: JSON has no word for them, and a bare NaN stops strict readers."""
-    if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return value

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any, Literal
 
+from dynakin.elements import element
 from dynakin.results.estimate import Estimate
 from dynakin.results.naming import INERTIA_WORDS, listed, words
 from dynakin.results.records import Parameter
@@ -105,8 +106,8 @@ def _which(names: list[str]) -> str:
     """Segments, and where several numbers of each are in the group, how many of them."""
     segments: dict[str, list[str]] = {}
     for name in names:
-        parts = name.split("/")
-        segments.setdefault(parts[1], []).append(parts[-1])
+        _, owner, kind = element(name)
+        segments.setdefault(owner, []).append(kind)
     several = any(name.rpartition("/")[2] in ("mx", "my", "mz") for name in names)
     said = [
         words(segment) + (f" {' and '.join(INERTIA_WORDS[k].rpartition(', ')[2] for k in kinds)}" if several else "")

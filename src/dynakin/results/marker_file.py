@@ -1,4 +1,4 @@
-"""``markers.trc``: the model's markers in the recording's laboratory frame and unit."""
+"""``markers.trc``: the model's markers in the frame of ``coordinates.mot`` and the recording's unit."""
 
 from __future__ import annotations
 
@@ -14,12 +14,15 @@ _PER_METRE = {"m": 1.0, "mm": 1000.0}
 
 
 def laboratory_markers(estimate: Estimate) -> np.ndarray:
-    """Estimated markers (T, M, 3), m, in the laboratory frame of the recording.
+    """Estimated markers (T, M, 3), m: where the model that ``coordinates.mot`` poses has them, in its frame.
 
-    An axis that the model does not explain (a planar model's Z) is left as measured. Where the marker was not
-    measured such a point is not known in the laboratory and is NaN; its in-plane estimate is in ``estimate.nc``.
+    A planar model knows two axes only: its markers are given in the recording's own laboratory frame, with the third
+    axis as measured. Where the marker was not measured such a point is not known in the laboratory and is NaN; its
+    in-plane estimate is in ``estimate.nc``.
     """
     estimated = estimate.data["markers_estimated"].transpose("time", "marker", "axis").values
+    if estimate.modelled_axes().all():
+        return np.asarray(estimated)
     recording = estimate.recording
     recorded = np.stack([recording.marker(name) for name in estimate.marker_names], axis=1)
     measured = estimate.ground.points_to_ground(recorded)

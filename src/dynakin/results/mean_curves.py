@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.results.estimate import COMPONENTS, Estimate
+from dynakin.results.facing import facing
 from dynakin.results.naming import plural
 from dynakin.results.repetitions import Movement, Repetition, repetitions_of
 from dynakin.results.sources import measured_moments, measured_wrench
@@ -146,6 +147,7 @@ def _mean_curve(movement: Movement, side: str, method: str, signal: Signal, each
 
 def estimate_curves(estimate: Estimate) -> list[MeanCurve]:
     """Mean curves of the filter's own quantities and of the plates'; nothing without a repetition."""
+    estimate = facing(estimate)
     preset = estimate.config.get("preset")
     data = estimate.data
     coordinates = data["coordinates"].transpose("time", "coordinate").values

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections import Counter
-from dataclasses import asdict
+from collections.abc import Callable
+from contextlib import nullcontext
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -12,6 +14,8 @@ from dynakin.results.adaptation import adaptation
 from dynakin.results.bounds import parameter_bounds
 from dynakin.results.consistency import Consistency, consistency
 from dynakin.results.estimate import COMPONENTS, Estimate
+from dynakin.results.facing import facing
+from dynakin.results.failures import Failures
 from dynakin.results.feet import foot_figures
 from dynakin.results.fit import WrenchFit, marker_rms_mm, wrench_fit
 from dynakin.results.kinematic_consistency import mismatch_in_words, speed_mismatch
@@ -21,6 +25,7 @@ from dynakin.results.soft_tissue import soft_tissue
 from dynakin.results.sources import moment_figures
 from dynakin.results.stances import counted
 from dynakin.results.symmetry import asymmetry
+from dynakin.results.tracking import tracking_figures
 
 SCHEMA_VERSION = 1
 """Version of ``metrics.json``, ``parameters.json`` and ``estimate.nc``; it grows when a key changes its meaning."""
@@ -38,33 +43,53 @@ def evaluation_window(time: np.ndarray) -> np.ndarray:
     return np.ones(len(time), dtype=bool)
 
 
-def compute_metrics(estimate: Estimate) -> dict[str, Any]:
-    """Everything in ``metrics.json`` as a plain dictionary; a figure that is not defined is None."""
+def compute_metrics(estimate: Estimate, failures: Failures | None = None) -> dict[str, Any]:
+    """Everything in ``metrics.json`` as a plain dictionary; a figure that is not defined is None.
+
+    Components of the wrench are along the way the person faces: fx forward, fy up, fz to the right.
+
+    Args:
+        failures: takes what fails, whose block is None then; not given: it is raised.
+    """
+    estimate = facing(estimate)
     window = evaluation_window(estimate.time)
     kept = estimate.time[window]
-    return {
+    window &= ~estimate.lost
+    blocks: dict[str, Callable[[], Any]] = {
+        "markers": lambda: _markers(estimate, "estimated", window),
+        "wrench": lambda: _wrench(estimate, "estimated", window),
+        "prediction": lambda: _prediction(estimate, window),
+        "tracking": lambda: tracking_figures(estimate),
+        "consistency": lambda: _consistency(estimate, window),
+        "adaptation": lambda: adaptation(estimate),
+        "bounds": lambda: parameter_bounds(estimate, window),
+        "soft_tissue": lambda: soft_tissue(estimate, window),
+        "identifiability": lambda: learned(estimate),
+        "moments": lambda: moment_figures(estimate),
+        "peak_moments_per_kg": lambda: _peak_moments(estimate, window),
+        "work": lambda: work(estimate, window),
+        "angles": lambda: _angles(estimate),
+        "asymmetry": lambda: asymmetry(estimate, window),
+        "feet": lambda: foot_figures(estimate, window),
+        "events": lambda: _events(estimate),
+        "timing": lambda: asdict(estimate.timing),
+    }
+    metrics: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
         "window": {"start_s": float(kept[0]), "end_s": float(kept[-1])},
-        "markers": _markers(estimate, "estimated", window),
-        "wrench": _wrench(estimate, "estimated", window),
-        "prediction": {
-            "what": "one frame ahead: the model's expectation before the frame is used",
-            "markers": _markers(estimate, "predicted", window),
-            "wrench": {"rms": _wrench(estimate, "predicted", window)["rms"]},
-        },
-        "consistency": _consistency(estimate, window),
-        "adaptation": adaptation(estimate),
-        "bounds": parameter_bounds(estimate, window),
-        "soft_tissue": soft_tissue(estimate, window),
-        "identifiability": learned(estimate),
-        "moments": moment_figures(estimate),
-        "peak_moments_per_kg": _peak_moments(estimate, window),
-        "work": work(estimate, window),
-        "angles": _angles(estimate),
-        "asymmetry": asymmetry(estimate, window),
-        "feet": foot_figures(estimate, window),
-        "events": _events(estimate),
-        "timing": asdict(estimate.timing),
+    }
+    for name, block in blocks.items():
+        metrics[name] = None
+        with nullcontext() if failures is None else failures.stage(f"{name} in metrics.json"):
+            metrics[name] = block()
+    return metrics
+
+
+def _prediction(estimate: Estimate, window: np.ndarray) -> dict[str, Any]:
+    return {
+        "what": "one frame ahead: the model's expectation before the frame is used",
+        "markers": _markers(estimate, "predicted", window),
+        "wrench": {"rms": _wrench(estimate, "predicted", window)["rms"]},
     }
 
 
@@ -141,6 +166,11 @@ def speed_consistency(estimate: Estimate, window: np.ndarray) -> tuple[dict[str,
 def _consistency(estimate: Estimate, window: np.ndarray) -> dict[str, Any]:
     found = window_consistency(estimate, window)
     mismatch, speeds_verdict = speed_consistency(estimate, window)
+    if estimate.why_lost is not None:
+        found = replace(found, judgement=None, verdict="The person was lost, so nothing is said of consistency.")
+        speeds_verdict = ""
+    elif estimate.lost.any():
+        found = replace(found, verdict=f"Of the frames that are not lost: {found.verdict}")
     return {
         "mean_nis_per_dof": found.mean_nis_per_dof,
         "interval_95": list(found.interval_95) if found.interval_95 else None,

@@ -28,7 +28,7 @@ def write_coordinates(estimate: Estimate, path: Path) -> None:
         estimate.coordinate_names,
         _in_degrees(estimate, "coordinates"),
         in_degrees=True,
-        notes=["Rotations in degrees, translations in metres."],
+        notes=["Rotations in degrees, translations in metres.", _frame(estimate)],
     )
 
 
@@ -41,7 +41,7 @@ def write_speeds(estimate: Estimate, path: Path) -> None:
         estimate.coordinate_names,
         _in_degrees(estimate, "speeds"),
         in_degrees=True,
-        notes=["Rotations in degrees per second, translations in metres per second."],
+        notes=["Rotations in degrees per second, translations in metres per second.", _frame(estimate)],
     )
 
 
@@ -54,7 +54,10 @@ def write_accelerations(estimate: Estimate, path: Path) -> None:
         estimate.coordinate_names,
         _in_degrees(estimate, "accelerations"),
         in_degrees=True,
-        notes=["Rotations in degrees per second squared, translations in metres per second squared."],
+        notes=[
+            "Rotations in degrees per second squared, translations in metres per second squared.",
+            _frame(estimate),
+        ],
     )
 
 
@@ -142,10 +145,15 @@ def write_wrench(estimate: Estimate, path: Path) -> None:
         table,
         in_degrees=False,
         notes=[
-            "Forces in N, moments in N m about the origin of the ground frame (X forward, Y up, Z right), "
-            "acting from the ground on the person. Estimated where it is not measured, derived from the motion."
+            "Forces in N, moments in N m about the origin of the frame, acting from the ground on the person. "
+            "Estimated where it is not measured, derived from the motion.",
+            _frame(estimate),
         ],
     )
+
+
+def _frame(estimate: Estimate) -> str:
+    return f"Frame: {estimate.ground.in_words}."
 
 
 def _in_degrees(estimate: Estimate, variable: str) -> np.ndarray:

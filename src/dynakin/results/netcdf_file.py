@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
+from dynakin.absent import finite, with_nulls
 from dynakin.results.estimate import Estimate
 from dynakin.results.metrics import SCHEMA_VERSION
 from dynakin.results.sources import MEANINGS
@@ -48,6 +49,8 @@ def full_dataset(estimate: Estimate) -> xr.Dataset:
         unit = next((unit for stem, unit in _UNITS.items() if str(name).startswith(stem)), None)
         if unit is not None:
             variable.attrs["units"] = unit
+    for name in [name for name, variable in data.data_vars.items() if variable.dtype.kind == "f"]:
+        data[name] = data[name].copy(data=finite(data[name].values))
     for name, (meanings, what) in _FLAGS.items():
         if name in data:
             data[name].attrs.update(
@@ -63,7 +66,7 @@ def full_dataset(estimate: Estimate) -> xr.Dataset:
     data = data.assign_coords(parameter=[p.name for p in parameters])
     for key in _PARAMETER_NUMBERS:
         numbers = [np.nan if getattr(p, key) is None else getattr(p, key) for p in parameters]
-        data[f"parameter_{key}"] = ("parameter", np.array(numbers, dtype=float))
+        data[f"parameter_{key}"] = ("parameter", finite(numbers))
     for key in ("kind", "segment", "unit"):
         data[f"parameter_{key}"] = (
             "parameter",
@@ -87,9 +90,9 @@ def full_dataset(estimate: Estimate) -> xr.Dataset:
         schema_version=SCHEMA_VERSION,
         dynakin_version=versions()["dynakin"],
         model=estimate.model_name,
-        frame="ground frame: X forward, Y up, Z right; origin at the model's ground origin; SI, radians",
+        frame=f"{estimate.ground.in_words}; SI, radians",
         messages="\n".join(estimate.messages),
-        configuration=json.dumps(estimate.config, default=str),
+        configuration=json.dumps(with_nulls(estimate.config), default=str, allow_nan=False),
     )
     return data
 

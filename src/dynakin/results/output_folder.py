@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dynakin.errors import OutputError
+from dynakin.recordings.textfile import is_text
 
 OUTPUT_FILES = (
     "coordinates.mot",
@@ -36,8 +37,9 @@ OPTIONAL_FILES = (
     "feet.sto",
     "feet_source.sto",
     "angles.sto",
+    "failures.log",
 )
-"""Written where an estimate holds what they are made of, or where they were asked for."""
+"""Written where an estimate holds what they are made of, where they were asked for, or where something failed."""
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,8 @@ def check_output_writable(folder: str | Path, *, kind: FolderKind = RESULTS, ove
             did not write (or, with ``overwrite`` false, anything at all).
     """
     folder = Path(folder)
+    if "\0" in str(folder) or not is_text(str(folder)):
+        raise OutputError(f"{folder}: cannot write results there, its name is no text")
     try:
         _check_replaceable(folder, kind, overwrite)
         ancestor = _nearest_existing(folder.absolute().parent)
@@ -85,7 +89,7 @@ def replacing(folder: Path, *, kind: FolderKind = RESULTS, overwrite: bool = Tru
     made: Path | None = None
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)
-        made = Path(tempfile.mkdtemp(prefix=f".{folder.name}-", dir=folder.parent))
+        made = Path(tempfile.mkdtemp(prefix=".dynakin-", dir=folder.parent))
         made.chmod(0o755)  # mkdtemp makes it private, results are ordinary files
         yield made
         _swap(made, folder)
@@ -101,7 +105,7 @@ def _swap(made: Path, folder: Path) -> None:
     if not folder.exists():
         made.rename(folder)
         return
-    old = Path(tempfile.mkdtemp(prefix=f".{folder.name}-old-", dir=folder.parent)) / folder.name
+    old = Path(tempfile.mkdtemp(prefix=".dynakin-old-", dir=folder.parent)) / folder.name
     try:
         folder.rename(old)
         try:

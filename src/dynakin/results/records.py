@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 ParameterKind = Literal["length", "marker", "inertia", "plates"]
+NOT_SMOOTHED = "Not smoothed:"
+"""How the message begins of a run whose settings have no smoother."""
+
 EventKind = Literal["missing", "gated", "at_bound", "reset", "note"]
 EVENT_KINDS: tuple[EventKind, ...] = ("missing", "gated", "at_bound", "reset", "note")
 

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.signal import find_peaks
 
+from dynakin.elements import element
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.recordings import DEFAULT_PAIRS, GroundFrame, Recording, find_marker
 from dynakin.recordings.smoothing import smooth, stretches
@@ -66,7 +67,7 @@ class Found:
 
 @dataclass(frozen=True, eq=False)
 class BodyPaths:
-    """What repetitions are told from, ground frame, NaN where not known.
+    """What repetitions are told from, X forward and Y up, NaN where not known.
 
     time: (T,) s. pelvis: (T, 3) m. heels: by side, (T, 3) m each.
     """
@@ -83,6 +84,7 @@ def body_paths(recording: Recording, ground: GroundFrame, pelvis: Iterable[str] 
         pelvis: the recording's names of markers on the pelvis; none: iliac spines by their usual names. Heels are
             found by theirs (`recordings.DEFAULT_PAIRS`).
     """
+    ground = ground.facing()
     named = list(pelvis) or _present(recording, chain(*DEFAULT_PAIRS.pelvis))
     missing = np.full((recording.n_frames, 3), np.nan)
     middle = np.mean([recording.marker(name) for name in named], axis=0) if named else missing
@@ -95,7 +97,7 @@ def body_paths(recording: Recording, ground: GroundFrame, pelvis: Iterable[str] 
 
 def repetitions_of(estimate: Estimate, movement: Movement | None = None) -> Found:
     """Whole repetitions of an estimate that lie after the adaptation; as `find_repetitions`."""
-    carriers = {p.name.split("/")[1]: p.segment for p in estimate.parameters if p.kind == "marker"}
+    carriers = {element(p.name).owner: p.segment for p in estimate.parameters if p.kind == "marker"}
     pelvis = [name for name in estimate.marker_names if carriers.get(name) == "pelvis"]
     paths = body_paths(estimate.recording, estimate.ground, pelvis)
     return find_repetitions(paths, movement, evaluation_window(estimate.time))

@@ -2,21 +2,41 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
+from dynakin.errors import OutputError
 from dynakin.results import body_files, motion_files
 from dynakin.results.config_file import write_config
 from dynakin.results.estimate import Estimate
+from dynakin.results.failures import LOG, Failures
 from dynakin.results.json_files import write_metrics, write_parameters
 from dynakin.results.marker_file import write_markers
 from dynakin.results.mean_curves import curve_points, estimate_curves, write_curves
+from dynakin.results.metrics import compute_metrics
 from dynakin.results.netcdf_file import write_netcdf
 from dynakin.results.output_folder import replacing
 
 if TYPE_CHECKING:
     from dynakin.comparison import Trial
     from dynakin.identifiability import Identifiability
+
+Write = Callable[[Estimate, Path], None]
+
+_FILES: dict[str, Write] = {
+    "coordinates.mot": motion_files.write_coordinates,
+    "speeds.sto": motion_files.write_speeds,
+    "accelerations.sto": motion_files.write_accelerations,
+    "moments.sto": motion_files.write_moments,
+    "moments_source.sto": motion_files.write_moment_sources,
+    "wrench.sto": motion_files.write_wrench,
+    "uncertainty.sto": motion_files.write_deviations,
+    "markers.trc": write_markers,
+    "parameters.json": write_parameters,
+    "estimate.nc": write_netcdf,
+}
 
 
 def save_estimate(
@@ -26,28 +46,55 @@ def save_estimate(
     overwrite: bool = True,
     comparison: Trial | None = None,
     identifiability: Identifiability | None = None,
+    failures: Failures | None = None,
 ) -> Path:
     """See `dynakin.results.Estimate.save`."""
     from dynakin.report import write_report  # the report is made from results, so it comes after them
 
-    metrics = estimate.metrics()
-    if identifiability is not None:
-        metrics["identifiability"] = identifiability.as_dict()
-    curves = estimate_curves(estimate) if comparison is None else comparison.curves()
+    failed = Failures() if failures is None else failures
+    metrics = _metrics(estimate, identifiability, failed)
     with replacing(folder, overwrite=overwrite) as made:
-        motion_files.write_coordinates(estimate, made / "coordinates.mot")
-        motion_files.write_speeds(estimate, made / "speeds.sto")
-        motion_files.write_accelerations(estimate, made / "accelerations.sto")
-        motion_files.write_moments(estimate, made / "moments.sto")
-        motion_files.write_moment_sources(estimate, made / "moments_source.sto")
-        motion_files.write_wrench(estimate, made / "wrench.sto")
-        motion_files.write_deviations(estimate, made / "uncertainty.sto")
-        body_files.write_body_files(estimate, made)
-        write_curves(made / "repetitions.csv", curve_points(estimate.recording.name, curves))
-        write_markers(estimate, made / "markers.trc")
-        write_parameters(estimate, made / "parameters.json")
-        write_metrics(metrics, made / "metrics.json")
-        write_netcdf(estimate, made / "estimate.nc")
+        for name, write in _FILES.items():
+            _written(made / name, failed, lambda path, write=write: write(estimate, path))  # type: ignore[misc]
+        with failed.stage("files of the body"):
+            body_files.write_body_files(estimate, made)
+        _written(made / "repetitions.csv", failed, lambda path: _write_repetitions(estimate, comparison, path))
         write_config(estimate.config, made / "config.toml")
-        write_report(estimate, made / "report.html", metrics=metrics, comparison=comparison)
+        told = replace(estimate, messages=[*estimate.messages, *failed.messages()])
+        _written(
+            made / "report.html", failed, lambda path: write_report(told, path, metrics=metrics, comparison=comparison)
+        )
+        said = {"messages": [*estimate.messages, *failed.messages()]}
+        said["failures"] = [failure.stage for failure in failed.found]
+        write_metrics(metrics | said, made / "metrics.json")
+        if failed.found:
+            (made / LOG).write_text(failed.log(), encoding="utf-8", newline="\n")
+    if failures is None and failed.found:
+        raise OutputError(f"{folder}: the results are saved ({LOG} has details). {' '.join(failed.messages())}")
     return folder
+
+
+def _metrics(estimate: Estimate, identifiability: Identifiability | None, failed: Failures) -> dict[str, Any]:
+    """All figures, or those that can be had."""
+    try:
+        metrics = estimate.metrics()
+    except Exception:
+        metrics = compute_metrics(estimate, failed)
+    if identifiability is not None:
+        with failed.stage("what the recording tells of the constants"):
+            metrics["identifiability"] = identifiability.as_dict()
+    return metrics
+
+
+def _written(path: Path, failed: Failures, write: Callable[[Path], None]) -> None:
+    """One file, or none: half a file looks like a whole one."""
+    before = len(failed.found)
+    with failed.stage(path.name):
+        write(path)
+    if len(failed.found) > before:
+        path.unlink(missing_ok=True)
+
+
+def _write_repetitions(estimate: Estimate, comparison: Trial | None, path: Path) -> None:
+    curves = estimate_curves(estimate) if comparison is None else comparison.curves()
+    write_curves(path, curve_points(estimate.recording.name, curves))

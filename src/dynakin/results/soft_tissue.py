@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from dynakin.elements import element
 from dynakin.recordings.landmarks import plain_name
 from dynakin.results.estimate import AXES, Estimate
 from dynakin.results.naming import words
@@ -49,13 +50,13 @@ def displacements(estimate: Estimate, window: np.ndarray) -> dict[str, MarkerDis
     the model cannot explain. A filter with a state block ``soft_tissue`` (``soft_tissue/NAME/x``, m) has that added,
     and declares its amplitudes in the variable ``soft_tissue_amplitude`` (marker,), m, of the estimate's data.
     """
-    blocks = [_paths(estimate, block) for block in ("marker", "soft_tissue")]
+    blocks = [state_paths(estimate, block) for block in ("marker", "soft_tissue")]
     initial = {p.name: p.initial for p in estimate.parameters}
-    segments = {p.name.split("/")[1]: p.segment for p in estimate.parameters if p.kind == "marker"}
+    segments = {element(p.name).owner: p.segment for p in estimate.parameters if p.kind == "marker"}
     measured = estimate.data["markers_measured"].transpose("time", "marker", "axis").values
     seen = np.isfinite(measured[:, :, estimate.modelled_axes()]).all(axis=2)
     found = {}
-    for k, (name, site) in enumerate(_sites(estimate)):
+    for k, (name, site) in enumerate(marker_sites(estimate)):
         frames, segment = window & seen[:, k], segments.get(site, "")
         paths = [1000.0 * sum(b[site][axis] for b in blocks if axis in b.get(site, {})) for axis in _axes(blocks, site)]
         size, source = _declared(estimate, k, name, segment)
@@ -113,11 +114,11 @@ def excess_in_words(markers: Mapping[str, Mapping[str, Any]], limit: int = 3) ->
     return f"{', '.join(parts)}{more}: more than soft tissue does, so the model does not fit there."
 
 
-def _sites(estimate: Estimate) -> list[tuple[str, str]]:
+def marker_sites(estimate: Estimate) -> list[tuple[str, str]]:
     """Recorded name and name in the state of each marker, both in the model's order; the same where they differ in
     number (a filter that does not estimate every place)."""
     names = estimate.marker_names
-    sites = list(dict.fromkeys(p.name.split("/")[1] for p in estimate.parameters if p.kind == "marker"))
+    sites = list(dict.fromkeys(element(p.name).owner for p in estimate.parameters if p.kind == "marker"))
     if len(sites) == len(names):
         return list(zip(names, sites, strict=True))
     plain = {plain_name(site): site for site in sites}
@@ -136,13 +137,12 @@ def _axes(blocks: list[dict[str, dict[str, np.ndarray]]], site: str) -> list[str
     return [axis for axis in AXES if any(axis in block.get(site, {}) for block in blocks)]
 
 
-def _paths(estimate: Estimate, block: str) -> dict[str, dict[str, np.ndarray]]:
+def state_paths(estimate: Estimate, block: str) -> dict[str, dict[str, np.ndarray]]:
     """Site -> axis -> (T,) m of the state's elements ``block/SITE/AXIS``."""
     state = estimate.data["state"].transpose("time", "element").values
     paths: dict[str, dict[str, np.ndarray]] = {}
     for k, name in enumerate(str(name) for name in estimate.data["element"].values):
-        first, _, rest = name.partition("/")
-        site, _, axis = rest.rpartition("/")
-        if first == block and axis in AXES:
+        kind, site, axis = element(name)
+        if kind == block and axis in AXES:
             paths.setdefault(site, {})[axis] = state[:, k]
     return paths

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from dynakin.absent import finite
 from dynakin.errors import OutputError
 
 # 15 significant digits: what a reader computes from the file equals what was computed from the arrays.
@@ -29,11 +30,11 @@ def write_storage(
         title: first line of the file.
         time: (T,) s.
         names: one a column, without ``time``.
-        values: (T, N) in the units that the file is to carry; NaN stays ``nan``.
+        values: (T, N) in the units that the file is to carry; NaN is written as ``nan``, and so is infinity.
         in_degrees: OpenSim's header line; says in what the rotational columns are given.
         notes: lines of the header for people, ``;`` and ``=`` excluded since readers take ``key=value`` for settings.
     """
-    values = np.asarray(values, dtype=float)
+    values = finite(values)
     if values.shape != (len(time), len(names)):
         raise OutputError(
             f"{path.name}: values of shape {values.shape}, expected ({len(time)}, {len(names)}) for its names"

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynakin.errors import ConfigError
+from dynakin.recordings.textfile import is_file
 from dynakin.simulation.body import SimulatedBody
 from dynakin.simulation.gait import gait_movement
 from dynakin.simulation.mechanics import Motion
@@ -60,7 +61,7 @@ def choose_movement(
             )
         return (MOTIONS_IN_SPACE if body.in_space else MOTIONS)[str(motion)](rng, body, duration_s)
     path = Path(motion)
-    if path.suffix.casefold() in (".mot", ".sto") and path.is_file():
+    if path.suffix.casefold() in (".mot", ".sto") and is_file(path):
         return file_movement(path, body, cutoff_hz)
     every = tuple(MOTIONS_IN_SPACE if body.in_space else MOTIONS)
     near = difflib.get_close_matches(str(motion), every, n=1)

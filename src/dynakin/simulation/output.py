@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from dynakin.absent import with_nulls
 from dynakin.recordings import Plate
 from dynakin.results.marker_file import write_trc
 from dynakin.results.output_folder import FolderKind, check_output_writable, replacing
@@ -151,7 +152,7 @@ def _write_truth(trial: SimulatedTrial, path: Path) -> None:
         "repetitions": [asdict(r) for r in truth.repetitions],
         "faults": [asdict(f) for f in truth.faults],
     }
-    text = json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
+    text = json.dumps(with_nulls(content), indent=2, ensure_ascii=False, allow_nan=False)
     path.write_text(text + "\n", encoding="utf-8", newline="\n")
 
 

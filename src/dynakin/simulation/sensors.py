@@ -9,6 +9,7 @@ from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 
 from dynakin.errors import ConfigError
+from dynakin.recordings.textfile import LARGEST_TEXT, is_file, read_bytes
 
 _HIGHEST = {"soft_tissue_random": 1.0, "plate_gain_sd": 0.5}
 _SIGNED = {"plate_lag_s": 0.5}
@@ -132,13 +133,13 @@ def load_sensors(name_or_path: str) -> SensorNoise:
     if name_or_path in PRESETS:
         return PRESETS[name_or_path]()
     path = Path(name_or_path)
-    if path.suffix != ".toml" or not path.is_file():
+    if path.suffix != ".toml" or not is_file(path):
         raise ConfigError(
             f"simulation: sensors is {name_or_path!r}, expected {', '.join(PRESETS)} or a .toml file that exists"
         )
     try:
-        values = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        values = tomllib.loads(read_bytes(path, ConfigError, LARGEST_TEXT).decode())
+    except (ValueError, RecursionError) as error:
         raise ConfigError(f"{path}: cannot be read as TOML ({error})") from None
     try:
         return SensorNoise().changed(values)

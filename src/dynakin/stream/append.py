@@ -1,7 +1,8 @@
 """The recorder's own process: copies its standard input to a file, and on to the disk twice a second.
 
 Run as a script, with the standard library alone, so that it is there at once. Whatever happens to the session, what it
-has sent is written; whatever happens to this process, what it has written stays.
+has sent is written; whatever happens to this process, what it has written stays. Where the disk takes no more it ends
+with the number of the system's error.
 """
 
 import os
@@ -13,7 +14,11 @@ SYNC_S = 0.5
 
 
 def main(path: str) -> None:
-    """Until the input ends."""
+    """Until the input ends.
+
+    Raises:
+        OSError: the file takes no more.
+    """
     out = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
     synced, dirty = time.monotonic(), False
     while True:
@@ -33,4 +38,7 @@ def main(path: str) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    try:
+        main(sys.argv[1])
+    except OSError as error:
+        sys.exit(error.errno or 1)

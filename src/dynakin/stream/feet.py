@@ -12,7 +12,7 @@ from dynakin.filter import FootWrenches, Noise
 from dynakin.filter.total_wrench import foot_wrenches
 from dynakin.model import InitialModel
 from dynakin.recordings.feet import distance_to_hull
-from dynakin.recordings.foot_contact import AFTER_S, NEAR_FLOOR_M, SLOW_M_S
+from dynakin.recordings.foot_contact import AFTER_S, ALOFT_M, NEAR_FLOOR_M, SLOW_M_S
 from dynakin.recordings.foot_loads import (
     BETWEEN_M,
     EMPTY_N,
@@ -28,7 +28,6 @@ from dynakin.recordings.foot_loads import (
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
-_LOW_M = 0.05  # a foot whose lowest marker is higher than this above its place in standing sets down on nothing
 _RISE_M_S = 0.0025  # how fast a marker's lowest place is forgotten, so that one bad moment does not stay
 _DT_S = (0.001, 0.05)  # how far ahead the feet are predicted
 
@@ -56,6 +55,7 @@ class LiveFeet:
         self._own = np.full((F, max(map(len, own), default=0)), M)  # markers of each foot, filled up with M: none
         for f, markers in enumerate(own):
             self._own[f, : len(markers)] = markers
+        self._marked = np.array([len(markers) > 0 for markers in own], dtype=bool)
         self._standing, self._floor = np.full(M, np.inf), np.full(M, np.inf)
         self._time = -np.inf
         self._touched = np.full(F, -np.inf)  # when the foot last stood
@@ -74,8 +74,10 @@ class LiveFeet:
             state: (n,) before the step. wrenches: (P, 6) N and N m, laboratory frame, or None.
         """
         dt = float(np.clip(time_s - self._time, *_DT_S))
-        outlines, low = self._move(model, state, time_s, dt)
+        outlines, low, moves = self._move(model, state, time_s, dt)
         bears = time_s - self._touched <= AFTER_S
+        stands = self._touched == time_s
+        aloft = moves & (~low | (~bears & (stands.sum() > stands)))
         self._near[~bears], self._loaded[~bears] = 0, 0
         plates = [] if wrenches is None else self._plates(wrenches)
         if plates:
@@ -86,7 +88,7 @@ class LiveFeet:
             self._owners[:], off = False, bears
         on = self._owners[:, : len(plates)]
         seen = [None if (own == len(self._floor)).all() else outlines[[f]] for f, own in enumerate(self._own)]
-        loads = divided(self.feet, plates, seen, on[None], off[None])
+        loads = divided(self.feet, plates, seen, on[None], off[None], aloft[None])
         known = bool(loads.total_known[0])
         for p in np.flatnonzero(on.sum(axis=0) > 1) if (loads.reason == SHARED).any() else ():
             self._say(
@@ -109,8 +111,9 @@ class LiveFeet:
             self._said.add(text)
             self._to_say.append(text)
 
-    def _move(self, model: _core.Model, state: Array, time_s: float, dt: float) -> tuple[Array, Flags]:
-        """Outlines (F, K, 2) of the feet, predicted, and whether each is low; keeps when it last stood."""
+    def _move(self, model: _core.Model, state: Array, time_s: float, dt: float) -> tuple[Array, Flags, Flags]:
+        """Outlines (F, K, 2) of the feet, predicted, whether each is low, and whether all of it moves; keeps when it
+        last stood."""
         offset, size = model.layout.blocks["coordinates"]
         speeds, _ = model.layout.blocks["speeds"]
         ahead = state.copy()
@@ -124,8 +127,9 @@ class LiveFeet:
         height = places[:, 1] - self._floor
         touching = np.append((height < NEAR_FLOOR_M) & (speed < SLOW_M_S), False)
         self._touched[touching[self._own].any(axis=1)] = time_s
-        low = np.append(height < _LOW_M, False)[self._own].any(axis=1)
-        return np.vstack([places[:, [0, 2]], np.full(2, np.nan)])[self._own], low
+        low = np.append(height < ALOFT_M, False)[self._own].any(axis=1)
+        moves = self._marked & np.append(speed > SLOW_M_S, True)[self._own].all(axis=1)
+        return np.vstack([places[:, [0, 2]], np.full(2, np.nan)])[self._own], low, moves
 
     def _plates(self, wrenches: Array) -> list[PlateLoad]:
         loads = self.initial.ground.wrench_to_ground(wrenches)

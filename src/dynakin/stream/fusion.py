@@ -10,6 +10,7 @@ import numpy.typing as npt
 from dynakin.errors import StreamError
 from dynakin.filter import Sample
 from dynakin.recordings import DEFAULT_THRESHOLD_N
+from dynakin.recordings.limits import FARTHEST_M
 from dynakin.stream.clock import Clock, offset_between
 from dynakin.stream.in_order import Counts, InOrder
 from dynakin.stream.packets import MarkerPacket, Packet, PlatePacket, StreamInfo
@@ -118,7 +119,9 @@ class Fusion:
         if time is None:
             self._frames.counts.invalid += 1
             return
-        self._frames.push(time, time, packet.arrived_s, MarkerPacket(time, packet.positions, packet.arrived_s))
+        seen = (np.abs(packet.positions) <= FARTHEST_M).all(axis=1, keepdims=True)
+        positions = np.where(seen, packet.positions, np.nan)  # infinite, say: some systems' word for missing
+        self._frames.push(time, time, packet.arrived_s, MarkerPacket(time, positions, packet.arrived_s))
 
     def _push_plates(self, packet: PlatePacket) -> None:
         assert self.plates is not None and self._blocks is not None

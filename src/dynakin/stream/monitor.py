@@ -25,13 +25,14 @@ class Monitor:
     """What a session's status shows, kept cheap: a step pays for some sums only.
 
     Args:
-        plates: whether plates were told. used: whether the filter takes them.
+        plates: whether plates were told. used: whether the filter takes them. holds: whether the filter holds a motion
+            that it does not see, instead of carrying it on.
     """
 
-    def __init__(self, initial: InitialModel, rate_hz: float, plates: bool, used: bool) -> None:
+    def __init__(self, initial: InitialModel, rate_hz: float, plates: bool, used: bool, holds: bool = True) -> None:
         self.initial, self.rate_hz = initial, rate_hz
         self.last = Status(phase="running")
-        self._plates, self._used = plates, used
+        self._plates, self._used, self._holds = plates, used, holds
         self._recent: deque[tuple[float, float]] = deque()
         kinds = [name.split("/")[0] for name in initial.names]
         self._constants = np.flatnonzero([kind in ("length", "inertia") for kind in kinds])
@@ -43,6 +44,8 @@ class Monitor:
         self.left_out = self._told_left_out = 0
         self._told_s = -np.inf
         self.stepped_s = -np.inf  # time of the last step
+        self._followed_s = np.nan  # time of the last step with markers that fitted
+        self._lost = False
 
     def status(
         self,
@@ -90,6 +93,31 @@ class Monitor:
         )
         return self.last
 
+    def motion(self, estimate: StepEstimate, fused: Fused) -> list[str]:
+        """A sentence where the motion is lost, and where it is found again: then the markers fit."""
+        word, at, before = self.last.tracking, estimate.time_s, self._followed_s
+        if np.isfinite(fused.positions).any() and word in ("following", "found"):
+            self._followed_s = at
+        if word in ("lost", "restarted") and not self._lost:
+            self._lost = True
+            return [f"The motion is lost at {at:.2f} s: it is held until the markers fit again."]
+        if word != "found":
+            return []
+        self._lost = False
+        return [
+            f"The motion is found again at {at:.2f} s, {at - before:.1f} s after it was last followed: markers used "
+            f"are {1e3 * self._distance(estimate, fused):.0f} mm off (RMS)."
+        ]
+
+    def _distance(self, estimate: StepEstimate, fused: Fused) -> float:
+        """RMS over the markers that were used, m, on the axes that the model measures."""
+        sample, refused = fused.sample.markers, self.last.refused
+        used = [k for k, name in enumerate(self.initial.recorded_markers) if name in sample and name not in refused]
+        measured = np.stack([np.asarray(sample[self.initial.recorded_markers[k]], float) for k in used])
+        axes = np.array([self.initial.spec.markers[k].measured for k in used])
+        off = np.where(axes, self.initial.ground.points_to_ground(measured) - estimate.markers[used], 0.0)
+        return float(np.sqrt(np.nanmean((off**2).sum(axis=1))))
+
     def published(self, time_s: float, latency_s: float) -> None:
         """An estimate went out, so long after its sample had arrived."""
         self.stepped_s = time_s
@@ -121,6 +149,8 @@ class Monitor:
         for kind, silent in (("markers", fusion.markers_silent(now_s)), ("plates", fusion.plates_silent(now_s))):
             if silent != self._silent[kind]:
                 self._silent[kind] = silent
+                if silent and kind == "markers" and self._holds:  # nothing may be stepped until they are back
+                    self.last = replace(self.last, tracking="lost")
                 goes_on = "going on with markers alone" if kind == "plates" else self._without_markers(fusion, now_s)
                 said.append(f"The {kind} are silent; {goes_on}." if silent else f"The {kind} are back.")
         if self.left_out > self._told_left_out and now_s - self._told_s > _SLOW_S:
@@ -135,6 +165,8 @@ class Monitor:
         return said
 
     def _without_markers(self, fusion: Fusion, now_s: float) -> str:
+        if self._holds:
+            return "the motion is held until they are back"
         if not self._plates or fusion.plates_silent(now_s):
             return "the estimate waits for them"
         return "going on with plates alone" if self._used else "the movement is only predicted meanwhile"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.recordings.limits import LARGEST_MOMENT_NM
 from dynakin.recordings.resampling import CausalLowPass, latest_before, low_pass_for
 from dynakin.stream.pace import Pace
 
@@ -38,7 +39,7 @@ class PlateSamples:
     def push(self, time: Array, wrenches: Array) -> None:
         """The next samples: (K,) s and (K, P, 6)."""
         values = np.asarray(wrenches, float).reshape(len(time), 6 * self.count)
-        good = np.isfinite(values).all(axis=1) & np.isfinite(time)
+        good = (np.abs(values) <= LARGEST_MOMENT_NM).all(axis=1) & np.isfinite(time)  # NaN is not
         time, values = np.asarray(time, float)[good], values[good]
         if not len(time):
             return

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from dynakin.errors import RecordingError
+from dynakin.recordings.textfile import read_bytes
 from dynakin.stream.packets import MarkerPacket, Packet, PlatePacket
 
 _MAGIC = b"DKR1"
@@ -43,31 +43,33 @@ def read_records(path: Path) -> Iterator[dict[str, Any] | Packet]:
     Raises:
         RecordingError: the file cannot be read.
     """
-    try:
-        data = path.read_bytes()
-    except OSError as error:
-        raise RecordingError(f"{path}: cannot be read ({error.strerror})") from None
+    data = read_bytes(path)
     at = data.find(_MAGIC)
     while 0 <= at <= len(data) - _HEAD.size:
         _, kind, length, checksum = _HEAD.unpack_from(data, at)
         payload = data[at + _HEAD.size : at + _HEAD.size + length]
         if len(payload) == length and zlib.crc32(payload) == checksum:
-            yield _content(kind, payload)
+            if (content := _content(kind, payload)) is not None:
+                yield content
             at += _HEAD.size + length
             at = data.find(_MAGIC, at)
         else:
             at = data.find(_MAGIC, at + 1)
 
 
-def _content(kind: bytes, payload: bytes) -> dict[str, Any] | Packet:
-    if kind == b"J":
-        found: dict[str, Any] = json.loads(payload)
-        return found
-    numbers = np.frombuffer(payload, dtype="<f8").astype(float)
-    if kind == b"M":
-        return MarkerPacket(float(numbers[1]), numbers[2:].reshape(-1, 3), float(numbers[0]))
-    count = int(numbers[1])
-    return PlatePacket(numbers[2 : 2 + count], numbers[2 + count :].reshape(count, -1, 6), float(numbers[0]))
+def _content(kind: bytes, payload: bytes) -> dict[str, Any] | Packet | None:
+    """What a whole record holds; None where that is no packet."""
+    try:
+        if kind == b"J":
+            found = json.loads(payload)
+            return found if isinstance(found, dict) else None
+        numbers = np.frombuffer(payload, dtype="<f8").astype(float)
+        if kind == b"M":
+            return MarkerPacket(float(numbers[1]), numbers[2:].reshape(-1, 3), float(numbers[0]))
+        count = int(numbers[1])
+        return PlatePacket(numbers[2 : 2 + count], numbers[2 + count :].reshape(count, -1, 6), float(numbers[0]))
+    except (ValueError, LookupError, ArithmeticError, RecursionError):
+        return None
 
 
 def _record(kind: bytes, payload: bytes) -> bytes:

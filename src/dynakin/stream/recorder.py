@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import queue
 import subprocess
 import sys
@@ -15,6 +16,7 @@ import numpy as np
 
 from dynakin.errors import OutputError, RecordingError
 from dynakin.recordings import Recording
+from dynakin.recordings.limits import FASTEST_HZ, SLOWEST_HZ
 from dynakin.results import Estimate, check_output_writable
 from dynakin.stream.fusion import DELAY_S, Fused, Fusion
 from dynakin.stream.packets import MarkerPacket, Packet, PlatePacket, StreamInfo
@@ -24,6 +26,7 @@ from dynakin.stream.sinks import Sink, Status
 from dynakin.stream.start import recording_of
 
 FILE = "stream.dkr"
+_CLOSE_S = 10.0  # for the last half second to reach the disk
 
 
 class Recorder(Sink):
@@ -47,6 +50,7 @@ class Recorder(Sink):
             raise OutputError(f"{self.folder}: is not empty, expected a new folder for a recording")
         self._session: dict[str, Any] = {}
         self.restarts = 0  # of the process, which somebody else ended
+        self._failure: str | None = None
         self._queue: queue.SimpleQueue[bytes | None] = queue.SimpleQueue()
         self._process = self._begin()
         self._thread = threading.Thread(target=self._write, daemon=True)
@@ -74,12 +78,18 @@ class Recorder(Sink):
         """Writes it."""
         self._queue.put(text_record({"said": text, "phase": status.phase}))
 
+    def failure(self) -> str | None:
+        """The file takes no more, as of a full disk."""
+        return self._failure
+
     def close(self) -> None:
-        """Everything is on the disk afterwards; may be called twice."""
+        """Everything is on the disk afterwards, or there is a `failure`; may be called twice."""
         if not self._thread.is_alive():
             return
         self._queue.put(None)
-        self._thread.join(10.0)
+        self._thread.join(_CLOSE_S)
+        if self._thread.is_alive():
+            self._fail(f"still not written {_CLOSE_S:g} s after the end")
 
     def _begin(self) -> subprocess.Popen[bytes]:
         command = [sys.executable, "-I", str(Path(__file__).with_name("append.py")), str(self.folder / FILE)]
@@ -87,16 +97,31 @@ class Recorder(Sink):
 
     def _write(self) -> None:
         while (data := self._queue.get()) is not None:
-            try:
-                self._send(data)
-            except OSError:  # somebody ended the process: a new one goes on in the same file
-                self.restarts += 1
-                self._process.wait()
+            while not self._sent(data):
+                if (code := self._process.wait()) > 0:
+                    self._fail(os.strerror(code))
+                    return
+                self.restarts += 1  # somebody ended the process: a new one goes on in the same file
                 self._process = self._begin()
-                self._send(data)
         assert self._process.stdin is not None
         self._process.stdin.close()
-        self._process.wait(10.0)
+        if (code := self._process.wait()) > 0:
+            self._fail(os.strerror(code))
+
+    def _fail(self, reason: str) -> None:
+        self._failure = (
+            f"Error: the recording has ended: {self.folder / FILE} takes no more ({reason}). What was written before "
+            "can be read."
+        )
+
+    def _sent(self, data: bytes) -> bool:
+        """False where the process has ended."""
+        assert self._process.stdin is not None
+        try:
+            self._send(data)
+        except OSError:
+            return False
+        return True
 
     def _send(self, data: bytes) -> None:
         assert self._process.stdin is not None
@@ -122,9 +147,13 @@ def read_recorded(folder: str | Path) -> tuple[list[Fused], StreamInfo, StreamIn
                 fusion.push(record)
                 found += fusion.poll(record.arrived_s)
         elif "streams" in record:
-            streams = {kind: info and _info(info) for kind, info in record["streams"].items()}
-            fusion = Fusion(streams["markers"], streams["plates"], delay_s=record.get("delay_s", DELAY_S))
-            begun = record
+            if begun and record["streams"] != begun["streams"]:
+                raise RecordingError(f"{path}: holds two sessions with other markers or plates, expected one")
+            try:
+                fusion = fusion or _fusion(record)
+            except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
+                raise RecordingError(f"{path}: its streams are not told as expected ({error!r})") from None
+            begun = begun or record
     if fusion is None:
         raise RecordingError(f"{path}: holds no recorded session")
     return found + fusion.poll(np.inf), fusion.markers, fusion.plates, begun
@@ -154,5 +183,15 @@ def finish(folder: str | Path, output: str | Path) -> Estimate:
     return estimate
 
 
+def _fusion(record: Mapping[str, Any]) -> Fusion:
+    streams = {kind: info and _info(info) for kind, info in record["streams"].items()}
+    if not all(isinstance(record.get(key, {}), dict) for key in ("settings", "subject")):
+        raise ValueError("settings and subject, expected tables")
+    return Fusion(streams["markers"], streams["plates"], delay_s=float(record.get("delay_s", DELAY_S)))
+
+
 def _info(told: dict[str, Any]) -> StreamInfo:
-    return StreamInfo(tuple(told["names"]), float(told["rate_hz"]), str(told["clock"]), bool(told.get("ordered")))
+    rate = float(told["rate_hz"])
+    if not SLOWEST_HZ <= rate <= FASTEST_HZ:
+        raise ValueError(f"{rate:g} Hz, expected {SLOWEST_HZ:g} to {FASTEST_HZ:g} Hz")
+    return StreamInfo(tuple(map(str, told["names"])), rate, str(told["clock"]), bool(told.get("ordered")))

@@ -14,6 +14,8 @@ from dynakin.recordings.read import read_forces
 from dynakin.recordings.recording import Array
 from dynakin.stream.packets import MarkerPacket, Packet, PlatePacket, StreamInfo, Streams
 
+_SEAM_S = 1.0  # nobody is seen between the last frame and the first: a gap, as it would be where somebody comes back
+
 
 class Replay:
     """Plays markers, and plates at their own rate where they come from a force file.
@@ -22,7 +24,7 @@ class Replay:
         recording: a file, or a recording in memory.
         forces: a force file (.mot, .sto, .csv), whose rows are played as they are.
         speed: 1 is the recording's own pace; 0: as fast as it is read.
-        loop: begin again at the end; time goes on.
+        loop: begin again at the end, after a gap of 1 s; time goes on.
         duration_s: stop after so much of the recording's time; None: at its end.
     """
 
@@ -77,7 +79,7 @@ class Replay:
             if not self.loop:
                 return None
             self._frame, self._row, self._round = 0, 0, self._round + 1
-        shift = self._round * (own[-1] - own[0] + 1.0 / self.recording.rate)
+        shift = self._round * (own[-1] - own[0] + _SEAM_S)
         played = own[self._frame] - own[0] + shift
         if self.duration_s is not None and played > self.duration_s:
             return None

@@ -79,6 +79,7 @@ class Live:
         self._labels_checked = False
         self._subject: dict[str, float] = {}
         self._stopped = False
+        self.failures: list[str] = []  # of sinks; a session with some is not to be called a success
 
     @property
     def fusion(self) -> Fusion:
@@ -117,6 +118,7 @@ class Live:
             self._reader.close()
             for sink in self.sinks:
                 sink.close()
+            self._drop_failed()
 
     def stop(self) -> None:
         """End `run` soon; from any thread."""
@@ -181,7 +183,19 @@ class Live:
                 for text in self._monitor.changes(self.fusion, now):
                     self.say(text)
 
+    def _drop_failed(self) -> None:
+        for sink in [sink for sink in self.sinks if sink.failure() is not None]:
+            text = sink.failure()
+            assert text is not None
+            self.sinks.remove(sink)
+            if sink is self._recording:
+                self._recording = None
+            sink.close()
+            self.failures.append(text)
+            self.say(text)
+
     def _wishes(self) -> None:
+        self._drop_failed()
         for wish in [wish for sink in self.sinks for wish in sink.asked()]:
             if wish in ("restart", "recalibrate", "stop"):
                 getattr(self, wish)()
@@ -191,10 +205,12 @@ class Live:
     def _switch_recorder(self, record: Callable[[], Sink]) -> None:
         """Begin to record, or end it."""
         if self._recording is not None:
-            self.sinks.remove(self._recording)
             self._recording.close()
-            self._recording = None
-            self.say("The recording has ended.")
+            self._drop_failed()
+            if self._recording is not None:
+                self.sinks.remove(self._recording)
+                self._recording = None
+                self.say("The recording has ended.")
             return
         try:
             self._recording = record()
@@ -273,10 +289,11 @@ class Live:
         initial, model = self.estimator.initial, self.estimator.core_model
         assert initial is not None
         plates = self.fusion.plates is not None
-        self._monitor = Monitor(initial, self.fusion.markers.rate_hz, plates, plates and self._use_plates)
+        rate, holds = self.fusion.markers.rate_hz, self.estimator.noise.recover
+        self._monitor = Monitor(initial, rate, plates, plates and self._use_plates, holds)
         self._feet = None
-        if initial.feet and self.fusion.plates is not None:
-            names = self.fusion.plates.names
+        if initial.feet:  # without plates too: what hangs on the ground is then absent
+            names = () if self.fusion.plates is None else self.fusion.plates.names
             self._feet = LiveFeet(initial, self.estimator.noise, names, self.estimator.plates)
         self._running = True
         self._ready_s = time.monotonic()
@@ -313,7 +330,8 @@ class Live:
             sink.frame(frame)
         monitor.published(sample.time_s, time.monotonic() - fused.arrived_s)
         news = self._feet.news() if self._feet is not None else []
-        for text in [*news, *monitor.settling(sample.time_s, state, self.estimator)]:
+        motion = monitor.motion(estimate, fused)
+        for text in [*news, *motion, *monitor.settling(sample.time_s, state, self.estimator)]:
             self.say(text)
 
     def say(self, text: str) -> None:

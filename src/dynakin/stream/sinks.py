@@ -27,7 +27,7 @@ class Status:
         plates: "used", "refused", "silent", "incomplete" (they do not carry all of the person now: left out in this
             step), "left out" or "none".
         at_bound: constants that sit on a bound.
-        tracking: the filter's own word ("following", "doubtful", "lost", ...).
+        tracking: the filter's own word ("following", "doubtful", "lost", ...); "lost" also while no markers come.
         left_out: frames so far for which the computer was too slow.
         late, lost, duplicate: packets so far.
         settled: whether lengths and masses have come to rest.
@@ -104,6 +104,10 @@ class Sink:
     def asked(self) -> list[str]:
         """What the user asked for through this sink: some of "restart", "recalibrate", "record", "stop"."""
         return []
+
+    def failure(self) -> str | None:
+        """Why it takes nothing more; said once, and the sink is closed then."""
+        return None
 
     def close(self) -> None:
         """The session is over."""

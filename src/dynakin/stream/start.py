@@ -25,6 +25,7 @@ from dynakin.recordings import (
     standing_window,
 )
 from dynakin.recordings.plates import LOADED_N, MASS_REFUSED_KG
+from dynakin.recordings.textfile import LARGEST_TEXT, read_bytes
 from dynakin.recordings.vertical import axis_vector, find_vertical
 from dynakin.stream.fusion import Fused
 from dynakin.units import GRAVITY_M_S2
@@ -215,9 +216,10 @@ def read_known(path: Path) -> dict[str, tuple[float, float]]:
         ModelError: the file cannot be read or is none of that kind.
     """
     try:
-        entries = json.loads(path.read_text(encoding="utf-8"))["parameters"]
-        return {str(e["name"]): (float(e["value"]), float(e["sd"])) for e in entries if e["estimated"]}
-    except OSError as error:
-        raise ModelError(f"{path}: cannot be read ({error.strerror or error})") from None
-    except (ValueError, KeyError, TypeError) as error:
+        entries = json.loads(read_bytes(path, ModelError, LARGEST_TEXT))["parameters"]
+        found = {str(e["name"]): (float(e["value"]), float(e["sd"])) for e in entries if e["estimated"]}
+        if not np.isfinite(list(found.values())).all():
+            raise ValueError("a number is not finite")
+        return found
+    except (ValueError, KeyError, TypeError, ArithmeticError, RecursionError) as error:
         raise ModelError(f"{path}: no parameters.json of a run ({error})") from None

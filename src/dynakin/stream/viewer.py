@@ -85,7 +85,7 @@ class Viewer(Sink):
 
     def said(self, text: str, status: Status) -> None:
         """Shows what is told."""
-        self._lines.put(json.dumps({"said": text, "phase": status.phase}))
+        self._lines.put(json.dumps({"said": text, "phase": status.phase, "tracking": status.tracking}))
 
     def asked(self) -> list[str]:
         """Buttons that were pressed."""

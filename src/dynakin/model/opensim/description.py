@@ -13,6 +13,9 @@ from scipy.spatial.transform import Rotation
 from dynakin.model.inertia import RigidBody
 from dynakin.model.opensim.functions import Function
 
+GROUND = "ground"
+"""Name of what the first body hangs on."""
+
 Array = npt.NDArray[np.float64]
 Vector = tuple[float, float, float]
 ZERO: Vector = (0.0, 0.0, 0.0)
@@ -156,3 +159,11 @@ class OpenSimModel:
     def mass(self) -> float:
         """kg."""
         return sum(body.mass for body in self.bodies)
+
+    @property
+    def floating(self) -> tuple[str, ...]:
+        """The six coordinates by which the body may be anywhere in the ground; none where it is held in some way."""
+        roots = [joint for joint in self.joints if joint.parent == GROUND]
+        free = [c.name for joint in roots for c in joint.coordinates if not c.locked]
+        driven = {coupler.dependent for coupler in self.couplers}
+        return tuple(free) if len(roots) == 1 and len(free) == 6 and not driven & set(free) else ()

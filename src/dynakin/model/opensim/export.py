@@ -5,6 +5,9 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
+
+from dynakin.elements import element
 from dynakin.errors import ModelError
 from dynakin.model.initial import InitialModel
 from dynakin.model.opensim.definition import OpenSimDefinition
@@ -13,6 +16,7 @@ from dynakin.model.opensim.from_core import from_core
 from dynakin.model.opensim.identified import identified
 from dynakin.model.opensim.sites import with_mass
 from dynakin.model.validation import read_toml
+from dynakin.recordings.textfile import LARGEST_TEXT, is_file, read_bytes
 
 
 def read_values(path: Path) -> dict[str, float]:
@@ -22,11 +26,12 @@ def read_values(path: Path) -> dict[str, float]:
         ModelError: the file cannot be read or is none of that kind.
     """
     try:
-        entries = json.loads(path.read_text(encoding="utf-8"))["parameters"]
-        return {str(entry["name"]): float(entry["value"]) for entry in entries}
-    except OSError as error:
-        raise ModelError(f"{path}: cannot be read ({error.strerror or error})") from None
-    except (ValueError, KeyError, TypeError) as error:
+        entries = json.loads(read_bytes(path, ModelError, LARGEST_TEXT))["parameters"]
+        found = {str(entry["name"]): float(entry["value"]) for entry in entries}
+        if not np.isfinite(list(found.values())).all():
+            raise ValueError("a number is not finite")
+        return found
+    except (ValueError, KeyError, TypeError, ArithmeticError, RecursionError) as error:
         raise ModelError(f"{path}: no parameters.json of a run ({error})") from None
 
 
@@ -37,9 +42,11 @@ def mass_of_run(parameters: Path) -> float | None:
         ModelError: that file is damaged.
     """
     path = parameters.with_name("config.toml")
-    if not path.exists():
+    if not is_file(path):
         return None
     mass = read_toml(path).get("mass_kg")
+    if mass is not None and not (isinstance(mass, int | float) and 0.0 < mass < float("inf")):
+        raise ModelError(f"{path}: mass_kg is {mass!r}, expected a number above 0")
     return None if mass is None else float(mass)
 
 
@@ -54,8 +61,8 @@ def of_definition(definition: OpenSimDefinition, values: dict[str, float], mass_
     known |= {f"marker/{marker.name}" for marker in source.markers}
     known |= {f"inertia/{body.name}" for body in source.bodies}
     for name in values:
-        kind, *rest = name.split("/")
-        if kind in ("length", "marker", "inertia") and f"{kind}/{rest[0]}" not in known:
+        kind, owner, _ = element(name)
+        if kind in ("length", "marker", "inertia") and f"{kind}/{owner}" not in known:
             raise ModelError(f"{source.path}: has no {name}, which the parameters hold: they are another model's")
     if mass_kg is not None:
         source = with_mass(source, mass_kg)

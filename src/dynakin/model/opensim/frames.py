@@ -4,10 +4,8 @@ from __future__ import annotations
 
 import posixpath
 
-from dynakin.model.opensim.description import Offset
+from dynakin.model.opensim.description import GROUND, Offset
 from dynakin.model.opensim.xml_file import Node
-
-GROUND = "ground"
 
 
 def read_offset(node: Node, translation: str, orientation: str) -> Offset:

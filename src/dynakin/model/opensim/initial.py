@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from types import SimpleNamespace
 
 import numpy as np
@@ -13,7 +14,7 @@ from dynakin.model.body import find_mass
 from dynakin.model.inertia import INERTIA_NAMES
 from dynakin.model.initial import InitialModel
 from dynakin.model.opensim.definition import OpenSimDefinition
-from dynakin.model.opensim.description import OpenSimModel
+from dynakin.model.opensim.description import Marker, OpenSimModel
 from dynakin.model.opensim.sites import sites, with_mass
 from dynakin.model.opensim.skin import skin_of
 from dynakin.model.opensim.spec import free_coordinates, to_spec, unseen
@@ -21,7 +22,8 @@ from dynakin.model.pose_start import start_posture
 from dynakin.model.priors import Bounds, Interval, Priors
 from dynakin.model.spec import in_layout
 from dynakin.model.state_priors import state_bounds, state_prior
-from dynakin.recordings import GroundFrame, Recording, find_ground_frame
+from dynakin.recordings import GroundFrame, Recording, find_ground_frame, find_laboratory_frame
+from dynakin.recordings.landmarks import DEFAULT_PAIRS, FacingPairs
 
 Array = npt.NDArray[np.float64]
 
@@ -30,6 +32,7 @@ _A_TURN = 1e-3  # rad: files write pi with few digits
 _MODEL_M = 0.003
 """Standard deviation of a marker for what a generic skeleton, scaled, gets wrong of a person's joints: on `squats1` the
 normalised innovations are consistent with it (1.1), and far too large with the cameras' noise alone (1.9 to 18)."""
+_APART_M, _LEVEL_M = 0.08, 0.03  # of markers that show which way a body points; of markers that lie beside each other
 _FEET = ("calcn", "foot", "calc", "talus")  # bodies that stand on the ground, the first that a model has
 
 
@@ -44,13 +47,16 @@ def lay_on(
     priors: Priors | None = None,
     bounds: Bounds | None = None,
 ) -> InitialModel:
-    """`dynakin.initialise` of an OpenSim model; arguments and errors as there. The ground's origin is the
-    laboratory's."""
+    """`dynakin.initialise` of an OpenSim model; arguments and errors as there. The ground is the laboratory, Y up; X is
+    forward where it is asked for, or where the file holds the body so that it cannot head anywhere."""
     from dynakin.model.initialise import first_centre_of_pressure
 
     source, options, messages = definition.source, definition.options, list(definition.source.left_out)
     _refuse_other_gravity(source)
-    frame = ground or find_ground_frame(recording, vertical=vertical, forward=forward)
+    find = find_laboratory_frame if source.floating else find_ground_frame
+    frame = ground or find(
+        recording, vertical=vertical, forward=forward, pairs=_facing_pairs(source, sites(definition, recording)[0])
+    )
     messages += frame.how
     source = _of_subject(definition, [r for r in (static, recording) if r is not None], frame, messages)
     chosen, said = sites(definition, recording)
@@ -82,6 +88,7 @@ def lay_on(
         f"Start: frame {first + 1} ({recording.time[first]:.2f} s), where the model of {source.path.name} fits the "
         f"markers to {1000.0 * fit.rms_m:.0f} mm (root mean square)."
     )
+    messages += _beyond_range(source, fit.coordinates)
     spec = spec_at(fit.coordinates)
     _refuse_too_few(source, spec, [name for _, name in chosen], recording)
     core = _core.Model(spec)
@@ -125,13 +132,27 @@ def lay_on(
 
 
 def limits_of(source: OpenSimModel) -> dict[str, Interval]:
-    """Limits (rad or m) of the free coordinates; a turn that is clamped to a whole one or more has none."""
+    """Limits (rad or m) of the free coordinates; a turn that is clamped to a whole one or more has none, nor has the
+    root of a body that is fixed nowhere: its ranges are those of the laboratory that the file was made in."""
     turns = {axis.coordinate for joint in source.joints for axis in joint.axes if axis.kind == "rotation"}
     found = {}
     for c in free_coordinates(source):
-        low, high = c.limits
+        low, high = (-np.inf, np.inf) if c.name in source.floating else c.limits
         found[c.name] = (-np.inf, np.inf) if c.name in turns and high - low > 2.0 * np.pi - _A_TURN else (low, high)
     return found
+
+
+def _beyond_range(source: OpenSimModel, start: dict[str, float]) -> list[str]:
+    """Says where the root starts beyond what the file clamps it to: OpenSim would draw it at the end of that range."""
+    clamped = [c for c in free_coordinates(source) if c.name in source.floating]
+    names = [c.name for c in clamped if not c.limits[0] <= start[c.name] <= c.limits[1]]
+    if not names:
+        return []
+    return [
+        f"Warning: {', '.join(names)} begin beyond the range to which {source.path.name} clamps them; OpenSim may not "
+        "follow coordinates.mot there. Widen the range in the file, or give --forward: X is then the way the person "
+        "faces."
+    ]
 
 
 def _refuse_other_gravity(source: OpenSimModel) -> None:
@@ -202,6 +223,26 @@ def _reach(source: OpenSimModel) -> dict[str, float]:
         ]
         found[name] = max([found[name], *joints])
     return found
+
+
+def _facing_pairs(source: OpenSimModel, chosen: Sequence[tuple[Marker, str]]) -> FacingPairs:
+    """Recorded markers that lie behind each other on feet and pelvis: bodies of OpenSim's models have X forward."""
+
+    def on(body: str) -> list[tuple[float, float, str]]:
+        return sorted((m.location[0], m.location[2], name) for m, name in chosen if m.body == body)
+
+    def ends(body: str) -> list[tuple[str, str]]:
+        """Backmost and foremost; of each side, where there are several."""
+        places = on(body)
+        if not places or places[-1][0] - places[0][0] < _APART_M:
+            return []
+        back = sorted((z, name) for x, z, name in places if x - places[0][0] < _LEVEL_M)
+        front = sorted((z, name) for x, z, name in places if places[-1][0] - x < _LEVEL_M)
+        return [(back[0][1], front[0][1]), (back[-1][1], front[-1][1])]
+
+    feet = [pair for body in feet_of(source).values() for pair in ends(body)]
+    pelvis = [pair for body in source.bodies if "pelvis" in body.name.casefold() for pair in ends(body.name)]
+    return FacingPairs((*feet, *DEFAULT_PAIRS.heel_toe), (*pelvis, *DEFAULT_PAIRS.pelvis))
 
 
 def feet_of(source: OpenSimModel) -> dict[str, str]:

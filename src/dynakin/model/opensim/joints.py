@@ -114,6 +114,8 @@ def read_coordinate(node: Node, fallback: str) -> Coordinate:
     """A coordinate of either version."""
     if node.flag("prescribed"):
         node.fail("a prescribed motion is not supported")
+    if "/" in node.name:
+        node.fail("a coordinate's name has no /, which parts it from its derivatives")
     limits = node.numbers("range", 2, (-np.inf, np.inf))
     if limits[0] >= limits[1]:
         node.need("range").fail(f"found {limits[0]:g} to {limits[1]:g}, expected an increasing pair")

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import re
+from collections import Counter
 from pathlib import Path
 
 from dynakin.model.opensim.bodies import read_body, read_couplers
-from dynakin.model.opensim.description import Coordinate, Joint, Marker, Offset, OpenSimModel
-from dynakin.model.opensim.frames import GROUND, Frames, read_offset
+from dynakin.model.opensim.description import GROUND, Coordinate, Joint, Marker, Offset, OpenSimModel
+from dynakin.model.opensim.frames import Frames, read_offset
 from dynakin.model.opensim.joints import read_axes, read_coordinate
 from dynakin.model.opensim.xml_file import Node, read_xml
 from dynakin.model.validation import nearest
 
 _OLDEST = 20000  # before that, OpenSim 1's files are built otherwise
+_MOST = 1000  # bodies or joints: whole bodies with fingers and vertebrae have a fifth
 _NOT_MECHANICS = {
     "ForceSet": "muscles and other forces",
     "ControllerSet": "controllers",
@@ -31,8 +34,11 @@ def read_osim(path: str | Path) -> OpenSimModel:
     root = read_xml(path)
     if root.tag != "OpenSimDocument":
         root.fail("expected an OpenSimDocument")
-    version = int(root.name) if root.name.isdigit() else 0
+    version = int(root.name) if re.fullmatch("[0-9]{1,9}", root.name) else 0
     model = root.need("Model")
+    for tag in ("BodySet", "JointSet"):
+        if (count := len(model.objects(tag))) > _MOST:
+            model.fail(f"found {count} entries in {tag}, expected at most {_MOST}")
     if version < _OLDEST:
         root.fail(f"found version {root.name or 'none'}, expected {_OLDEST} or more (OpenSim 2 to 4)")
     newer = bool(model.objects("JointSet"))
@@ -41,9 +47,9 @@ def read_osim(path: str | Path) -> OpenSimModel:
     if not bodies:
         model.fail("expected bodies in BodySet")
     _refuse_other_mechanics(model)
-    names = [c.name for _, joint in joints for c in joint.coordinates]
-    for name in names:
-        if names.count(name) > 1:
+    names = Counter(c.name for _, joint in joints for c in joint.coordinates)
+    for name, count in names.items():
+        if count > 1:
             model.fail(f"coordinate {name!r} is in two joints")
     couplers, said = read_couplers(model, set(names))
     markers = _markers(model, Frames(model) if newer else None, {GROUND, *(body.name for body in bodies)})

@@ -8,8 +8,7 @@ import numpy as np
 
 from dynakin.errors import ModelError
 from dynakin.model.opensim.definition import OpenSimDefinition
-from dynakin.model.opensim.description import Marker, OpenSimModel
-from dynakin.model.opensim.frames import GROUND
+from dynakin.model.opensim.description import GROUND, Marker, OpenSimModel
 from dynakin.model.validation import nearest
 from dynakin.recordings import Recording, plain_name
 

@@ -8,8 +8,7 @@ import numpy as np
 
 from dynakin import _core
 from dynakin.model.opensim.chains import ChainAxis, Placed, place
-from dynakin.model.opensim.description import Coordinate, Marker, OpenSimModel
-from dynakin.model.opensim.frames import GROUND
+from dynakin.model.opensim.description import GROUND, Coordinate, Marker, OpenSimModel
 
 AXES = [True, True, True]
 

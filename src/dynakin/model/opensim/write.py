@@ -10,6 +10,7 @@ import numpy as np
 
 from dynakin.errors import OutputError
 from dynakin.model.opensim.description import (
+    GROUND,
     Body,
     Coordinate,
     Coupler,
@@ -19,7 +20,6 @@ from dynakin.model.opensim.description import (
     Offset,
     OpenSimModel,
 )
-from dynakin.model.opensim.frames import GROUND
 from dynakin.model.opensim.functions import Chain, Function, is_constant
 from dynakin.model.opensim.joints import UNITS
 

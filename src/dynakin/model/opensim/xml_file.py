@@ -9,6 +9,9 @@ from typing import NoReturn
 from xml.parsers import expat
 
 from dynakin.errors import ModelError
+from dynakin.recordings.textfile import LARGEST_TEXT, read_bytes
+
+_DEEPEST = 100  # elements in one another; OpenSim's own files have 15
 
 
 @dataclass(eq=False)
@@ -95,10 +98,7 @@ def read_xml(path: Path) -> Node:
     Raises:
         ModelError: the file cannot be read, or is no (whole) XML file; with the line.
     """
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise ModelError(f"{path}: cannot be read ({error.strerror or error})") from None
+    content = read_bytes(path, ModelError, LARGEST_TEXT)
     parser = expat.ParserCreate()
     parser.buffer_text = True
     top = Node("", "", 0, path)
@@ -107,6 +107,8 @@ def read_xml(path: Path) -> Node:
     def start(tag: str, attributes: dict[str, str]) -> None:
         named = attributes.get("name", "") or attributes.get("Version", "")
         node = Node(tag, named, parser.CurrentLineNumber, path)
+        if len(stack) > _DEEPEST:
+            node.fail(f"found more than {_DEEPEST} elements in one another, expected fewer")
         stack[-1].children.append(node)
         stack.append(node)
 
@@ -121,4 +123,6 @@ def read_xml(path: Path) -> Node:
     except expat.ExpatError as error:
         message = expat.errors.messages[error.code]
         raise ModelError(f"{path}, line {error.lineno}: not a whole XML file: {message}") from None
+    except (LookupError, ValueError) as error:  # Python's codecs, asked by the parser
+        raise ModelError(f"{path}: its encoding cannot be read ({error}), expected UTF-8") from None
     return top.children[0]

@@ -1,0 +1,89 @@
+"""What no laboratory measures: beyond these a value is damaged, or in another unit than it is said to be."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.errors import RecordingError
+
+if TYPE_CHECKING:
+    from dynakin.recordings.recording import Array, Recording
+
+SLOWEST_HZ, FASTEST_HZ = 5.0, 1e5
+"""Rates of markers and plates. A movement cannot be followed from a sample every 0.2 s; times in milliseconds are the
+usual reason for that. No camera or amplifier comes near the other end."""
+LONGEST_GAP_S = 3600.0
+"""Between two samples of one recording: who stops for longer begins a new one."""
+FARTHEST_M = 1e4
+"""Of a marker from the laboratory's origin: ten times the largest volume that is filmed (a ski slope)."""
+LARGEST_FORCE_N = 1e5
+"""Of one plate: ten tonnes, ten times a landing of the heaviest athlete, and beyond what plates survive."""
+LARGEST_MOMENT_NM = 1e8
+"""Of one plate, about the laboratory's origin: that force a kilometre away."""
+
+
+def rate_problem(time: Array) -> str | None:
+    """What is wrong with the rate of increasing times (T,) s, None where nothing is."""
+    if len(time) < 2:
+        return None
+    step = float(np.median(np.diff(time)))
+    if SLOWEST_HZ * step <= 1.0 <= FASTEST_HZ * step:
+        return None
+    units = {"milliseconds": 1e-3, "microseconds": 1e-6}
+    fits = [unit for unit, s in units.items() if SLOWEST_HZ * s * step <= 1.0 <= FASTEST_HZ * s * step]
+    hint = f"; they seem to be in {fits[0]}, expected seconds" if step > 1.0 and fits else ""
+    return (
+        f"found times that are {step:.4g} s apart ({1.0 / step:.4g} Hz), expected {SLOWEST_HZ:g} to "
+        f"{FASTEST_HZ:g} Hz{hint}"
+    )
+
+
+def check_recording(recording: Recording) -> None:
+    """Times increase, and every marker and wrench is missing (NaN) or of a size that somebody could have measured.
+
+    Raises:
+        RecordingError: the first that is not, with its frame and marker or plate.
+    """
+    where, time = recording.path or recording.name, recording.time
+    for k in np.flatnonzero(~np.isfinite(time))[:1]:
+        raise RecordingError(f"{where}: time of frame {k + 1} is {time[k]}, expected a number")
+    for k in np.flatnonzero(np.diff(time) <= 0)[:1]:
+        raise RecordingError(
+            f"{where}: time {time[k + 1]:g} s of frame {k + 2} does not come after {time[k]:g} s, "
+            "expected increasing times"
+        )
+    for frame, m in _beyond(recording.markers, FARTHEST_M):
+        raise RecordingError(
+            f"{where}: marker {recording.marker_names[m]!r} at frame {frame + 1} is at "
+            f"{_listed(recording.markers[frame, m])} m, expected at most {FARTHEST_M:g} m from the origin: "
+            "the value is damaged, or the length unit wrong"
+        )
+    for plate in recording.plates:
+        check_wrench(plate.name, time, plate.force, plate.moment, str(where))
+
+
+def check_wrench(name: str, time: Array, force: Array, moment: Array, where: str) -> None:
+    """A plate's force (T, 3) N and moment (T, 3) N m about the laboratory's origin are missing or possible.
+
+    Raises:
+        RecordingError: the first sample that is not, with its time.
+    """
+    limits = ((force, LARGEST_FORCE_N, "force", "N"), (moment, LARGEST_MOMENT_NM, "moment", "N m"))
+    for values, most, what, unit in limits:
+        for k, _ in _beyond(values[:, None], most):
+            raise RecordingError(
+                f"{where}: {name} at frame {k + 1} ({time[k]:g} s) has a {what} of {_listed(values[k])} {unit}, "
+                f"expected at most {most:g} {unit}: the value is damaged, or its unit wrong"
+            )
+
+
+def _beyond(values: Array, most: float) -> npt.NDArray[np.intp]:
+    """(frame, item) of values (T, K, 3) that are infinite or larger; NaN is neither."""
+    return np.argwhere((np.abs(values) > most).any(axis=2))
+
+
+def _listed(values: Array) -> str:
+    return ", ".join(f"{value:.4g}" for value in values)

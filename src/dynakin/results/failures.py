@@ -1,0 +1,60 @@
+"""Late stages that failed: what was computed before them is kept, and the failure has a name."""
+
+from __future__ import annotations
+
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from dynakin.errors import DynakinError
+
+FAILED = "Failed:"
+"""How the message of a failed stage begins."""
+LOG = "failures.log"
+
+
+@dataclass(frozen=True)
+class Failure:
+    """A stage by its name, one line of why, and the traceback."""
+
+    stage: str
+    reason: str
+    details: str
+
+    @property
+    def message(self) -> str:
+        """One sentence for messages, console and page."""
+        return f"{FAILED} {self.stage}: {self.reason.rstrip('.')}."
+
+
+class Failures:
+    """Collects what failed once the estimate was there; each stage runs in ``with failures.stage(name):``."""
+
+    def __init__(self) -> None:
+        self.found: list[Failure] = []
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Turn any exception within into a `Failure`.
+
+        Raises:
+            OSError: the disk does not take what is written, which no other stage mends.
+        """
+        try:
+            yield
+        except OSError:
+            raise
+        except Exception as error:
+            lines = str(error).strip().splitlines()
+            kind = "" if isinstance(error, DynakinError) else type(error).__name__
+            reason = ": ".join(filter(None, [kind, lines[0] if lines else ""]))
+            self.found.append(Failure(name, reason, traceback.format_exc()))
+
+    def messages(self) -> list[str]:
+        """One sentence a failure."""
+        return [failure.message for failure in self.found]
+
+    def log(self) -> str:
+        """Content of `LOG`: each failure with its traceback."""
+        return "\n".join(f"{failure.message}\n{failure.details}" for failure in self.found)

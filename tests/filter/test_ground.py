@@ -1,0 +1,209 @@
+"""What is known of the ground: a seat, a box, a belt, no plates at all; flags follow from plates and motion alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dynakin
+from dynakin import Estimate, Estimator, Subject, load_model
+from dynakin.filter.closure import closure
+from dynakin.filter.total_wrench import Ground
+from dynakin.recordings import Plate, Recording
+from dynakin.results.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
+from dynakin.results.sources import ABSENT, DERIVED
+from dynakin.simulation import simulate
+from dynakin.units import GRAVITY_M_S2
+
+WEIGHT = 70.0 * GRAVITY_M_S2
+
+
+def person(model: str) -> Estimator:
+    return Estimator(load_model(model, Subject(mass_kg=70.0, height_m=1.75, sex="male")))
+
+
+def ground_of(recording: Recording, estimator: Estimator) -> Ground:
+    return estimator._measured(recording, estimator.start(recording))[2]
+
+
+def with_loads(recording: Recording, factor: np.ndarray) -> Recording:
+    """Plates that read so much (T,) of what they carry."""
+    plates = [
+        replace(p, force=p.force * factor[:, None], moment=p.moment * factor[:, None], free_moment=p.free_moment)
+        for p in recording.plates
+    ]
+    return recording.with_plates(tuple(plates))
+
+
+def sources(found: Estimate, coordinate: str) -> np.ndarray:
+    return found.data["moment_source"].sel(coordinate=coordinate).values
+
+
+@pytest.mark.parametrize(
+    ("model", "motion"), [("sagittal7", "squat"), ("squat7", "sit-to-stand"), ("fullbody", "squat")]
+)
+@pytest.mark.parametrize("seed", [11, 12])
+def test_plates_that_carry_the_person_are_found_to(model: str, motion: str, seed: int) -> None:
+    """The seat has its own plate here."""
+    recording = simulate(model, motion, seed, 12.0).recording
+    estimator = person(model)
+    initial = estimator.start(recording)
+    markers, wrench, ground = estimator._measured(recording, initial)
+    found = closure(initial, recording.time, markers, wrench, np.ones(len(wrench), dtype=bool))
+    assert found is not None and not found.undeclared.any() and not ground.undeclared.any()
+    assert np.sqrt(np.nanmean(found.excess**2, axis=0)).max() < 0.02 * WEIGHT
+    assert found.load_ratio == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize("seed", [11, 12])
+def test_a_seat_that_nothing_measures_is_noticed_and_leaves_no_moments(seed: int) -> None:
+    recording = simulate("squat7", "sit-to-stand", seed, 12.0).recording
+    seat = np.asarray(recording.plates[2].force[:, 1])
+    assert recording.plates[2].name == "plate 3" and seat.max() > 0.25 * WEIGHT
+    found = person("squat7").run(recording.with_plates(recording.plates[:2]))
+    absent = sources(found, "knee") == ABSENT
+    assert absent[seat > 0.2 * WEIGHT].all() and not absent[seat < 0.01 * WEIGHT][50:-50].mean() > 0.1
+    assert np.array_equal(np.isnan(found.data["moments"].sel(coordinate="knee").values), absent)
+    assert np.isnan(found.data["wrench_measured"].values[absent]).all()
+    said = [text for text in found.messages if "no plate measures" in text]
+    assert len(said) == 1 and "less upwards" in said[0]
+
+
+def test_without_plates_a_leg_that_may_stand_has_no_moments_and_one_that_swings_has() -> None:
+    walk = simulate("fullbody", "gait", 3, 4.0, 50.0).recording
+    blind = person("fullbody").run(walk.with_plates(()))
+    contact = blind.data["foot_contact"].transpose("time", "foot").values
+    assert set(np.unique(contact)) == {IN_THE_AIR, NOT_MEASURED}
+    for k, side in enumerate("rl"):
+        for joint in ("hip_flexion", "knee_angle", "ankle_angle"):
+            moments = blind.data["moments"].sel(coordinate=f"{joint}_{side}").values
+            assert np.array_equal(np.isnan(moments), contact[:, k] == NOT_MEASURED)
+        assert 0.1 < np.mean(contact[:, k] == IN_THE_AIR) < 0.45
+        assert np.isfinite(blind.data["moments"].sel(coordinate=f"elbow_flex_{side}").values).all()
+    assert np.isnan(blind.data["moments"].sel(coordinate="pelvis_ty").values).all()
+    assert np.isnan(blind.data["joint_loads"].sel(joint="pelvis").values).all()
+    assert np.isfinite(blind.data["joint_loads"].sel(joint="torso").values).all()
+
+
+def test_a_box_that_nothing_measures_is_no_flight() -> None:
+    """Someone who stands while the plates read nothing stands on something."""
+    recording = simulate("fullbody", "squat", 4, 6.0, 50.0).recording
+    off = recording.time < 2.0
+    found = person("fullbody").run(with_loads(recording, np.where(off, 0.0, 1.0)))
+    contact = found.data["foot_contact"].transpose("time", "foot").values
+    early, late = recording.time < 1.9, recording.time > 2.4
+    assert (contact[early] == NOT_MEASURED).all() and (contact[late] == MEASURED).all()
+    assert np.isnan(found.data["moments"].sel(coordinate="knee_angle_r").values[early]).all()
+    assert (sources(found, "elbow_flex_r")[early] == ABSENT).all()  # it may be a rail as well
+    assert (sources(found, "knee_angle_r")[late] == 0).all()
+
+
+def test_half_of_a_foots_load_that_is_missing_is_said_of_that_foot() -> None:
+    recording = simulate("fullbody", "squat", 4, 6.0, 50.0).recording
+    part = np.where((recording.time > 2.0) & (recording.time < 4.0), 0.4, 1.0)[:, None]
+    one, *others = recording.plates
+    recording = recording.with_plates((replace(one, force=part * one.force, moment=part * one.moment), *others))
+    found = ground_of(recording, person("fullbody"))
+    inside = (recording.time > 2.2) & (recording.time < 3.8)
+    assert found.loads is not None and found.undeclared[inside].all()
+    assert np.isnan(found.loads.wrench[inside]).all(axis=2).any(axis=1).all()
+
+
+def test_a_belt_moves_the_feet_and_they_keep_their_plates() -> None:
+    """A walk as a treadmill shows it: the person stays, the floor moves; no foot ever stands still."""
+    walk = simulate("fullbody", "gait", 5, 4.0, 100.0).recording
+    still, belt = ground_of(walk, person("fullbody")), ground_of(on_a_belt(walk), person("fullbody"))
+    assert still.loads is not None and belt.loads is not None
+    known = still.loads.total_known & belt.loads.total_known
+    assert known.sum() > 0.5 * still.loads.total_known.sum()
+    np.testing.assert_allclose(belt.loads.wrench[known][..., 1], still.loads.wrench[known][..., 1], atol=25.0)
+    assert (belt.loads.wrench[known][..., 1] > 300.0).any(axis=0).all()
+
+
+def on_a_belt(walk: Recording) -> Recording:
+    hips = walk.markers[:, [walk.marker_names.index(name) for name in ("r.ASIS", "L.ASIS")]].mean(axis=1)
+    speed = (hips[-1] - hips[0]) / (walk.time[-1] - walk.time[0]) * [1.0, 0.0, 1.0]
+    shift = -(walk.time - walk.time[0])[:, None] * speed
+    plates = tuple(
+        Plate(p.name, p.force, p.moment + np.cross(shift, p.force), p.cop + shift, p.free_moment, None)
+        for p in walk.plates
+    )
+    return replace(walk, markers=walk.markers + shift[:, None], plates=plates)
+
+
+def test_a_foot_beside_the_plates_alone_is_derived() -> None:
+    walk = simulate("fullbody", "gait", 3, 4.0, 50.0).recording
+    found = person("fullbody").run(walk.with_plates(walk.plates[1:]))
+    codes = sources(found, "ankle_angle_r"), sources(found, "ankle_angle_l")
+    assert any((code == DERIVED).any() for code in codes)
+    moments = found.data["moments"].sel(coordinate=["ankle_angle_r", "ankle_angle_l"]).values
+    assert np.array_equal(np.isnan(moments), np.stack(codes, axis=1) == ABSENT)
+
+
+class TestRealRecordings:
+    """Recordings that 0.1 saved with exit code 0 and leg moments that lack the ground."""
+
+    def test_a_chair_that_no_plate_measures(self, data_dir: Path) -> None:
+        folder = data_dir / "opencap_subject4"
+        recording = dynakin.read(folder / "STS1.trc", folder / "STS1_grf.mot").window(0.0, 5.2)
+        model = load_model("fullbody", Subject(mass_kg=60.05, height_m=1.7), markers="opencap")
+        found = Estimator(model).run(recording)
+        time = found.time
+        seated = (time < 0.8) | ((time > 2.6) & (time < 3.5))
+        alone = ((time > 1.07) & (time < 2.26)) | ((time > 3.74) & (time < 4.89))
+        for side in "rl":
+            assert (sources(found, f"hip_flexion_{side}")[seated] == ABSENT).all()
+            assert (sources(found, f"hip_flexion_{side}")[alone] == 0).all()
+            assert (sources(found, f"ankle_angle_{side}")[alone] == 0).all()
+        pressed = np.min([p.force[:, 1] for p in recording.plates[:2]], axis=0) > 25.0  # seated too
+        assert (pressed & seated).sum() > 40 and (sources(found, "ankle_angle_r")[pressed] == 0).all()
+        assert any("m or more from the feet" in text for text in found.messages)
+
+    def test_a_drop_from_a_box(self, data_dir: Path) -> None:
+        folder = data_dir / "opencap_subject4"
+        recording = dynakin.read(folder / "DJ1.trc", folder / "DJ1_grf.mot")
+        model = load_model("fullbody", Subject(mass_kg=60.05, height_m=1.7), markers="opencap")
+        ground = ground_of(recording, Estimator(model))
+        on_the_box, flight = recording.time < 0.9, (recording.time > 2.2) & (recording.time < 2.5)
+        assert ground.loads is not None
+        assert np.isnan(ground.loads.wrench[on_the_box]).all()
+        assert not ground.undeclared[flight].any() and (ground.loads.reason[flight] == 0).all()
+
+    def test_a_run_on_a_treadmill_finds_its_plates_and_keeps_its_clock(self, data_dir: Path) -> None:
+        """A delay of the plates grew to 958 ms; ankles 4676 N m."""
+        folder = data_dir / "rajagopal"
+        recording = dynakin.read(folder / "motion_capture_run.trc", folder / "grf_run.mot").window(0.2, 2.5)
+        model = load_model(str(folder / "subject_scaled_run.osim"), Subject(mass_kg=72.84, height_m=1.8))
+        found = Estimator(model).run(recording, smooth=True)
+        names, reference = storage(folder / "run_id.sto")
+        inner = (found.time > 0.5) & (found.time < 2.2)
+        assert (found.data["moment_source"].values[inner] == 0).all()
+        for side in "rl":
+            for joint, least in (("ankle_angle", 0.95), ("knee_angle", 0.95), ("hip_flexion", 0.9)):
+                column = reference[:, names.index(f"{joint}_{side}_moment")]
+                wanted = np.interp(found.time, reference[:, 0], column)[inner]
+                ours = found.data["moments"].sel(coordinate=f"{joint}_{side}").values[inner]
+                assert np.corrcoef(ours, wanted)[0, 1] > least
+
+    def test_the_oldest_example_of_opensim(self, data_dir: Path) -> None:
+        """Times rounded to 0.1 ms, a treadmill, markers with names of its own: 718 N were left at the pelvis."""
+        folder = data_dir / "gait2354"
+        recording = dynakin.read(folder / "subject01_walk1.trc", folder / "subject01_walk1_grf.mot")
+        model = load_model(str(folder / "subject01_simbody.osim"), Subject(mass_kg=72.6, height_m=1.8))
+        found = Estimator(model).run(recording)
+        assert (found.data["moment_source"].values == 0).all()
+        names, reference = storage(folder / "inverse_dynamics.sto")
+        inner = (found.time > 0.4) & (found.time < 1.6)
+        for side in "rl":
+            wanted = np.interp(found.time, reference[:, 0], reference[:, names.index(f"ankle_angle_{side}_moment")])
+            ours = found.data["moments"].sel(coordinate=f"ankle_angle_{side}").values
+            assert np.corrcoef(ours[inner], wanted[inner])[0, 1] > 0.98
+
+
+def storage(path: Path) -> tuple[list[str], np.ndarray]:
+    lines = path.read_text().splitlines()
+    head = next(k for k, line in enumerate(lines) if line.strip().casefold() == "endheader")
+    return lines[head + 1].split(), np.array([line.split() for line in lines[head + 2 :] if line.strip()], dtype=float)
