@@ -82,7 +82,13 @@ def test_a_walk_has_curves_of_each_foot(data_dir: Path, compared: Trial) -> None
     found = find_repetitions(body_paths(recording, find_ground_frame(recording)))
     short = {"time": recording.time, "repetitions": found}
     methods = tuple(
-        replace(m, coordinates=m.coordinates[:215], moments=m.moments[:215], wrench=m.wrench[:215])
+        replace(
+            m,
+            coordinates=m.coordinates[:215],
+            moments=m.moments[:215],
+            wrench=m.wrench[:215],
+            data=m.data.isel(time=slice(215)),  # says of each moment where it comes from
+        )
         for m in compared.methods
     )
     walk = replace(compared, methods=methods, measured_wrench=compared.measured_wrench[:215], **short)

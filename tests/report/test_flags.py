@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import re
 from dataclasses import replace
@@ -10,10 +11,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from conftest import made_comparison
-from test_spatial import unpacked
 from walking_estimate import make_walker
 
+from dynakin.comparison import Trial
 from dynakin.report import render_report, save_figures
 from dynakin.report.insights import in_short, insights
 from dynakin.report.method_sections import moment_part
@@ -125,7 +125,9 @@ def test_the_film_dashes_what_is_derived(walker: Estimate) -> None:
     found = spatial_playback(walker)
     content = json.loads(str(found.data))
     frames = np.searchsorted(walker.time, np.array(content["time"]) - 1e-6)
-    derived = unpacked(content["arrays"]["derived"])
+    packed = content["arrays"]["derived"]
+    numbers = np.frombuffer(base64.b64decode(packed["values"]), dtype="<i2").astype(float)
+    derived = packed["scale"] * numbers.reshape(-1, packed["columns"])
     np.testing.assert_allclose(derived[:, 1], (frames >= 170) & (frames < 230), atol=1e-3)
     assert not derived[:, 0].any() and found.has_derived
     assert [entry["derived"] for entry in content["arrows"]] == [False, False, True, True]
@@ -168,13 +170,17 @@ def test_planar_panels_dash_what_is_derived_and_leave_out_what_is_absent(estimat
     assert dashes(titled(wrench_section(missing, compute_metrics(missing)).panels, "Vertical")) == 1
 
 
-def test_moments_by_method_are_compared_where_measured_and_dashed_elsewhere(jointed: Estimate) -> None:
+def test_moments_by_method_are_compared_where_measured_and_dashed_elsewhere(
+    jointed: Estimate, comparison: Trial
+) -> None:
     derived = with_source(jointed, DERIVED, slice(0, 600))
     data = derived.data.copy(deep=True)
     data["moments"][:600, :4] *= 3.0
-    trial, plain = made_comparison(replace(derived, data=data)), made_comparison(jointed)
+    filtered = replace(comparison.methods[0], data=data, moments=data["moments"].values)
+    estimates = {"paper": replace(derived, data=data)}
+    trial = replace(comparison, methods=(filtered, *comparison.methods[1:]), estimates=estimates)
     panels = moment_part(trial, "m").panels
-    assert dashes(panels[0]) > dashes(moment_part(plain, "m").panels[0])
+    assert dashes(panels[0]) > dashes(moment_part(comparison, "m").panels[0])
     knee = trial.methods[0].measured_moments()[:, trial.coordinate_names.index("knee")]
     assert np.isnan(knee[:600]).all() and np.isfinite(knee[600:]).all()
     assert "10.0 N m" in panels[0].note  # AT is 10 N m off where both are there, whatever is derived

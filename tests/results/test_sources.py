@@ -201,6 +201,9 @@ def test_nothing_left_at_the_root_is_said_by_the_numbers_only() -> None:
     assert contradicted["left_at_root"]["grounded"]["force_n"] == pytest.approx(718.0)
     assert "Nothing is left" not in contradicted["verdict"]
     assert "Up to 718 N and 0 N m are left at the root" in contradicted["verdict"]
+    seated = walker.data.copy(deep=True)  # both feet measured, and yet not all that bears the person
+    seated["moment_source"][:100, 0] = ABSENT
+    assert "in the 141 of 301 frames" in compute_metrics(replace(walker, data=seated))["feet"]["verdict"]
     data["foot_contact"][:] = 0  # both feet "in the air" for three seconds
     flying = compute_metrics(replace(walker, data=data))["feet"]["verdict"]
     assert "Nothing is left" not in flying and "That is no flight" in flying

@@ -23,6 +23,8 @@ def print_summary(estimate: Estimate, folder: Path) -> None:
     blocks = (metrics[block] for block in ("tracking", "consistency", "adaptation", "soft_tissue"))
     verdicts = [block["verdict"] for block in blocks if block]
     for message in estimate.messages:
+        if message.removeprefix("Warning: ") in metrics["moments"]["reasons"]:
+            continue  # said first
         if message.startswith("Warning:"):
             console.print(message, style="yellow")
         elif message.startswith(NOT_SMOOTHED) or message.endswith("brought into step."):

@@ -50,9 +50,11 @@ def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str,
     )
     remainder = estimate.data["wrench_remainder"].transpose("time", "component").values[window]
     codes = foot_sources(estimate.data)[window]
-    flight = (contact == IN_THE_AIR).all(axis=1)
-    grounded = (contact != NOT_MEASURED).all(axis=1) & ~flight
-    known = (contact == MEASURED) & grounded[:, None]
+    told = np.isfinite(remainder).all(axis=1)
+    flight = (contact == IN_THE_AIR).all(axis=1) & told
+    grounded = (contact != NOT_MEASURED).all(axis=1) & (contact == MEASURED).any(axis=1) & told
+    grounded &= _root_measured(estimate)[window]
+    known = (contact == MEASURED) & grounded[:, None] & np.isfinite(adjusted).all(axis=2)  # not where it is lost
     rms = {
         name: dict(zip(COMPONENTS, _rms(adjusted[known[:, k], k]), strict=True)) if known[:, k].any() else None
         for k, name in enumerate(estimate.foot_names)
@@ -84,6 +86,16 @@ def _root(estimate: Estimate) -> np.ndarray:
     """(T, 3) m: the joint by which the body hangs on the ground."""
     root = int(np.flatnonzero(estimate.data["joint_parent"].values < 0)[0])
     return np.asarray(estimate.data["joint_centres"].transpose("time", "joint", "axis").values[:, root])
+
+
+def _root_measured(estimate: Estimate) -> npt.NDArray[np.bool_]:
+    """(T,) frames in which every contact is: feet may stand on plates while a seat bears the rest."""
+    data = estimate.data
+    if "coordinate_segment" not in data.coords:
+        return np.ones(len(estimate.time), dtype=bool)
+    roots = data["joint_segment"].values[data["joint_parent"].values < 0]
+    own = np.isin(data["coordinate_segment"].values, roots)
+    return np.asarray((sources.moment_sources(data)[:, own] == sources.MEASURED).all(axis=1))
 
 
 def _rms(values: np.ndarray) -> list[float]:
