@@ -60,7 +60,7 @@ def asymmetry(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str, An
     for name, *sides in paired(estimate.coordinate_names):
         done = [work_of(time, power[:, k]) for k in sides]
         magnitudes = {
-            "range": [float(np.ptp(angles[:, k])) for k in sides],
+            "range": [_range(angles[:, k]) for k in sides],
             "peak_moment": [_largest(moments[:, k]) for k in sides],
             "positive_work": [w.positive_j for w in done],
             "negative_work": [-w.negative_j for w in done],
@@ -90,6 +90,11 @@ def _derived(estimate: Estimate, name: str, across: str, code: int) -> npt.NDArr
     if name not in estimate.data:
         return np.zeros((len(estimate.time), estimate.data.sizes[across]), dtype=bool)
     return np.asarray(estimate.data[name].transpose("time", across).values == code)
+
+
+def _range(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.ptp(known)) if len(known) else float("nan")
 
 
 def _largest(values: Array) -> float:
