@@ -13,7 +13,7 @@ from dynakin.cli import main
 from dynakin.cli import run as run_module
 from dynakin.recordings import Recording
 from dynakin.report import figures
-from dynakin.results import OUTPUT_FILES
+from dynakin.results import OUTPUT_FILES, write_storage, write_trc
 from dynakin.simulation import SimulatedTrial, simulate_squat
 
 SUBJECT = ["--model", "sagittal7", "--markers", "opencap", "--mass", "70", "--height", "1.75"]
@@ -55,20 +55,7 @@ def test_what_fails_after_the_estimate_is_named_and_the_rest_saved(
     assert (drawn / "figure4_markers.svg").exists() and not (drawn / "figure5_angles.svg").exists()
 
 
-def with_times(recording: Recording, factor: float, frames: int | None = None) -> Recording:
-    plates = tuple(
-        replace(p, force=p.force[:frames], moment=p.moment[:frames], cop=p.cop[:frames], free_moment=p.free_moment[:frames])
-        for p in recording.plates
-    )  # fmt: skip
-    return replace(
-        recording, time=factor * recording.time[:frames], markers=recording.markers[:frames], plates=plates,
-        rate=recording.rate / factor,
-    )  # fmt: skip
-
-
 def written(recording: Recording, folder: Path) -> list[str]:
-    from dynakin.results import write_storage, write_trc
-
     write_trc(folder / "m.trc", recording.time, list(recording.marker_names), recording.markers, unit="mm")
     names, columns = [], []
     for number, plate in enumerate(recording.plates, 1):
@@ -101,7 +88,7 @@ def test_times_in_another_unit_are_no_estimate_and_kept_where_asked(
     squat: SimulatedTrial, factor: float, tmp_path: Path, capsys: Said
 ) -> None:
     """0.1 asked for 6.8 TiB (us) and lost the results."""
-    trial = written(with_times(squat.recording, factor), tmp_path)
+    trial = written(replace(squat.recording, time=factor * squat.recording.time), tmp_path)
     out = tmp_path / "out"
     code = main(["run", *trial, *SUBJECT, "-o", str(out)])
     said = capsys.readouterr().err
