@@ -84,17 +84,15 @@ def test_one_frame_gives_results_and_a_page(squat: SimulatedTrial, tmp_path: Pat
 
 
 @pytest.mark.parametrize("factor", [1e3, 1e6])
-def test_times_in_another_unit_are_no_estimate_and_kept_where_asked(
-    squat: SimulatedTrial, factor: float, tmp_path: Path, capsys: Said
-) -> None:
-    """0.1 asked for 6.8 TiB (us) and lost the results."""
+def test_times_in_another_unit_are_refused(squat: SimulatedTrial, factor: float, tmp_path: Path, capsys: Said) -> None:
+    """0.1 took minutes (ms), or asked for 6.8 TiB and lost the results (us)."""
     trial = written(replace(squat.recording, time=factor * squat.recording.time), tmp_path)
     out = tmp_path / "out"
     code = main(["run", *trial, *SUBJECT, "-o", str(out)])
     said = capsys.readouterr().err
-    assert code in (1, 2) and said.startswith("error: ") and not out.exists()
-    if code == 1:  # read, and lost
-        assert "the person was lost" in said
-        assert main(["run", *trial, *SUBJECT, "-o", str(out), "--keep-lost"]) == 1
-        assert {file.name for file in out.iterdir()} >= set(OUTPUT_FILES)
-        assert json.loads((out / "metrics.json").read_text())["failures"] == []
+    assert (
+        code == 2
+        and f"frames are {0.01 * factor:.4g} s apart" in said
+        and "are the times in s?" in said
+        and not out.exists()
+    )
