@@ -97,3 +97,14 @@ def test_a_segment_has_one_colour_whatever_the_others() -> None:
     alone, together = segment_colours(["thigh"]), segment_colours(["foot", "thigh", "thigh_r", "tail"])
     assert alone["thigh"] == together["thigh"] == together["thigh_r"]
     assert len({together["foot"], together["thigh"], together["tail"]}) == 3
+
+
+def test_a_motion_beyond_all_measure_has_few_ticks_and_one_frame_is_shown(estimate: Estimate) -> None:
+    """0.1 asked for 6.8 TiB of ticks, and divided by the rate of a single frame."""
+    far = estimate.data["markers_estimated"].copy(deep=True)
+    far[5, 0, 0] = 1e9
+    shown = playback(replace(estimate, data=estimate.data.assign(markers_estimated=far)))
+    assert len(shown.ticks_mm) < 300
+    one = estimate.data.isel(time=slice(0, 1))
+    recording = replace(estimate.recording, time=estimate.time[:1], markers=estimate.recording.markers[:1], plates=())
+    assert playback(replace(estimate, data=one, recording=recording)).last == 0

@@ -125,6 +125,7 @@ def test_metrics_hold_the_keys_of_the_design(estimate: Estimate) -> None:
         "markers",
         "wrench",
         "prediction",
+        "tracking",
         "consistency",
         "adaptation",
         "bounds",

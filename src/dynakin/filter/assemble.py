@@ -161,13 +161,15 @@ def _dataset(
 def _feet(arrays: Mapping[str, Array], feet: FootWrenches) -> dict[str, Any]:
     per_foot = ("time", "foot", "component")
     measured = np.where((feet.contact == MEASURED)[..., None], feet.wrench, np.nan)
+    others = [k for k, name in enumerate(feet.names) if name == ELSEWHERE]
+    no_feet = arrays["remainder"] + np.asarray(arrays["foot_wrench"])[:, others].sum(axis=1)  # a seat's, say
     return {
         "foot_contact": (("time", "foot"), feet.contact),
         "foot_wrench_measured": (per_foot, measured),
         "foot_wrench": (per_foot, arrays["foot_wrench"]),
         "foot_wrench_sd": (per_foot, arrays["foot_wrench_sd"]),
         "foot_adjustment": (per_foot, np.where(np.isfinite(measured), arrays["foot_adjustment"], np.nan)),
-        "wrench_remainder": (("time", "component"), arrays["remainder"]),
+        "wrench_remainder": (("time", "component"), no_feet),
         "moment_source": (("time", "coordinate"), arrays["moment_source"]),
     }
 

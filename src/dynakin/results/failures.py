@@ -49,7 +49,8 @@ class Failures:
             lines = str(error).strip().splitlines()
             kind = "" if isinstance(error, DynakinError) else type(error).__name__
             reason = ": ".join(filter(None, [kind, lines[0] if lines else ""]))
-            self.found.append(Failure(name, reason, traceback.format_exc()))
+            if (name, reason) not in [(failure.stage, failure.reason) for failure in self.found]:  # tried again
+                self.found.append(Failure(name, reason, traceback.format_exc()))
 
     def messages(self) -> list[str]:
         """One sentence a failure."""

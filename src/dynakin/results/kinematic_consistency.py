@@ -23,8 +23,14 @@ def speed_mismatch(time: np.ndarray, coordinates: np.ndarray, speeds: np.ndarray
     if len(time) < 3:
         return np.full(coordinates.shape[1], np.nan), np.full(coordinates.shape[1], np.nan)
     derivative = np.gradient(coordinates, time, axis=0)
-    mismatch = np.sqrt(np.mean((speeds - derivative) ** 2, axis=0))
-    return mismatch, np.sqrt(np.mean(derivative**2, axis=0))
+    return _rms(speeds - derivative), _rms(derivative)
+
+
+def _rms(values: np.ndarray) -> np.ndarray:
+    """Of each column, frames without a number left out."""
+    known = np.isfinite(values)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.sqrt(np.sum(np.where(known, values, 0.0) ** 2, axis=0) / known.sum(axis=0)))
 
 
 def mismatch_in_words(names: list[str], rotation: np.ndarray, mismatch: np.ndarray, moving: np.ndarray) -> str:

@@ -54,7 +54,7 @@ def compute_metrics(estimate: Estimate, failures: Failures | None = None) -> dic
     estimate = facing(estimate)
     window = evaluation_window(estimate.time)
     kept = estimate.time[window]
-    window &= ~estimate.lost
+    good = window & ~estimate.lost  # for what is made of `state`, which keeps what the filter held
     blocks: dict[str, Callable[[], Any]] = {
         "markers": lambda: _markers(estimate, "estimated", window),
         "wrench": lambda: _wrench(estimate, "estimated", window),
@@ -62,8 +62,8 @@ def compute_metrics(estimate: Estimate, failures: Failures | None = None) -> dic
         "tracking": lambda: tracking_figures(estimate),
         "consistency": lambda: _consistency(estimate, window),
         "adaptation": lambda: adaptation(estimate),
-        "bounds": lambda: parameter_bounds(estimate, window),
-        "soft_tissue": lambda: soft_tissue(estimate, window),
+        "bounds": lambda: parameter_bounds(estimate, good),
+        "soft_tissue": lambda: soft_tissue(estimate, good),
         "identifiability": lambda: learned(estimate),
         "moments": lambda: moment_figures(estimate),
         "peak_moments_per_kg": lambda: _peak_moments(estimate, window),

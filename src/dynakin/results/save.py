@@ -23,21 +23,6 @@ if TYPE_CHECKING:
     from dynakin.comparison import Trial
     from dynakin.identifiability import Identifiability
 
-Write = Callable[[Estimate, Path], None]
-
-_FILES: dict[str, Write] = {
-    "coordinates.mot": motion_files.write_coordinates,
-    "speeds.sto": motion_files.write_speeds,
-    "accelerations.sto": motion_files.write_accelerations,
-    "moments.sto": motion_files.write_moments,
-    "moments_source.sto": motion_files.write_moment_sources,
-    "wrench.sto": motion_files.write_wrench,
-    "uncertainty.sto": motion_files.write_deviations,
-    "markers.trc": write_markers,
-    "parameters.json": write_parameters,
-    "estimate.nc": write_netcdf,
-}
-
 
 def save_estimate(
     estimate: Estimate,
@@ -53,8 +38,20 @@ def save_estimate(
 
     failed = Failures() if failures is None else failures
     metrics = _metrics(estimate, identifiability, failed)
+    files: dict[str, Callable[[Estimate, Path], None]] = {
+        "coordinates.mot": motion_files.write_coordinates,
+        "speeds.sto": motion_files.write_speeds,
+        "accelerations.sto": motion_files.write_accelerations,
+        "moments.sto": motion_files.write_moments,
+        "moments_source.sto": motion_files.write_moment_sources,
+        "wrench.sto": motion_files.write_wrench,
+        "uncertainty.sto": motion_files.write_deviations,
+        "markers.trc": write_markers,
+        "parameters.json": write_parameters,
+        "estimate.nc": write_netcdf,
+    }
     with replacing(folder, overwrite=overwrite) as made:
-        for name, write in _FILES.items():
+        for name, write in files.items():
             _written(made / name, failed, lambda path, write=write: write(estimate, path))  # type: ignore[misc]
         with failed.stage("files of the body"):
             body_files.write_body_files(estimate, made)
@@ -76,9 +73,12 @@ def save_estimate(
 
 def _metrics(estimate: Estimate, identifiability: Identifiability | None, failed: Failures) -> dict[str, Any]:
     """All figures, or those that can be had."""
-    try:
+    before = len(failed.found)
+    metrics: dict[str, Any] = {}
+    with failed.stage("metrics.json"):
         metrics = estimate.metrics()
-    except Exception:
+    if not metrics:
+        del failed.found[before:]  # each block by its own name
         metrics = compute_metrics(estimate, failed)
     if identifiability is not None:
         with failed.stage("what the recording tells of the constants"):
@@ -88,10 +88,11 @@ def _metrics(estimate: Estimate, identifiability: Identifiability | None, failed
 
 def _written(path: Path, failed: Failures, write: Callable[[Path], None]) -> None:
     """One file, or none: half a file looks like a whole one."""
-    before = len(failed.found)
+    done = False
     with failed.stage(path.name):
         write(path)
-    if len(failed.found) > before:
+        done = True
+    if not done:
         path.unlink(missing_ok=True)
 
 

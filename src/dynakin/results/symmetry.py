@@ -71,7 +71,7 @@ def asymmetry(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str, An
                 _mean(lambda own, at, sign=sign: work_of(at, sign * own).positive_j, power[:, k], own, time)
                 for k, own in zip(sides, parts, strict=True)
             ]
-        magnitudes = {"range": [float(np.ptp(angles[:, k])) for k in sides]} | magnitudes
+        magnitudes = {"range": [_range(angles[:, k]) for k in sides]} | magnitudes
         found[name] = {key: symmetry_index(*pair) for key, pair in magnitudes.items()}
     feet = _feet(estimate, stances, slice(start, end))
     if not found and feet is None:
@@ -122,6 +122,11 @@ def _mean(of: Callable[..., float], values: Array, parts: Sequence[slice], *alon
     """Mean over the parts that are known throughout; NaN where none is."""
     each = [of(values[p], *(a[p] for a in along)) for p in parts if np.isfinite(values[p]).all()]
     return float(np.mean(each)) if each else float("nan")
+
+
+def _range(values: Array) -> float:
+    known = values[np.isfinite(values)]
+    return float(np.ptp(known)) if len(known) else float("nan")
 
 
 def _largest(values: Array) -> float:

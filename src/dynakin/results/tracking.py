@@ -12,6 +12,7 @@ from dynakin.errors import LostError
 from dynakin.results.estimate import AXES, Estimate
 from dynakin.results.naming import sentence
 from dynakin.results.soft_tissue import marker_sites, state_paths
+from dynakin.results.sources import ABSENT
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -34,9 +35,9 @@ MOST_LOST = 0.10
 _REFUSED = 2  # of `Estimate.data["verdict"]`
 _USED_NOTHING, _HELD, _RESTARTED = 1, 2, 4  # of `Estimate.data["tracking"]`
 _KEPT = ("_measured", "_covariance")
-_RECORD = {"state", "state_sd", "foot_contact", "moment_source", "verdict", "tracking", "constrained", "lost"}
+_RECORD = {"state", "state_sd", "foot_contact", "verdict", "tracking", "constrained", "lost"}
 _RECORD |= {"constraints_met", "step_us"}
-_UNKNOWN_MOMENT = 2
+_SOURCES = {"moment_source", "joint_source"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,10 +88,8 @@ def without_lost(estimate: Estimate) -> Estimate:
             text = str(name)
             if "time" not in variable.dims or text in _RECORD or text.endswith(_KEPT):
                 continue
-            empty = 0 if variable.dtype.kind in "iu" else np.nan
+            empty = ABSENT if text in _SOURCES else 0 if variable.dtype.kind in "iu" else np.nan
             data[name] = variable.where(~data["lost"], empty).astype(variable.dtype)
-        if "moment_source" in data:
-            data["moment_source"] = data["moment_source"].where(~data["lost"], _UNKNOWN_MOMENT).astype(np.uint8)
     told = [f"Warning: {in_words(estimate.time, found)}"] if found.lost.any() else []
     return replace(estimate, data=data, messages=[*estimate.messages, *told], tracking=found)
 

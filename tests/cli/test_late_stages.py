@@ -1,0 +1,98 @@
+"""Late stages of `run` that fail, and recordings of one frame or with times in another unit."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dynakin.cli import main
+from dynakin.cli import run as run_module
+from dynakin.recordings import Recording
+from dynakin.report import figures
+from dynakin.results import OUTPUT_FILES, write_storage, write_trc
+from dynakin.simulation import SimulatedTrial, simulate_squat
+
+SUBJECT = ["--model", "sagittal7", "--markers", "opencap", "--mass", "70", "--height", "1.75"]
+Said = pytest.CaptureFixture[str]
+
+
+@pytest.fixture(scope="module")
+def squat() -> SimulatedTrial:
+    return simulate_squat(seed=3, duration_s=5.0)
+
+
+def broken(*_: object, **__: object) -> None:
+    raise ValueError("zero-size array")
+
+
+def test_what_fails_after_the_estimate_is_named_and_the_rest_saved(
+    squat: SimulatedTrial, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Said
+) -> None:
+    squat.save(tmp_path / "trial")
+    monkeypatch.setattr(run_module, "trial_of", broken)
+    monkeypatch.setattr(run_module, "identifiability", broken)
+    monkeypatch.setattr(run_module, "print_summary", broken)
+    monkeypatch.setitem(figures.FIGURES, "figure5_angles", broken)
+    trial = [str(tmp_path / "trial" / "markers.trc"), "--forces", str(tmp_path / "trial" / "forces.mot")]
+    out, drawn = tmp_path / "out", tmp_path / "figures"
+    assert main(["run", *trial, *SUBJECT, "-o", str(out), "--figures", str(drawn)]) == 1
+    said = capsys.readouterr().err.splitlines()
+    stages = [
+        "comparison with the reference methods",
+        "what the recording tells of the constants",
+        "summary",
+        "figure figure5_angles",
+    ]
+    assert said == [f"error: Failed: {stage}: ValueError: zero-size array." for stage in stages]
+    assert {file.name for file in out.iterdir()} >= {*OUTPUT_FILES, "failures.log"}
+    assert json.loads((out / "metrics.json").read_text())["failures"] == stages
+    page = (out / "report.html").read_text()
+    assert all(stage in page for stage in stages) and "Nothing in this run speaks against using it" not in page
+    assert (drawn / "figure4_markers.svg").exists() and not (drawn / "figure5_angles.svg").exists()
+
+
+def written(recording: Recording, folder: Path) -> list[str]:
+    write_trc(folder / "m.trc", recording.time, list(recording.marker_names), recording.markers, unit="mm")
+    names, columns = [], []
+    for number, plate in enumerate(recording.plates, 1):
+        for stem, values in (("v", plate.force), ("p", np.nan_to_num(plate.cop)), ("m", plate.free_moment)):
+            names += [f"ground_force_{number}_{stem}{axis}" for axis in "xyz"]
+            columns.append(values)
+    write_storage(folder / "f.mot", "forces", recording.time, names, np.hstack(columns), in_degrees=False)
+    return [str(folder / "m.trc"), "--forces", str(folder / "f.mot")]
+
+
+def test_one_frame_gives_results_and_a_page(squat: SimulatedTrial, tmp_path: Path) -> None:
+    """0.1 lost it all: ValueError in the page's player."""
+    squat.save(tmp_path / "trial")
+    for name in ("markers.trc", "forces.mot"):
+        lines = (tmp_path / "trial" / name).read_text().splitlines()
+        head = next(k for k, line in enumerate(lines) if line.startswith(("Frame#", "endheader")))
+        first = head + (2 if name == "forces.mot" else 3)
+        kept = [line.replace("nRows=501", "nRows=2") for line in lines[: first + (2 if name == "forces.mot" else 1)]]
+        if name == "markers.trc":
+            kept[2] = kept[2].replace("\t501\t", "\t1\t").replace("\t501", "\t1")
+        (tmp_path / "trial" / name).write_text("\n".join(kept) + "\n")
+    trial = [str(tmp_path / "trial" / "markers.trc"), "--forces", str(tmp_path / "trial" / "forces.mot")]
+    assert main(["run", *trial, *SUBJECT, "-o", str(tmp_path / "out")]) == 0
+    assert {file.name for file in (tmp_path / "out").iterdir()} >= set(OUTPUT_FILES)
+    assert json.loads((tmp_path / "out" / "metrics.json").read_text())["failures"] == []
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e6])
+def test_times_in_another_unit_are_refused(squat: SimulatedTrial, factor: float, tmp_path: Path, capsys: Said) -> None:
+    """0.1 took minutes (ms), or asked for 6.8 TiB and lost the results (us)."""
+    trial = written(replace(squat.recording, time=factor * squat.recording.time), tmp_path)
+    out = tmp_path / "out"
+    code = main(["run", *trial, *SUBJECT, "-o", str(out)])
+    said = capsys.readouterr().err
+    assert (
+        code == 2
+        and f"frames are {0.01 * factor:.4g} s apart" in said
+        and "are the times in s?" in said
+        and not out.exists()
+    )

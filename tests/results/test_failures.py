@@ -1,0 +1,62 @@
+"""A late stage that fails: everything else is saved, and the failure is named."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+from synthetic_estimate import make_estimate
+
+import dynakin.report
+from dynakin.errors import OutputError
+from dynakin.results import OUTPUT_FILES, Estimate, check_output_writable, metrics, save
+from dynakin.results.failures import Failures
+
+
+def broken(*_: object, **__: object) -> None:
+    raise MemoryError("Unable to allocate 6.8 TiB")
+
+
+@pytest.fixture(scope="module")
+def short() -> Estimate:
+    return make_estimate(1.0)
+
+
+def test_a_page_that_fails_loses_no_file(short: Estimate, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(dynakin.report, "write_report", broken)
+    failures = Failures()
+    out = short.save(tmp_path / "out", failures=failures)
+    assert {file.name for file in out.iterdir()} >= {*OUTPUT_FILES, "failures.log"} - {"report.html"}
+    assert not (out / "report.html").exists()
+    expected = "Failed: report.html: MemoryError: Unable to allocate 6.8 TiB."
+    assert failures.messages() == [expected]
+    written = json.loads((out / "metrics.json").read_text())
+    assert written["messages"][-1] == expected and written["failures"] == ["report.html"]
+    assert "Traceback" in (out / "failures.log").read_text()
+    check_output_writable(out)  # with its log it is still ours
+    with pytest.raises(OutputError, match=r"the results are saved .*Failed: report\.html"):  # nobody takes the failures
+        short.save(out)
+    monkeypatch.undo()
+    short.save(out)
+    assert (out / "report.html").exists() and not (out / "failures.log").exists()
+
+
+def test_a_figure_or_a_file_that_fails_is_left_out_and_named_on_the_page(
+    short: Estimate, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(metrics, "asymmetry", broken)
+    monkeypatch.setattr(save, "write_markers", broken)
+    failures = Failures()
+    fresh = make_estimate(1.0)
+    out = fresh.save(tmp_path / "out", failures=failures)
+    assert [failure.stage for failure in failures.found] == ["asymmetry in metrics.json", "markers.trc"]
+    written = json.loads((out / "metrics.json").read_text())
+    assert written["asymmetry"] is None and written["markers"]["mean_rms_mm"] > 0.0
+    assert not (out / "markers.trc").exists()
+    assert "Not made" in (out / "report.html").read_text()
+
+
+def test_a_full_disk_is_no_stage(short: Estimate) -> None:
+    with pytest.raises(OSError, match="No space"), Failures().stage("report.html"):
+        raise OSError(28, "No space left on device")

@@ -1,0 +1,132 @@
+"""Frames that are no estimate: found by all markers' distance and by refusals, empty in files, and said with times."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import xarray as xr
+from synthetic_estimate import make_estimate
+
+import dynakin
+from dynakin.cli import main
+from dynakin.comparison import Setup, compare_trial
+from dynakin.errors import LostError
+from dynakin.results import Estimate
+from dynakin.results.tracking import tracking_of, without_lost
+from dynakin.simulation import SimulatedTrial, simulate_squat
+
+ARM = slice(7, 10)
+"""Three of ten markers."""
+
+
+def arm_off(frames: slice, metres: float = 0.1) -> Estimate:
+    """The synthetic squat with three of ten markers' estimates off for some frames."""
+    estimate = make_estimate(gaps=False)
+    markers = estimate.data["markers_estimated"].copy(deep=True)
+    markers[frames, ARM, 0] += metres
+    return replace(estimate, data=estimate.data.assign(markers_estimated=markers))
+
+
+def test_a_good_estimate_has_no_lost_frame() -> None:
+    assert not tracking_of(make_estimate()).lost.any()
+    assert not tracking_of(arm_off(slice(None), 0.03)).lost.any()  # skin moves by that
+
+
+def test_lost_frames_are_empty_and_out_of_the_figures() -> None:
+    estimate = without_lost(arm_off(slice(500, 520)))
+    assert np.flatnonzero(estimate.lost).tolist() == list(range(500, 520))
+    for name in ("coordinates", "speeds", "moments", "markers_estimated", "wrench_estimated", "nis"):
+        values = estimate.data[name].transpose("time", ...).values
+        assert np.isnan(values[500:520]).all(), name
+    assert np.isfinite(estimate.data["markers_measured"].values[505, :, :2]).all()
+    assert estimate.why_lost is None  # 1.7 % of the frames
+    (said,) = [message for message in estimate.messages if "lost" in message]
+    assert said.startswith("Warning: the person was lost: 20 of 1201 frames") and "(5.00 to 5.19 s)" in said
+    metrics = estimate.metrics()
+    whole = make_estimate(gaps=False).metrics()
+    assert metrics["markers"]["rms_mm"] == pytest.approx(whole["markers"]["rms_mm"], rel=0.05)
+    assert metrics["tracking"]["lost_frames"] == 20 and not metrics["tracking"]["trial_lost"]
+    assert metrics["consistency"]["verdict"].startswith("Of the frames that are not lost")
+    work = {name: entry["positive_j"] for name, entry in metrics["work"].items()}
+    assert all(np.isfinite(value) for value in work.values())
+
+
+def test_skin_that_takes_up_a_wrong_posture_counts() -> None:
+    estimate = make_estimate(gaps=False)
+    names = [f"marker/{marker}/x" for marker in estimate.marker_names[ARM]]
+    state = estimate.data["state"].copy(deep=True)
+    state.loc[{"element": names}] += 0.15  # the markers fit as before
+    assert tracking_of(replace(estimate, data=estimate.data.assign(state=state))).lost.all()
+
+
+def test_refused_markers_count_by_their_share_and_by_limb() -> None:
+    estimate = make_estimate(gaps=False)
+    verdict = np.ones((len(estimate.time), len(estimate.marker_names) + 1), dtype=int)
+    verdict[100:300, 0] = 2  # one marker alone
+    thigh = [k for k, p in enumerate(p for p in estimate.parameters if p.kind == "marker" and p.name.endswith("/x"))
+             if p.segment == "thigh"]  # fmt: skip
+    assert len(thigh) > 1
+    verdict[400:420, thigh] = 2  # too short for a limb
+    verdict[600:700, thigh] = 2
+    data = estimate.data.assign(verdict=(("time", "sensor"), verdict))
+    lost = tracking_of(replace(estimate, data=data)).lost
+    assert np.flatnonzero(lost).tolist() == list(range(600, 700))
+
+
+def test_a_lost_trial_is_saved_only_where_asked(tmp_path: Path) -> None:
+    estimate = without_lost(arm_off(slice(300, 500)))
+    assert estimate.why_lost is not None and "17 % of the frames with markers, expected 10 %" in estimate.why_lost
+    with pytest.raises(LostError, match=r"3\.00 to 4\.99 s.*nothing is saved \(--keep-lost"):
+        estimate.save(tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+    folder = estimate.save(tmp_path / "out", keep_lost=True)
+    metrics = json.loads((folder / "metrics.json").read_text())
+    assert metrics["tracking"]["trial_lost"] and metrics["consistency"]["judgement"] is None
+    assert "The filter is consistent" not in (folder / "report.html").read_text()
+    table = np.genfromtxt((folder / "coordinates.mot").read_text().split("endheader\n")[1].splitlines()[1:])
+    assert np.isnan(table[300:500, 1:]).all() and np.isfinite(table[:300, 1:]).all()
+    with xr.open_dataset(folder / "estimate.nc", engine="h5netcdf") as data:
+        assert int(data["lost"].sum()) == 200
+
+
+@pytest.fixture(scope="module")
+def squat() -> SimulatedTrial:
+    return simulate_squat(seed=3, duration_s=6.0)
+
+
+@pytest.mark.parametrize("smooth", [False, True])
+def test_known_truth_what_is_flagged_is_what_is_wrong(squat: SimulatedTrial, smooth: bool) -> None:
+    """From 3 to 4.5 s every marker but the feet's carries another one's label: no posture fits."""
+    subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
+    model = dynakin.load_model("sagittal7", subject=subject, markers="opencap")
+    good = dynakin.Estimator(model).run(squat.recording, smooth=smooth)
+    assert not good.lost.any()
+    markers = squat.recording.markers.copy()
+    names = squat.recording.marker_names
+    others = [k for k, name in enumerate(names) if not name.endswith(("toe", "5meta", "calc"))]  # these must stay
+    markers[300:450, others] = np.roll(markers[300:450][:, others], 5, axis=1)
+    mislabelled = replace(squat.recording, markers=markers)
+    found = dynakin.Estimator(model).run(mislabelled, smooth=smooth)
+    assert found.lost[310:450].all() and found.why_lost is not None
+    truth = squat.truth.data["coordinates"].sel(coordinate=found.coordinate_names)
+    error = np.abs(found.data["coordinates"] - truth.transpose("time", "coordinate").values).values
+    assert np.nanmax(np.degrees(error)) < 25.0  # what is left is right
+    with pytest.raises(LostError, match=r"EKF \(default\): the person was lost.*3\.00 to 4\.49 s"):
+        compare_trial(mislabelled, Setup(model, smooth=smooth))
+
+
+def test_a_drop_jump_that_is_not_followed_is_no_result(
+    data_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """0.1 saved it with markers 64 mm off and `The filter is consistent`."""
+    folder, out = data_dir / "opencap_subject4", tmp_path / "out"
+    trial = [str(folder / "DJ1.trc"), "--forces", str(folder / "DJ1_grf.mot")]
+    options = ["--model", "fullbody", "--markers", "opencap", "--mass", "60.05", "-o", str(out)]
+    assert main(["run", *trial, *options]) == 1
+    said = capsys.readouterr()
+    assert "DJ1.trc: the person was lost" in said.err and "0.00 to 2.68 s" in said.err
+    assert "consistent" not in said.out and not out.exists()
