@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import html
 import json
 import socket
 import time
+import urllib.error
 import urllib.request
+from importlib.metadata import version
 
 import numpy as np
 import pytest
@@ -16,7 +19,7 @@ from dynakin.recordings import Recording
 from dynakin.simulation import simulate_squat
 from dynakin.stream import Callback, Live, LiveFrame, Replay, Started
 from dynakin.stream.latest import Latest
-from dynakin.stream.picture import Picture, arrow, in_words, split, status_text
+from dynakin.stream.picture import Picture, arrow, as_text, in_words, split, status_text
 from dynakin.stream.sinks import Status
 
 
@@ -65,6 +68,16 @@ def test_the_picture_holds_what_is_estimated_and_measured(squat: Recording) -> N
     assert 400.0 < weight < 1000.0 and np.isfinite(part["moment_sd"]).all()
 
 
+def wait_for_page(url: str) -> bytes:
+    deadline, page = time.monotonic() + 60.0, b""
+    while not page and time.monotonic() < deadline:
+        try:
+            page = urllib.request.urlopen(url, timeout=5.0).read()
+        except OSError:
+            time.sleep(0.2)
+    return page
+
+
 def test_the_page_is_served_to_this_machine_and_ends_with_the_session(
     squat: Recording, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -77,16 +90,93 @@ def test_the_page_is_served_to_this_machine_and_ends_with_the_session(
     viewer = Viewer(port=port)
     assert "seen by this machine alone" in capsys.readouterr().out
     session(squat, [viewer], speed=0.0)  # not run: the page is there before the person
-    deadline, page = time.monotonic() + 60.0, b""
-    while not page and time.monotonic() < deadline:
-        try:
-            page = urllib.request.urlopen(viewer.url, timeout=5.0).read()
-        except OSError:
-            time.sleep(0.2)
-    assert b"<html" in page.lower()
+    assert b"<html" in wait_for_page(viewer.url).lower()
     live = session(squat, [viewer])
     live.run()
     assert viewer._process.poll() == 0  # it ended by itself and without an error
+
+
+def connects(url: str, origin: str | None, host: str | None = None) -> bool:
+    """Whether a websocket is opened and something is told on it."""
+    from websockets.exceptions import InvalidStatus
+    from websockets.sync.client import connect
+    from websockets.typing import Origin, Subprotocol
+
+    protocol = Subprotocol(f"viser-v{version('viser')}")
+    address = url.removeprefix("http://").split(":")
+    try:
+        with connect(
+            f"ws://{host or address[0]}:{address[1]}",
+            sock=socket.create_connection((address[0], int(address[1]))),
+            origin=None if origin is None else Origin(origin),
+            subprotocols=[protocol],
+            max_size=None,
+        ) as socket_:
+            return len(socket_.recv(timeout=20.0)) > 0
+    except InvalidStatus as error:
+        assert error.response.status_code == 403
+        return False
+
+
+def test_only_the_page_itself_reads_the_stream_and_presses_buttons(squat: Recording) -> None:
+    """A page of another site that the browser has open, one under a name that was pointed here, and a bare client."""
+    pytest.importorskip("viser")
+    from dynakin.stream.viewer import Viewer
+
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    viewer = Viewer(port=port)
+    try:
+        wait_for_page(viewer.url)
+        assert connects(viewer.url, viewer.url)
+        assert connects(viewer.url, f"http://localhost:{port}", host="localhost")
+        for origin in ("http://evil.example", f"http://127.0.0.1:{port + 1}", "null", None):
+            assert not connects(viewer.url, origin), origin
+        assert not connects(viewer.url, f"http://evil.example:{port}", host="evil.example")
+        request = urllib.request.Request(viewer.url, headers={"Host": f"evil.example:{port}"})
+        with pytest.raises(urllib.error.HTTPError, match="403"):
+            urllib.request.urlopen(request, timeout=5.0)
+        assert not {"restart", "recalibrate", "record"} & set(viewer.asked())
+    finally:
+        viewer.close()
+
+
+@pytest.mark.parametrize(
+    ("served", "host", "origin", "taken"),
+    [
+        ("127.0.0.1", "127.0.0.1:8080", "http://127.0.0.1:8080", True),
+        ("127.0.0.1", "LocalHost:8080", "http://localhost:8080", True),
+        ("127.0.0.1", "localhost:9000", "http://localhost:9000", True),  # another port that is led here
+        ("127.0.0.1", "[::1]:8080", "http://[::1]:8080", True),
+        ("127.0.0.1", "192.168.0.7:8080", "http://192.168.0.7:8080", False),
+        ("127.0.0.1", "evil.example:8080", "http://evil.example:8080", False),
+        ("127.0.0.1", "localhost:8080@evil.example", "http://localhost:8080@evil.example", False),
+        ("127.0.0.1", "localhost.:8080", "http://localhost.:8080", False),
+        ("127.0.0.1", "", "http://", False),
+        ("0.0.0.0", "192.168.0.7:8080", "http://192.168.0.7:8080", True),
+        ("0.0.0.0", "evil.example:8080", "http://evil.example:8080", False),
+        ("0.0.0.0", f"{socket.gethostname()}:8080", f"http://{socket.gethostname()}:8080", True),
+        ("lab-pc", "lab-pc:8080", "http://lab-pc:8080", True),
+        ("192.168.0.7", "192.168.0.8:8080", "http://192.168.0.8:8080", False),
+    ],
+)
+def test_hosts_and_origins_that_are_our_own(served: str, host: str, origin: str, taken: bool) -> None:
+    pytest.importorskip("websockets")
+    from dynakin.stream.own_origin import refusal
+
+    assert (refusal(served, [host], [origin], websocket=True) is None) is taken
+    assert (refusal(served, [host], [], websocket=False) is None) is taken
+    assert refusal(served, [host], ["http://evil.example"], websocket=True) is not None
+    assert refusal(served, [host], [origin, origin], websocket=True) is not None
+    assert refusal(served, [host, host], [origin], websocket=True) is not None
+
+
+def test_names_are_shown_as_they_are() -> None:
+    strange = "<script>x()</script> ![a](/etc/passwd) **b** | _c_ [d](http://e) `f` &lt;\n# g"
+    shown = as_text(strange)
+    assert not set(shown) & set("<>![]()*|_`\n/") and html.unescape(shown) == strange.replace("\n", " ")
+    assert as_text("knee Größe 3") == "knee Größe 3"
 
 
 def test_without_viser_it_is_said_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -104,10 +104,9 @@ class Monitor:
         if word != "found":
             return []
         self._lost = False
-        return [
-            f"The motion is found again at {at:.2f} s, {at - before:.1f} s after it was last followed: markers used "
-            f"are {1e3 * self._distance(estimate, fused):.0f} mm off (RMS)."
-        ]
+        off_mm = 1e3 * self._distance(estimate, fused)
+        since = f", {at - before:.1f} s after it was last followed" if before == before else ""
+        return [f"The motion is found again at {at:.2f} s{since}; the markers used are {off_mm:.0f} mm off (RMS)."]
 
     def _distance(self, estimate: StepEstimate, fused: Fused) -> float:
         """RMS over the markers that were used, m, on the axes that the model measures."""

@@ -105,6 +105,12 @@ def in_words(names: Mapping[str, Any]) -> str:
     return (", ".join(names["first"]) or "none") + (f" and {more} more" if more else "")
 
 
+def as_text(text: str) -> str:
+    """Markdown that shows a text as it is: names come from files, and the page would take HTML, links and pictures of
+    this machine's files from them."""
+    return "".join(c if c.isalnum() or c == " " else f"&#{ord(c)};" if c.isprintable() else " " for c in text)
+
+
 def rotations(spec: _core.ModelSpec) -> list[bool]:
     """Of each coordinate whether it turns: unless every axis that it moves is a translation."""
     kinds: dict[str, set[str]] = {}

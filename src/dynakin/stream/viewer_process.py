@@ -15,7 +15,8 @@ import viser
 from viser import uplot
 
 from dynakin.stream.latest import Latest
-from dynakin.stream.picture import in_words, split
+from dynakin.stream.own_origin import OwnOrigin
+from dynakin.stream.picture import as_text, in_words, split
 
 _PERIOD_S = 1.0 / 30.0
 _PLOT_S = 0.1
@@ -31,7 +32,10 @@ class Page:
     """The page: a scene on the left, words, buttons and plots on the right."""
 
     def __init__(self, host: str, port: int) -> None:
-        self.server = viser.ViserServer(host=host, port=port, label="dynakin live", verbose=False)
+        with OwnOrigin(host) as own:
+            self.server = viser.ViserServer(host=host, port=port, label="dynakin live", verbose=False)
+        if not own.guards:  # a viser that serves in another way
+            raise RuntimeError(f"viser {viser.__version__} cannot be kept to its own origin; the page is not served")
         self.server.scene.set_up_direction("+y")
         self.server.gui.configure_theme(show_logo=False, show_share_button=False)
         self.server.scene.add_grid("/floor", 4.0, 4.0, plane="xz", cell_size=0.25, section_size=1.0)
@@ -101,11 +105,12 @@ class Page:
             aspect=2.2,
         )
 
-    def tell(self, text: str, phase: str) -> None:
+    def tell(self, text: str, phase: str, tracking: str) -> None:
         """Shows a sentence."""
-        self.said.append(text)
+        self.said.append(as_text(text))
         lines = [*list(self.said)[:-1], f"**{self.said[-1]}**"]
-        self.words.content = f"### dynakin live: {phase}\n" + "  \n".join(lines)
+        motion = f", motion {tracking}" if tracking in ("doubtful", "lost", "restarted") else ""
+        self.words.content = f"### dynakin live: {as_text(phase + motion)}\n" + "  \n".join(lines)
 
     def draw(self) -> None:
         """Shows the newest numbers, where there are any."""
@@ -163,7 +168,7 @@ class Page:
             rows.append(("Left out", f"{status['left_out']} frames: this computer is too slow"))
         if status["delay_s"]:
             rows.append(("Smoothed", f"{1e3 * status['delay_s']:.0f} ms later"))
-        self.status.content = "\n".join(["| | |", "|---|---|", *(f"| {a} | {b} |" for a, b in rows)])
+        self.status.content = "\n".join(["| | |", "|---|---|", *(f"| {a} | {as_text(b)} |" for a, b in rows)])
 
 
 def _place_camera(client: viser.ClientHandle) -> None:
@@ -209,7 +214,7 @@ def main(host: str, port: int) -> None:
             if "setup" in told:
                 page.begin(told["setup"])
             else:
-                page.tell(told["said"], told["phase"])
+                page.tell(told["said"], told["phase"], told["tracking"])
         page.draw()
         time.sleep(max(0.002, _PERIOD_S - (time.monotonic() - began)))
 
