@@ -441,7 +441,7 @@ def whole_body(model: Model, states: Annotated[NDArray[numpy.float64], dict(shap
 class RecoverySettings:
     """When the motion counts as lost, and how it is sought anew."""
 
-    def __init__(self, blind_s: float = 0.2, coordinate_sd: float = 0.5, speed_sd: float = 2.0, acceleration_sd: float = 20.0, unseen_sd: float = float('inf')) -> None: ...
+    def __init__(self, blind_s: float = 0.2, coordinate_sd: float = 0.5, speed_sd: float = 2.0, acceleration_sd: float = 20.0, unseen_sd: float = float('inf'), fit_m: float = 0.03) -> None: ...
 
 class FilterSettings:
     """Noise, bounds and constraints of a Filter, SI units."""
