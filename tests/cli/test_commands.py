@@ -17,6 +17,8 @@ from dynakin.results import OUTPUT_FILES
 
 Said = pytest.CaptureFixture[str]
 
+OF_THE_BODY = ("centre_of_mass.sto", "joint_reactions.sto", "joint_reactions_source.sto")
+
 
 def test_version(capsys: Said) -> None:
     assert main(["--version"]) == 0
@@ -89,7 +91,7 @@ def test_demo_compares_with_the_truth_and_says_where_the_report_lies(tmp_path: P
     assert main(["demo", "-o", str(out), "--duration", "6"]) == 0
     told = capsys.readouterr().out
     assert "RMS error against the truth" in told and str(out / "report.html") in told.replace("\n", "")
-    assert {entry.name for entry in out.iterdir()} == {*OUTPUT_FILES, "centre_of_mass.sto", "joint_reactions.sto"}
+    assert {entry.name for entry in out.iterdir()} == {*OUTPUT_FILES, *OF_THE_BODY}
     page = (out / "report.html").read_text()
     assert 'id="methods"' in page and "classical (6 Hz)" in page and "against AT" in page
 
@@ -173,5 +175,5 @@ def test_run_replaces_its_own_output_and_draws_figures(data_dir: Path, tmp_path:
     assert (tmp_path / "figures" / "figure3_sensitivity.svg").exists()
     assert (tmp_path / "figures" / "repetitions.pdf").exists()
     assert drawn == {".svg", ".pdf", ".png"} and str(tmp_path / "figures") in capsys.readouterr().out.replace("\n", "")
-    written = {*OUTPUT_FILES, "centre_of_mass.sto", "joint_reactions.sto"}
+    written = {*OUTPUT_FILES, *OF_THE_BODY}
     assert {entry.name for entry in (tmp_path / "out").iterdir()} == written
