@@ -64,7 +64,7 @@ void Filter::reset(const Eigen::VectorXd& x, const Eigen::MatrixXd& P) {
   x_ = x0_ = x_before_ = x_ahead_ = x;
   P_ = P0_ = P_before_ = P;
   unbelieved_s_ = 0.0;
-  shortest_step_s_ = k_infinity;
+  sought_s_ = shortest_step_s_ = k_infinity;
   held_ = false;
   last_ = StepReport{};
 }
@@ -76,6 +76,7 @@ void Filter::predict(double dt) {
   if (carried == dt || carried > 0.0) dynakin::predict(model_, settings_, carried, step_, x_, P_);
   if (carried < dt) decay(model_, settings_, dt - carried, step_, x_, P_);
   unbelieved_s_ += dt;
+  sought_s_ += dt;
 }
 
 StepReport Filter::update(const Eigen::Ref<const MarkerMatrix>& markers, const Vector6& wrench) {
@@ -215,6 +216,7 @@ void Filter::save(Checkpoint& out) const {
   out.P = P_;
   projection_.save(out.projection);
   out.unbelieved_s = unbelieved_s_;
+  out.sought_s = sought_s_;
   out.shortest_step_s = shortest_step_s_;
   out.held = held_;
   out.last = last_;
@@ -225,6 +227,7 @@ void Filter::restore(const Checkpoint& checkpoint) {
   P_ = checkpoint.P;
   projection_.restore(checkpoint.projection);
   unbelieved_s_ = checkpoint.unbelieved_s;
+  sought_s_ = checkpoint.sought_s;
   shortest_step_s_ = checkpoint.shortest_step_s;
   held_ = checkpoint.held;
   last_ = checkpoint.last;

@@ -136,15 +136,18 @@ bool Filter::turn_towards(const MarkerRef& markers) {
   return true;
 }
 
-// Holds the motion for a trial: true, and sought and found, where fewer markers than so many are refused then; else
-// nothing has changed.
+// Seeks a motion for a trial, of the coordinates that are held unseen or else of all: true, and found, where so many
+// markers at most are refused then; else nothing has changed.
 bool Filter::seek_better(const MarkerRef& markers, const Vector6& wrench, int refused) {
   const Eigen::VectorXd x = x_;
   const Eigen::MatrixXd P = P_;
   const std::vector<std::uint8_t> forgotten = tape_ ? tape_->forgotten : std::vector<std::uint8_t>();
   const bool any_forgotten = tape_ && tape_->any_forgotten;
-  hold_motion();
-  if (2 * gate_.markers_measured() >= measurement_.markers_in_use() && seek_motion(markers, refused - 1)) return true;
+  if (2 * gate_.markers_measured() >= measurement_.markers_in_use()) {
+    if (unseen_ && seek_motion(markers, refused)) return true;
+    hold_motion();
+    if (seek_motion(markers, refused)) return true;
+  }
   x_ = x;
   P_ = P;
   if (tape_) {
@@ -157,15 +160,21 @@ bool Filter::seek_better(const MarkerRef& markers, const Vector6& wrench, int re
   return false;
 }
 
-// RMS over the markers that are accepted, m, from where the last evaluation has them; 0 without any.
+// Of a marker from where the last evaluation has it, m^2, on the axes that are measured.
+double Filter::squared_distance(const MarkerRef& markers, std::size_t m) const {
+  double sum = 0.0;
+  for (int k = 0; k < 3; ++k)
+    if (model_.markers()[m].measured[k]) sum += std::pow(markers(k, m) - measurement_.kinematics().markers[m](k), 2);
+  return sum;
+}
+
+// RMS over the markers that are accepted, m; 0 without any.
 double Filter::distance(const MarkerRef& markers) const {
   double sum = 0.0;
   int count = 0;
   for (std::size_t m = 0; m < model_.markers().size(); ++m) {
     if (gate_.verdicts()[m] != Verdict::accepted) continue;
-    const Marker& marker = model_.markers()[m];
-    for (int k = 0; k < 3; ++k)
-      if (marker.measured[k]) sum += std::pow(markers(k, m) - measurement_.kinematics().markers[m](k), 2);
+    sum += squared_distance(markers, m);
     ++count;
   }
   return count == 0 ? 0.0 : std::sqrt(sum / count);
@@ -179,41 +188,65 @@ double Filter::distance_within_bounds(const MarkerRef& markers) {
   return distance(markers);
 }
 
+// Corrects so that the markers used lie within fit_m of the estimate; those that lie further off are refused, and the
+// rest is used without them. False, and nothing done, where most would have to be refused.
+bool Filter::correct_to_fit(const MarkerRef& markers, const Vector6& wrench) {
+  constexpr int rounds = 3;
+  const double most = settings_.recovery.fit_m;
+  const Eigen::VectorXd x = x_;
+  const Eigen::MatrixXd P = P_;
+  for (int round = 0; round < rounds; ++round) {
+    sums_ = correct(markers, wrench);
+    if (!sums_.factored) return true;  // broken down, which the step will say
+    x_ahead_ = x_;
+    retract(x_ahead_, dx_);
+    if (distance_within_bounds(markers) <= most) return true;
+    for (std::size_t m = 0; m < model_.markers().size(); ++m)
+      if (gate_.verdicts()[m] == Verdict::accepted && !(squared_distance(markers, m) <= most * most))
+        gate_.decide(static_cast<int>(m), Verdict::refused);
+    x_ = x;
+    P_ = P;
+    measurement_.linearise(x_, markers, wrench);
+    if (2 * gate_.markers_refused() > gate_.markers_measured()) return false;
+  }
+  return false;
+}
+
 // Corrects a motion that is followed. Where the markers used are far from what was predicted it is known so badly that
-// the gate may have agreed with anything. If they are far from the corrected estimate too, or other markers are
-// refused, as all those of a segment that went astray, then a motion that fits more of them is sought; without one,
-// what does not fit is not used, and the rest is.
+// the gate may have agreed with anything; where a coordinate is held unseen, the gate, which knows tangents only, may
+// refuse the markers of a segment that has turned too far. If some do not fit the corrected estimate either, or were
+// refused, as all those of a segment that went astray, then a motion that leaves half as many out is sought; that takes
+// long and costs all that is known of speeds, so it is not tried again before blind_s has passed.
 Tracking Filter::fit(const MarkerRef& markers, const Vector6& wrench) {
   if (gate_.markers_measured() == 0) {
     sums_ = correct(markers, wrench);
     return Tracking::following;
   }
-  const double most = settings_.recovery.fit_m;
-  Tracking tracking = Tracking::following;
-  if (distance(markers) > most) {
+  const bool astray = unseen_ && gate_.markers_refused() > 0;
+  if (distance(markers) <= settings_.recovery.fit_m && !astray) {
+    sums_ = correct(markers, wrench);
+  } else {
     const Eigen::VectorXd x = x_;
     const Eigen::MatrixXd P = P_;
-    const int refused = gate_.markers_refused();
-    sums_ = correct(markers, wrench);
-    if (!sums_.factored) return tracking;
-    x_ahead_ = x_;
-    retract(x_ahead_, dx_);
-    const bool fits = distance_within_bounds(markers) <= most;
-    if (!fits || refused > 0) {
+    bool fits = correct_to_fit(markers, wrench);
+    if ((!fits || gate_.markers_refused() > 0) && sought_s_ > settings_.recovery.blind_s) {
+      sought_s_ = 0.0;
       x_ = x;
       P_ = P;
-      if (seek_better(markers, wrench, fits ? refused : gate_.markers_measured())) {
-        tracking = Tracking::found;
-      } else {
-        if (!fits) tracking = doubt();
-        sums_ = correct(markers, wrench);
+      if (seek_better(markers, wrench, (fits ? gate_.markers_refused() : gate_.markers_measured()) / 2)) {
+        unbelieved_s_ = 0.0;
+        return Tracking::found;
       }
+      fits = correct_to_fit(markers, wrench);
     }
-  } else {
-    sums_ = correct(markers, wrench);
+    if (!fits) {
+      const Tracking tracking = doubt();
+      sums_ = correct(markers, wrench);
+      return tracking;
+    }
   }
-  if (tracking != Tracking::doubtful) unbelieved_s_ = 0.0;
-  return tracking;
+  unbelieved_s_ = 0.0;
+  return Tracking::following;
 }
 
 void Filter::forget(int element, double variance) {
@@ -237,8 +270,12 @@ void Filter::hold_coordinate(int i) {
 // range; it is held instead.
 void Filter::hold_unseen() {
   const double most = settings_.recovery.unseen_sd * settings_.recovery.unseen_sd;
-  for (int i = 0; i < model_.n_free(); ++i)
-    if (P_(i, i) > most) hold_coordinate(i);
+  unseen_ = false;
+  for (int i = 0; i < model_.n_free(); ++i) {
+    if (!(P_(i, i) > most)) continue;
+    hold_coordinate(i);
+    unseen_ = true;
+  }
 }
 
 // All coordinates. What is known of constants, soft tissue and plates stays, apart from what it had to do with the
@@ -296,10 +333,7 @@ bool Filter::judge_by_distance(const MarkerRef& markers) {
       for (int c : {marker.column[k], marker.soft_tissue[k]})
         if (c != k_none) variance = std::max(variance, P_before_(c, c));
     variance = 2.0 * variance + settings_.marker_variance(m);
-    double distance = 0.0;
-    for (int k = 0; k < 3; ++k)
-      if (marker.measured[k]) distance += std::pow(markers(k, m) - measurement_.kinematics().markers[m](k), 2);
-    const bool fits = distance <= settings_.marker_gate[marker.n_measured - 1] * variance;
+    const bool fits = squared_distance(markers, m) <= settings_.marker_gate[marker.n_measured - 1] * variance;
     const Verdict verdict = fits ? Verdict::accepted : Verdict::refused;
     changed = changed || verdict != gate_.verdicts()[m];
     gate_.decide(static_cast<int>(m), verdict);

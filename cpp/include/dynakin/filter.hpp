@@ -17,9 +17,9 @@ namespace dynakin {
 enum class StepStatus { ok, no_measurement, innovation_not_definite, not_finite, variance_not_positive };
 const char* describe(StepStatus status);
 
-// What the filter makes of its own estimate. doubtful: most markers were refused, or those used would still be further
-// than recovery.fit_m from the estimate, so nothing of the frame was used; lost: so, or unseen, for longer than
-// recovery.blind_s, the motion is held until it is found; found: sought anew in this frame, and the markers fit;
+// What the filter makes of its own estimate. doubtful: most markers were refused, or would be further than
+// recovery.fit_m from the estimate that they gave, so nothing of the frame was used; lost: so, or unseen, for longer
+// than recovery.blind_s, the motion is held until it is found; found: sought anew in this frame, and the markers fit;
 // restarted: the numbers had broken down, everything starts again from x0, and the motion is to be found.
 enum class Tracking : std::uint8_t { following, doubtful, lost, found, restarted };
 const char* describe(Tracking tracking);
@@ -71,7 +71,7 @@ class Filter {
     Eigen::VectorXd x;
     Eigen::MatrixXd P;
     Projection::Memory projection;
-    double unbelieved_s = 0.0, shortest_step_s = k_infinity;
+    double unbelieved_s = 0.0, sought_s = k_infinity, shortest_step_s = k_infinity;
     bool held = false;
     StepReport last;
   };
@@ -97,8 +97,10 @@ class Filter {
   Tracking believe(const MarkerRef& markers);
   Tracking doubt();
   Tracking seek(const MarkerRef& markers);
+  double squared_distance(const MarkerRef& markers, std::size_t m) const;
   double distance(const MarkerRef& markers) const;
   double distance_within_bounds(const MarkerRef& markers);
+  bool correct_to_fit(const MarkerRef& markers, const Vector6& wrench);
   Tracking fit(const MarkerRef& markers, const Vector6& wrench);
   void leave_out_refused();
   double uncertainty_seen() const;
@@ -126,9 +128,11 @@ class Filter {
   SigmoidBounds sigmoid_{model_.state_size()};
   Projection projection_;
   UpdateSums sums_;
-  double unbelieved_s_ = 0.0;  // since a frame whose markers were believed
+  double unbelieved_s_ = 0.0;     // since a frame whose markers were believed
+  double sought_s_ = k_infinity;  // since a better motion was last sought than one that is followed
   double shortest_step_s_ = k_infinity;
-  bool held_ = false;  // the motion is lost, and to be found before anything is believed
+  bool unseen_ = false;  // coordinates are held in this frame, because nothing is seen of them
+  bool held_ = false;    // the motion is lost, and to be found before anything is believed
   StepReport last_;
   FrameTape* tape_ = nullptr;
 };
