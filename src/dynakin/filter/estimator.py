@@ -156,7 +156,7 @@ class Estimator:
                 arrays = self.run_smoothed_arrays(recording.time, markers, wrench, back, on_feet)
         except ValueError as error:  # a frame that the core refuses, named by it
             raise RecordingError(f"{recording.path or recording.name}: {error}") from None
-        config = self.settings() | {"smooth": smooth}
+        config = self.settings() | {"smooth": smooth, "ground_reasons": list(ground.reasons)}
         notes += [*([doubt] if doubt else clock if ground.usable else []), *unsmoothed]
         assert self._filter is not None
         covariances = (initial_covariance(initial, self.noise), self._filter.covariance)
