@@ -51,7 +51,8 @@ def compute_metrics(estimate: Estimate, failures: Failures | None = None) -> dic
     Args:
         failures: takes what fails, whose block is None then; not given: it is raised.
     """
-    estimate = facing(estimate)
+    with nullcontext() if failures is None else failures.stage("figures along the way the person faces"):
+        estimate = facing(estimate)
     window = evaluation_window(estimate.time)
     kept = estimate.time[window]
     good = window & ~estimate.lost  # for what is made of `state`, which keeps what the filter held
