@@ -86,6 +86,16 @@ def test_standing_on_a_plate_that_fails_for_a_frame_has_no_peak() -> None:
     assert "not measured in every frame" in found["reason"]
 
 
+@pytest.mark.parametrize("window", [(0, 31), (0, 10), (25, 60), (60, 75), (100, 101)])
+def test_a_foot_that_changes_once_in_the_window_or_never_has_no_stance_to_count(window: tuple[int, int]) -> None:
+    walker = make_walker(ALL)  # the left knee is nowhere measured in a stance
+    frames = np.zeros(301, dtype=bool)
+    frames[slice(*window)] = True
+    found = counted(walker, frames)
+    assert not found[~frames].any() and found[frames, 0].all() == (moment_sources(walker.data)[frames, 0] == 0).all()
+    assert not found[:, 2].any() or (moment_sources(walker.data)[frames, 2] == 0).all()
+
+
 def test_frames_are_counted_by_leg_and_said_with_the_reason() -> None:
     found = compute_metrics(make_walker((2,)))["moments"]
     assert found["legs"] == {

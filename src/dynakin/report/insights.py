@@ -16,6 +16,7 @@ from dynakin.report.labels import (
     short_marker_names,
     words,
 )
+from dynakin.report.section import needs
 from dynakin.results import Estimate
 from dynakin.results.bounds import counts_in_words
 from dynakin.results.consistency import CONSISTENT
@@ -108,6 +109,7 @@ def insights(estimate: Estimate, metrics: dict[str, Any]) -> list[Insight]:
     return [insight for insight in found if insight is not None]
 
 
+@needs("moments", otherwise=None)
 def _moments(metrics: dict[str, Any]) -> Insight | None:
     """Why moments are not measured, and what that leaves out; how many are is said before all findings."""
     found = metrics["moments"]
@@ -142,6 +144,7 @@ def _tracking(metrics: dict[str, Any]) -> Insight | None:
     return Insight("warning", "Lost", found["verdict"] + whole, advice)
 
 
+@needs("markers", otherwise=None)
 def _markers(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     mean = metrics["markers"]["mean_rms_mm"]
     if mean is None:
@@ -168,6 +171,7 @@ def _markers(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     )
 
 
+@needs("wrench", otherwise=None)
 def _wrench(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     rms = metrics["wrench"]["rms"]
     told = [text for text in estimate.messages if text.startswith(PLATE_WORDS)]
@@ -187,6 +191,7 @@ def _wrench(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     )
 
 
+@needs("prediction", "wrench", otherwise=None)
 def _prediction(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     """How much of the fit is the model, and how much is following the measurement of the same frame."""
     ahead, fitted = metrics["prediction"]["wrench"]["rms"], metrics["wrench"]["rms"]
@@ -217,6 +222,7 @@ def _prediction(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     )
 
 
+@needs("consistency", otherwise=None)
 def _consistency(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     if estimate.why_lost is not None:
         return None
@@ -273,7 +279,8 @@ def _constants(estimate: Estimate) -> list[Insight]:
     return found
 
 
-def _bounds(estimate: Estimate, metrics: dict[str, Any]) -> Insight:
+@needs("bounds", otherwise=None)
+def _bounds(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     free = [p for p in estimate.parameters if p.estimated and p.lower is not None]
     names = short_marker_names(estimate.marker_names)
     stuck = [parameter_label(p, names) for p in free if p.at_bound]
@@ -298,6 +305,7 @@ def _bounds(estimate: Estimate, metrics: dict[str, Any]) -> Insight:
     )
 
 
+@needs("adaptation", otherwise=None)
 def _adaptation(metrics: dict[str, Any]) -> Insight | None:
     """When the estimate settled, beside the time from which the figures are taken."""
     found = metrics["adaptation"]
@@ -316,6 +324,7 @@ def _adaptation(metrics: dict[str, Any]) -> Insight | None:
     )
 
 
+@needs("soft_tissue", otherwise=None)
 def _soft_tissue(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     """Markers that move on their segments further than skin does."""
     names = short_marker_names(estimate.marker_names)
@@ -351,7 +360,8 @@ def _joint_limits(estimate: Estimate) -> Insight | None:
     return Insight("warning", "Joint limits", f"Held at its limit for part of the time: {listed(stuck)}.")
 
 
-def _missing(estimate: Estimate, metrics: dict[str, Any]) -> Insight:
+@needs("events", otherwise=None)
+def _missing(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     gaps: dict[str, int] = metrics["events"]["missing_frames"]
     if not gaps:
         return Insight("good", "Gaps", "Every marker in use was measured in every frame.")

@@ -86,6 +86,16 @@ def compute_metrics(estimate: Estimate, failures: Failures | None = None) -> dic
     return metrics
 
 
+def known_metrics(estimate: Estimate, failures: Failures) -> dict[str, Any]:
+    """`Estimate.metrics`, or what of it can be had."""
+    try:
+        return estimate.metrics()
+    except OSError:
+        raise
+    except Exception:  # each block by its own name
+        return compute_metrics(estimate, failures)
+
+
 def _prediction(estimate: Estimate, window: np.ndarray) -> dict[str, Any]:
     return {
         "what": "one frame ahead: the model's expectation before the frame is used",

@@ -9,6 +9,8 @@ from typing import Literal
 ParameterKind = Literal["length", "marker", "inertia", "plates"]
 NOT_SMOOTHED = "Not smoothed:"
 """How the message begins of a run whose settings have no smoother."""
+MASS_DOUBTED = "check the mass"
+"""What the message says of a run in which the plates contradict the mass."""
 
 EventKind = Literal["missing", "gated", "at_bound", "reset", "note"]
 EVENT_KINDS: tuple[EventKind, ...] = ("missing", "gated", "at_bound", "reset", "note")

@@ -32,6 +32,13 @@ NOTES = (
 """What the codes say, for the headers of files."""
 REASON = re.compile(r"left out there|total wrench is left out|not used|set aside|no moments|nothing declares|absent")
 """How the messages of a run that leaves out the ground's reaction, and with it moments, can be known."""
+UNKNOWN: dict[str, Any] = {
+    "legs": {},
+    "frames": 0,
+    "reasons": [],
+    "verdict": "Which moments are measured is not known: their block in metrics.json was not made.",
+}
+"""In the place of `moment_figures` where these failed."""
 
 
 def moment_sources(data: xr.Dataset) -> Codes:
