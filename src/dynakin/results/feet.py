@@ -11,6 +11,7 @@ import xarray as xr
 from dynakin.results import sources
 from dynakin.results.estimate import COMPONENTS
 from dynakin.results.naming import plural
+from dynakin.units import GRAVITY_M_S2
 
 if TYPE_CHECKING:
     from dynakin.results.estimate import Estimate
@@ -71,7 +72,7 @@ def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str,
         "unknown_frames": int((codes == sources.ABSENT).any(axis=1).sum()),
         "left_at_root": left,
     }
-    weight = 9.80665 * (estimate.mass_kg or 0.0)
+    weight = GRAVITY_M_S2 * (estimate.mass_kg or 0.0)
     return figures | {"verdict": _words(figures, int(grounded.sum()), len(contact), FLIGHT * weight)}
 
 
