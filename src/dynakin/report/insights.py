@@ -22,6 +22,7 @@ from dynakin.results.bounds import counts_in_words
 from dynakin.results.consistency import CONSISTENT
 from dynakin.results.failures import FAILED, LOG
 from dynakin.results.metrics import ADAPTATION_S, evaluation_window, speed_consistency, window_consistency
+from dynakin.results.records import MASS_DOUBTED
 from dynakin.results.soft_tissue import excess_in_words
 
 # Expected one frame ahead against seen: further apart than this, the estimate follows the measurements.
@@ -88,6 +89,7 @@ def in_short(found: list[Insight]) -> str:
 def insights(estimate: Estimate, metrics: dict[str, Any]) -> list[Insight]:
     """All findings, in the order of the report."""
     found = [
+        _mass(estimate),
         _failed(estimate),
         _tracking(metrics),
         _moments(metrics),
@@ -125,6 +127,14 @@ def _moments(metrics: dict[str, Any]) -> Insight | None:
         text.append(f"{plural(len(found['reasons']) - 3, 'more reason')} under Joint moments.")
     advice = "Give the forces of every contact (--forces), and plates under every step that is to be judged."
     return Insight("warning", "Joint moments", " ".join(text), advice)
+
+
+def _mass(estimate: Estimate) -> Insight | None:
+    """Plates that contradict the mass: forces, moments and inertia are all wrong then."""
+    told = [text.removeprefix("Warning: ") for text in estimate.messages if MASS_DOUBTED in text]
+    if not told:
+        return None
+    return Insight("warning", "Mass", sentence(" ".join(told)), "Give the mass as weighed, with all that is worn.")
 
 
 def _failed(estimate: Estimate) -> Insight | None:
@@ -174,7 +184,7 @@ def _markers(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
 @needs("wrench", otherwise=None)
 def _wrench(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     rms = metrics["wrench"]["rms"]
-    told = [text for text in estimate.messages if text.startswith(PLATE_WORDS)]
+    told = [text for text in estimate.messages if text.startswith(PLATE_WORDS) and MASS_DOUBTED not in text]
     if not rms:
         why = " ".join(told) or "No wrench was compared: none was measured, or none is modelled."
         return Insight("warning" if told else "note", "Force plates", why.removeprefix("Warning: "))

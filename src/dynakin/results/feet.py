@@ -134,9 +134,11 @@ def _words(figures: dict[str, Any], grounded: int, frames: int, weight_n: float)
             text.append(f"{_up_to(left['grounded'])} are left at the root {where}: no contact accounts for them.")
     if left["flight"] is not None:
         flight = plural(figures["flight_frames"], "frame")
-        text.append(f"{_up_to(left['flight'])} are left in the {flight} in which no foot touches the ground.")
-        if left["flight"]["force_n"] > weight_n > 0.0:
-            text.append("That is no flight: something that is not measured carries the person.")
+        large = left["flight"]["force_n"] > weight_n > 0.0
+        text.append(
+            f"{_up_to(left['flight'])} are left in flight ({flight} in which no foot touches the ground)"
+            + (": the model's error, or a contact that is not measured." if large else ".")
+        )
     if count := figures["derived_frames"]:
         text.append(f"In {count} of {frames} frames one contact was not measured: what hangs on it is derived.")
     if count := figures["unknown_frames"]:

@@ -122,6 +122,12 @@ def in_words(time: Array, found: Tracking) -> str:
     return f"the person was lost: {'; '.join(parts)}."
 
 
+def lost_in_words(estimate: Estimate) -> str:
+    """`in_words` of an estimate; empty where nobody was lost."""
+    found = estimate.tracking
+    return in_words(estimate.time, found) if found is not None and found.lost.any() else ""
+
+
 def times(time: Array, flags: Mask, limit: int = 4) -> str:
     """Stretches of frames as times: `0.10 to 0.55 s, 1.20 to 1.31 s and 2 more`."""
     parts = [f"{time[first]:.2f} to {time[end - 1]:.2f} s" for first, end in runs(flags)]
