@@ -18,6 +18,8 @@ from dynakin.recordings import Recording
 from dynakin.results import Estimate
 from dynakin.results.angles import angle_columns, with_angles
 from dynakin.results.facing import PELVIS, facing, nearly_singular
+from dynakin.results.failures import Failures
+from dynakin.results.tracking import without_lost
 
 Array = npt.NDArray[np.float64]
 QUARTER = Rotation.from_euler("Y", 90.0, degrees=True).as_matrix()
@@ -100,3 +102,27 @@ def test_a_lean_near_the_singularity_is_said(data_dir: Path) -> None:
     data["coordinates"].loc[{"coordinate": "pelvis_list"}][7] = np.radians(-84.0)
     (said,) = nearly_singular(replace(estimate, data=data))
     assert said.startswith("Warning: pelvis_list reaches -84 deg at 2.07 s") and "--forward" in said
+
+
+def test_lost_frames_of_who_faces_off_x_stay_lost_and_lose_nothing_else(data_dir: Path, tmp_path: Path) -> None:
+    trial = read(data_dir / "opencap_subject4/squats1.trc", data_dir / "opencap_subject4/squats1_grf.mot")
+    trial = turned(trial.window(2.0, 6.0), QUARTER)
+    markers = trial.markers.copy()
+    gap = slice(200, 230)
+    markers[gap] = np.nan
+    trial = replace(trial, markers=markers)
+    estimate = Estimator(load_model("fullbody", Subject(mass_kg=60.05, height_m=1.70))).run(trial, smooth=False)
+    assert estimate.lost[205:230].any() and not estimate.lost[:195].any()
+    failures = Failures()
+    estimate.save(tmp_path / "gap", failures=failures)
+    assert failures.messages() == []
+    faced = of(facing(estimate), "coordinates", list(PELVIS))
+    np.testing.assert_array_equal(np.isnan(faced).any(axis=1), estimate.lost)
+    assert np.degrees(np.nanmax(np.abs(faced[:, 1:]))) < 12.0  # turned before the gap and after it
+
+    held = estimate.data.assign(tracking=("time", np.full(len(estimate.time), 2)))
+    nothing = without_lost(replace(estimate, data=held, messages=[]))
+    assert nothing.lost.all() and nearly_singular(nothing) == []
+    nothing.save(tmp_path / "lost", failures=failures, keep_lost=True)
+    assert failures.messages() == []
+    assert (tmp_path / "lost" / "report.html").exists()

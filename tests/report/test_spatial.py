@@ -98,8 +98,9 @@ def test_moments_are_per_kg_and_derived_ones_dashed(spatial: Estimate, metrics: 
     assert "stroke-dasharray" in knee.svg and knee.svg.count("stroke-dasharray") == 1  # the left one only
     assert "N m/kg</text>" in hip.svg
     assert section.text.startswith(
-        "Leg moments: right measured in 551 of 601 frames and absent in 50; left measured in 451, derived from the "
-        "motion in 100 and absent in 50."
+        "Leg moments: right: knee measured in 601 of 601 frames, hip measured in 551 and absent in 50; left: knee "
+        "measured in 501 and derived from the motion in 100, hip measured in 451, derived from the motion in 100 and "
+        "absent in 50."
     )
     assert hip.note == "right no whole measured stance; left no whole measured stance"
     assert any(line.label == "derived from the motion" for line in section.lines)

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+import io
 import json
+from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 from synthetic_estimate import make_estimate
+from walking_estimate import make_walker
 
 import dynakin.report
+from dynakin.cli import summary
 from dynakin.errors import OutputError
 from dynakin.results import OUTPUT_FILES, Estimate, check_output_writable, metrics, save
 from dynakin.results.failures import Failures
@@ -60,3 +66,41 @@ def test_a_figure_or_a_file_that_fails_is_left_out_and_named_on_the_page(
 def test_a_full_disk_is_no_stage(short: Estimate) -> None:
     with pytest.raises(OSError, match="No space"), Failures().stage("report.html"):
         raise OSError(28, "No space left on device")
+
+
+FUNCTIONS = {
+    "markers": "_markers",
+    "wrench": "_wrench",
+    "prediction": "_prediction",
+    "consistency": "_consistency",
+    "adaptation": "adaptation",
+    "bounds": "parameter_bounds",
+    "soft_tissue": "soft_tissue",
+    "identifiability": "learned",
+    "moments": "moment_figures",
+    "peak_moments_per_kg": "_peak_moments",
+    "work": "work",
+    "asymmetry": "asymmetry",
+    "feet": "foot_figures",
+    "tracking": "tracking_figures",
+    "events": "_events",
+}
+"""What makes each block of ``metrics.json``."""
+
+
+@pytest.mark.parametrize("block", FUNCTIONS)
+@pytest.mark.parametrize("make", [make_walker, partial(make_estimate, 1.0)], ids=["space", "plane"])
+def test_page_and_console_bear_any_block_that_failed(
+    block: str, make: Callable[..., Estimate], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    estimate, text = make(), io.StringIO()
+    monkeypatch.setattr(metrics, FUNCTIONS[block], broken)
+    monkeypatch.setattr(summary, "out", lambda: Console(file=text, width=200))
+    failures = Failures()
+    folder = estimate.save(tmp_path / "out", failures=failures)
+    known = {"markers": {"markers in metrics.json", "prediction in metrics.json"}}
+    known["wrench"] = {"wrench in metrics.json", "prediction in metrics.json"}
+    assert {failure.stage for failure in failures.found} == known.get(block, {f"{block} in metrics.json"})
+    assert "Not made" in (folder / "report.html").read_text()
+    summary.print_summary(estimate, folder)
+    assert "Report" in text.getvalue()

@@ -104,7 +104,7 @@ def test_trc_of_a_single_frame(tmp_path: Path) -> None:
 
 def test_parameters_json_is_strict_json_with_every_parameter(folder: Path, estimate: Estimate) -> None:
     content = json.loads((folder / "parameters.json").read_text(), parse_constant=pytest.fail)
-    assert content["schema_version"] == 1
+    assert content["schema_version"] == 2
     found = {entry["name"]: entry for entry in content["parameters"]}
     assert set(found) == {p.name for p in estimate.parameters}
     thigh = found["length/thigh"]
@@ -114,7 +114,7 @@ def test_parameters_json_is_strict_json_with_every_parameter(folder: Path, estim
 
 def test_netcdf_gives_everything_back_with_labels(folder: Path, estimate: Estimate) -> None:
     with xr.open_dataset(folder / "estimate.nc", engine="h5netcdf") as data:
-        assert data.attrs["schema_version"] == 1
+        assert data.attrs["schema_version"] == 2
         for name, variable in estimate.data.data_vars.items():
             np.testing.assert_array_equal(data[name].values, variable.values)
         knee = data["coordinates"].sel(coordinate="knee")

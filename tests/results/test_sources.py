@@ -15,11 +15,13 @@ from walking_estimate import MASS_KG, STANCE_S, make_walker
 
 from dynakin.cli import summary
 from dynakin.recordings import read_table
+from dynakin.report.insights import in_short, insights
 from dynakin.results import Estimate, Repetition, compute_metrics
 from dynakin.results.feet import NOT_MEASURED
 from dynakin.results.mean_curves import curve_points, mean_curves, signals, write_curves
-from dynakin.results.sources import ABSENT, DERIVED, legs_of, measured_moments, moment_sources
+from dynakin.results.sources import ABSENT, DERIVED, legs_of, measured_moments, moment_figures, moment_sources
 from dynakin.results.stances import counted, phases
+from dynakin.results.tracking import without_lost
 
 PEAK_N = 700.0
 ALL = (0, 1, 2, 3)
@@ -86,6 +88,16 @@ def test_standing_on_a_plate_that_fails_for_a_frame_has_no_peak() -> None:
     assert "not measured in every frame" in found["reason"]
 
 
+@pytest.mark.parametrize("window", [(0, 31), (0, 10), (25, 60), (60, 75), (100, 101)])
+def test_a_foot_that_changes_once_in_the_window_or_never_has_no_stance_to_count(window: tuple[int, int]) -> None:
+    walker = make_walker(ALL)  # the left knee is nowhere measured in a stance
+    frames = np.zeros(301, dtype=bool)
+    frames[slice(*window)] = True
+    found = counted(walker, frames)
+    assert not found[~frames].any() and found[frames, 0].all() == (moment_sources(walker.data)[frames, 0] == 0).all()
+    assert not found[:, 2].any() or (moment_sources(walker.data)[frames, 2] == 0).all()
+
+
 def test_frames_are_counted_by_leg_and_said_with_the_reason() -> None:
     found = compute_metrics(make_walker((2,)))["moments"]
     assert found["legs"] == {
@@ -99,6 +111,43 @@ def test_frames_are_counted_by_leg_and_said_with_the_reason() -> None:
     assert found["reasons"] == make_walker((2,)).messages[-1:]
     whole = compute_metrics(make_walker())["moments"]
     assert whole["verdict"] == "Leg moments: measured in all 301 frames." and whole["reasons"] == []
+
+
+def test_legs_are_said_by_joint_where_these_differ() -> None:
+    """Both feet touch one plate: only the hips are absent, and 0.1 said that of all the legs."""
+    walker = make_walker()
+    renamed = {"knee_angle_r": "subtalar_angle_r", "knee_angle_l": "hip_flexion_l"}
+    data = walker.data.copy(deep=True)
+    data["moments"][:, 2] = np.nan
+    data["moments"][:20, 1] = np.nan
+    names = [renamed.get(name, name) for name in walker.coordinate_names]
+    found = compute_metrics(replace(walker, data=data.assign_coords(coordinate=names)))["moments"]
+    assert found["verdict"] == "Leg moments: right measured in 281 of 301 frames and absent in 20; left absent in 301."
+    both = data.assign_coords(coordinate=names).sel(coordinate=[names[1], names[1], names[2]])
+    both = both.assign_coords(
+        coordinate=["ankle_angle_l", "subtalar_angle_l", "hip_flexion_l"],
+        coordinate_segment=("coordinate", ["foot_l", "foot_l", "shank_l"]),
+    )
+    both["moments"][:30, 0] = np.nan  # the joint is not known where one of its coordinates is not
+    found = moment_figures(replace(walker, data=both))
+    assert found["verdict"] == (
+        "Leg moments: left: ankle measured in 271 of 301 frames and absent in 30, hip absent in 301."
+    )
+    assert found["coordinates"]["subtalar_angle_l"]["measured"] == 281 and found["legs"]["left"]["absent"] == 301
+
+
+def test_reasons_are_the_grounds_and_of_lost_frames_whatever_other_messages_say() -> None:
+    """0.1 sought words: a column not used was a reason, plates that are NaN were none."""
+    walker = make_walker((2,))
+    other = "columns not used: emg_1."
+    said = replace(walker, messages=[*walker.messages, other])
+    assert other not in compute_metrics(said)["moments"]["reasons"]
+    assert compute_metrics(replace(said, config={}))["moments"]["reasons"] == []
+    plates = replace(said, config={"ground_reasons": ["Warning: the plates are silent from 1.70 to 2.30 s."]})
+    assert compute_metrics(plates)["moments"]["reasons"] == ["the plates are silent from 1.70 to 2.30 s."]
+    held = plates.data.assign(tracking=("time", np.where(np.arange(301) < 10, 2, 0)))
+    reasons = compute_metrics(without_lost(replace(plates, data=held)))["moments"]["reasons"]
+    assert len(reasons) == 2 and reasons[1].startswith("the person was lost: 10 of 301 frames")
 
 
 def test_legs_are_found_without_feet_too() -> None:
@@ -206,7 +255,11 @@ def test_nothing_left_at_the_root_is_said_by_the_numbers_only() -> None:
     assert "in the 141 of 301 frames" in compute_metrics(replace(walker, data=seated))["feet"]["verdict"]
     data["foot_contact"][:] = 0  # both feet "in the air" for three seconds
     flying = compute_metrics(replace(walker, data=data))["feet"]["verdict"]
-    assert "Nothing is left" not in flying and "That is no flight" in flying
+    assert (
+        "Nothing is left" not in flying
+        and "are left in flight (" in flying
+        and "or a contact that is not measured" in flying
+    )
     data["foot_contact"][:] = NOT_MEASURED
     unknown = compute_metrics(replace(walker, data=data))["feet"]
     assert unknown["left_at_root"] == {"grounded": None, "flight": None}
@@ -220,3 +273,18 @@ def test_the_console_says_first_what_is_measured(monkeypatch: pytest.MonkeyPatch
     first, second = text.getvalue().splitlines()[:2]
     assert first.startswith("Leg moments: right measured in 301 of 301 frames")
     assert "off the plates from 1.70 to 2.30 s" in second
+
+
+def test_the_console_says_warnings_before_figures_and_the_mass_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    walker, text = make_walker(), io.StringIO()
+    light = "Warning: the plates carry 70.0 kg on average where the person weighs 40.0 kg: check the mass."
+    doubted = replace(walker, messages=["Warning: something else.", light, "A note."])
+    monkeypatch.setattr(summary, "out", lambda: Console(file=text, width=200))
+    summary.print_summary(doubted, Path("out"))
+    lines = text.getvalue().splitlines()
+    assert lines[1:3] == [light, "Warning: something else."]
+    assert lines[0].startswith("Leg moments:") and "Verdict:" not in "".join(lines[:5])
+    (first, *others) = insights(doubted, compute_metrics(doubted))
+    assert (first.level, first.title) == ("warning", "Mass") and "check the mass" in first.text
+    assert not any("check the mass" in insight.text for insight in others)
+    assert in_short([first, *others]).split(": ")[1].startswith("mass")

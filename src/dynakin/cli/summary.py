@@ -11,24 +11,31 @@ from rich.table import Table
 from dynakin.cli.console import out, table
 from dynakin.results import Estimate
 from dynakin.results.bounds import counts_in_words
-from dynakin.results.records import NOT_SMOOTHED
+from dynakin.results.failures import Failures
+from dynakin.results.metrics import known_metrics
+from dynakin.results.records import MASS_DOUBTED, NOT_SMOOTHED
+from dynakin.results.sources import UNKNOWN
 
 
 def print_summary(estimate: Estimate, folder: Path) -> None:
-    """Fit, what to look at, speed, and where the files lie."""
+    """Which moments there are, what to look at, the figures, the verdict, and where the files lie."""
     console = out()
-    metrics = estimate.metrics()
-    _print_moments(console, metrics["moments"])
+    metrics = known_metrics(estimate, Failures())  # what failed was named when it was saved
+    moments = metrics["moments"] or UNKNOWN
+    _print_moments(console, moments)
+    warnings = [
+        message
+        for message in estimate.messages
+        if message.startswith("Warning:") and message.removeprefix("Warning: ") not in moments["reasons"]
+    ]
+    for message in sorted(warnings, key=lambda message: MASS_DOUBTED not in message):
+        console.print(message, style="yellow")
     console.print(_figures(estimate, metrics))
+    for message in estimate.messages:
+        if message.startswith(NOT_SMOOTHED) or message.endswith("brought into step."):
+            console.print(message)
     blocks = (metrics[block] for block in ("tracking", "consistency", "adaptation", "soft_tissue"))
     verdicts = [block["verdict"] for block in blocks if block]
-    for message in estimate.messages:
-        if message.removeprefix("Warning: ") in metrics["moments"]["reasons"]:
-            continue  # said first
-        if message.startswith("Warning:"):
-            console.print(message, style="yellow")
-        elif message.startswith(NOT_SMOOTHED) or message.endswith("brought into step."):
-            console.print(message)
     console.print(f"Verdict: {' '.join(filter(None, verdicts))}", style="dim")
     console.print()
     console.print(f"Results  {folder}", soft_wrap=True)
@@ -38,7 +45,7 @@ def print_summary(estimate: Estimate, folder: Path) -> None:
 
 def _print_moments(console: Console, moments: dict[str, Any]) -> None:
     """First of all which moments there are, and why not all."""
-    whole = all(count["measured"] == moments["frames"] for count in moments["legs"].values())
+    whole = bool(moments["legs"]) and all(leg["measured"] == moments["frames"] for leg in moments["legs"].values())
     console.print(moments["verdict"], style="" if whole else "yellow")
     for reason in moments["reasons"]:
         console.print(f"  {reason}", style="dim")
@@ -53,32 +60,35 @@ def _figures(estimate: Estimate, metrics: dict[str, Any]) -> Table:
         numbers=(1,),
         title=f"{estimate.recording.name}, {estimate.model_name}: {window['start_s']:g} to {window['end_s']:g} s",
     )
-    rms = {name: value for name, value in metrics["markers"]["rms_mm"].items() if value is not None}
+    markers, wrench, events = (metrics[block] or {} for block in ("markers", "wrench", "events"))
+    rms = {name: value for name, value in markers.get("rms_mm", {}).items() if value is not None}
     if rms:
         worst = max(rms, key=lambda name: rms[name])
-        rows.add_row("markers, mean RMS", f"{metrics['markers']['mean_rms_mm']:.2f} mm", f"{len(rms)} markers")
+        rows.add_row("markers, mean RMS", f"{markers['mean_rms_mm']:.2f} mm", f"{len(rms)} markers")
         rows.add_row("worst marker, RMS", f"{rms[worst]:.2f} mm", worst)
-    for name, value in metrics["wrench"]["rms"].items():
+    for name, value in wrench.get("rms", {}).items():
         unit = "N" if name.startswith("f") else "N m"
-        share = metrics["wrench"]["nrms_percent"][name]
+        share = wrench["nrms_percent"][name]
         rows.add_row(
             f"wrench {name}, RMS", f"{value:.2f} {unit}", "" if share is None else f"{share:.1f} % of measured"
         )
-    after = metrics["adaptation"]["after_s"]
-    if not estimate.smoothed:
+    if metrics["adaptation"] and not estimate.smoothed:
+        after = metrics["adaptation"]["after_s"]
         rows.add_row("settled after", "-" if after is None else f"{after:.1f} s", "")
-    stuck = metrics["events"]["parameters_at_bound"]
+    stuck = [p for p in estimate.parameters if p.at_bound]
     free = sum(p.estimated and p.lower is not None for p in estimate.parameters)
-    by_kind = counts_in_words(metrics["bounds"]["by_kind"], "at_end")
-    rows.add_row("parameters on a bound", f"{len(stuck)} of {free}", by_kind if stuck else "")
-    moved = {name: m for name, m in metrics["soft_tissue"]["markers"].items() if m["max_mm"] is not None}
+    by_kind = counts_in_words(metrics["bounds"]["by_kind"], "at_end") if stuck and metrics["bounds"] else ""
+    rows.add_row("parameters on a bound", f"{len(stuck)} of {free}", by_kind)
+    moved = (metrics["soft_tissue"] or {}).get("markers", {})
+    moved = {name: m for name, m in moved.items() if m["max_mm"] is not None}
     if moved:
         most = max(moved, key=lambda name: moved[name]["max_mm"])
         declared = moved[most]["declared_mm"]
         size = "" if declared is None else f" (declared {declared:.0f} mm)"
         rows.add_row("largest move on a segment", f"{moved[most]['max_mm']:.0f} mm", f"{most}{size}")
-    gaps = metrics["events"]["missing_frames"]
-    rows.add_row("markers with gaps", str(len(gaps)), ", ".join(gaps))
+    gaps = events.get("missing_frames")
+    if gaps is not None:
+        rows.add_row("markers with gaps", str(len(gaps)), ", ".join(gaps))
     refused = sorted({event.subject for event in estimate.events if event.kind == "gated"})
     if refused:
         rows.add_row("refused for a time", str(len(refused)), ", ".join(refused))

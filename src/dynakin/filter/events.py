@@ -7,15 +7,9 @@ import numpy.typing as npt
 import xarray as xr
 
 from dynakin.model import InitialModel
+from dynakin.recordings.foot_contact import runs
 from dynakin.results import Event, Parameter
-from dynakin.results.records import EventKind
-
-REFUSED = 2
-"""Value of a verdict: 0 missing, 1 accepted, 2 refused (as the core has it)."""
-FOLLOWING = 0
-"""Value of tracking where nothing is wrong."""
-TRACKING = ("following", "doubtful", "lost", "found", "restarted")
-"""Words of the core's tracking states, by their number."""
+from dynakin.results.records import REFUSED, TRACKING, EventKind
 
 
 def events_of(
@@ -115,10 +109,9 @@ def _coordinates_at_bounds(data: xr.Dataset, initial: InitialModel) -> list[Even
 def _stretches(
     time: npt.NDArray[np.float64], flags: npt.NDArray[np.bool_], kind: EventKind, subject: str, what: str
 ) -> list[Event]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     events = []
-    for first, end in zip(edges[::2], edges[1::2], strict=True):
-        n = int(end - first)
+    for first, end in runs(flags):
+        n = end - first
         text = f"{what} for {n} frame{'s' if n > 1 else ''}, {time[first]:.2f} to {time[end - 1]:.2f} s"
-        events.append(Event(float(time[first]), int(first), kind, subject, text))
+        events.append(Event(float(time[first]), first, kind, subject, text))
     return events

@@ -16,11 +16,13 @@ from dynakin.report.labels import (
     short_marker_names,
     words,
 )
+from dynakin.report.section import needs
 from dynakin.results import Estimate
 from dynakin.results.bounds import counts_in_words
 from dynakin.results.consistency import CONSISTENT
 from dynakin.results.failures import FAILED, LOG
 from dynakin.results.metrics import ADAPTATION_S, evaluation_window, speed_consistency, window_consistency
+from dynakin.results.records import MASS_DOUBTED
 from dynakin.results.soft_tissue import excess_in_words
 
 # Expected one frame ahead against seen: further apart than this, the estimate follows the measurements.
@@ -87,6 +89,7 @@ def in_short(found: list[Insight]) -> str:
 def insights(estimate: Estimate, metrics: dict[str, Any]) -> list[Insight]:
     """All findings, in the order of the report."""
     found = [
+        _mass(estimate),
         _failed(estimate),
         _tracking(metrics),
         _moments(metrics),
@@ -108,6 +111,7 @@ def insights(estimate: Estimate, metrics: dict[str, Any]) -> list[Insight]:
     return [insight for insight in found if insight is not None]
 
 
+@needs("moments", otherwise=None)
 def _moments(metrics: dict[str, Any]) -> Insight | None:
     """Why moments are not measured, and what that leaves out; how many are is said before all findings."""
     found = metrics["moments"]
@@ -123,6 +127,14 @@ def _moments(metrics: dict[str, Any]) -> Insight | None:
         text.append(f"{plural(len(found['reasons']) - 3, 'more reason')} under Joint moments.")
     advice = "Give the forces of every contact (--forces), and plates under every step that is to be judged."
     return Insight("warning", "Joint moments", " ".join(text), advice)
+
+
+def _mass(estimate: Estimate) -> Insight | None:
+    """Plates that contradict the mass: forces, moments and inertia are all wrong then."""
+    told = [text.removeprefix("Warning: ") for text in estimate.messages if MASS_DOUBTED in text]
+    if not told:
+        return None
+    return Insight("warning", "Mass", sentence(" ".join(told)), "Give the mass as weighed, with all that is worn.")
 
 
 def _failed(estimate: Estimate) -> Insight | None:
@@ -142,6 +154,7 @@ def _tracking(metrics: dict[str, Any]) -> Insight | None:
     return Insight("warning", "Lost", found["verdict"] + whole, advice)
 
 
+@needs("markers", otherwise=None)
 def _markers(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     mean = metrics["markers"]["mean_rms_mm"]
     if mean is None:
@@ -168,9 +181,10 @@ def _markers(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     )
 
 
+@needs("wrench", otherwise=None)
 def _wrench(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     rms = metrics["wrench"]["rms"]
-    told = [text for text in estimate.messages if text.startswith(PLATE_WORDS)]
+    told = [text for text in estimate.messages if text.startswith(PLATE_WORDS) and MASS_DOUBTED not in text]
     if not rms:
         why = " ".join(told) or "No wrench was compared: none was measured, or none is modelled."
         return Insight("warning" if told else "note", "Force plates", why.removeprefix("Warning: "))
@@ -187,6 +201,7 @@ def _wrench(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     )
 
 
+@needs("prediction", "wrench", otherwise=None)
 def _prediction(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     """How much of the fit is the model, and how much is following the measurement of the same frame."""
     ahead, fitted = metrics["prediction"]["wrench"]["rms"], metrics["wrench"]["rms"]
@@ -217,6 +232,7 @@ def _prediction(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     )
 
 
+@needs("consistency", otherwise=None)
 def _consistency(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     if estimate.why_lost is not None:
         return None
@@ -273,7 +289,8 @@ def _constants(estimate: Estimate) -> list[Insight]:
     return found
 
 
-def _bounds(estimate: Estimate, metrics: dict[str, Any]) -> Insight:
+@needs("bounds", otherwise=None)
+def _bounds(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     free = [p for p in estimate.parameters if p.estimated and p.lower is not None]
     names = short_marker_names(estimate.marker_names)
     stuck = [parameter_label(p, names) for p in free if p.at_bound]
@@ -298,6 +315,7 @@ def _bounds(estimate: Estimate, metrics: dict[str, Any]) -> Insight:
     )
 
 
+@needs("adaptation", otherwise=None)
 def _adaptation(metrics: dict[str, Any]) -> Insight | None:
     """When the estimate settled, beside the time from which the figures are taken."""
     found = metrics["adaptation"]
@@ -316,6 +334,7 @@ def _adaptation(metrics: dict[str, Any]) -> Insight | None:
     )
 
 
+@needs("soft_tissue", otherwise=None)
 def _soft_tissue(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     """Markers that move on their segments further than skin does."""
     names = short_marker_names(estimate.marker_names)
@@ -351,7 +370,8 @@ def _joint_limits(estimate: Estimate) -> Insight | None:
     return Insight("warning", "Joint limits", f"Held at its limit for part of the time: {listed(stuck)}.")
 
 
-def _missing(estimate: Estimate, metrics: dict[str, Any]) -> Insight:
+@needs("events", otherwise=None)
+def _missing(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     gaps: dict[str, int] = metrics["events"]["missing_frames"]
     if not gaps:
         return Insight("good", "Gaps", "Every marker in use was measured in every frame.")

@@ -16,6 +16,7 @@ from dynakin.report.sections import sections
 from dynakin.results import Estimate, compute_metrics
 from dynakin.results.config_file import plain
 from dynakin.results.facing import facing
+from dynakin.results.sources import UNKNOWN
 from dynakin.results.versions import versions
 
 if TYPE_CHECKING:
@@ -62,7 +63,7 @@ def render_report(estimate: Estimate, *, metrics: dict[str, Any] | None = None, 
         ],
         what_was_run=what_was_run(estimate),
         figures=_headline(estimate, metrics),
-        moments=metrics["moments"]["verdict"],
+        moments=(metrics["moments"] or UNKNOWN)["verdict"],
         insights=found,
         in_short=in_short(found),
         warnings=sum(insight.level == "warning" for insight in found),
@@ -85,12 +86,13 @@ def write_report(
 
 
 def _headline(estimate: Estimate, metrics: dict[str, Any]) -> list[dict[str, str]]:
-    rms = metrics["wrench"]["rms"]
+    rms = metrics["wrench"]["rms"] if metrics["wrench"] else {}
     forces = [value for name, value in rms.items() if name.startswith("f")]
     moments = [value for name, value in rms.items() if name.startswith("m")]
     stuck = [p for p in estimate.parameters if p.at_bound]
     free = [p for p in estimate.parameters if p.estimated and p.lower is not None]
-    tiles = [{"value": number(metrics["markers"]["mean_rms_mm"], digits=2), "unit": "mm", "label": "markers, mean RMS"}]
+    mean = metrics["markers"]["mean_rms_mm"] if metrics["markers"] else None
+    tiles = [{"value": number(mean, digits=2), "unit": "mm", "label": "markers, mean RMS"}]
     if forces:
         names = listed([name for name in rms if name.startswith("f")])
         value = " / ".join(number(force, digits=2) for force in forces)

@@ -20,6 +20,7 @@ from dynakin.results import Estimate
 from dynakin.results.feet import foot_sources
 from dynakin.results.pressure import centre_of_pressure
 from dynakin.results.sources import DERIVED, moment_sources, wrench_sources
+from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
 
@@ -72,7 +73,7 @@ def spatial_playback(estimate: Estimate) -> SpatialPlayback:
     forces = [arrays[entry["forces"]] for entry in arrows]
     load = np.concatenate([np.linalg.norm(f.reshape(len(f), -1, 3), axis=2).ravel() for f in forces] or [np.zeros(0)])
     load = load[np.isfinite(load)]
-    heaviest = (estimate.mass_kg or 0.0) * 9.80665 or (float(load.max()) if len(load) else 1.0)
+    heaviest = (estimate.mass_kg or 0.0) * GRAVITY_M_S2 or (float(load.max()) if len(load) else 1.0)
     view["mm_per_newton"] = float(f"{0.5 * view['height'] / heaviest:.6g}")
     if "mass_centre" in estimate.data:
         arrays["mass_centre"] = 1000.0 * estimate.data["mass_centre"].transpose("time", "axis").values

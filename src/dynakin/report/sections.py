@@ -26,7 +26,7 @@ from dynakin.report.method_styles import DERIVED_LINE
 from dynakin.report.panels import Panel
 from dynakin.report.plot import ESTIMATED
 from dynakin.report.repetition_sections import repetition_section
-from dynakin.report.section import Section
+from dynakin.report.section import NOTHING, Section, needs
 from dynakin.report.spatial_repetitions import spatial_repetition_section
 from dynakin.report.spatial_sections import (
     foot_section,
@@ -47,7 +47,7 @@ from dynakin.results import (
     estimate_curves,
     repetitions_of,
 )
-from dynakin.results.sources import DERIVED, moment_sources, wrench_sources
+from dynakin.results.sources import DERIVED, UNKNOWN, moment_sources, wrench_sources
 
 if TYPE_CHECKING:
     from dynakin.comparison import Trial
@@ -103,6 +103,7 @@ def spatial_sections(
     ]
 
 
+@needs("markers", otherwise=NOTHING)
 def marker_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
     """RMS a marker, paths in the plane, and every marker over time."""
     names = short_marker_names(estimate.marker_names)
@@ -138,6 +139,7 @@ def marker_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
     )
 
 
+@needs("wrench", otherwise=NOTHING)
 def wrench_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
     """Each modelled component, measured and estimated."""
     measured = estimate.data["wrench_measured"].values
@@ -221,7 +223,8 @@ def moment_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
                 derived=sources[:, index] == DERIVED,
             )
         )
-    text = metrics["moments"]["verdict"]
+    found = metrics["moments"] or UNKNOWN
+    text = found["verdict"]
     if panels:
         text += " What the muscles and ligaments do about each joint, in the direction in which its coordinate grows."
     if panels and is_planar(estimate):
@@ -237,7 +240,7 @@ def moment_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
         panels,
         key=key,
         lines=(DERIVED_LINE,) if (sources == DERIVED).any() else (),
-        notes=tuple(metrics["moments"]["reasons"]),
+        notes=tuple(found["reasons"]),
     )
 
 

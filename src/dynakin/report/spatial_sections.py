@@ -15,7 +15,7 @@ from dynakin.report.labels import COMPONENT_LABELS, listed, number, sentence, sh
 from dynakin.report.method_styles import DERIVED_LINE, LineStyle
 from dynakin.report.panels import Panel, band_is_too_wide, rms_bars
 from dynakin.report.plot import ESTIMATED, MEASURED
-from dynakin.report.section import Section
+from dynakin.report.section import NOTHING, Section, needs
 from dynakin.report.sides import REGIONS, Joint, joints_of
 from dynakin.report.text_tables import TextTable
 from dynakin.results import AXES, COMPONENTS, Estimate
@@ -24,7 +24,7 @@ from dynakin.results.feet import ROUNDING, foot_sources
 from dynakin.results.metrics import evaluation_window
 from dynakin.results.power import root_coordinates
 from dynakin.results.pressure import centre_of_pressure
-from dynakin.results.sources import DERIVED, measured_only, moment_sources, wrench_sources
+from dynakin.results.sources import DERIVED, UNKNOWN, measured_only, moment_sources, wrench_sources
 from dynakin.results.sources import MEASURED as MOMENT_MEASURED
 from dynakin.results.stances import compared_stances
 
@@ -35,6 +35,7 @@ _DIRECTIONS = {"x": "forward", "y": "up", "z": "to the right"}
 _AXIS_COLOURS = {"x": "#0072B2", "y": "#009E73", "z": "#CC79A7"}
 
 
+@needs("markers", otherwise=NOTHING)
 def spatial_marker_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
     """RMS a marker, and how far each is from where it was measured, over time."""
     names = short_marker_names(estimate.marker_names)
@@ -64,7 +65,9 @@ def spatial_marker_section(estimate: Estimate, metrics: dict[str, Any]) -> Secti
         f"Root mean square distance in space between {window['start_s']:.4g} and {window['end_s']:.4g} s. Where soft "
         "tissue is estimated, an estimated marker holds its displacement: how far each moves on its segment says how "
         "well a rigid body fits.",
-        tables=[_displacements(estimate, metrics)] if metrics["soft_tissue"]["markers"] else [],
+        tables=[_displacements(estimate, metrics)]
+        if metrics["soft_tissue"] and metrics["soft_tissue"]["markers"]
+        else [],
         wide=titled,
         folded=folded,
         folded_title="Every marker over time: estimated less measured",
@@ -90,6 +93,7 @@ def _displacements(estimate: Estimate, metrics: dict[str, Any]) -> TextTable:
     return TextTable("Movement of each marker on its segment", headings, rows, (2, 3, 4), folded=True)
 
 
+@needs("wrench", otherwise=NOTHING)
 def spatial_wrench_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
     """The total of all plates, measured and estimated."""
     measured, estimated = _of(estimate, "wrench_measured", "component"), _of(estimate, "wrench_estimated", "component")
@@ -259,6 +263,7 @@ def spatial_moment_section(estimate: Estimate, metrics: dict[str, Any]) -> Secti
     moments = _of(estimate, "moments", "coordinate") / (mass or 1.0)
     sd = _of(estimate, "moments_sd", "coordinate") / (mass or 1.0) if "moments_sd" in estimate.data else None
     source, peaks = moment_sources(estimate.data), metrics["peak_moments_per_kg"]
+    found = metrics["moments"] or UNKNOWN
 
     def draw(joint: Joint) -> Panel | None:
         unit = ("N m" if joint.rotation else "N") + ("/kg" if mass else "")
@@ -272,9 +277,9 @@ def spatial_moment_section(estimate: Estimate, metrics: dict[str, Any]) -> Secti
             own_sd = None if sd is None else np.where(derived, np.nan, sd[:, k])
             wide = own_sd is not None and band_is_too_wide(moments[:, k], own_sd)
             lines.append(Line(moments[:, k], SIDE_COLOURS[side], 1.2, None if wide else own_sd, derived))
-            if found := peaks.get(estimate.coordinate_names[k]):
-                notes.append(f"{who}{_two_digits(found['smallest'])} to {_two_digits(found['largest'])}")
-            elif mass:
+            if own := (peaks or {}).get(estimate.coordinate_names[k]):
+                notes.append(f"{who}{_two_digits(own['smallest'])} to {_two_digits(own['largest'])}")
+            elif mass and peaks is not None:
                 notes.append(f"{who}no whole measured stance")
         return (
             chart(joint.name, unit, estimate.time, lines[::-1], note="; ".join(notes), least_range=0.02)
@@ -290,7 +295,7 @@ def spatial_moment_section(estimate: Estimate, metrics: dict[str, Any]) -> Secti
         for side, k in joint.columns.items()
         if not np.isfinite(moments[:, k]).any()
     ]
-    text = [metrics["moments"]["verdict"]]
+    text = [found["verdict"]]
     if parts:
         about = "What muscles and ligaments do about each joint, in the direction in which its coordinate grows"
         text.append(f"{about}, over the body mass." if mass else f"{about}.")
@@ -305,7 +310,7 @@ def spatial_moment_section(estimate: Estimate, metrics: dict[str, Any]) -> Secti
         " ".join(text),
         lines=(*SIDE_LINES, *((DERIVED_LINE,) if (source == DERIVED).any() else ())) if parts else (),
         band="" if sd is None or not parts else "± 2 standard deviations",
-        notes=tuple(metrics["moments"]["reasons"]),
+        notes=tuple(found["reasons"]),
         parts=parts,
     )
 

@@ -11,7 +11,7 @@ from dynakin.report.chart import Line, chart
 from dynakin.report.colours import SIDE_COLOURS
 from dynakin.report.labels import listed, number
 from dynakin.report.method_styles import DERIVED_LINE
-from dynakin.report.section import Section
+from dynakin.report.section import NOTHING, Section, needs
 from dynakin.report.sides import Joint, joints_of
 from dynakin.report.spatial_sections import SIDE_LINES
 from dynakin.report.text_tables import TextTable
@@ -22,6 +22,7 @@ _NOT_MEANT = 0.02
 """Below this share of the largest of its kind a quantity is too small for a ratio of the sides to say anything."""
 
 
+@needs("work", otherwise=NOTHING)
 def power_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
     """Power of the joints over the body mass, and the work of each coordinate."""
     work, mass = metrics["work"], estimate.mass_kg
@@ -78,11 +79,10 @@ def _work_table(estimate: Estimate, joints: list[Joint], work: Mapping[str, Any]
     return TextTable(title, (*headings, "frames"), rows, tuple(range(2, 9)), folded=len(rows) > 12)
 
 
+@needs("asymmetry", "work", otherwise=NOTHING)
 def asymmetry_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
     """Symmetry indices of legs, and folded of arms."""
     found = metrics["asymmetry"]
-    if found is None:
-        return Section("asymmetry", "Right and left", "")
     joints = [joint for joint in joints_of(estimate) if len(joint.columns) == 2]
     small = _too_small(estimate, metrics, joints)
     keys = ("range", "peak_moment", "positive_work", "negative_work")

@@ -63,7 +63,8 @@ def _turned(values: Array, turn: Array, name: str, last: str) -> Array:
 
 
 def _pelvis(estimate: Estimate, turn: Array) -> Array | None:
-    """Tilt, list and rotation (T, 3) rad of the pelvis' axes, turned; None where the model's are no such turns."""
+    """Tilt, list and rotation (T, 3) rad of the pelvis' axes, turned, NaN in lost frames; None where the model's are no
+    such turns."""
     root = root_coordinates(estimate)
     if not set(PELVIS) <= root:
         return None
@@ -71,10 +72,12 @@ def _pelvis(estimate: Estimate, turn: Array) -> Array | None:
     at = [str(name) for name in estimate.data["joint_segment"].values].index(segment)
     R_GB = estimate.data["joint_orientations"].transpose("time", "joint", "axis", "axis_").values[:, at]
     own = estimate.data["coordinates"].sel(coordinate=list(PELVIS)).transpose("time", "coordinate").values
-    if np.abs(Rotation.from_euler("ZXY", own).as_matrix() - R_GB).max() > _SAME:
+    known = np.isfinite(R_GB).all(axis=(1, 2))
+    if not known.any() or np.abs(Rotation.from_euler("ZXY", own[known]).as_matrix() - R_GB[known]).max() > _SAME:
         return None
-    angles = Rotation.from_matrix(turn @ R_GB).as_euler("ZXY")
-    return np.asarray(np.unwrap(angles, axis=0))
+    angles = np.full(own.shape, np.nan)
+    angles[known] = np.unwrap(Rotation.from_matrix(turn @ R_GB[known]).as_euler("ZXY"), axis=0)
+    return angles
 
 
 def nearly_singular(estimate: Estimate) -> list[str]:
@@ -82,7 +85,7 @@ def nearly_singular(estimate: Estimate) -> list[str]:
     if not set(PELVIS) <= root_coordinates(estimate):
         return []
     middle = np.degrees(estimate.data["coordinates"].sel(coordinate=PELVIS[1]).values)
-    away = np.abs((middle + 90.0) % 180.0 - 90.0)
+    away = np.nan_to_num(np.abs((middle + 90.0) % 180.0 - 90.0))  # lost frames do not lean
     if away.max() <= _SINGULAR_DEG:
         return []
     frame = int(np.argmax(away))

@@ -11,6 +11,7 @@ import xarray as xr
 from dynakin.results import sources
 from dynakin.results.estimate import COMPONENTS
 from dynakin.results.naming import plural
+from dynakin.units import GRAVITY_M_S2
 
 if TYPE_CHECKING:
     from dynakin.results.estimate import Estimate
@@ -71,7 +72,7 @@ def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str,
         "unknown_frames": int((codes == sources.ABSENT).any(axis=1).sum()),
         "left_at_root": left,
     }
-    weight = 9.80665 * (estimate.mass_kg or 0.0)
+    weight = GRAVITY_M_S2 * (estimate.mass_kg or 0.0)
     return figures | {"verdict": _words(figures, int(grounded.sum()), len(contact), FLIGHT * weight)}
 
 
@@ -133,9 +134,11 @@ def _words(figures: dict[str, Any], grounded: int, frames: int, weight_n: float)
             text.append(f"{_up_to(left['grounded'])} are left at the root {where}: no contact accounts for them.")
     if left["flight"] is not None:
         flight = plural(figures["flight_frames"], "frame")
-        text.append(f"{_up_to(left['flight'])} are left in the {flight} in which no foot touches the ground.")
-        if left["flight"]["force_n"] > weight_n > 0.0:
-            text.append("That is no flight: something that is not measured carries the person.")
+        large = left["flight"]["force_n"] > weight_n > 0.0
+        text.append(
+            f"{_up_to(left['flight'])} are left in flight ({flight} in which no foot touches the ground)"
+            + (": the model's error, or a contact that is not measured." if large else ".")
+        )
     if count := figures["derived_frames"]:
         text.append(f"In {count} of {frames} frames one contact was not measured: what hangs on it is derived.")
     if count := figures["unknown_frames"]:

@@ -25,9 +25,9 @@ from dynakin.results.soft_tissue import soft_tissue
 from dynakin.results.sources import moment_figures
 from dynakin.results.stances import counted
 from dynakin.results.symmetry import asymmetry
-from dynakin.results.tracking import tracking_figures
+from dynakin.results.tracking import lost_in_words, tracking_figures
 
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 """Version of ``metrics.json``, ``parameters.json`` and ``estimate.nc``; it grows when a key changes its meaning."""
 
 # The paper lets the filter adapt for 2 s before it counts (section III); a recording that is not at least twice as
@@ -51,7 +51,8 @@ def compute_metrics(estimate: Estimate, failures: Failures | None = None) -> dic
     Args:
         failures: takes what fails, whose block is None then; not given: it is raised.
     """
-    estimate = facing(estimate)
+    with nullcontext() if failures is None else failures.stage("figures along the way the person faces"):
+        estimate = facing(estimate)
     window = evaluation_window(estimate.time)
     kept = estimate.time[window]
     good = window & ~estimate.lost  # for what is made of `state`, which keeps what the filter held
@@ -65,7 +66,7 @@ def compute_metrics(estimate: Estimate, failures: Failures | None = None) -> dic
         "bounds": lambda: parameter_bounds(estimate, good),
         "soft_tissue": lambda: soft_tissue(estimate, good),
         "identifiability": lambda: learned(estimate),
-        "moments": lambda: moment_figures(estimate),
+        "moments": lambda: moment_figures(estimate, lost_in_words(estimate)),
         "peak_moments_per_kg": lambda: _peak_moments(estimate, window),
         "work": lambda: work(estimate, window),
         "angles": lambda: _angles(estimate),
@@ -83,6 +84,16 @@ def compute_metrics(estimate: Estimate, failures: Failures | None = None) -> dic
         with nullcontext() if failures is None else failures.stage(f"{name} in metrics.json"):
             metrics[name] = block()
     return metrics
+
+
+def known_metrics(estimate: Estimate, failures: Failures) -> dict[str, Any]:
+    """`Estimate.metrics`, or what of it can be had."""
+    try:
+        return estimate.metrics()
+    except OSError:
+        raise
+    except Exception:  # each block by its own name
+        return compute_metrics(estimate, failures)
 
 
 def _prediction(estimate: Estimate, window: np.ndarray) -> dict[str, Any]:

@@ -7,8 +7,16 @@ from dataclasses import dataclass
 from typing import Literal
 
 ParameterKind = Literal["length", "marker", "inertia", "plates"]
+REFUSED = 2
+"""Value of a verdict on a marker or the plates: 0 missing, 1 accepted, 2 refused (as the core has it)."""
+TRACKING = ("following", "doubtful", "lost", "found", "restarted")
+"""Words of the core's tracking states, by their number."""
+FOLLOWING = TRACKING.index("following")
+"""Value of tracking where nothing is wrong."""
 NOT_SMOOTHED = "Not smoothed:"
 """How the message begins of a run whose settings have no smoother."""
+MASS_DOUBTED = "check the mass"
+"""What the message says of a run in which the plates contradict the mass."""
 
 EventKind = Literal["missing", "gated", "at_bound", "reset", "note"]
 EVENT_KINDS: tuple[EventKind, ...] = ("missing", "gated", "at_bound", "reset", "note")

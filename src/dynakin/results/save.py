@@ -15,7 +15,7 @@ from dynakin.results.failures import LOG, Failures
 from dynakin.results.json_files import write_metrics, write_parameters
 from dynakin.results.marker_file import write_markers
 from dynakin.results.mean_curves import curve_points, estimate_curves, write_curves
-from dynakin.results.metrics import compute_metrics
+from dynakin.results.metrics import known_metrics
 from dynakin.results.netcdf_file import write_netcdf
 from dynakin.results.output_folder import replacing
 
@@ -73,13 +73,7 @@ def save_estimate(
 
 def _metrics(estimate: Estimate, identifiability: Identifiability | None, failed: Failures) -> dict[str, Any]:
     """All figures, or those that can be had."""
-    before = len(failed.found)
-    metrics: dict[str, Any] = {}
-    with failed.stage("metrics.json"):
-        metrics = estimate.metrics()
-    if not metrics:
-        del failed.found[before:]  # each block by its own name
-        metrics = compute_metrics(estimate, failed)
+    metrics = known_metrics(estimate, failed)
     if identifiability is not None:
         with failed.stage("what the recording tells of the constants"):
             metrics["identifiability"] = identifiability.as_dict()

@@ -6,14 +6,13 @@ but all others are, it follows from the motion and is *derived*; where that cann
 
 from __future__ import annotations
 
-import re
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from dynakin.results.naming import listed
+from dynakin.results.naming import listed, words
 
 if TYPE_CHECKING:
     from dynakin.results.estimate import Estimate
@@ -30,8 +29,15 @@ NOTES = (
     "2 absent: not known, the value is nan.",
 )
 """What the codes say, for the headers of files."""
-REASON = re.compile(r"left out there|total wrench is left out|not used|set aside|no moments|nothing declares|absent")
-"""How the messages of a run that leaves out the ground's reaction, and with it moments, can be known."""
+_JOINTS = {"hip": "hip", "knee": "knee", "ankle": "ankle", "subtalar": "ankle"}
+"""The joint that a coordinate of a leg is of, by what its name holds; another is its own."""
+UNKNOWN: dict[str, Any] = {
+    "legs": {},
+    "frames": 0,
+    "reasons": [],
+    "verdict": "Which moments are measured is not known: their block in metrics.json was not made.",
+}
+"""In the place of `moment_figures` where these failed."""
 
 
 def moment_sources(data: xr.Dataset) -> Codes:
@@ -116,25 +122,31 @@ def _side(segment: str) -> str:
     return ""
 
 
-def moment_figures(estimate: Estimate) -> dict[str, Any]:
+def moment_figures(estimate: Estimate, lost: str = "") -> dict[str, Any]:
     """The block ``moments`` of ``metrics.json``: in how many frames of the recording the moments are measured, derived
-    and absent, by coordinate and by leg (where one of its moments is not measured, the leg is not), why, and in words.
+    and absent, by coordinate and by leg (where one of its moments is not measured, the leg is not), why, and in words
+    by leg and joint.
+
+    Args:
+        lost: the sentence on frames in which the person was lost.
     """
     data = estimate.data
     sources = moment_sources(data)
     groups = _groups(data)
     legs = {name: _count(sources[:, columns].max(axis=1)) for name, columns in groups.items()}
-    reasons = []
+    reasons: list[str] = []
     if any(count["measured"] < len(sources) for count in legs.values()):
-        reasons = [text.removeprefix("Warning: ") for text in estimate.messages if REASON.search(text)]
+        reasons = [str(text).removeprefix("Warning: ") for text in estimate.config.get("ground_reasons", [])]
+        reasons += [lost] if lost else []
+    names = estimate.coordinate_names
     return {
         "what": "frames of the whole recording; derived: from the motion, because one contact behind the joint is not "
         "measured; absent: not known",
         "frames": len(sources),
         "legs": legs,
-        "coordinates": {name: _count(sources[:, k]) for k, name in enumerate(estimate.coordinate_names)},
-        "reasons": reasons,
-        "verdict": _words(legs, len(sources)),
+        "coordinates": {name: _count(sources[:, k]) for k, name in enumerate(names)},
+        "reasons": list(dict.fromkeys(reasons)),
+        "verdict": _words({leg: _by_joint(sources, names, own) for leg, own in groups.items()}, len(sources)),
     }
 
 
@@ -149,17 +161,35 @@ def _count(codes: Codes) -> dict[str, int]:
     return {meaning: int((codes == code).sum()) for code, meaning in enumerate(MEANINGS)}
 
 
-def _words(legs: dict[str, dict[str, int]], frames: int) -> str:
+def _by_joint(sources: Codes, names: list[str], columns: list[int]) -> dict[str, dict[str, int]]:
+    """Counts by joint of a leg: of one with several coordinates, where one is not measured the joint is not."""
+    joints: dict[str, list[int]] = {}
+    for k in columns:
+        stem = names[k].removesuffix("_r").removesuffix("_l")
+        joint = next((joint for part, joint in _JOINTS.items() if part in stem), words(stem))
+        joints.setdefault(joint, []).append(k)
+    return {joint: _count(sources[:, own].max(axis=1)) for joint, own in joints.items()}
+
+
+def _words(legs: dict[str, dict[str, dict[str, int]]], frames: int) -> str:
+    """By leg, and by joint where these differ, those that are measured longest first."""
     what = "Moments" if "" in legs else "Leg moments"
     for meaning, how in (("measured", "measured"), ("derived", "derived from the motion"), ("absent", "absent")):
-        if all(count[meaning] == frames for count in legs.values()):
+        if all(count[meaning] == frames for joints in legs.values() for count in joints.values()):
             return f"{what}: {how} in all {frames} frames."
-    each: list[str] = []
-    for leg, count in legs.items():
-        parts = [f"measured in {count['measured']}" + ("" if each else f" of {frames} frames")]
-        parts += [f"derived from the motion in {count['derived']}"] if count["derived"] else []
-        parts += [f"absent in {count['absent']}"] if count["absent"] else []
-        each.append(f"{leg} {listed(parts)}".strip())
+    each, of = [], f" of {frames} frames"
+    for leg, joints in legs.items():
+        alike: dict[tuple[int, ...], list[str]] = {}
+        for joint, count in joints.items():
+            alike.setdefault(tuple(count[meaning] for meaning in MEANINGS), []).append(joint)
+        parts = []
+        for (measured, derived, absent), names in sorted(alike.items(), reverse=True):
+            said = [f"measured in {measured}{of}"] if measured or not (derived or absent) else []
+            said += [f"derived from the motion in {derived}{'' if said else of}"] if derived else []
+            said += [f"absent in {absent}{'' if said else of}"] if absent else []
+            of = ""
+            parts.append((f"{listed(names)} " if len(alike) > 1 else "") + listed(said))
+        each.append(f"{leg}{':' if leg and len(alike) > 1 else ''} {', '.join(parts)}".strip())
     return f"{what}: {'; '.join(each)}."
 
 

@@ -78,9 +78,11 @@ def counted(estimate: Estimate, window: Flags) -> Flags:
     legs = sources.legs_of(estimate.data)
     for foot in estimate.foot_names:
         whole = [phase for phase in phases(estimate, foot, window) if phase.whole]
-        known = np.array([measured[phase.frames].all(axis=0) for phase in whole]).reshape(len(whole), -1)
+        known = np.zeros((len(whole), len(legs)), dtype=bool)  # of no rows, where the foot changes once in the window
+        for k, phase in enumerate(whole):
+            known[k] = measured[phase.frames].all(axis=0)
         own = np.array([leg == foot for leg in legs])
-        own &= known[[phase.stance for phase in whole]].any(axis=0)
+        own &= known[np.array([phase.stance for phase in whole], dtype=bool)].any(axis=0)
         for phase, throughout in zip(whole, known, strict=True):
             found[phase.frames] |= own & throughout
     return found

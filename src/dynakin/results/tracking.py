@@ -9,8 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import LostError
+from dynakin.recordings.foot_contact import runs
 from dynakin.results.estimate import AXES, Estimate
 from dynakin.results.naming import sentence
+from dynakin.results.records import REFUSED, TRACKING
 from dynakin.results.soft_tissue import marker_sites, state_paths
 from dynakin.results.sources import ABSENT
 
@@ -20,6 +22,9 @@ Mask = npt.NDArray[np.bool_]
 ASTRAY_M = 0.060
 """A marker further than this from its place on the bone is astray: skin moves by 40 mm at most, and a start posture
 that fits no better is refused. On good recordings nine markers of ten stay within 24 mm."""
+COMMON_M = 0.040
+"""All places of a segment may move together by so much: the joints' angles and centres move with them, so the fit stays
+as it is (30 mm in sitting down and standing up with `sagittal7`, markers within 5 mm). More is a wrong posture."""
 USED_ASTRAY = 0.10
 """Part of the markers that the filter believed although they are astray: then the posture is wrong, not a marker."""
 ANY_ASTRAY = 0.34
@@ -32,8 +37,7 @@ BRIDGED_S = 0.1
 MOST_LOST = 0.10
 """Part of the measured frames from which on the whole trial is lost: lengths and inertia have learnt from them too."""
 
-_REFUSED = 2  # of `Estimate.data["verdict"]`
-_USED_NOTHING, _HELD, _RESTARTED = 1, 2, 4  # of `Estimate.data["tracking"]`
+_NO_ESTIMATE = ("doubtful", "lost", "restarted")
 _KEPT = ("_measured", "_covariance")
 _RECORD = {"state", "state_sd", "foot_contact", "verdict", "tracking", "constrained", "lost"}
 _RECORD |= {"constraints_met", "step_us"}
@@ -68,13 +72,13 @@ def tracking_of(estimate: Estimate) -> Tracking:
     seen = np.isfinite(data["markers_measured"].transpose("time", "marker", "axis").values[:, :, axes]).all(axis=2)
     count = seen.shape[1]
     verdict = data["verdict"].transpose("time", "sensor").values[:, :count] if "verdict" in data else np.ones_like(seen)
-    refused = (verdict == _REFUSED) & seen
+    refused = (verdict == REFUSED) & seen
     astray = seen & ~(distance <= ASTRAY_M)
     n = np.maximum(seen.sum(axis=1), 1)
     lost = ((astray & ~refused).sum(axis=1) > np.maximum(USED_ASTRAY * n, 1.0)) | (astray.sum(axis=1) > ANY_ASTRAY * n)
     lost |= _limb_lost(estimate, seen, refused)
     if "tracking" in data:
-        lost |= np.isin(data["tracking"].values, (_USED_NOTHING, _HELD, _RESTARTED))
+        lost |= np.isin(data["tracking"].values, [TRACKING.index(word) for word in _NO_ESTIMATE])
     return Tracking(_bridged(lost, estimate.time), seen.any(axis=1), np.where(seen, distance, np.nan), refused)
 
 
@@ -118,10 +122,15 @@ def in_words(time: Array, found: Tracking) -> str:
     return f"the person was lost: {'; '.join(parts)}."
 
 
+def lost_in_words(estimate: Estimate) -> str:
+    """`in_words` of an estimate; empty where nobody was lost."""
+    found = estimate.tracking
+    return in_words(estimate.time, found) if found is not None and found.lost.any() else ""
+
+
 def times(time: Array, flags: Mask, limit: int = 4) -> str:
     """Stretches of frames as times: `0.10 to 0.55 s, 1.20 to 1.31 s and 2 more`."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
-    parts = [f"{time[first]:.2f} to {time[end - 1]:.2f} s" for first, end in zip(edges[::2], edges[1::2], strict=True)]
+    parts = [f"{time[first]:.2f} to {time[end - 1]:.2f} s" for first, end in runs(flags)]
     more = f" and {len(parts) - limit} more" if len(parts) > limit else ""
     return ", ".join(parts[:limit]) + more
 
@@ -175,30 +184,41 @@ def tracking_figures(estimate: Estimate) -> dict[str, Any] | None:
 
 def _skin(estimate: Estimate) -> Array:
     """(T, M) m by which each marker lies off the place on its segment that it started with: skin's displacement, and
-    what the place itself has moved by, which takes up a wrong posture as well (27 mm at most on good recordings)."""
+    what the place itself has moved by against those of its segment, which takes up a wrong posture as well. Of what
+    all places of a segment move by together (a gauge with the joints' angles), only what exceeds `COMMON_M` counts.
+    """
     skin, places = (state_paths(estimate, block) for block in ("soft_tissue", "marker"))
     start = {p.name: p.initial for p in estimate.parameters if p.kind == "marker"}
-    size = np.zeros((len(estimate.time), len(estimate.marker_names)))
+    size = (len(estimate.time), len(estimate.marker_names), len(AXES))
+    moved, shift = np.zeros(size), np.zeros(size)
     for k, (_, site) in enumerate(marker_sites(estimate)):
-        for axis in AXES:
-            moved = skin.get(site, {}).get(axis, 0.0)
+        for i, axis in enumerate(AXES):
+            moved[:, k, i] = skin.get(site, {}).get(axis, 0.0)
             if axis in places.get(site, {}):
-                moved = moved + places[site][axis] - start.get(f"marker/{site}/{axis}", np.nan)
-            size[:, k] += moved**2
-    return np.sqrt(size)
+                shift[:, k, i] = places[site][axis] - start.get(f"marker/{site}/{axis}", np.nan)
+    for columns in _worn(estimate).values():
+        common = shift[:, columns].mean(axis=1, keepdims=True)
+        length = np.linalg.norm(common, axis=2, keepdims=True)
+        shift[:, columns] -= common * np.minimum(1.0, COMMON_M / np.maximum(length, COMMON_M))
+    return np.asarray(np.linalg.norm(moved + shift, axis=2))
 
 
-def _limb_lost(estimate: Estimate, seen: Mask, refused: Mask) -> Mask:
-    """(T,) frames in which some segment's markers are all refused, for `LIMB_S` on end."""
+def _worn(estimate: Estimate) -> dict[str, list[int]]:
+    """Columns of the markers on each segment that wears two at least."""
     segments = {p.name.split("/")[1]: p.segment for p in estimate.parameters if p.kind == "marker"}
     worn: dict[str, list[int]] = {}
     for k, (_, site) in enumerate(marker_sites(estimate)):
         if site in segments:
             worn.setdefault(segments[site], []).append(k)
+    return {segment: columns for segment, columns in worn.items() if len(columns) > 1}
+
+
+def _limb_lost(estimate: Estimate, seen: Mask, refused: Mask) -> Mask:
+    """(T,) frames in which some segment's markers are all refused, for `LIMB_S` on end."""
     found = np.zeros(len(estimate.time), dtype=bool)
-    for columns in (columns for columns in worn.values() if len(columns) > 1):
+    for columns in _worn(estimate).values():
         none_used = (refused[:, columns] == seen[:, columns]).all(axis=1) & (seen[:, columns].sum(axis=1) > 1)
-        for first, end in _stretches(none_used):
+        for first, end in runs(none_used):
             if estimate.time[end - 1] - estimate.time[first] >= LIMB_S:
                 found[first:end] = True
     return found
@@ -206,12 +226,7 @@ def _limb_lost(estimate: Estimate, seen: Mask, refused: Mask) -> Mask:
 
 def _bridged(lost: Mask, time: Array) -> Mask:
     bridged = lost.copy()
-    for first, end in _stretches(~lost):
+    for first, end in runs(~lost):
         if first > 0 and end < len(time) and time[end] - time[first - 1] < BRIDGED_S:
             bridged[first:end] = True
     return bridged
-
-
-def _stretches(flags: Mask) -> list[tuple[int, int]]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]

@@ -10,11 +10,11 @@ import numpy.typing as npt
 from dynakin.engine.journal import digest
 from dynakin.filter import Estimator, Noise
 from dynakin.filter.alignment import in_step
-from dynakin.filter.events import FOLLOWING, REFUSED
 from dynakin.filter.extend import QUANTITIES, Quantity
 from dynakin.model import InitialModel
 from dynakin.recordings import Recording
 from dynakin.results import evaluation_window
+from dynakin.results.records import FOLLOWING, REFUSED
 
 Array = npt.NDArray[np.float64]
 
