@@ -167,7 +167,7 @@ def estimate_from(
     estimate = estimator.run(recording, static=static, smooth=config.smooth, progress=progress)
     estimate = replace(estimate, config=config.as_used() | estimate.config)
     if not keep_lost:
-        refuse_lost(estimate)
+        refuse_lost(estimate, "--keep-lost")
     with failures.stage("joint angles of angles.sto"):
         estimate = asked_angles(estimator, estimate, static, config.zero, config.signs)
     assert estimator.initial is not None
