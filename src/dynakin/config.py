@@ -11,7 +11,16 @@ from pydantic import Field, model_validator
 from dynakin.errors import ConfigError, ModelError
 from dynakin.filter import Estimator, Noise, presets
 from dynakin.filter.extend import QUANTITIES, Quantity
-from dynakin.model import Bounds, CarriedLoad, Definition, OpenSimOptions, Priors, Subject, load_model
+from dynakin.model import (
+    Bounds,
+    CarriedLoad,
+    Definition,
+    OpenSimOptions,
+    Priors,
+    Subject,
+    available_models,
+    load_model,
+)
 from dynakin.model.identified import IdentifiedSubject, read_identified
 from dynakin.model.subject import Sex
 from dynakin.model.validation import Strict, nearest, read_toml, validate
@@ -208,7 +217,8 @@ def make_config(content: dict[str, Any], where: str) -> RunConfig:
     Raises:
         ConfigError: a key that is unknown (the nearest is suggested) or missing, or a value that is wrong.
     """
-    for key, option in (("trial", "TRIAL"), ("model", "--model NAME"), ("output", "-o OUT")):
+    models = f"--model NAME ({', '.join(available_models())}, a .toml or .osim file)"
+    for key, option in (("trial", "TRIAL"), ("model", models), ("output", "-o OUT")):
         if content.get(key) is None:
             raise ConfigError(f'{where}: {key} is missing, expected {option} or {key} = "..." in the configuration')
     try:

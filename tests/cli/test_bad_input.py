@@ -130,6 +130,24 @@ def test_mass_of_zero(trial: Path, refused: Refused, tmp_path: Path) -> None:
     assert "mass_kg" in refused("run", trial, *_options(tmp_path, mass="0"))
 
 
+def test_a_number_in_another_unit_names_the_option(trial: Path, refused: Refused, tmp_path: Path) -> None:
+    said = refused("run", trial, *_options(tmp_path, mass="6200"))
+    assert "mass_kg" in said and "expected kilograms (--mass)" in said
+    assert "expected metres (--height), 1.70?" in refused("run", trial, *_options(tmp_path, height="170"))
+
+
+def test_without_a_model_the_models_are_listed(trial: Path, refused: Refused, tmp_path: Path) -> None:
+    assert "--model NAME (fullbody, sagittal7, squat7, " in refused("run", trial, *_options(tmp_path, model=""))
+
+
+def test_an_option_is_no_value_of_another(trial: Path, refused: Refused, tmp_path: Path) -> None:
+    said = refused("run", trial, *_options(tmp_path, o=""), "--figures", "-o", tmp_path / "out")
+    assert "Option --figures has no value: after it stands -o" in said
+    said = refused("tune", "grid", trial, "--model", "--mass", "70")
+    assert "Option --model has no value: after it stands --mass" in said
+    assert "has no value" not in refused("run", tmp_path / "nowhere.trc", *_options(tmp_path), "--forward", "-X")
+
+
 def test_a_misspelt_key_in_a_configuration(trial: Path, refused: Refused, tmp_path: Path) -> None:
     config = tmp_path / "run.toml"
     config.write_text('trial = "squat.trc"\nmodel = "sagittal7"\noutput = "out"\nhieght_m = 1.7\n')

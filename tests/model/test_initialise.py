@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 
 from dynakin.errors import ModelError
-from dynakin.model import Bounds, Priors, Subject, load_model, measure
-from dynakin.recordings import Recording
+from dynakin.model import Bounds, Priors, Subject, load_marker_set, load_model, measure
+from dynakin.model.body import find_height
+from dynakin.model.frames import Trial
+from dynakin.model.marker_set import match_markers
+from dynakin.recordings import Recording, find_ground_frame
 
 from .conftest import FOOT_DIRECTION, LENGTHS, make, stand
 
@@ -177,6 +180,30 @@ def test_mass_is_needed_and_height_is_estimated(standing_person: Recording) -> N
     assert "Height" in text
     assert "not given, estimated from SHOULDER" in text
     assert "Sex not given: regressions and table are the mean of both sexes" in text
+
+
+def test_a_height_is_taken_from_one_frame_with_a_foot_on_the_ground() -> None:
+    """From a box of 0.4 m through the air, the feet pointing down: the box is no part of the person."""
+    places = stand()
+    lowest = min(place[1] for place in places.values())
+    frames = []
+    for k in range(100):
+        up = 0.4 if k < 40 else max(0.0, 0.4 - (k - 40) * 0.02)
+        down = 0.1 if up > 0.0 and k >= 40 else 0.0  # in the air
+        frames.append(
+            {n: place + np.array([0.0, up - (down if place[1] < 0.2 else 0.0), 0.0]) for n, place in places.items()}
+        )
+    recording = make(frames)
+    match = match_markers(load_marker_set("opencap"), recording.marker_names, [True] * len(places), "made")
+    ground = find_ground_frame(recording, vertical="+Y", forward="+X")
+    height, _ = find_height(Subject(), [recording], Trial.of(recording, match, ground))
+    assert height == pytest.approx((places["R_Shoulder"][1] - lowest) / 0.818, abs=1e-9)
+
+
+def test_a_height_that_is_none_of_that_mass_is_refused(standing_person: Recording) -> None:
+    crouched = replace(standing_person, markers=standing_person.markers * 0.5)
+    with pytest.raises(ModelError, match=r"height_m is not given, and 0\.8\d m .*of 70\.0 kg .*10 to 60\).*--height"):
+        measure(load_model("sagittal7", Subject(mass_kg=70.0)), crouched)
 
 
 def test_one_frame_is_enough() -> None:

@@ -45,6 +45,13 @@ def test_squats1(data_dir: Path) -> None:
     assert plan.start["hip"] == pytest.approx(angles["hip_flexion_r"], abs=np.deg2rad(12.0))
 
 
+@pytest.mark.parametrize("name", ["DJ1", "STS1", "squats1", "walking1"])
+def test_height_is_that_of_the_standing_trial(data_dir: Path, name: str) -> None:
+    """1.70 m. DJ1, a jump from a box, had 2.15 m: the highest shoulder of the trial over its lowest marker."""
+    _, found = measure(load_model("fullbody", Subject(mass_kg=60.05), "opencap"), opencap(data_dir, name))
+    assert found.height_m == pytest.approx(1.703, abs=0.025)
+
+
 def test_static1_as_the_trial_and_as_the_static(data_dir: Path) -> None:
     static = opencap(data_dir, "static1")
     _, found = measure(load_model("sagittal7", markers="opencap"), static)

@@ -14,9 +14,22 @@ import dynakin
 from dynakin.errors import ModelError, StreamError
 from dynakin.recordings import Recording
 from dynakin.simulation import simulate_squat
-from dynakin.stream import Callback, Fusion, Live, LiveFrame, MarkerPacket, Packet, PlatePacket, Replay, Sink, Streams
+from dynakin.stream import (
+    Callback,
+    Fusion,
+    Live,
+    LiveFrame,
+    MarkerPacket,
+    Packet,
+    PlatePacket,
+    Replay,
+    Sink,
+    Streams,
+    start,
+)
 from dynakin.stream.monitor import Monitor
 from dynakin.stream.recorder import Recorder, recorded
+from dynakin.stream.start import quietest
 
 
 @pytest.fixture(scope="module")
@@ -256,3 +269,18 @@ def test_silent_markers_are_told_with_what_happens_then(squat: Recording) -> Non
         told = monitor.changes(Fusion(live.fusion.markers, None), 1e9)
         assert told == [f"The markers are silent; {what}."]
         assert monitor.last.tracking == ("lost" if holds else "following")
+
+
+def test_a_movement_weighs_a_person_only_where_it_is_long_and_steady(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As `find_mass` has it of files; a step beside the plates went into the mass, by half of it, before."""
+    squats = replace(simulate_squat(seed=1, duration_s=12.0).recording.window(3.0, 12.0), subject={})
+    monkeypatch.setattr(start, "standing_window", lambda recording: None)  # between the squats they do stand
+    told = quietest(squats)
+    assert told[0].subject["mass_kg"] == pytest.approx(70.0, abs=2.0) and "mean load" in told[2]
+    beside = np.where(squats.time < 7.0, 1.0, 0.3)[:, None]
+    uneven = squats.with_plates(
+        tuple(replace(p, force=p.force * beside, moment=p.moment * beside) for p in squats.plates)
+    )
+    for trial, why in ((uneven, "of its mean, which is no weight"), (squats.window(3.0, 7.0), "weigh nobody")):
+        present, _, text = quietest(trial)
+        assert "mass_kg" not in present.subject and why in text and "mean load" not in text

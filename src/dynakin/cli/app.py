@@ -5,7 +5,8 @@ from __future__ import annotations
 import os
 import sys
 from collections.abc import Sequence
-from typing import Annotated
+from itertools import pairwise
+from typing import Annotated, Any
 
 import typer
 
@@ -62,8 +63,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     DYNAKIN_DEBUG=1 in the environment lets the traceback through.
     """
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    if wrong := _without_value(words):
+        print_error(wrong)
+        return 2
     try:
-        code = app(args=list(sys.argv[1:] if arguments is None else arguments), standalone_mode=False)
+        code = app(args=words, standalone_mode=False)
     except DynakinError as error:
         if os.environ.get("DYNAKIN_DEBUG") == "1":
             raise
@@ -81,3 +86,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print_error("stopped")
         return 130
     return code if isinstance(code, int) else 0
+
+
+def _without_value(words: Sequence[str]) -> str | None:
+    """What is wrong where an option that needs a value is followed by another option, which click takes for it."""
+    command: Any = typer.main.get_command(app)
+    for word in words:
+        inner = getattr(command, "commands", {}).get(word)
+        if inner is None:
+            break
+        command = inner
+    options = [parameter for parameter in command.params if parameter.param_type_name == "option"]
+    names = {name for option in options for name in (*option.opts, *option.secondary_opts)}
+    valued = {name for option in options if not (option.is_flag or option.count) for name in option.opts}
+    for option, value in pairwise(words):
+        if option in valued and value in names:
+            return f"Option {option} has no value: after it stands {value}, an option itself. See dynakin --help."
+    return None

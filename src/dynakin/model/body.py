@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Protocol
 
 import numpy as np
+import numpy.typing as npt
 
 from dynakin.errors import ModelError
 from dynakin.model.frames import Trial
@@ -13,6 +14,8 @@ from dynakin.model.subject import Subject
 from dynakin.recordings import GroundFrame, Recording, check_plates
 from dynakin.recordings.foot_loads import foot_loads
 from dynakin.units import GRAVITY_M_S2
+
+Array = npt.NDArray[np.float64]
 
 _LEAST_S = 5.0
 """Of a movement that is to weigh a person: its mean force is the weight but for the momentum gained, and 2 m/s gained
@@ -22,6 +25,8 @@ _STEADY = 0.3
 a step beside the plates or a box beside them do by more."""
 _BODY_MASS_INDEX = (10.0, 60.0)
 """kg/m2; what lies beyond is no weight of a person of that height who stood on the plates."""
+_STANDS_M_S = 0.1
+"""Speed of the lowest marker below which a foot stands: in the air it points down, which adds 0.2 m to a height."""
 
 
 class OnPlates(Protocol):
@@ -52,7 +57,7 @@ def find_mass(subject: Subject, trials: Sequence[OnPlates]) -> tuple[float, str]
         if check.refusal is not None:
             reasons.append(f"{recording.name}: {check.refusal}")
         elif check.mass_kg_from_plates is None:
-            mean, why = _steady_load(recording, trial.ground)
+            mean, why = steady_load(recording, trial.ground)
             reasons.append(f"nobody stands still on the plates of {recording.name}, and {why}")
             if mean is not None:
                 means.append((mean, recording.name))
@@ -73,7 +78,7 @@ def find_mass(subject: Subject, trials: Sequence[OnPlates]) -> tuple[float, str]
     )
 
 
-def _steady_load(recording: Recording, ground: GroundFrame) -> tuple[float | None, str]:
+def steady_load(recording: Recording, ground: GroundFrame) -> tuple[float | None, str]:
     """Mean load (kg) of the frames in which every foot that stands is on a plate, and why it is no weight; None where
     these are few, or it varies too much."""
     loads = foot_loads(recording, ground)
@@ -91,12 +96,18 @@ def _steady_load(recording: Recording, ground: GroundFrame) -> tuple[float | Non
 def check_body_mass(subject: Subject, mass_kg: float, height_m: float | None) -> None:
     """
     Raises:
-        ModelError: a mass that was not given is none of a person of that height.
+        ModelError: a mass that was not given is none of a person of that height, or a height none of that mass.
     """
-    if subject.mass_kg is not None or height_m is None:
+    if height_m is None or (subject.mass_kg is not None and subject.height_m is not None):
         return
     index, (low, high) = mass_kg / height_m**2, _BODY_MASS_INDEX
     if not low <= index <= high:
+        if subject.mass_kg is not None:
+            raise ModelError(
+                f"height_m is not given, and {height_m:.2f} m by markers or file is no height of a person of "
+                f"{mass_kg:.1f} kg ({index:.0f} kg/m2, expected {low:g} to {high:g}); expected height_m of the subject "
+                "(--height)"
+            )
         raise ModelError(
             f"mass_kg is not given, and {mass_kg:.1f} kg by plates or file is no mass of a person of {height_m:.2f} m "
             f"({index:.0f} kg/m2, expected {low:g} to {high:g}); expected mass_kg of the subject (--mass)"
@@ -106,10 +117,9 @@ def check_body_mass(subject: Subject, mass_kg: float, height_m: float | None) ->
 def find_height(subject: Subject, recordings: list[Recording], trial: Trial) -> tuple[float | None, str]:
     """Height (m) and where it comes from; None with the reason where nothing tells.
 
-    Estimated from the marker set's ``height_marker`` (the acromion) where it is highest in the trial, over
-    the lowest
-    marker, divided by its fraction of the body height: a person who never stands upright comes out too
-    small, and the lowest marker lies 1 to 3 cm over the floor, which makes it 1 to 2 % too small as well.
+    Estimated from the marker set's ``height_marker`` (the acromion) where it is highest over the lowest marker of the
+    same frame, a foot that stands, divided by its fraction of the body height: a person who never stands upright comes
+    out too small, and the lowest marker lies 1 to 3 cm over the floor, which makes it 1 to 2 % too small as well.
     """
     if subject.height_m is not None:
         return subject.height_m, f"Height {subject.height_m:.2f} m: given."
@@ -118,14 +128,32 @@ def find_height(subject: Subject, recordings: list[Recording], trial: Trial) -> 
         if told:
             return told, f"Height {told:.2f} m: from the file {recording.name}."
     marker_set = trial.match.marker_set
-    heights = {key: path[np.isfinite(path).all(axis=1), 1] for key, path in trial.paths.items()}
-    tops = [np.percentile(y, 99.0) for key, y in heights.items() if key[0] == marker_set.height_marker and len(y)]
-    if not tops or marker_set.height_fraction is None:
+    tops = [
+        path
+        for key, path in trial.paths.items()
+        if key[0] == marker_set.height_marker and np.isfinite(path).all(axis=1).any()
+    ]
+    over = _over_the_foot(trial, tops) if tops else np.empty(0)
+    if not len(over) or marker_set.height_fraction is None:
         return None, f"height_m is not given and {marker_set.height_marker or 'no marker'} does not tell it."
-    floor = min(np.percentile(y, 1.0) for y in heights.values() if len(y))
-    height = float(np.mean(tops) - floor) / marker_set.height_fraction
+    height = float(np.percentile(over, 99.0)) / marker_set.height_fraction
     return height, (
         f"Height {height:.2f} m: not given, estimated from {marker_set.height_marker} (where it is highest) "
-        "over the "
-        f"lowest marker, divided by {marker_set.height_fraction:g} ({marker_set.height_source})."
+        f"over the lowest marker of the same frame, divided by {marker_set.height_fraction:g} "
+        f"({marker_set.height_source})."
     )
+
+
+def _over_the_foot(trial: Trial, tops: list[Array]) -> Array:
+    """Heights (K,) m of the mean of markers (T, 3) over the lowest one, in the frames in which that one stands still,
+    or in all where it never does, as on a treadmill."""
+    time, places = trial.recording.time, np.stack(list(trial.paths.values()), axis=1)
+    heights = np.where(np.isfinite(places[..., 1]), places[..., 1], np.inf)
+    lowest = heights.argmin(axis=1)
+    over = np.mean(tops, axis=0)[:, 1] - heights.min(axis=1)
+    seen = np.isfinite(over)
+    if len(time) < 2:
+        return np.asarray(over[seen])
+    speed = np.linalg.norm(np.gradient(places, time, axis=0), axis=2)[np.arange(len(time)), lowest]
+    still = seen & (speed < _STANDS_M_S)  # NaN beside a gap: not known to be still
+    return np.asarray(over[still if still.any() else seen])

@@ -36,5 +36,19 @@ class Subject(_SubjectFields):
             if key not in _SubjectFields.model_fields:
                 known = _SubjectFields.model_fields
                 raise ModelError(f"subject: unknown key {key!r}{nearest(key, known)}; expected {', '.join(known)}")
-        checked = validate(_SubjectFields, fields, "subject")
+        try:
+            checked = validate(_SubjectFields, fields, "subject")
+        except ModelError as error:
+            raise ModelError(error.message + _hint(fields)) from None
         super().__init__(**checked.model_dump())
+
+
+def _hint(fields: dict[str, Any]) -> str:
+    """The option, and what a number in another unit would be in ours."""
+    mass, height = (fields.get(key) for key in ("mass_kg", "height_m"))
+    if isinstance(mass, int | float) and not 0.0 < mass < 500.0:
+        return "; expected kilograms (--mass)"
+    if isinstance(height, int | float) and not 0.3 < height < 2.8:
+        metres = next((height * unit for unit in (0.01, 0.001) if 0.3 < height * unit < 2.8), None)
+        return "; expected metres (--height)" if metres is None else f"; expected metres (--height), {metres:.2f}?"
+    return ""

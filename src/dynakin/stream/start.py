@@ -12,6 +12,7 @@ import numpy as np
 from dynakin.errors import ModelError, RecordingError
 from dynakin.filter import Estimator
 from dynakin.model import Definition, InitialModel
+from dynakin.model.body import steady_load
 from dynakin.model.definition import ModelDefinition
 from dynakin.model.marker_set import choose_marker_set, match_markers
 from dynakin.recordings import (
@@ -21,14 +22,14 @@ from dynakin.recordings import (
     Recording,
     Surface,
     check_plates,
+    find_ground_frame,
     plate_from_wrench,
     standing_window,
 )
-from dynakin.recordings.plates import LOADED_N, MASS_REFUSED_KG
+from dynakin.recordings.plates import LOADED_N
 from dynakin.recordings.textfile import LARGEST_TEXT, read_bytes
 from dynakin.recordings.vertical import axis_vector, find_vertical
 from dynakin.stream.fusion import Fused
-from dynakin.units import GRAVITY_M_S2
 
 _NOW_S = 0.1  # the present posture, from a few frames
 _KINDS = ("length", "marker", "inertia")
@@ -127,26 +128,26 @@ def quietest(recording: Recording) -> tuple[Recording, Recording | None, str]:
     end = float(recording.time[-1])
     window = standing_window(recording)
     if window is None:
-        present = _weighed(recording.window(end - _NOW_S, end), recording)
-        mass = present.subject.get("mass_kg")
-        told = (
-            f"; the plates' mean load, {mass:.1f} kg, is the mass where none is given"
-            if mass and mass != recording.subject.get("mass_kg")
-            else ""
-        )
+        present, told = _weighed(recording.window(end - _NOW_S, end), recording)
         return present, None, f"the present posture is taken{told}."
     still = recording.time[window]
     quiet = recording.window(float(still[0]), float(still[-1]))
     return recording.window(end - _NOW_S, end), quiet, f"{still[-1] - still[0]:.1f} s of it are taken."
 
 
-def _weighed(present: Recording, whole: Recording) -> Recording:
-    """With the mass by the mean load of a movement, where nothing else tells it: a moment alone weighs nobody."""
+def _weighed(present: Recording, whole: Recording) -> tuple[Recording, str]:
+    """With the mass by the mean load of a movement that is long and steady enough (a moment alone weighs nobody), where
+    nothing else tells it, and words for that, or for why the load is no weight."""
     if not whole.plates or "mass_kg" in present.subject:
-        return present
-    load = np.nanmean(np.sum([plate.force for plate in whole.plates], axis=0), axis=0)
-    mass = float(np.linalg.norm(load)) / GRAVITY_M_S2
-    return replace(present, subject={**present.subject, "mass_kg": mass}) if mass > MASS_REFUSED_KG[0] else present
+        return present, ""
+    try:
+        mass, why = steady_load(whole, find_ground_frame(whole))
+    except RecordingError as error:
+        mass, why = None, error.message
+    if mass is None:
+        return present, f"; the plates weigh nobody: {why}"
+    told = f"; the plates' mean load, {mass:.1f} kg, is the mass where none is given"
+    return replace(present, subject={**present.subject, "mass_kg": mass}), told
 
 
 def begin(
