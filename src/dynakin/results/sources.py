@@ -29,7 +29,7 @@ NOTES = (
     "2 absent: not known, the value is nan.",
 )
 """What the codes say, for the headers of files."""
-_JOINTS = {"hip": "hip", "knee": "knee", "ankle": "ankle", "subtalar": "ankle"}
+_JOINTS = {"hip": "hip", "knee": "knee", "tibia": "knee", "ankle": "ankle", "subtalar": "ankle"}
 """The joint that a coordinate of a leg is of, by what its name holds; another is its own."""
 UNKNOWN: dict[str, Any] = {
     "legs": {},
