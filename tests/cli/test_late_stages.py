@@ -55,6 +55,28 @@ def test_what_fails_after_the_estimate_is_named_and_the_rest_saved(
     assert (drawn / "figure4_markers.svg").exists() and not (drawn / "figure5_angles.svg").exists()
 
 
+def test_figures_that_cannot_be_written_are_refused_before_or_named_after(
+    squat: SimulatedTrial, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Said
+) -> None:
+    """Before, the results were written and the exit code was 2, as if nothing were; other failures went unsaid."""
+    squat.save(tmp_path / "trial")
+    trial = [str(tmp_path / "trial" / "markers.trc"), "--forces", str(tmp_path / "trial" / "forces.mot")]
+    out = tmp_path / "out"
+    assert main(["run", *trial, *SUBJECT, "-o", str(out), "--figures", "/proc/figures"]) == 2
+    assert "/proc/figures: cannot write results there" in capsys.readouterr().err and not out.exists()
+
+    def full(*_: object, **__: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(run_module, "identifiability", broken)
+    monkeypatch.setitem(figures.FIGURES, "figure4_markers", full)
+    assert main(["run", *trial, *SUBJECT, "-o", str(out), "--figures", str(tmp_path / "figures")]) == 1
+    said = capsys.readouterr().err.splitlines()
+    assert said[0].endswith("Failed: what the recording tells of the constants: ValueError: zero-size array.")
+    assert said[1].endswith("figures: cannot write figures there (No space left on device).") and len(said) == 2
+    assert json.loads((out / "metrics.json").read_text())["failures"][-1] == "figures"
+
+
 def written(recording: Recording, folder: Path) -> list[str]:
     write_trc(folder / "m.trc", recording.time, list(recording.marker_names), recording.markers, unit="mm")
     names, columns = [], []

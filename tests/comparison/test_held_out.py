@@ -10,7 +10,7 @@ import pytest
 from dynakin import _core
 from dynakin.comparison import Identified, Setup, halves, identify_on, judge, predict_blind
 from dynakin.comparison.freeze import final_values, freeze, initial_values
-from dynakin.errors import RecordingError
+from dynakin.errors import LostError, RecordingError
 from dynakin.recordings import Plate, Recording
 from dynakin.simulation import SimulatedTrial
 
@@ -113,3 +113,20 @@ def test_a_marker_that_the_judging_trial_lacks_is_missing_not_zero(
     )
     wrench = predict_blind(identified, fewer).wrenches["EKF (default), identified"]
     assert np.isfinite(wrench[:, [0, 1, 5]]).all()
+
+
+def test_a_trial_in_which_a_filter_lost_the_person_neither_teaches_nor_judges(
+    identified: Identified, parts: tuple[Recording, Recording], setup: Setup
+) -> None:
+    """Three seconds of six with every marker but the feet's under another one's label."""
+
+    def mislabelled(part: Recording) -> Recording:
+        markers = part.markers.copy()
+        others = [k for k, n in enumerate(part.marker_names) if not n.endswith(("toe", "5meta", "calc"))]
+        markers[200:500, others] = np.roll(markers[200:500][:, others], 5, axis=1)
+        return replace(part, markers=markers)
+
+    with pytest.raises(LostError, match=r"first half: EKF \(default\): the person was lost"):
+        identify_on(mislabelled(parts[0]), setup, same_recording=True)
+    with pytest.raises(LostError, match=r"second half: EKF \(default\), identified: the person was lost"):
+        predict_blind(identified, mislabelled(parts[1]))

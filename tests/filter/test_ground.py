@@ -12,7 +12,9 @@ import dynakin
 from dynakin import Estimate, Estimator, Subject, load_model
 from dynakin.filter.closure import closure
 from dynakin.filter.total_wrench import Ground
-from dynakin.recordings import Plate, Recording
+from dynakin.recordings import GroundFrame, Plate, Recording
+from dynakin.recordings.foot_loads import UNKNOWN as FOOT_UNKNOWN
+from dynakin.recordings.foot_loads import foot_loads
 from dynakin.results.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
 from dynakin.results.sources import ABSENT, DERIVED
 from dynakin.simulation import simulate
@@ -207,3 +209,44 @@ def storage(path: Path) -> tuple[list[str], np.ndarray]:
     lines = path.read_text().splitlines()
     head = next(k for k, line in enumerate(lines) if line.strip().casefold() == "endheader")
     return lines[head + 1].split(), np.array([line.split() for line in lines[head + 2 :] if line.strip()], dtype=float)
+
+
+def test_a_pause_in_the_times_is_no_seat() -> None:
+    whole = simulate("fullbody", "squat", 4, 8.0, 50.0).recording
+    later = replace(whole, time=np.where(whole.time < 4.0, whole.time, whole.time + 30.0))
+    assert not ground_of(later, person("fullbody")).undeclared.any()
+
+
+def test_hidden_pelvis_markers_hide_no_seat() -> None:
+    recording = simulate("squat7", "sit-to-stand", 11, 12.0).recording
+    seat = np.asarray(recording.plates[2].force[:, 1])
+    seated = seat > 0.25 * WEIGHT
+    markers = recording.markers.copy()
+    hidden = [k for k, name in enumerate(recording.marker_names) if "ASI" in name]
+    assert hidden and seated.sum() > 100
+    markers[np.ix_(seated, hidden)] = np.nan
+    blind = replace(recording, markers=markers).with_plates(recording.plates[:2])
+    assert ground_of(blind, person("squat7")).undeclared[seated].mean() > 0.95
+
+
+def test_a_foot_on_a_pedal_is_not_in_the_air() -> None:
+    """It goes round 17 cm, fast, and never stands still: whatever it presses on moves with it."""
+    time = np.arange(600) / 100.0
+    names, paths = [], []
+    for side, z, phase in (("R", 0.1, 0.0), ("L", -0.1, np.pi)):
+        turn = 2.0 * np.pi * 80.0 / 60.0 * time + phase
+        for marker, x in (("HEE", -0.1), ("TOE", 0.1)):
+            names.append(side + marker)
+            paths.append(np.stack([x + 0.17 * np.cos(turn), 0.4 + 0.17 * np.sin(turn), np.full(600, z)], axis=1))
+    ground = GroundFrame(np.eye(3), np.zeros(3), "+Y", np.array([1.0, 0.0, 0.0]))
+    loads = foot_loads(Recording("bicycle", None, time, tuple(names), np.stack(paths, axis=1), ()), ground)
+    assert (loads.reason == FOOT_UNKNOWN).all() and np.isnan(loads.wrench).all()
+
+
+@pytest.mark.parametrize("frames", [1, 9, 30])
+def test_a_recording_too_short_to_judge_is_weighed(frames: int) -> None:
+    whole = simulate("fullbody", "squat", 4, 5.0, 100.0).recording
+    short = with_loads(whole, np.full(whole.n_frames, 0.2)).window(2.0, 2.0 + (frames - 0.5) / 100.0)
+    assert short.n_frames == frames
+    ground = ground_of(short, person("fullbody"))
+    assert ground.undeclared.all() and any("not used for the total" in text for text in ground.reasons)

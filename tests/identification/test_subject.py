@@ -2,17 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from dynakin.cli import main
-from dynakin.errors import ModelError
+from dynakin.errors import LostError, ModelError
 from dynakin.filter.extend import initial_covariance
-from dynakin.identification import Decision, Identified, change_between, change_in_words
+from dynakin.identification import (
+    Decision,
+    Identified,
+    change_between,
+    change_in_words,
+    identify_subject,
+    measure_all,
+)
 from dynakin.identification.decision import parts_of
 from dynakin.model.identified import read_identified, with_identified
+from dynakin.recordings import Recording
 from identification.conftest import Case, estimator
 
 
@@ -124,6 +133,37 @@ def test_what_is_wrong_with_the_input_is_one_line_and_nothing_is_written(
         assert not captured.out and not file.exists()
     assert main(["identify", *files, *OPTIONS, "-o", str(tmp_path / "no" / "subject.toml")]) == 2
     assert "in a folder that exists" in capsys.readouterr().err
+
+
+def mislabelled(recording: Recording) -> Recording:
+    """From 3 to 6 s every marker but the feet's carries another one's label: no posture fits."""
+    markers = recording.markers.copy()
+    others = [k for k, n in enumerate(recording.marker_names) if not n.endswith(("toe", "5meta", "calc"))]
+    markers[300:600, others] = np.roll(markers[300:600][:, others], 5, axis=1)
+    return replace(recording, name="mislabelled", markers=markers)
+
+
+def test_a_trial_that_is_lost_is_left_out_and_a_lone_one_refused(case: Case) -> None:
+    """0.1 and later identified on it without a word."""
+    squat, sitting = (sim.recording for sim in case.sims)
+    lost = mislabelled(squat)
+    with pytest.raises(LostError, match=r"mislabelled.*the person was lost.*no trial is left to identify on"):
+        identify_subject(estimator(), [lost], static=case.common.static)
+    with pytest.raises(LostError, match=r"mislabelled.*the person was lost.*one trial is left to identify on"):
+        identify_subject(estimator(), [lost, sitting], static=case.common.static)
+    found = identify_subject(estimator(), [lost, squat, sitting], static=case.common.static)
+    assert found.subject.trials == (squat.name, sitting.name)
+    assert found.lost == found.subject.report[:1] and "left out: " in found.lost[0] and "mislabelled" in found.lost[0]
+
+
+def test_lost_frames_of_a_trial_that_is_followed_say_nothing_of_the_body(case: Case) -> None:
+    markers = (recording := case.sims[0].recording).markers.copy()
+    others = [k for k, n in enumerate(recording.marker_names) if not n.endswith(("toe", "5meta", "calc"))]
+    markers[300:370, others] = np.roll(markers[300:370][:, others], 5, axis=1)
+    (trial,) = measure_all(case.common, [replace(recording, markers=markers)])
+    lost = trial.movement.lost
+    assert 10 < lost.sum() < 40 and np.isnan(trial.wrench[lost]).all() and np.isfinite(trial.wrench[~lost]).any()
+    assert trial.part(slice(10, 20)).movement.lost.shape == (10,)
 
 
 def test_a_file_that_does_not_fit_is_refused(

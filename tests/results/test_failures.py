@@ -18,6 +18,7 @@ from dynakin.cli import summary
 from dynakin.errors import OutputError
 from dynakin.results import OUTPUT_FILES, Estimate, check_output_writable, metrics, save
 from dynakin.results.failures import Failures
+from dynakin.results.output_folder import check_folder_writable
 
 
 def broken(*_: object, **__: object) -> None:
@@ -63,8 +64,8 @@ def test_a_figure_or_a_file_that_fails_is_left_out_and_named_on_the_page(
     assert "Not made" in (out / "report.html").read_text()
 
 
-def test_a_full_disk_is_no_stage(short: Estimate) -> None:
-    with pytest.raises(OSError, match="No space"), Failures().stage("report.html"):
+def test_a_full_disk_is_no_stage_of_the_results_but_one_of_what_comes_after_them() -> None:
+    with pytest.raises(OSError, match="No space"), Failures().stage("report.html", writes=True):
         raise OSError(28, "No space left on device")
 
 
@@ -104,3 +105,17 @@ def test_page_and_console_bear_any_block_that_failed(
     assert "Not made" in (folder / "report.html").read_text()
     summary.print_summary(estimate, folder)
     assert "Report" in text.getvalue()
+
+    failures = Failures()
+    with failures.stage("figures"):
+        raise OSError(28, "No space left on device")
+    assert failures.messages() == ["Failed: figures: OSError: [Errno 28] No space left on device."]
+
+
+def test_a_folder_for_figures_may_hold_anything_but_has_to_take_files(tmp_path: Path) -> None:
+    (tmp_path / "thesis.tex").write_text("")
+    assert check_folder_writable(tmp_path) == tmp_path and check_folder_writable(tmp_path / "a" / "b")
+    assert [entry.name for entry in tmp_path.iterdir()] == ["thesis.tex"]
+    for folder in (tmp_path / "thesis.tex", tmp_path / "thesis.tex" / "a", Path("/proc/figures"), "a\0b"):
+        with pytest.raises(OutputError, match="cannot write"):
+            check_folder_writable(folder)

@@ -143,7 +143,7 @@ def test_reasons_are_the_grounds_and_of_lost_frames_whatever_other_messages_say(
     said = replace(walker, messages=[*walker.messages, other])
     assert other not in compute_metrics(said)["moments"]["reasons"]
     assert compute_metrics(replace(said, config={}))["moments"]["reasons"] == []
-    plates = replace(said, config={"ground_reasons": ["Warning: the plates are silent from 1.70 to 2.30 s."]})
+    plates = replace(said, config={"ground": {"reasons": ["Warning: the plates are silent from 1.70 to 2.30 s."]}})
     assert compute_metrics(plates)["moments"]["reasons"] == ["the plates are silent from 1.70 to 2.30 s."]
     held = plates.data.assign(tracking=("time", np.where(np.arange(301) < 10, 2, 0)))
     reasons = compute_metrics(without_lost(replace(plates, data=held)))["moments"]["reasons"]

@@ -16,7 +16,7 @@ from dynakin.cli import main
 from dynakin.comparison import Setup, compare_trial
 from dynakin.errors import LostError
 from dynakin.results import Estimate
-from dynakin.results.tracking import tracking_of, without_lost
+from dynakin.results.tracking import refuse_lost, tracking_of, without_lost
 from dynakin.simulation import SimulatedTrial, simulate_squat
 
 ARM = slice(7, 10)
@@ -80,7 +80,7 @@ def test_refused_markers_count_by_their_share_and_by_limb() -> None:
 def test_a_lost_trial_is_saved_only_where_asked(tmp_path: Path) -> None:
     estimate = without_lost(arm_off(slice(300, 500)))
     assert estimate.why_lost is not None and "17 % of the frames with markers, expected 10 %" in estimate.why_lost
-    with pytest.raises(LostError, match=r"3\.00 to 4\.99 s.*nothing is saved \(--keep-lost"):
+    with pytest.raises(LostError, match=r"3\.00 to 4\.99 s.*nothing is saved \(keep_lost=True saves"):
         estimate.save(tmp_path / "out")
     assert not (tmp_path / "out").exists()
     folder = estimate.save(tmp_path / "out", keep_lost=True)
@@ -91,6 +91,16 @@ def test_a_lost_trial_is_saved_only_where_asked(tmp_path: Path) -> None:
     assert np.isnan(table[300:500, 1:]).all() and np.isfinite(table[:300, 1:]).all()
     with xr.open_dataset(folder / "estimate.nc", engine="h5netcdf") as data:
         assert int(data["lost"].sum()) == 200
+
+
+def test_what_keeps_the_good_frames_is_said_where_it_is_and_where_there_are_any() -> None:
+    estimate = without_lost(arm_off(slice(300, 500)))
+    with pytest.raises(LostError, match=r"nothing is saved \(--keep-lost saves the frames that are good\)$"):
+        refuse_lost(estimate, "--keep-lost")
+    with pytest.raises(LostError, match=r"at most; nothing is saved$"):
+        refuse_lost(estimate)
+    with pytest.raises(LostError, match=r"at most; no frame is good, nothing is saved$"):
+        refuse_lost(without_lost(arm_off(slice(None))), "--keep-lost")
 
 
 @pytest.fixture(scope="module")
@@ -129,6 +139,7 @@ def test_a_drop_jump_that_is_not_followed_is_no_result(
     assert main(["run", *trial, *options]) == 1
     said = capsys.readouterr()
     assert "DJ1.trc: the person was lost" in said.err and "0.00 to 2.68 s" in said.err
+    assert "no frame is good, nothing is saved" in said.err and "--keep-lost" not in said.err
     assert "consistent" not in said.out and not out.exists()
 
 

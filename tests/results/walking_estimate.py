@@ -120,6 +120,6 @@ def make_walker(withheld: tuple[int, ...] = (), *, absent: bool = False) -> Esti
         made,
         data=data,
         model_name="fullbody",
-        config=made.config | {"mass_kg": MASS_KG, "ground_reasons": messages if withheld else []},
+        config=made.config | {"mass_kg": MASS_KG, "ground": {"reasons": messages if withheld else []}},
         messages=[*made.messages, *(messages if withheld else [])],
     )

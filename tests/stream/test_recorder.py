@@ -154,6 +154,20 @@ def test_a_disk_that_is_full_ends_the_recording_at_once_and_says_so(tmp_path: Pa
     recorder.close()
 
 
+def test_only_an_error_of_the_system_is_named_by_its_number(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A writer that Python ends has 1, which is the system's number of `Operation not permitted`."""
+    popen = subprocess.Popen
+
+    def broken(command: list[str], **options: object) -> subprocess.Popen[bytes]:
+        return popen([command[0], "-c", "raise ValueError"], **options)  # type: ignore[call-overload,no-any-return]
+
+    monkeypatch.setattr(subprocess, "Popen", broken)
+    recorder = Recorder(tmp_path / "r")
+    recorder.close()
+    failure = recorder.failure()
+    assert failure is not None and "takes no more (the process that writes ended)" in failure
+
+
 def test_a_session_whose_recorder_fails_goes_on_and_is_no_success(squat: Recording) -> None:
     class Full(Sink):
         frames, closed = 0, 0

@@ -79,7 +79,7 @@ def identify(
 def _print(found: Identified) -> None:
     """What the decision was, what moved, how sure."""
     console = out()
-    for text in found.decision.in_words():
+    for text in (*found.lost, *found.decision.in_words()):
         console.print(f"- {text}")
     used = "used" if found.subject.use == "bodies" else "not used: the table is kept"
     total = found.posterior.unknowns.bodies.total

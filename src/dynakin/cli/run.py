@@ -41,6 +41,7 @@ from dynakin.recordings import read, without_plate_loads
 from dynakin.report import read_sensitivity, save_figures
 from dynakin.results import Estimate, check_output_writable
 from dynakin.results.failures import Failures
+from dynakin.results.output_folder import check_folder_writable
 from dynakin.results.tracking import refuse_lost
 
 LARGEST_BENCH = 250
@@ -108,6 +109,8 @@ def run(
     check_output_writable(config.output)
     if sensitivity is not None and figures is None:
         raise typer.BadParameter("--sensitivity is a figure for papers, expected --figures FOLDER with it")
+    if figures is not None:
+        check_folder_writable(figures)
     grid = None if sensitivity is None else read_sensitivity(sensitivity)
     failures = Failures()
     with progress_bar("estimating") as progress:
@@ -119,11 +122,13 @@ def run(
     with failures.stage("summary"):
         print_summary(found, folder)
     if figures is not None:
-        with busy("drawing figures"):
-            written = save_figures(found, figures, comparison=comparison, sensitivity=grid, failures=failures)
-        out().print(f"Figures  {figures} ({len(written)} files)", soft_wrap=True)
+        with failures.stage("figures"):
+            with busy("drawing figures"):
+                written = save_figures(found, figures, comparison=comparison, sensitivity=grid, failures=failures)
+            out().print(f"Figures  {figures} ({len(written)} files)", soft_wrap=True)
     if len(failures.found) > saved:  # what failed since then is to stand in the files too
-        save(failures=failures)
+        with failures.stage("what failed, in the files"):  # these stay as they were saved
+            save(failures=failures)
     wrong = [*failures.messages(), *filter(None, [found.why_lost])]
     for message in wrong:
         print_error(message)
@@ -167,7 +172,7 @@ def estimate_from(
     estimate = estimator.run(recording, static=static, smooth=config.smooth, progress=progress)
     estimate = replace(estimate, config=config.as_used() | estimate.config)
     if not keep_lost:
-        refuse_lost(estimate)
+        refuse_lost(estimate, "--keep-lost")
     with failures.stage("joint angles of angles.sto"):
         estimate = asked_angles(estimator, estimate, static, config.zero, config.signs)
     assert estimator.initial is not None

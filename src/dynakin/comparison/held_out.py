@@ -12,13 +12,16 @@ from dynakin.comparison.freeze import final_values, freeze, initial_values
 from dynakin.comparison.setup import Setup
 from dynakin.comparison.statistics import spread
 from dynakin.comparison.table2 import Row, unit_of
-from dynakin.errors import ModelError, RecordingError
+from dynakin.errors import LostError, ModelError, RecordingError
+from dynakin.filter import Estimator
+from dynakin.filter.assemble import assemble
 from dynakin.filter.smoothing import can_smooth
 from dynakin.filter.total_wrench import known_ground
 from dynakin.model import Bounds, Definition, InitialModel, Priors, initialise
 from dynakin.recordings import GroundFrame, Recording
 from dynakin.reference import identify, predicted_wrench, reference_methods
 from dynakin.results import COMPONENTS, Estimate, evaluation_window, signal_fit
+from dynakin.results.tracking import without_lost
 
 Array = npt.NDArray[np.float64]
 
@@ -81,13 +84,14 @@ def identify_on(
             begin in the middle of a movement.
 
     Raises:
-        DynakinError: as `Estimator.run`.
+        LostError: a filter lost the person. Other DynakinErrors: as `Estimator.run`.
     """
     estimates = {}
     for preset in setup.noise:
         estimator = setup.estimator(preset)
         # only what it ends with is used, which smoothing does not change
         estimates[preset] = estimator.run(recording, static=static, smooth=False)
+        _refuse_lost(estimates[preset], f"EKF ({preset})")
     assert estimator.initial is not None
     wrench = measured_wrench(recording, estimator.initial, setup.plates)
     ground = estimator.initial.ground if same_recording else None
@@ -103,7 +107,8 @@ def predict_blind(identified: Identified, recording: Recording) -> Blind:
     inertia. Persistence: the identifying trial's last wrench, and its mean.
 
     Raises:
-        ModelError, RecordingError: the trial's markers do not fit the model. DivergenceError: from a filter.
+        ModelError, RecordingError: the trial's markers do not fit the model. DivergenceError: from a filter. LostError:
+            a filter lost the person.
     """
     recording = replace(recording, plates=())
     setup, measured = identified.setup, identified.initial
@@ -117,10 +122,12 @@ def predict_blind(identified: Identified, recording: Recording) -> Blind:
             estimator = setup.estimator(preset)
             estimator.start_from(freeze(measured, values, coordinates))
             arrays = estimator.run_arrays(recording.time, markers, blank)
+            _refuse_lost(as_estimate(estimator, arrays, recording, markers), f"EKF ({preset}), {label}")
             found[f"EKF ({preset}), {label}"] = arrays["wrench_estimated"]
             if label == "identified" and can_smooth(setup.noise[preset]):
                 estimator.start_from(freeze(measured, values, coordinates))
                 arrays = estimator.run_smoothed_arrays(recording.time, markers, blank)
+                _refuse_lost(as_estimate(estimator, arrays, recording, markers), f"EKF ({preset}), smoothed")
                 found[f"EKF ({preset}), smoothed"] = arrays["wrench_estimated"]
     notes: list[str] = []
     try:
@@ -178,6 +185,25 @@ def marker_paths(recording: Recording, initial: InitialModel, ground: GroundFram
     missing = np.full((recording.n_frames, 3), np.nan)
     paths = [recording.marker(name) if name in recording.marker_names else missing for name in initial.recorded_markers]
     return ground.points_to_ground(np.stack(paths, axis=1))
+
+
+def as_estimate(estimator: Estimator, arrays: Mapping[str, Array], recording: Recording, markers: Array) -> Estimate:
+    """What an estimator that was started by hand made of a recording's markers (T, M, 3) m alone, judged frame by frame
+    like any other estimate."""
+    assert estimator.initial is not None
+    measured = (markers, np.full((recording.n_frames, 6), np.nan))
+    covariances = (estimator.covariance, estimator.covariance)
+    return without_lost(
+        assemble(
+            arrays, estimator.core_model, estimator.initial, recording, measured, estimator.settings(), [], covariances
+        )
+    )
+
+
+def _refuse_lost(estimate: Estimate, method: str) -> None:
+    if (reason := estimate.why_lost) is not None:
+        where = estimate.recording.path or estimate.recording.name
+        raise LostError(f"{where}: {method}: {reason}; nothing is judged by it")
 
 
 def start_as(

@@ -59,7 +59,7 @@ def assemble(
     parameters = parameters_of(
         initial, arrays["state"][-1], arrays["state_sd"][-1], prior_sd, noise.get("length_skin", 0.0)
     )
-    config = config | {
+    config = {key: value for key, value in config.items() if key != "ground_reasons"} | {
         "mass_kg": initial.mass_kg,
         "height_m": initial.height_m,
         "side": initial.side,
@@ -67,6 +67,7 @@ def assemble(
             "vertical": initial.ground.vertical,
             "forward": initial.ground.forward.tolist(),
             "origin_m": initial.ground.origin_L.tolist(),
+            "reasons": list(config.get("ground_reasons", ())),
         },
     }
     estimate = Estimate(

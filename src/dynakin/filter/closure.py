@@ -11,11 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import ndimage, signal
+from scipy import ndimage
 
-from dynakin import _core
+from dynakin.filter.mass_centre import mass_centre
 from dynakin.model import InitialModel
 from dynakin.recordings.foot_contact import runs
+from dynakin.recordings.recording import rate_of
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
@@ -29,16 +30,9 @@ EDGE = 0.06
 SPREAD_S = 0.3
 SMOOTH_S = 0.05
 """Standard deviation of the Gaussian by which the difference is smoothed: -3 dB at 2.6 Hz."""
-CUTOFF_HZ = 6.0
-"""Low-pass of the centre of mass before it is differentiated."""
-SHORTEST_S = 0.5
-"""Recordings that are shorter are not judged: the derivatives at their ends are not known."""
-_END_S = 0.1
-_GAP_S = 0.2
-_GAP_WEIGHT = 0.05
-"""Longer gaps of markers that make up more than this part of the mean are not judged."""
 _MASS_WITHIN, _OFTEN = 0.15, 0.2
-_POSTURES, _SPREAD_RAD = 200, 0.4
+_UNSEEN_S = 0.2
+"""Where too few markers are seen for longer than this, the plates' mean has to be near the weight."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,6 +45,7 @@ class Closure:
         moment: (T, 2) N m of the excess about the ground's origin: about X and about Z, of its vertical part, as far as
             the body does not turn.
         undeclared: (T,) frames in which something bears (or pulls) the person that no plate measures.
+        unjudged: number of claimed frames in which too few markers are seen, or which lie at an end.
         load_ratio: the plates' load over that of the declared mass where they carry the person; None where that is
             within 15 % too seldom to be said.
     """
@@ -58,6 +53,7 @@ class Closure:
     excess: Array
     moment: Array
     undeclared: Flags
+    unjudged: int
     load_ratio: float | None
 
     def place(self, frames: slice) -> Array:
@@ -78,20 +74,12 @@ def closure(initial: InitialModel, time: Array, markers: Array, wrench: Array, c
         None where nothing can be judged.
     """
     claimed = claimed & np.isfinite(wrench).all(axis=1)
-    if len(time) < 2 or time[-1] - time[0] < SHORTEST_S or not claimed.any():
+    found = mass_centre(initial, time, markers) if claimed.any() else None
+    if found is None or not (found.known & claimed).any():
         return None
-    rate = (len(time) - 1) / float(time[-1] - time[0])
-    found = _centre_of_mass(initial, time, markers)
-    if found is None or rate < 2.5 * CUTOFF_HZ:
-        return None
-    centre, judged = found
+    judged = found.known & claimed
+    centre, acceleration, rate = found.path, found.acceleration, rate_of(time)
     axes = np.array(initial.spec.wrench_measured[:3])
-    acceleration = _second_derivative(centre, rate)
-    end = round(_END_S * rate)
-    judged = judged & claimed
-    judged[:end] = judged[len(judged) - end :] = False
-    if not judged.any():
-        return None
     weight = initial.weighed_kg * GRAVITY_M_S2
     need = initial.weighed_kg * (acceleration + np.array([0.0, GRAVITY_M_S2, 0.0]))
     ratio = _load_ratio(need[judged, 1], wrench[judged, 1], weight)
@@ -101,7 +89,12 @@ def closure(initial: InitialModel, time: Array, markers: Array, wrench: Array, c
     zmp = centre - centre[:, [1]] * acceleration / (acceleration[:, [1]] + GRAVITY_M_S2).clip(1.0)
     about = np.stack([-need[:, 1] * zmp[:, 2] - wrench[:, 3], need[:, 1] * zmp[:, 0] - wrench[:, 5]], axis=1)
     size = np.abs(np.nan_to_num(excess)).max(axis=1) / weight
-    return Closure(excess, _smooth(about, judged, rate), _lasting(size, judged, claimed, rate), ratio)
+    undeclared = _lasting(size, judged, claimed, rate)
+    for first, end in runs(claimed & ~judged):
+        load = float(np.median(wrench[first:end, 1]))
+        if end - first > _UNSEEN_S * rate and abs(load - weight) > EXCESS * weight:
+            undeclared[first:end] = True
+    return Closure(excess, _smooth(about, judged, rate), undeclared, int(np.sum(claimed & ~judged)), ratio)
 
 
 def plates_misfit(initial: InitialModel, time: Array, markers: Array, wrench: Array) -> float | None:
@@ -139,52 +132,3 @@ def _smooth(values: Array, judged: Flags, rate: float) -> Array:
     total = ndimage.gaussian_filter1d(weights, SMOOTH_S * rate, mode="constant")
     with np.errstate(divide="ignore", invalid="ignore"):
         return np.where(judged[:, None], sums / total[:, None], np.nan)
-
-
-def _second_derivative(centre: Array, rate: float) -> Array:
-    sos = signal.butter(2, CUTOFF_HZ / 0.802, fs=rate, output="sos")  # twice: -3 dB at the cut-off
-    smooth = signal.sosfiltfilt(sos, centre, axis=0, padlen=min(len(centre) - 1, round(rate / CUTOFF_HZ)))
-    return np.asarray(np.gradient(np.gradient(smooth, 1.0 / rate, axis=0), 1.0 / rate, axis=0))
-
-
-def _centre_of_mass(initial: InitialModel, time: Array, markers: Array) -> tuple[Array, Flags] | None:
-    """Centre of mass (T, 3) as a fixed mean of the markers, and the frames in which enough of these are seen."""
-    axes = np.array(initial.spec.markers[0].measured)
-    seen: Flags = np.asarray(np.isfinite(markers[:, :, axes]).all(axis=2))
-    use = np.flatnonzero(seen.mean(axis=0) > 0.8)
-    if len(use) < 4:
-        return None
-    weights = _weights(initial, use)
-    centre, judged = np.zeros((len(time), 3)), np.ones(len(time), dtype=bool)
-    lost = np.zeros(len(time))
-    for weight, m in zip(weights, use, strict=True):
-        known: Flags = seen[:, m]
-        for axis in np.flatnonzero(axes):
-            centre[:, axis] += weight * np.interp(time, time[known], markers[known, m, axis])
-        for first, end in runs(~known):
-            if time[end - 1] - time[first] > _GAP_S or first == 0 or end == len(time):
-                lost[first:end] += abs(weight)
-    return centre, judged & (lost <= _GAP_WEIGHT)
-
-
-def _weights(initial: InitialModel, use: npt.NDArray[np.intp]) -> Array:
-    """Weights (K,), of sum 1, of the markers by which they give the centre of mass, over many postures of the model.
-
-    Least squares with a small ridge; on our models it is within 2 to 3 mm where every angle turns by 23 deg.
-    """
-    model = _core.Model(initial.spec)
-    offset, size = model.layout.blocks["coordinates"]
-    states = np.tile(initial.x0, (_POSTURES, 1))
-    turned = {axis.coordinate for s in initial.spec.segments for axis in s.axes if axis.kind == "rotation"}
-    turns = np.array([c.name in turned for c in initial.spec.coordinates if not c.locked])
-    rng = np.random.default_rng(0)
-    states[:, offset : offset + size] += rng.normal(0.0, _SPREAD_RAD, (_POSTURES, size)) * turns
-    axes = np.array(initial.spec.markers[0].measured)
-    places = np.stack([_core.marker_positions(model, x)[use] for x in states])[..., axes]
-    centre = _core.whole_body(model, states)["mass_centre"][:, axes]
-    middle = places.mean(axis=1, keepdims=True)
-    A = (places - middle).transpose(0, 2, 1).reshape(-1, len(use))
-    b = (centre - middle[:, 0]).reshape(-1)
-    ridge = 1e-4 * len(b) * np.eye(len(use))
-    found = np.linalg.solve(A.T @ A + ridge, A.T @ b)
-    return np.asarray(found - found.mean() + 1.0 / len(use))

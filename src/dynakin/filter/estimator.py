@@ -26,6 +26,7 @@ from dynakin.model import Bounds, CarriedLoad, Definition, InitialModel, Priors,
 from dynakin.model.identified import IdentifiedSubject, with_identified
 from dynakin.model.validation import nearest
 from dynakin.recordings import Recording
+from dynakin.recordings.limits import rate_problem
 from dynakin.results import Estimate
 from dynakin.results.tracking import without_lost
 
@@ -36,10 +37,6 @@ Feet = Callable[[InitialModel], FootWrenches | None]
 LARGEST_LAG = 1000
 """Frames. Each step goes back over all of them and each keeps its covariance: a whole body's take half a gigabyte, and
 no camera's frame is so long that a step would end within it."""
-
-
-LONGEST_STEP_S = 0.2
-"""Frames further apart than this do not follow a person: speeds change within it."""
 
 
 class Estimator:
@@ -134,7 +131,8 @@ class Estimator:
             DivergenceError: the filter lost its estimate; the message names the frame.
         """
         smooth, unsmoothed = whether_to_smooth(smooth, self.noise)
-        _check_step(recording)
+        if problem := rate_problem(recording.time):
+            raise RecordingError(f"{recording.path or recording.name}: {problem}")
         initial = self.start(recording, static=static)
         assert self._core_model is not None
         markers, wrench, ground = self._measured(recording, initial)
@@ -156,7 +154,7 @@ class Estimator:
                 arrays = self.run_smoothed_arrays(recording.time, markers, wrench, back, on_feet)
         except ValueError as error:  # a frame that the core refuses, named by it
             raise RecordingError(f"{recording.path or recording.name}: {error}") from None
-        config = self.settings() | {"smooth": smooth}
+        config = self.settings() | {"smooth": smooth, "ground_reasons": list(ground.reasons)}
         notes += [*([doubt] if doubt else clock if ground.usable else []), *unsmoothed]
         assert self._filter is not None
         covariances = (initial_covariance(initial, self.noise), self._filter.covariance)
@@ -438,19 +436,6 @@ class Estimator:
         """The core's settings for a measured model: this noise, the marker set's variances, the bounds of (9)."""
         assert self._core_model is not None
         return filter_settings(initial, self.noise, self._core_model.layout, self.estimate)
-
-
-def _check_step(recording: Recording) -> None:
-    """
-    Raises:
-        RecordingError: frames too far apart to follow a motion, as with times in ms that are read as s.
-    """
-    step = float(np.median(np.diff(recording.time))) if recording.n_frames > 1 else 0.0
-    if step > LONGEST_STEP_S:
-        raise RecordingError(
-            f"{recording.path or recording.name}: frames are {step:.4g} s apart, expected {LONGEST_STEP_S:g} s at "
-            "most to follow a motion (are the times in s?)"
-        )
 
 
 def _shares(progress: Progress | None, frames: int) -> tuple[Progress | None, Progress | None]:

@@ -36,6 +36,12 @@ _CONTACT = {
     on_plates.OFF_PLATE: NOT_MEASURED,
     on_plates.UNKNOWN: NOT_MEASURED,
 }
+UNJUDGED = (
+    "The recording is too short, or shows too few markers, to check by the motion of the centre of mass that the "
+    "plates carry the person."
+)
+MANY = 0.2
+"""Part of the frames from which it is said that they could not be checked; the ends of a recording never can."""
 _NEARLY_ALL = 0.8
 """Part of the judged frames from which an excess is said of the whole recording: its mass may be wrong."""
 _SHARED_PART = 0.2
@@ -74,7 +80,7 @@ class Ground:
             cable), wherever it acts: of the moments only those between the plates and the thighs are known.
         usable: whether the plates are used at all.
         load_ratio: what they carry over what the declared mass needs (`Closure`); None where that is not known.
-        notes: what there is to say.
+        notes: what there is to say. reasons: those of them that say why something is not measured.
     """
 
     loads: FootLoads | None
@@ -82,6 +88,7 @@ class Ground:
     usable: bool
     load_ratio: float | None
     notes: tuple[str, ...]
+    reasons: tuple[str, ...]
 
 
 def foot_markers(initial: InitialModel) -> dict[str, list[str]]:
@@ -108,8 +115,8 @@ def known_ground(
 
     Args:
         markers: (T, M, 3) m, of the model, ground frame. assigned: plate -> foot, as for `foot_loads`.
-        tolerance: part of the weight by which the plates' mean may differ; None: the total is used as it is, and only
-            the moments say what they lack.
+        tolerance: part of the weight by which the plates' mean may differ where `closure` cannot judge; None: nobody
+            asks.
 
     Raises:
         RecordingError: the plates are refused.
@@ -123,41 +130,52 @@ def known_ground(
             "No force plates: the ground reaction is not known, so the moments of a leg that may stand are absent; "
             "inertial parameters stay as the table has them."
         )
-        return Ground(loads, np.zeros(n, dtype=bool), False, None, (text,))
+        return Ground(loads, np.zeros(n, dtype=bool), False, None, (text,), (text,))
     # steps beside the plates: their mean load is no mass
     mass, feet = (None, foot_markers(initial)) if initial.feet else (initial.weighed_kg, None)
     check = check_plates(recording, initial.ground, mass, feet)
     if check.refusal:
         raise RecordingError(f"{recording.path or recording.name}: {check.refusal}")
-    notes = list(check.messages)
-    claimed: Flags = np.asarray(np.isfinite(wrench).all(axis=1)) if loads is None else loads.total_known
-    found = closure(initial, recording.time, markers, wrench, claimed)
-    undeclared = np.zeros(n, dtype=bool) if found is None else found.undeclared.copy()
+    notes, reasons = list(check.messages), list[str]()
+    measured: Flags = np.asarray(np.isfinite(wrench).all(axis=1))
+    claimed = measured if loads is None else loads.total_known
+    undeclared = np.zeros(n, dtype=bool) if loads is None else loads.elsewhere.copy()
+    beside = np.zeros((n, len(initial.feet)), dtype=bool)
+    if not measured.all():
+        reasons.append(f"The plates are not measured in {n - int(measured.sum())} of {n} frames.")
     if loads is not None:
-        notes += loads.messages
-        undeclared |= loads.elsewhere
-        loads = loads.with_undeclared(undeclared)
+        notes += [text for text in loads.messages if text not in loads.reasons]
+        reasons += loads.reasons
+    found = closure(initial, recording.time, markers, wrench, claimed)
     if found is None:
         foreign = _foreign_load(check, wrench, claimed, initial, tolerance)
-        if foreign is not None:
-            notes.append(foreign)
-            undeclared[:] = True
-            loads = loads and loads.with_undeclared(undeclared)
-    elif found.undeclared.any():
-        said, beside = _undeclared_in_words(found, recording, initial, markers, wrench)
-        notes += said
-        if _nearly_all(found):
-            undeclared[:] = True
-            loads = loads and loads.with_undeclared(undeclared)
-        loads = loads and loads.without(beside)
+        undeclared |= foreign is not None
+        reasons += [foreign] if foreign else []
+        notes.append(UNJUDGED)
+    else:
+        undeclared |= found.undeclared | _nearly_all(found)
+        if found.undeclared.any():
+            text, beside = _undeclared_in_words(found, recording, initial, markers, wrench)
+            reasons.append(text)
+        if found.unjudged > MANY * n:
+            notes.append(
+                f"In {found.unjudged} of {n} frames too few markers are seen to check that the plates carry the person."
+            )
     if loads is not None:
-        wrench[~loads.total_known] = np.nan
-    elif tolerance is not None:
-        wrench[undeclared] = np.nan
+        before, loads = loads, loads.with_undeclared(undeclared).without(beside)
+        for k, foot in enumerate(loads.feet):
+            light = (loads.reason[:, k] != before.reason[:, k]) & (before.reason[:, k] == on_plates.MEASURED)
+            if (light & ~beside[:, k]).any():
+                reasons.append(
+                    f"In {np.count_nonzero(light & ~beside[:, k])} of these frames the {foot} foot's plate reads less "
+                    f"than {LOADED_N:g} N: what the foot carries there is not known."
+                )
+    wrench[undeclared if loads is None else ~loads.total_known] = np.nan
     used = int(np.count_nonzero(np.isfinite(wrench).all(axis=1)))
     if loads is not None or used < n:
         notes.append(f"The total wrench is measured in {used} of {n} frames.")
-    return Ground(loads, undeclared, used > 0, None if found is None else found.load_ratio, tuple(notes))
+    ratio = None if found is None else found.load_ratio
+    return Ground(loads, undeclared, used > 0, ratio, (*notes, *reasons), tuple(reasons))
 
 
 def _nearly_all(found: Closure) -> bool:
@@ -167,26 +185,27 @@ def _nearly_all(found: Closure) -> bool:
 
 def _undeclared_in_words(
     found: Closure, recording: Recording, initial: InitialModel, markers: Array, wrench: Array
-) -> tuple[list[str], Flags]:
-    """Sentences on what the plates lack, with times, and the feet (T, F) under whose plates it acts."""
+) -> tuple[str, Flags]:
+    """A sentence on what the plates lack, with times, and the feet (T, F) under whose plates it acts."""
     time, feet = recording.time, foot_markers(initial)
     beside = np.zeros((len(time), len(feet)), dtype=bool)
     judged = np.isfinite(found.excess[:, 1])
     weight = initial.weighed_kg * GRAVITY_M_S2
     if _nearly_all(found):
         load = float(np.nanmean(wrench[judged, 1])) / GRAVITY_M_S2
-        return [
+        return (
             f"Warning: the plates carry {load:.1f} kg on average where the person weighs {initial.weighed_kg:.1f} kg "
             f"(by the motion {load + float(np.nanmean(found.excess[judged, 1])) / GRAVITY_M_S2:.1f} kg): the mass is "
             "wrong, a plate is missing, or something that no plate measures bears or pulls the person (a seat, a "
             "weight, a cable, a rail). The plates are not used for the total."
-        ], beside
-    spans, sizes, away = [], [], []
+        ), beside
+    spans, sizes, away = list[str](), list[tuple[float, int]](), list[float]()
     for first, end in runs(found.undeclared):
-        excess = found.excess[first:end]
-        if not np.isfinite(excess).any():
-            continue
         spans.append(f"{time[first]:.2f} to {time[end - 1]:.2f} s")
+        excess = found.excess[first:end]
+        if not np.isfinite(excess).any():  # not judged, but far from the weight
+            sizes.append((weight - float(np.median(wrench[first:end, 1])), 1))
+            continue
         worst = np.unravel_index(int(np.nanargmax(np.abs(excess))), excess.shape)
         sizes.append((float(excess[worst]), int(worst[1])))
         if sizes[-1][1] != 1:
@@ -200,16 +219,14 @@ def _undeclared_in_words(
             if np.isfinite(distance).any():
                 away.append(float(np.nanmedian(distance)))
                 beside[first:end, k] = sizes[-1][0] > 0.0 and away[-1] < NEAR_M
-    if not spans:
-        return [], beside
     size, axis = max(sizes, key=lambda pair: abs(pair[0]))
     near = f", {min(away):.2f} m or more from the feet" if away and not beside.any() else ""
-    return [
+    return (
         f"Warning: the plates carry up to {abs(size):.0f} N {'less' if size > 0.0 else 'more'} "
         f"{'upwards' if axis == 1 else 'sideways'} than the motion needs ({abs(size) / weight:.0%} of the weight, "
         f"expected within {EXCESS:.0%}): something that no plate measures bears or pulls the person there (a seat, a "
         f"rail, a box, a foot beside its plate){near}, from {', '.join(spans)}. The total wrench is left out there."
-    ], beside
+    ), beside
 
 
 def doubtful_mass(wrench: Array, mass_kg: float, load_ratio: float | None) -> str | None:
@@ -236,7 +253,7 @@ def _foreign_load(
     """
     mass_kg = initial.weighed_kg
     if initial.feet:
-        load, mean = _mean_load_kg(wrench[claimed], least=10), " on average"
+        load, mean = _mean_load_kg(wrench[claimed], least=1), " on average"
     else:
         load, mean = check.mass_kg_from_plates if check.mass_kg_from_plates is not None else check.mean_mass_kg, ""
     if tolerance is None or load is None or abs(load - mass_kg) <= tolerance * mass_kg:

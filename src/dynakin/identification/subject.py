@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.errors import LostError
 from dynakin.filter import Estimator
 from dynakin.identifiability.base import base_of
 from dynakin.identifiability.element_words import base_words
@@ -32,7 +33,7 @@ class Identified:
     Attributes:
         subject: what is written to the file. common, trials: what it was made of.
         posterior: the batch estimate of the bodies, used or not.
-        decision: of cross-validation.
+        decision: of cross-validation. lost: sentences on the trials that are left out, the person being lost in them.
     """
 
     subject: IdentifiedSubject
@@ -40,6 +41,7 @@ class Identified:
     trials: tuple[MeasuredTrial, ...]
     posterior: Posterior
     decision: Decision
+    lost: tuple[str, ...] = ()
 
 
 def identify_subject(
@@ -58,10 +60,12 @@ def identify_subject(
 
     Raises:
         ModelError, RecordingError: model, markers, plates and trials do not fit. ConfigError: noise without smoother.
+        LostError: the filter lost the person in all trials, or in all but one of several.
     """
     report = progress or (lambda done, of: None)
-    common = Common.measure(estimator, recordings[0], static)
-    trials = measure_all(common, recordings, lambda done, of: report(round(_SEEING * done / of), _WORK))
+    common, trials, lost = _followed(
+        estimator, recordings, static, lambda done, of: report(round(_SEEING * done / of), _WORK)
+    )
     decision = decide(common, trials, lambda done, of: report(round(_SEEING + (_WORK - _SEEING) * done / of), _WORK))
     bodies = estimate(common, trials, "bodies")
     batch = _batch(estimator, bodies)
@@ -69,11 +73,28 @@ def identify_subject(
         model=common.initial.spec.name,
         mass_kg=common.initial.mass_kg,
         use=decision.use,
-        trials=tuple(recording.name for recording in recordings),
-        report=tuple(in_words(decision, bodies, batch)),
+        trials=tuple(trial.movement.recording.name for trial in trials),
+        report=(*lost, *in_words(decision, bodies, batch)),
         batch=batch,
     )
-    return Identified(subject, common, tuple(trials), bodies, decision)
+    return Identified(subject, common, tuple(trials), bodies, decision, tuple(lost))
+
+
+def _followed(
+    estimator: Estimator, recordings: Sequence[Recording], static: Recording | None, progress: Progress
+) -> tuple[Common, list[MeasuredTrial], list[str]]:
+    """The trials in which the filter followed the person, and a sentence on each of the others."""
+    common, lost = Common.measure(estimator, recordings[0], static), dict[int, str]()
+    trials = measure_all(common, recordings, progress, lost)
+    if len(trials) < min(len(recordings), 2):
+        left = "one trial is" if trials else "no trial is"
+        raise LostError(f"{'; '.join(lost.values())}; {left} left to identify on, nothing is saved")
+    said = [f"Warning: left out: {reason}." for reason in lost.values()]
+    if 0 in lost and static is None:  # the lengths were measured on it
+        kept = [recording for k, recording in enumerate(recordings) if k not in lost]
+        common, trials, more = _followed(estimator, kept, static, progress)
+        said += more
+    return common, trials, said
 
 
 def _batch(estimator: Estimator, bodies: Posterior) -> Batch:

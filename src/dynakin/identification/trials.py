@@ -10,8 +10,8 @@ import numpy.typing as npt
 
 from dynakin import _core
 from dynakin.comparison.freeze import freeze, initial_values
-from dynakin.comparison.held_out import marker_paths, measured_wrench, start_as
-from dynakin.errors import ModelError, RecordingError
+from dynakin.comparison.held_out import as_estimate, marker_paths, measured_wrench, start_as
+from dynakin.errors import LostError, ModelError, RecordingError
 from dynakin.filter import Estimator
 from dynakin.model import InitialModel, OpenSimDefinition
 from dynakin.recordings import GroundFrame, Recording
@@ -36,13 +36,14 @@ class Movement:
 
     Attributes:
         recording: as read, its plates taken away. time: (T,) s. states: (T, n) of `Common.core`, with the constants
-            of the start. start: the trial's own coordinates and ground frame.
+            of the start. start: the trial's own coordinates and ground frame. lost: (T,) frames that are no estimate.
     """
 
     recording: Recording
     time: Array
     states: Array
     start: InitialModel
+    lost: npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +66,8 @@ class MeasuredTrial:
 
     def part(self, frames: slice) -> MeasuredTrial:
         """Some of its frames."""
-        kept = replace(self.movement, time=self.movement.time[frames], states=self.movement.states[frames])
+        whole = self.movement
+        kept = replace(whole, time=whole.time[frames], states=whole.states[frames], lost=whole.lost[frames])
         return MeasuredTrial(kept, self.wrench[frames], self.floating)
 
 
@@ -128,7 +130,8 @@ class Common:
             ground: directions of the laboratory where the trial is a part of another.
 
         Raises:
-            ModelError, RecordingError: the trial does not fit. DivergenceError: from the filter.
+            ModelError, RecordingError: the trial does not fit. DivergenceError: from the filter. LostError: the filter
+                lost the person in too many frames.
         """
         recording = replace(recording, plates=())
         start = self._start(recording, ground)
@@ -140,16 +143,19 @@ class Common:
         arrays = other.run_smoothed_arrays(
             recording.time, markers, np.full((recording.n_frames, 6), np.nan), progress
         )  # fmt: skip
+        judged = as_estimate(other, arrays, recording, markers)
+        if (reason := judged.why_lost) is not None:
+            raise LostError(f"{recording.path or recording.name}: {reason}")
         every = max(1, round(1.0 / (RATE_HZ * float(np.median(np.diff(recording.time))))))
         states = np.tile(self.initial.x0, (recording.n_frames, 1))
         columns = [self.columns(block) for block in ("coordinates", "speeds", "accelerations")]
         quiet = smooth(recording.time, arrays["state"][:, columns[0]], CUTOFF_HZ)
         for at, values in zip(columns, (quiet.values, quiet.rates, quiet.seconds), strict=True):
             states[:, at] = values
-        return Movement(recording, recording.time[::every], states[::every], start)
+        return Movement(recording, recording.time[::every], states[::every], start, judged.lost[::every])
 
     def with_plates(self, movement: Movement, recording: Recording, *, as_measured: bool = False) -> MeasuredTrial:
-        """The movement with the plates of its recording.
+        """The movement with the plates of its recording; NaN in frames in which the person was lost.
 
         Args:
             as_measured: without the low-pass that the kinematics have: for judging.
@@ -162,7 +168,7 @@ class Common:
             first_of_second = movement.time[middle_of(len(movement.time))]
             wrench = _low_passed(recording.time, wrench, int(np.searchsorted(recording.time, first_of_second - 1e-9)))
         every = np.searchsorted(recording.time, movement.time - 1e-9)
-        return MeasuredTrial(movement, wrench[every], self.floating)
+        return MeasuredTrial(movement, np.where(movement.lost[:, None], np.nan, wrench[every]), self.floating)
 
     def check(self, recording: Recording) -> None:
         """Whether a trial can be identified on: before anything that takes long.
@@ -232,23 +238,34 @@ def _brings_mass(estimator: Estimator) -> bool:
 
 
 def measure_all(
-    common: Common, recordings: Sequence[Recording], progress: Progress | None = None
+    common: Common,
+    recordings: Sequence[Recording],
+    progress: Progress | None = None,
+    lost: dict[int, str] | None = None,
 ) -> list[MeasuredTrial]:
     """All trials to identify on; ``progress`` counts frames.
 
+    Args:
+        lost: takes why the filter lost the person, by the trial's place among the recordings; these are left out.
+
     Raises:
         ModelError, RecordingError: as `Common.check`, before anything that takes long.
-        DivergenceError: from the filter.
+        DivergenceError: from the filter. LostError: from the filter, where ``lost`` is not given.
     """
     for recording in recordings:
         common.check(recording)
     found, total, before = [], sum(recording.n_frames for recording in recordings), 0
-    for recording in recordings:
+    for k, recording in enumerate(recordings):
 
         def advance(done: int, of: int, before: int = before, frames: int = recording.n_frames) -> None:
             if progress is not None:
                 progress(before + round(frames * done / max(of, 1)), total)
 
-        found.append(common.measured(recording, advance))
+        try:
+            found.append(common.measured(recording, advance))
+        except LostError as error:
+            if lost is None:
+                raise
+            lost[k] = error.message
         before += recording.n_frames
     return found

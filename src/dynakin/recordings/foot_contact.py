@@ -21,7 +21,7 @@ SLOW_M_S = 0.5
 GAP_S = 0.08
 """Shorter interruptions of a stance, or stances, are none: a foot takes 0.2 s and more for a step."""
 ALOFT_M = 0.05
-"""Height from which a moving foot surely touches nothing: twice what the skin of a standing foot rises by."""
+"""Height from which a moving foot touches no floor: twice what the skin of a standing foot rises by."""
 BEFORE_S, AFTER_S = 0.05, 0.15
 """A foot may bear load that long before its markers are slow (heel strike), and after the last one has left the floor
 (push-off: the toe rolls on while the marker over it rises)."""
@@ -38,8 +38,8 @@ class FootContact:
         stances: frames [first, end) of each stance, not padded.
         low: (T,) one of its markers is not high over its own lowest place.
         moves: (T,) all of its markers seen move.
-        aloft: (T,) surely in the air, whatever it might stand on: it moves, and all of its markers seen are high. A
-            foot on a belt is low, one on a step or a box stands still.
+        aloft: (T,) it moves, and all of its markers seen are high. A foot on a belt is low, one on a step or a box
+            stands still; one on a pedal is aloft too.
     """
 
     outline: Array

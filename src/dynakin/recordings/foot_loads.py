@@ -59,7 +59,7 @@ class FootLoads:
         elsewhere: (T,) frames in which something else may bear the person: no plate measures at all, a plate carries
             what no foot puts on it, or (`with_undeclared`) the motion needs what the plates do not have.
         aloft: (T, F) feet that are surely in the air, by their markers alone.
-        messages: sentences with times.
+        messages: sentences with times. reasons: those of them that say why something is not measured.
     """
 
     feet: tuple[str, ...]
@@ -69,7 +69,8 @@ class FootLoads:
     all_measured: Flags
     elsewhere: Flags
     aloft: Flags
-    messages: tuple[str, ...]
+    messages: tuple[str, ...] = ()
+    reasons: tuple[str, ...] = ()
 
     def with_undeclared(self, frames: Flags) -> FootLoads:
         """The same where something bears the person in these frames (T,) that no plate measures: the total is not
@@ -205,7 +206,6 @@ def divided(
     on: Flags,
     off: Flags,
     aloft: Flags,
-    messages: tuple[str, ...] = (),
 ) -> FootLoads:
     """The plates' wrenches given to the feet that stand on them.
 
@@ -230,7 +230,8 @@ def divided(
         share = _shares(plate, both, owners, outlines)
         for k in range(F):
             wrench[both, k] += share[:, k]
-            reason[both[owners[both, k]], k] = SHARED
+            of = both[owners[both, k]]
+            reason[of, k] = np.maximum(reason[of, k], SHARED)
         total_known &= plate.known
         reason[~plate.known[:, None] & owners] = UNKNOWN
         nobodys = (count == 0) & (np.nan_to_num(plate.wrench[:, 1]) > FOREIGN_N)
@@ -241,7 +242,7 @@ def divided(
     total_known &= ~off.any(axis=1)
     wrench[(reason == OFF_PLATE) | (reason == UNKNOWN)] = np.nan
     all_measured = total_known & (reason != SHARED).all(axis=1)
-    loads = FootLoads(feet, wrench, reason, total_known, all_measured, np.zeros(n, dtype=bool), aloft, messages)
+    loads = FootLoads(feet, wrench, reason, total_known, all_measured, np.zeros(n, dtype=bool), aloft)
     return loads.with_undeclared(elsewhere)
 
 
@@ -277,6 +278,7 @@ class _Assignment:
         self.on = np.zeros((n, F, P), dtype=bool)  # this foot stands on this plate
         self.off = np.zeros((n, F), dtype=bool)  # it may stand beside the plates
         self.messages: list[str] = []
+        self.reasons: list[str] = []
         for k, foot in enumerate(feet):
             if foot in contacts:
                 self.stances(k, contacts[foot])
@@ -315,7 +317,7 @@ class _Assignment:
             elif beside.any():
                 self.off[inside, k] |= beside
         for first, end in runs(self.off[:, k]):
-            self.messages.append(
+            self.reasons.append(
                 f"The {self.feet[k]} foot stands off the plates from {time[first]:.2f} to {time[end - 1]:.2f} s: "
                 "the total wrench is left out there."
             )
@@ -373,21 +375,24 @@ class _Assignment:
         for p, plate in enumerate(self.plates):
             self.say(plate, ~plate.known, np.flatnonzero(self.on[:, :, p].sum(axis=1) > 1), self.on[:, :, p])
         outlines = [self.contacts[foot].outline if foot in self.contacts else None for foot in self.feet]
-        return divided(self.feet, self.plates, outlines, self.on, self.off, self.aloft(), tuple(self.messages))
+        loads = divided(self.feet, self.plates, outlines, self.on, self.off, self.aloft())
+        return replace(loads, messages=(*self.messages, *self.reasons), reasons=tuple(self.reasons))
 
     def aloft(self) -> Flags:
-        """(T, F) feet that are surely in the air: high and moving, or moving while another one stands still, so that
-        what they might touch does not move with them."""
+        """(T, F) feet that are surely in the air: high and moving between two stances of their own, or moving while
+        another one stands still. A pedal moves with the foot that presses it, and lets it stand nowhere."""
         found = np.zeros(self.off.shape, dtype=bool)
         for k, name in enumerate(self.feet):
             foot = self.contacts.get(name)
             if foot is None:
                 continue
             others = [other.stands for at, other in self.contacts.items() if at != name]
-            bears = np.zeros(len(found), dtype=bool)
+            bears, between = np.zeros(len(found), dtype=bool), np.zeros(len(found), dtype=bool)
             for stance in foot.stances:
                 bears[foot.padded(stance, self.recording.rate)] = True
-            found[:, k] = foot.aloft | (np.any(others, axis=0) & foot.moves & ~bears)
+            if len(foot.stances) > 1:
+                between[foot.stances[0][1] : foot.stances[-1][0]] = True
+            found[:, k] = (foot.aloft & between) | (np.any(others, axis=0) & foot.moves & ~bears)
         return found
 
     def say(self, plate: PlateLoad, lost: Flags, both: npt.NDArray[np.intp], owners: Flags) -> None:
@@ -403,14 +408,14 @@ class _Assignment:
                 f"{time[both[-1]]:.2f} s: its wrench is divided between them by its centre of pressure."
             )
         for a, b in runs(lost):
-            self.messages.append(
+            self.reasons.append(
                 f"{plate.name} is not measured or at the end of its range from {time[a]:.2f} to {time[b - 1]:.2f} s: "
                 "the total wrench is left out there."
             )
         if len(self.contacts) == len(self.feet):
             alone = ~owners.any(axis=1) & (np.nan_to_num(plate.wrench[:, 1]) > FOREIGN_N)
             for a, b in runs(alone):
-                self.messages.append(
+                self.reasons.append(
                     f"Warning: {plate.name} carries up to {np.nanmax(plate.wrench[a:b, 1]):.0f} N where no foot "
                     f"stands, from {time[a]:.2f} to {time[b - 1]:.2f} s: the total wrench is left out there."
                 )

@@ -48,12 +48,17 @@ def beyond_limits(plate: Plate, recording: Recording, ground: GroundFrame) -> st
         size = np.median(np.abs(np.nan_to_num(vectors[loaded])), axis=0)
         return _AXES[int(np.argmax(np.where((up > 0.5) & level, -1.0, size)))]
 
-    shear = np.hypot(force[:, 0], force[:, 2])
-    over = np.divide(shear, load, out=np.zeros(len(load)), where=loaded)
-    if _lasts(over > FRICTION, load):
-        axis, frames = worst(plate.force, True), loaded & (over > FRICTION)
+    def beyond_friction(size: Array, limit: float) -> tuple[npt.NDArray[np.bool_], Array] | None:
+        """Loaded frames in which ``size`` (T,) over the load is above a limit, and the ratio; None: not for long."""
+        over = np.divide(size, load, out=np.zeros(len(load)), where=loaded)
+        frames = loaded & (over > limit)
+        return (frames, over[frames]) if _lasts(frames, load) else None
+
+    if found := beyond_friction(np.hypot(force[:, 0], force[:, 2]), FRICTION):
+        frames, over = found
+        axis = worst(plate.force, True)
         return (
-            f"{plate.name}: the horizontal force, mostly its {axis} component, is {_times(over[frames])} times the "
+            f"{plate.name}: the horizontal force, mostly its {axis} component, is {_times(over)} times the "
             f"vertical one in {_share(frames, loaded)} of the loaded frames, expected at most {FRICTION:g} (friction "
             f"holds no more): wrong unit or scale of F{axis}?"
         )
@@ -67,12 +72,12 @@ def beyond_limits(plate: Plate, recording: Recording, ground: GroundFrame) -> st
             "moment, or of the plate's place?"
         )
     twist = np.linalg.norm(np.nan_to_num(plate.free_moment), axis=1)
-    over = np.divide(twist, load, out=np.zeros(len(load)), where=loaded)
-    if _lasts(over > TWIST_M, load):
-        axis, frames = worst(plate.free_moment, False), loaded & (over > TWIST_M)
+    if found := beyond_friction(twist, TWIST_M):
+        frames, over = found
+        axis = worst(plate.free_moment, False)
         return (
             f"{plate.name}: the free moment, mostly its {axis} component, is {float(np.median(twist[frames])):.3g} N m "
-            f"in {_share(frames, loaded)} of the loaded frames, {_times(over[frames] / TWIST_M)} times what friction "
+            f"in {_share(frames, loaded)} of the loaded frames, {_times(over / TWIST_M)} times what friction "
             f"can do there: wrong unit or scale of M{axis}?"
         )
     return None

@@ -114,7 +114,7 @@ def _write(
     try:
         folder.mkdir(parents=True, exist_ok=True)
         for name, draw in draws.items():
-            guarded = nullcontext() if failures is None else failures.stage(f"figure {name}")
+            guarded = nullcontext() if failures is None else failures.stage(f"figure {name}", writes=True)
             with guarded, mpl.rc_context({**FILE_STYLE, "svg.hashsalt": name}):
                 figure = draw()
                 for form in formats if figure is not None else ():

@@ -229,7 +229,7 @@ class Estimate:
         from dynakin.results.tracking import refuse_lost
 
         if not keep_lost:
-            refuse_lost(self)
+            refuse_lost(self, "keep_lost=True")
         return save_estimate(
             self,
             Path(folder),

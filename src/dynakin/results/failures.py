@@ -35,17 +35,20 @@ class Failures:
         self.found: list[Failure] = []
 
     @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
+    def stage(self, name: str, *, writes: bool = False) -> Iterator[None]:
         """Turn any exception within into a `Failure`.
 
+        Args:
+            writes: the stage writes one of several files, and a disk that does not take it takes none of them.
+
         Raises:
-            OSError: the disk does not take what is written, which no other stage mends.
+            OSError: only with ``writes``.
         """
         try:
             yield
-        except OSError:
-            raise
         except Exception as error:
+            if writes and isinstance(error, OSError):
+                raise
             lines = str(error).strip().splitlines()
             kind = "" if isinstance(error, DynakinError) else type(error).__name__
             reason = ": ".join(filter(None, [kind, lines[0] if lines else ""]))

@@ -66,19 +66,42 @@ def check_output_writable(folder: str | Path, *, kind: FolderKind = RESULTS, ove
         OutputError: a file is in the way, the place cannot be written, or the folder holds something that dynakin
             did not write (or, with ``overwrite`` false, anything at all).
     """
-    folder = Path(folder)
-    if "\0" in str(folder) or not is_text(str(folder)):
-        raise OutputError(f"{folder}: cannot write results there, its name is no text")
+    folder = _named(folder)
     try:
         _check_replaceable(folder, kind, overwrite)
-        ancestor = _nearest_existing(folder.absolute().parent)
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot write results there ({error.strerror or error})") from error
+    _check_takes_files(folder, folder.absolute().parent)
+    return folder
+
+
+def check_folder_writable(folder: str | Path) -> Path:
+    """The same for files that are added to ``folder``, whatever it holds.
+
+    Raises:
+        OutputError: it is a file, or cannot be written.
+    """
+    folder = _named(folder)
+    _check_takes_files(folder, folder.absolute())
+    return folder
+
+
+def _named(folder: str | Path) -> Path:
+    if "\0" in str(folder) or not is_text(str(folder)):
+        raise OutputError(f"{folder}: cannot write results there, its name is no text")
+    return Path(folder)
+
+
+def _check_takes_files(folder: Path, place: Path) -> None:
+    """Whether the nearest folder that exists, from ``place`` upwards, can be written."""
+    try:
+        ancestor = _nearest_existing(place)
         if not ancestor.is_dir():
             raise OutputError(f"{folder}: cannot write there, {ancestor} is a file and a folder was expected")
         with tempfile.TemporaryDirectory(prefix=".dynakin-", dir=ancestor):
             pass
     except OSError as error:
         raise OutputError(f"{folder}: cannot write results there ({error.strerror or error})") from error
-    return folder
 
 
 @contextmanager

@@ -53,7 +53,7 @@ def save_estimate(
     with replacing(folder, overwrite=overwrite) as made:
         for name, write in files.items():
             _written(made / name, failed, lambda path, write=write: write(estimate, path))  # type: ignore[misc]
-        with failed.stage("files of the body"):
+        with failed.stage("files of the body", writes=True):
             body_files.write_body_files(estimate, made)
         _written(made / "repetitions.csv", failed, lambda path: _write_repetitions(estimate, comparison, path))
         write_config(estimate.config, made / "config.toml")
@@ -83,7 +83,7 @@ def _metrics(estimate: Estimate, identifiability: Identifiability | None, failed
 def _written(path: Path, failed: Failures, write: Callable[[Path], None]) -> None:
     """One file, or none: half a file looks like a whole one."""
     done = False
-    with failed.stage(path.name):
+    with failed.stage(path.name, writes=True):
         write(path)
         done = True
     if not done:

@@ -136,7 +136,8 @@ def moment_figures(estimate: Estimate, lost: str = "") -> dict[str, Any]:
     legs = {name: _count(sources[:, columns].max(axis=1)) for name, columns in groups.items()}
     reasons: list[str] = []
     if any(count["measured"] < len(sources) for count in legs.values()):
-        reasons = [str(text).removeprefix("Warning: ") for text in estimate.config.get("ground_reasons", [])]
+        found = [str(text).removeprefix("Warning: ") for text in estimate.config.get("ground", {}).get("reasons", [])]
+        reasons = [text[:1].upper() + text[1:] for text in found]
         reasons += [lost] if lost else []
     names = estimate.coordinate_names
     return {

@@ -149,15 +149,20 @@ def why_lost(estimate: Estimate) -> str | None:
     )
 
 
-def refuse_lost(estimate: Estimate) -> None:
+def refuse_lost(estimate: Estimate, keep: str | None = None) -> None:
     """
+    Args:
+        keep: what the caller is asked with to save the good frames all the same; None: it cannot be asked.
+
     Raises:
         LostError: the trial as a whole is no estimate.
     """
-    reason = why_lost(estimate)
-    if reason is not None:
+    reason, found = why_lost(estimate), estimate.tracking
+    if reason is not None and found is not None:
         where = estimate.recording.path or estimate.recording.name
-        raise LostError(f"{where}: {reason}; nothing is saved (--keep-lost saves the frames that are good)")
+        good = bool((found.measured & ~found.lost).any())
+        hint = f" ({keep} saves the frames that are good)" if keep and good else ""
+        raise LostError(f"{where}: {reason}; {'' if good else 'no frame is good, '}nothing is saved{hint}")
 
 
 def tracking_figures(estimate: Estimate) -> dict[str, Any] | None:

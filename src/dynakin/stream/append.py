@@ -2,7 +2,7 @@
 
 Run as a script, with the standard library alone, so that it is there at once. Whatever happens to the session, what it
 has sent is written; whatever happens to this process, what it has written stays. Where the disk takes no more it ends
-with the number of the system's error.
+with `SYSTEM_ERROR` and the number of the system's error: Python itself ends with 1 where something else is wrong.
 """
 
 import os
@@ -11,6 +11,7 @@ import sys
 import time
 
 SYNC_S = 0.5
+SYSTEM_ERROR = 100
 
 
 def main(path: str) -> None:
@@ -41,4 +42,4 @@ if __name__ == "__main__":
     try:
         main(sys.argv[1])
     except OSError as error:
-        sys.exit(error.errno or 1)
+        sys.exit(SYSTEM_ERROR + error.errno if error.errno else 1)

@@ -77,7 +77,7 @@ class LiveFeet:
         outlines, low, moves = self._move(model, state, time_s, dt)
         bears = time_s - self._touched <= AFTER_S
         stands = self._touched == time_s
-        aloft = moves & (~low | (~bears & (stands.sum() > stands)))
+        aloft = moves & ~bears & (stands.sum() > stands)  # high alone may be a pedal: no later stance is known yet
         self._near[~bears], self._loaded[~bears] = 0, 0
         plates = [] if wrenches is None else self._plates(wrenches)
         if plates:

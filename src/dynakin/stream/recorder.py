@@ -18,6 +18,8 @@ from dynakin.errors import OutputError, RecordingError
 from dynakin.recordings import Recording
 from dynakin.recordings.limits import FASTEST_HZ, SLOWEST_HZ
 from dynakin.results import Estimate, check_output_writable
+from dynakin.results.tracking import refuse_lost
+from dynakin.stream.append import SYSTEM_ERROR
 from dynakin.stream.fusion import DELAY_S, Fused, Fusion
 from dynakin.stream.packets import MarkerPacket, Packet, PlatePacket, StreamInfo
 from dynakin.stream.record_format import packet_record, read_records, text_record
@@ -99,14 +101,14 @@ class Recorder(Sink):
         while (data := self._queue.get()) is not None:
             while not self._sent(data):
                 if (code := self._process.wait()) > 0:
-                    self._fail(os.strerror(code))
+                    self._fail(_why_ended(code))
                     return
                 self.restarts += 1  # somebody ended the process: a new one goes on in the same file
                 self._process = self._begin()
         assert self._process.stdin is not None
         self._process.stdin.close()
         if (code := self._process.wait()) > 0:
-            self._fail(os.strerror(code))
+            self._fail(_why_ended(code))
 
     def _fail(self, reason: str) -> None:
         self._failure = (
@@ -128,6 +130,10 @@ class Recorder(Sink):
         rest = memoryview(data)
         while rest:
             rest = rest[self._process.stdin.write(rest) :]
+
+
+def _why_ended(code: int) -> str:
+    return os.strerror(code - SYSTEM_ERROR) if code > SYSTEM_ERROR else "the process that writes ended"
 
 
 def read_recorded(folder: str | Path) -> tuple[list[Fused], StreamInfo, StreamInfo | None, dict[str, Any]]:
@@ -179,6 +185,7 @@ def finish(folder: str | Path, output: str | Path) -> Estimate:
     check_output_writable(Path(output))
     settings = read_recorded(folder)[3]["settings"]
     estimate = estimator_of(settings).run(recorded(folder))
+    refuse_lost(estimate)  # live has no option to keep it
     estimate.save(Path(output))
     return estimate
 
