@@ -144,10 +144,10 @@ def test_reasons_are_the_grounds_and_of_lost_frames_whatever_other_messages_say(
     assert other not in compute_metrics(said)["moments"]["reasons"]
     assert compute_metrics(replace(said, config={}))["moments"]["reasons"] == []
     plates = replace(said, config={"ground": {"reasons": ["Warning: the plates are silent from 1.70 to 2.30 s."]}})
-    assert compute_metrics(plates)["moments"]["reasons"] == ["the plates are silent from 1.70 to 2.30 s."]
+    assert compute_metrics(plates)["moments"]["reasons"] == ["The plates are silent from 1.70 to 2.30 s."]
     held = plates.data.assign(tracking=("time", np.where(np.arange(301) < 10, 2, 0)))
     reasons = compute_metrics(without_lost(replace(plates, data=held)))["moments"]["reasons"]
-    assert len(reasons) == 2 and reasons[1].startswith("the person was lost: 10 of 301 frames")
+    assert len(reasons) == 2 and reasons[1].startswith("The person was lost: 10 of 301 frames")
 
 
 def test_legs_are_found_without_feet_too() -> None:
@@ -275,16 +275,24 @@ def test_the_console_says_first_what_is_measured(monkeypatch: pytest.MonkeyPatch
     assert "off the plates from 1.70 to 2.30 s" in second
 
 
-def test_the_console_says_warnings_before_figures_and_the_mass_first(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("doubt", ["check the mass", "the mass is wrong"])
+def test_the_console_says_warnings_before_figures_and_the_mass_first(
+    doubt: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
     walker, text = make_walker(), io.StringIO()
-    light = "Warning: the plates carry 70.0 kg on average where the person weighs 40.0 kg: check the mass."
+    light = f"Warning: the plates carry 70.0 kg on average where the person weighs 40.0 kg: {doubt}."
     doubted = replace(walker, messages=["Warning: something else.", light, "A note."])
     monkeypatch.setattr(summary, "out", lambda: Console(file=text, width=200))
     summary.print_summary(doubted, Path("out"))
     lines = text.getvalue().splitlines()
     assert lines[1:3] == [light, "Warning: something else."]
+    data = walker.data.assign(moments=walker.data["moments"].where(walker.data["coordinate"] != "knee_angle_r"))
+    text.seek(0)
+    known = {"ground": {"reasons": [light]}}  # said first, as a reason, and not again
+    summary.print_summary(replace(doubted, data=data, config=doubted.config | known), Path("out"))
+    assert text.getvalue()[: text.tell()].casefold().count("the plates carry") == 1
     assert lines[0].startswith("Leg moments:") and "Verdict:" not in "".join(lines[:5])
     (first, *others) = insights(doubted, compute_metrics(doubted))
-    assert (first.level, first.title) == ("warning", "Mass") and "check the mass" in first.text
-    assert not any("check the mass" in insight.text for insight in others)
+    assert (first.level, first.title) == ("warning", "Mass") and doubt in first.text
+    assert not any(doubt in insight.text for insight in others)
     assert in_short([first, *others]).split(": ")[1].startswith("mass")

@@ -13,7 +13,8 @@ from dynakin.results import Estimate
 from dynakin.results.bounds import counts_in_words
 from dynakin.results.failures import Failures
 from dynakin.results.metrics import known_metrics
-from dynakin.results.records import MASS_DOUBTED, NOT_SMOOTHED
+from dynakin.results.naming import sentence
+from dynakin.results.records import NOT_SMOOTHED, doubts_mass
 from dynakin.results.sources import UNKNOWN
 
 
@@ -26,9 +27,9 @@ def print_summary(estimate: Estimate, folder: Path) -> None:
     warnings = [
         message
         for message in estimate.messages
-        if message.startswith("Warning:") and message.removeprefix("Warning: ") not in moments["reasons"]
+        if message.startswith("Warning:") and sentence(message.removeprefix("Warning: ")) not in moments["reasons"]
     ]
-    for message in sorted(warnings, key=lambda message: MASS_DOUBTED not in message):
+    for message in sorted(warnings, key=lambda message: not doubts_mass(message)):
         console.print(message, style="yellow")
     console.print(_figures(estimate, metrics))
     for message in estimate.messages:

@@ -22,7 +22,7 @@ from dynakin.results.bounds import counts_in_words
 from dynakin.results.consistency import CONSISTENT
 from dynakin.results.failures import FAILED, LOG
 from dynakin.results.metrics import ADAPTATION_S, evaluation_window, speed_consistency, window_consistency
-from dynakin.results.records import MASS_DOUBTED
+from dynakin.results.records import doubts_mass
 from dynakin.results.soft_tissue import excess_in_words
 
 # Expected one frame ahead against seen: further apart than this, the estimate follows the measurements.
@@ -131,7 +131,7 @@ def _moments(metrics: dict[str, Any]) -> Insight | None:
 
 def _mass(estimate: Estimate) -> Insight | None:
     """Plates that contradict the mass: forces, moments and inertia are all wrong then."""
-    told = [text.removeprefix("Warning: ") for text in estimate.messages if MASS_DOUBTED in text]
+    told = [text.removeprefix("Warning: ") for text in estimate.messages if doubts_mass(text)]
     if not told:
         return None
     return Insight("warning", "Mass", sentence(" ".join(told)), "Give the mass as weighed, with all that is worn.")
@@ -184,7 +184,7 @@ def _markers(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
 @needs("wrench", otherwise=None)
 def _wrench(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     rms = metrics["wrench"]["rms"]
-    told = [text for text in estimate.messages if text.startswith(PLATE_WORDS) and MASS_DOUBTED not in text]
+    told = [text for text in estimate.messages if text.startswith(PLATE_WORDS) and not doubts_mass(text)]
     if not rms:
         why = " ".join(told) or "No wrench was compared: none was measured, or none is modelled."
         return Insight("warning" if told else "note", "Force plates", why.removeprefix("Warning: "))

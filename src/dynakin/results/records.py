@@ -15,11 +15,15 @@ FOLLOWING = TRACKING.index("following")
 """Value of tracking where nothing is wrong."""
 NOT_SMOOTHED = "Not smoothed:"
 """How the message begins of a run whose settings have no smoother."""
-MASS_DOUBTED = "check the mass"
-"""What the message says of a run in which the plates contradict the mass."""
+_MASS_DOUBTED = ("check the mass", "the mass is wrong")
 
 EventKind = Literal["missing", "gated", "at_bound", "reset", "note"]
 EVENT_KINDS: tuple[EventKind, ...] = ("missing", "gated", "at_bound", "reset", "note")
+
+
+def doubts_mass(message: str) -> bool:
+    """Whether it is that of a run in which the plates contradict the mass."""
+    return any(words in message for words in _MASS_DOUBTED)
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from dynakin.results.naming import listed, words
+from dynakin.results.naming import listed, sentence, words
 
 if TYPE_CHECKING:
     from dynakin.results.estimate import Estimate
@@ -29,7 +29,7 @@ NOTES = (
     "2 absent: not known, the value is nan.",
 )
 """What the codes say, for the headers of files."""
-_JOINTS = {"hip": "hip", "knee": "knee", "ankle": "ankle", "subtalar": "ankle"}
+_JOINTS = {"hip": "hip", "knee": "knee", "tibia": "knee", "ankle": "ankle", "subtalar": "ankle"}
 """The joint that a coordinate of a leg is of, by what its name holds; another is its own."""
 UNKNOWN: dict[str, Any] = {
     "legs": {},
@@ -137,8 +137,7 @@ def moment_figures(estimate: Estimate, lost: str = "") -> dict[str, Any]:
     reasons: list[str] = []
     if any(count["measured"] < len(sources) for count in legs.values()):
         found = [str(text).removeprefix("Warning: ") for text in estimate.config.get("ground", {}).get("reasons", [])]
-        reasons = [text[:1].upper() + text[1:] for text in found]
-        reasons += [lost] if lost else []
+        reasons = [sentence(text) for text in [*found, *([lost] if lost else [])]]
     names = estimate.coordinate_names
     return {
         "what": "frames of the whole recording; derived: from the motion, because one contact behind the joint is not "
