@@ -25,6 +25,7 @@ _STEADY = 0.3
 a step beside the plates or a box beside them do by more."""
 _BODY_MASS_INDEX = (10.0, 60.0)
 """kg/m2; what lies beyond is no weight of a person of that height who stood on the plates."""
+_OTHER_LEVEL_M = 0.08  # a heel that has left the floor, or a toe that dips, is nearer
 _STANDS_M_S = 0.1
 """Speed of the lowest marker below which a foot stands: in the air it points down, which adds 0.2 m to a height."""
 
@@ -118,8 +119,9 @@ def find_height(subject: Subject, recordings: list[Recording], trial: Trial) -> 
     """Height (m) and where it comes from; None with the reason where nothing tells.
 
     Estimated from the marker set's ``height_marker`` (the acromion) where it is highest over the lowest marker of the
-    same frame, a foot that stands, divided by its fraction of the body height: a person who never stands upright comes
-    out too small, and the lowest marker lies 1 to 3 cm over the floor, which makes it 1 to 2 % too small as well.
+    recording, divided by its fraction of the body height: a person who never stands upright comes out too small, and
+    the lowest marker lies 1 to 3 cm over the floor, which makes it 1 to 2 % too small as well. Where that marker is on
+    another level than the foot that stands (a box, stairs), the lowest one of the same frame takes its place.
     """
     if subject.height_m is not None:
         return subject.height_m, f"Height {subject.height_m:.2f} m: given."
@@ -136,12 +138,20 @@ def find_height(subject: Subject, recordings: list[Recording], trial: Trial) -> 
     over = _over_the_foot(trial, tops) if tops else np.empty(0)
     if not len(over) or marker_set.height_fraction is None:
         return None, f"height_m is not given and {marker_set.height_marker or 'no marker'} does not tell it."
-    height = float(np.percentile(over, 99.0)) / marker_set.height_fraction
+    top, lowest = np.mean([np.nanpercentile(path[:, 1], 99.0) for path in tops]), "lowest marker"
+    reach = float(top - np.nanmin([np.nanpercentile(path[:, 1], 1.0) for path in _seen(trial)]))
+    if reach - np.percentile(over, 99.0) > _OTHER_LEVEL_M:
+        reach, lowest = float(np.percentile(over, 99.0)), "lowest marker of the same frame"
+    height = reach / marker_set.height_fraction
     return height, (
         f"Height {height:.2f} m: not given, estimated from {marker_set.height_marker} (where it is highest) "
-        f"over the lowest marker of the same frame, divided by {marker_set.height_fraction:g} "
+        f"over the {lowest}, divided by {marker_set.height_fraction:g} "
         f"({marker_set.height_source})."
     )
+
+
+def _seen(trial: Trial) -> list[Array]:
+    return [path for path in trial.paths.values() if np.isfinite(path).all(axis=1).any()]
 
 
 def _over_the_foot(trial: Trial, tops: list[Array]) -> Array:
