@@ -98,8 +98,8 @@ def measure(
     messages.append(f"Lengths and marker places: {which}.")
     if model.sided and standing_window(source.recording) is None:
         messages.append(
-            f"Warning: nobody stands still in {source.recording.name}, so joint centres and the zeros of the joint angles "
-            "come from frames of the movement: angles, and moments with them, may be off. Give a standing trial "
+            f"Warning: nobody stands still in {source.recording.name}, so joint centres and the zeros of the joint "
+            "angles come from frames of the movement: angles, and moments with them, may be off. Give a standing trial "
             "(--static)."
         )
     standing = source.median(frames)
