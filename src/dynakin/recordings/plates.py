@@ -169,8 +169,8 @@ def _check_vertical(
         _compare_mass(mass, mass_kg, standing is not None, findings)
     elif standing is not None and not MASS_REFUSED_KG[0] < mass < MASS_REFUSED_KG[1]:
         findings.refuse(
-            f"the plates read {mass:.3g} kg standing, expected a person's mass (nobody on the plates, or another unit of "
-            "the forces?)"
+            f"the plates read {mass:.3g} kg standing, expected a person's mass (nobody on the plates, or another unit "
+            "of the forces?)"
         )
     return mass
 
