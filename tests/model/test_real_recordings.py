@@ -49,7 +49,7 @@ def test_squats1(data_dir: Path) -> None:
 def test_height_is_that_of_the_standing_trial(data_dir: Path, name: str) -> None:
     """1.70 m. DJ1, a jump from a box, had 2.15 m: the highest shoulder of the trial over its lowest marker."""
     _, found = measure(load_model("fullbody", Subject(mass_kg=60.05), "opencap"), opencap(data_dir, name))
-    assert found.height_m == pytest.approx(1.703, abs=0.025)
+    assert found.height_m == pytest.approx(1.703, abs=0.03)
 
 
 def test_static1_as_the_trial_and_as_the_static(data_dir: Path) -> None:
