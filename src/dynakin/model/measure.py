@@ -96,12 +96,6 @@ def measure(
         frames, which = source.calibration_frames(needed, wished)
     source = trial if static is None else _at_origin(model, source, finder, frames)
     messages.append(f"Lengths and marker places: {which}.")
-    if model.sided and standing_window(source.recording) is None:
-        messages.append(
-            f"Warning: nobody stands still in {source.recording.name}, so joint centres and the zeros of the joint "
-            "angles come from frames of the movement: angles, and moments with them, may be off. Give a standing trial "
-            "(--static)."
-        )
     standing = source.median(frames)
     landmarks = finder.find_in_space(standing) if model.sided else finder.find(standing)
 
