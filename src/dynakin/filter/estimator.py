@@ -197,11 +197,13 @@ class Estimator:
             The arrays, the seconds by which the last run took the plates earlier, and what there is to say of that.
         """
         arrays, shift = self.run_arrays(time, markers, wrench, progress, feet), 0.0
-        misfit = plates_misfit(initial, time, markers, wrench)
-        for _ in range(passes):
+        misfit = None
+        for done in range(passes):
             delay = self._delay(arrays)
             if delay is None or not is_late(delay):
                 break
+            if not done:  # of nearly every run nobody asks
+                misfit = plates_misfit(initial, time, markers, wrench)
             taken = in_step(time, wrench, shift + delay[0])
             fits = plates_misfit(initial, time, markers, taken)
             if misfit is not None and fits is not None and fits > misfit:
