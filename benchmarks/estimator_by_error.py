@@ -17,12 +17,13 @@ from itertools import repeat
 import numpy as np
 
 import dynakin
-from dynakin.comparison.truth import LEG
-from dynakin.filter import Noise, presets
+from dynakin.filter import presets
+from dynakin.filter.noise import Noise
 from dynakin.filter.samples import recording_arrays
-from dynakin.model import InitialModel
-from dynakin.reference import reference_methods
-from dynakin.simulation import SimulatedTrial, simulate
+from dynakin.model.calibration.initial import InitialModel
+from dynakin.simulation.trial import SimulatedTrial, simulate
+from dynakin.validation.reference.methods import reference_methods
+from dynakin.validation.truth import LEG
 
 SUBJECT = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
 MARKERS = {"sagittal7": "opencap", "squat7": "plug-in-gait"}

@@ -18,9 +18,11 @@ import numpy as np
 
 import dynakin
 from dynakin.errors import DivergenceError, DynakinError
-from dynakin.filter import Noise, presets
-from dynakin.results import Estimate
-from dynakin.simulation import SensorNoise, SimulatedTrial, simulate
+from dynakin.filter import presets
+from dynakin.filter.noise import Noise
+from dynakin.results.estimate import Estimate
+from dynakin.simulation.sensors.sizes import SensorNoise
+from dynakin.simulation.trial import SimulatedTrial, simulate
 
 DURATION_S = 12.0
 LOST_DEG = 25.0

@@ -18,9 +18,10 @@ from dataclasses import dataclass
 import numpy as np
 
 import dynakin
-from dynakin.filter import Noise, presets
-from dynakin.results.sources import DERIVED, MEASURED
-from dynakin.simulation import SimulatedTrial, simulate
+from dynakin.filter import presets
+from dynakin.filter.noise import Noise
+from dynakin.results.measures.sources import DERIVED, MEASURED
+from dynakin.simulation.trial import SimulatedTrial, simulate
 
 SUBJECT = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
 DURATION_S = {"squat": 15.0, "gait": 4.0}

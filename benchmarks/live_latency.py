@@ -24,9 +24,11 @@ from pathlib import Path
 import numpy as np
 
 import dynakin
-from dynakin.recordings import Plate, Recording
-from dynakin.simulation import simulate_squat
-from dynakin.stream import Callback, Live, LiveFrame, Replay, Sink
+from dynakin.recordings.recording import Plate, Recording
+from dynakin.simulation.trial import simulate_squat
+from dynakin.stream.session import Live
+from dynakin.stream.sinks.base import Callback, LiveFrame, Sink
+from dynakin.stream.sources.replay import Replay
 
 RATE_HZ = 200.0
 COLUMNS = (
@@ -77,7 +79,7 @@ def measure(name: str, seconds: float, view: bool) -> None:
 
     sinks: list[Sink] = [Callback(on_frame)]
     if view:
-        from dynakin.stream.viewer import Viewer
+        from dynakin.stream.viewer.sink import Viewer
 
         with contextlib.redirect_stdout(io.StringIO()):  # its address
             sinks.insert(0, Viewer(port=8137))

@@ -13,10 +13,11 @@ from collections import defaultdict
 import numpy as np
 
 import dynakin
-from dynakin.comparison.truth import FIGURES, LEG, truth_errors
-from dynakin.reference import bodies_of, identify, reference_methods, table_dynamics
-from dynakin.reference.methods import plane_wrench
-from dynakin.simulation import simulate_squat
+from dynakin.simulation.trial import simulate_squat
+from dynakin.validation.reference.least_squares import bodies_of, identify
+from dynakin.validation.reference.methods import plane_wrench, reference_methods
+from dynakin.validation.reference.table_dynamics import table_dynamics
+from dynakin.validation.truth import FIGURES, LEG, truth_errors
 
 SUBJECT = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
 START_S = 2.0

@@ -20,14 +20,17 @@ from opensim_peer import Kinematics, inverse_kinematics, load, residual
 from peers_times import times
 
 import dynakin
-from dynakin.comparison import Setup, halves, identify_on, predict_blind
-from dynakin.comparison.held_out import measured_wrench
 from dynakin.filter.events import REFUSED
 from dynakin.filter.samples import recording_arrays
-from dynakin.model import Definition, Subject, load_model, load_opensim
-from dynakin.recordings import Recording, read_table
-from dynakin.results import Estimate
-from dynakin.results.soft_tissue import displacements
+from dynakin.model.definition import Definition, load_model
+from dynakin.model.opensim.definition import load_opensim
+from dynakin.model.subject import Subject
+from dynakin.recordings.formats.mot import read_table
+from dynakin.recordings.recording import Recording
+from dynakin.results.estimate import Estimate
+from dynakin.results.measures.soft_tissue import displacements
+from dynakin.validation.held_out import halves, identify_on, measured_wrench, predict_blind
+from dynakin.validation.setup import Setup
 
 Array = NDArray[np.float64]
 DATA = Path(os.environ.get("DYNAKIN_TEST_DATA", Path(__file__).parents[2] / "shared" / "data")) / "opencap_subject4"

@@ -12,7 +12,8 @@ from opensim_peer import inverse_kinematics, load, without_patellae
 
 import dynakin
 from dynakin.filter.samples import recording_arrays
-from dynakin.model import Subject, load_opensim
+from dynakin.model.opensim.definition import load_opensim
+from dynakin.model.subject import Subject
 
 Array = NDArray[np.float64]
 ROUNDS = 3

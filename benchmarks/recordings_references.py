@@ -17,7 +17,8 @@ import ezc3d
 import numpy as np
 from numpy.typing import NDArray
 
-from dynakin.recordings import read, read_table
+from dynakin.recordings.formats.mot import read_table
+from dynakin.recordings.read import read
 
 Array = NDArray[np.float64]
 JOINTS = {"hip": "hip_flexion", "knee": "knee_angle", "ankle": "ankle_angle"}

@@ -15,9 +15,9 @@ import numpy as np
 
 import dynakin
 from dynakin import _core
-from dynakin.filter.extend import initial_covariance
+from dynakin.filter.augment import initial_covariance
 from dynakin.filter.samples import recording_arrays
-from dynakin.simulation import simulate_squat
+from dynakin.simulation.trial import simulate_squat
 
 STEPS = 20_000
 DATA = Path(os.environ.get("DYNAKIN_TEST_DATA", Path(__file__).parents[2] / "shared" / "data"))

@@ -16,14 +16,15 @@ from dataclasses import replace
 from pathlib import Path
 
 import dynakin
-from dynakin.comparison import Setup
-from dynakin.comparison.unseen import WITHHELD, plates_withheld
-from dynakin.engine import Pool, open_pool
-from dynakin.filter import Estimator, Noise, presets
-from dynakin.tuning import Shared, TuningTrial, prepare
-from dynakin.tuning.fit import Fitter, usual_names
-from dynakin.tuning.score import figures_of, left_out_mm
-from dynakin.tuning.trial import undoubting
+from dynakin.filter import presets
+from dynakin.filter.estimator import Estimator
+from dynakin.filter.noise import Noise
+from dynakin.studies.engine.pools import Pool, open_pool
+from dynakin.studies.tuning.fit import Fitter, usual_names
+from dynakin.studies.tuning.score import Shared, figures_of, left_out_mm
+from dynakin.studies.tuning.trial import TuningTrial, prepare, undoubting
+from dynakin.validation.setup import Setup
+from dynakin.validation.unseen import WITHHELD, plates_withheld
 
 ROOT = Path(__file__).resolve().parents[1]
 MOTION = ("jerk", "soft_tissue", "soft_tissue_time_s", "plate_force", "plate_moment")

@@ -12,11 +12,11 @@ import time
 
 from tuning_truth import ERRORS, means, score, trial_of
 
-from dynakin.engine import open_pool
 from dynakin.filter import presets
-from dynakin.tuning import Shared
-from dynakin.tuning.fit import Fitter, usual_names
-from dynakin.tuning.settings import together
+from dynakin.studies.engine.pools import open_pool
+from dynakin.studies.tuning.fit import Fitter, usual_names
+from dynakin.studies.tuning.score import Shared
+from dynakin.studies.tuning.settings import together
 
 MOTION = ("jerk", "soft_tissue", "soft_tissue_time_s", "plate_force", "plate_moment")
 

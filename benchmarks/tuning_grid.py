@@ -13,11 +13,15 @@ import time
 from pathlib import Path
 
 import dynakin
-from dynakin.engine import Journal, open_pool
-from dynakin.engine.folder import ROWS, open_folder
-from dynakin.filter import Estimator, presets
-from dynakin.tuning import Shared, belongs_to, paper_axes, prepare, run_grid
-from dynakin.tuning.output import write_grid
+from dynakin.filter import presets
+from dynakin.filter.estimator import Estimator
+from dynakin.studies.engine.folder import ROWS, open_folder
+from dynakin.studies.engine.journal import Journal
+from dynakin.studies.engine.pools import open_pool
+from dynakin.studies.tuning.grid import belongs_to, paper_axes, run_grid
+from dynakin.studies.tuning.output import write_grid
+from dynakin.studies.tuning.score import Shared
+from dynakin.studies.tuning.trial import prepare
 
 ROOT = Path(__file__).resolve().parents[1]
 

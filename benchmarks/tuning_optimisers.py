@@ -17,12 +17,14 @@ import numpy as np
 from scipy.optimize import minimize
 
 import dynakin
-from dynakin.engine import open_pool
-from dynakin.filter import Estimator, presets
-from dynakin.simulation import simulate
-from dynakin.tuning import Shared, prepare
-from dynakin.tuning.likelihood import REACH, Likelihood
-from dynakin.tuning.optimise import minimise
+from dynakin.filter import presets
+from dynakin.filter.estimator import Estimator
+from dynakin.simulation.trial import simulate
+from dynakin.studies.engine.pools import open_pool
+from dynakin.studies.tuning.likelihood import REACH, Likelihood
+from dynakin.studies.tuning.optimise import minimise
+from dynakin.studies.tuning.score import Shared
+from dynakin.studies.tuning.trial import prepare
 
 NAMES = ("jerk", "soft_tissue", "soft_tissue_time_s", "force", "plate_force", "plate_moment")
 Array = np.ndarray

@@ -17,17 +17,22 @@ from typing import Any
 import numpy as np
 
 import dynakin
-from dynakin.comparison.truth import LEG
-from dynakin.engine import Journal, Task, open_pool, work
-from dynakin.engine.folder import ROWS, open_folder, write_csv
-from dynakin.filter import Estimator, Noise, presets
-from dynakin.report import Sensitivity, save_sensitivity_figures
-from dynakin.simulation import simulate
-from dynakin.tuning import CRITERIA, TuningTrial, axis, prepare
-from dynakin.tuning.grid import combinations, mean_row
-from dynakin.tuning.score import figures_from, run_score
-from dynakin.tuning.settings import changed
-from dynakin.tuning.trial import undoubting
+from dynakin.filter import presets
+from dynakin.filter.estimator import Estimator
+from dynakin.filter.noise import Noise
+from dynakin.report.paper_figures.figures import save_sensitivity_figures
+from dynakin.report.paper_figures.sensitivity import Sensitivity
+from dynakin.simulation.trial import simulate
+from dynakin.studies.engine.folder import ROWS, open_folder, write_csv
+from dynakin.studies.engine.journal import Journal
+from dynakin.studies.engine.pools import open_pool
+from dynakin.studies.engine.tasks import Task
+from dynakin.studies.engine.work import work
+from dynakin.studies.tuning.grid import axis, combinations, mean_row
+from dynakin.studies.tuning.score import CRITERIA, figures_from, run_score
+from dynakin.studies.tuning.settings import changed
+from dynakin.studies.tuning.trial import TuningTrial, prepare, undoubting
+from dynakin.validation.truth import LEG
 
 SEEDS = range(1, 11)
 CHOOSE = 5

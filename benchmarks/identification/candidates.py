@@ -8,15 +8,17 @@ from contextlib import suppress
 import numpy as np
 
 from dynakin import _core
-from dynakin.comparison.freeze import final_values
 from dynakin.errors import DynakinError, RecordingError
-from dynakin.filter import Estimator, presets
-from dynakin.identification import Common, MeasuredTrial, Posterior, Unknowns, about, at_start, identify_batch
-from dynakin.identification.batch import FIRST_SIGMA
-from dynakin.recordings import Recording
-from dynakin.reference.base_parameters import base_parameters
-from dynakin.reference.condensed import stacked
-from dynakin.reference.identification import free_parameters
+from dynakin.filter import presets
+from dynakin.filter.estimator import Estimator
+from dynakin.identification.batch import FIRST_SIGMA, Posterior, at_start, identify_batch
+from dynakin.identification.trials import Common, MeasuredTrial, about
+from dynakin.identification.unknowns import Unknowns
+from dynakin.recordings.recording import Recording
+from dynakin.validation.freeze import final_values
+from dynakin.validation.reference.base_parameters import base_parameters
+from dynakin.validation.reference.condensed import stacked
+from dynakin.validation.reference.least_squares import free_parameters
 
 Array = np.ndarray
 

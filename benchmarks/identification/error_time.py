@@ -15,10 +15,13 @@ from protocol import PLACES, person
 from simulated import SKIPPED_ELSE_S, SKIPPED_S, TASKS, judged, subject_of
 
 import dynakin.identification.batch as batch
-from dynakin.identifiability.base import base_of
-from dynakin.identifiability.measured import MeasuredModel
-from dynakin.identification import MeasuredTrial, Unknowns, identify_batch, measure_all
-from dynakin.simulation import Spread, simulate
+from dynakin.identification.batch import identify_batch
+from dynakin.identification.observability.base import base_of
+from dynakin.identification.observability.measured import MeasuredModel
+from dynakin.identification.trials import MeasuredTrial, measure_all
+from dynakin.identification.unknowns import Unknowns
+from dynakin.simulation.bodies.subject import Spread
+from dynakin.simulation.trial import simulate
 
 LEAST_S = (0.0, 0.25, 0.5, 1.0, 2.0)
 CHOSEN = (

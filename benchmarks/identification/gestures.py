@@ -7,13 +7,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynakin.simulation import Movement, SimulatedBody
+from dynakin.simulation.bodies.body import SimulatedBody
+from dynakin.simulation.bodies.whole_body import SIDES, Sole, ankle_height, hip_in_pelvis
 from dynakin.simulation.contacts import mechanical_state
 from dynakin.simulation.jets import Jet, constant, sinusoids, step
 from dynakin.simulation.mechanics import Motion, SegmentMotion
-from dynakin.simulation.posed import foot_about, whole_motion
+from dynakin.simulation.motions.movement import Movement
+from dynakin.simulation.motions.posed import foot_about, whole_motion
 from dynakin.simulation.support import Footing, Support
-from dynakin.simulation.whole_body import SIDES, Sole, ankle_height, hip_in_pelvis
 
 Array = np.ndarray
 

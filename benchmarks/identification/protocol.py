@@ -20,14 +20,17 @@ from gestures import GESTURE_S, Gesture, gestures, movement_of, possible
 from simulated import DURATION_S, MARKERS, SKIPPED_S, SUBJECT, judged
 
 import dynakin
-from dynakin.identifiability.base import base_of
-from dynakin.identifiability.measured import MeasuredModel
-from dynakin.identification import Common, MeasuredTrial, Unknowns, identify_batch, measure_all
-from dynakin.identification.batch import wrench_rows
-from dynakin.results.learned import judged as judgement
-from dynakin.simulation import SimulatedBody, Spread, simulate
-from dynakin.simulation.bodies import choose_body
+from dynakin.identification.batch import identify_batch, wrench_rows
+from dynakin.identification.observability.base import base_of
+from dynakin.identification.observability.measured import MeasuredModel
+from dynakin.identification.trials import Common, MeasuredTrial, measure_all
+from dynakin.identification.unknowns import Unknowns
+from dynakin.results.measures.posterior import judged as judgement
+from dynakin.simulation.bodies.body import SimulatedBody
+from dynakin.simulation.bodies.registry import choose_body
+from dynakin.simulation.bodies.subject import Spread
 from dynakin.simulation.streams import Streams
+from dynakin.simulation.trial import simulate
 
 Array = np.ndarray
 RATE_HZ = 25.0

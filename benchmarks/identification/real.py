@@ -21,12 +21,13 @@ from candidates import all_candidates, predicted
 from simulated import judged
 
 import dynakin
-from dynakin.comparison.held_out import halves, marker_paths
-from dynakin.filter import Estimator
-from dynakin.identification import Common, MeasuredTrial, Movement, about, identify_subject
+from dynakin.filter.estimator import Estimator
+from dynakin.identification.subject import identify_subject
+from dynakin.identification.trials import Common, MeasuredTrial, Movement, about
 from dynakin.model.identified import IdentifiedSubject
-from dynakin.recordings import Recording
-from dynakin.results import COMPONENTS
+from dynakin.recordings.recording import Recording
+from dynakin.results.estimate import COMPONENTS
+from dynakin.validation.held_out import halves, marker_paths
 
 Array = np.ndarray
 DATA = Path(os.environ.get("DYNAKIN_TEST_DATA", "../shared/data")) / "opencap_subject4"

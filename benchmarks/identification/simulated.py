@@ -16,11 +16,13 @@ import numpy as np
 from candidates import all_candidates, batch, predicted
 
 import dynakin
-from dynakin.identifiability.base import base_of
-from dynakin.identifiability.measured import MeasuredModel
-from dynakin.identification import Common, MeasuredTrial, Unknowns, measure_all, rms_of
-from dynakin.results import COMPONENTS
-from dynakin.simulation import SimulatedTrial, simulate
+from dynakin.identification.decision import rms_of
+from dynakin.identification.observability.base import base_of
+from dynakin.identification.observability.measured import MeasuredModel
+from dynakin.identification.trials import Common, MeasuredTrial, measure_all
+from dynakin.identification.unknowns import Unknowns
+from dynakin.results.estimate import COMPONENTS
+from dynakin.simulation.trial import SimulatedTrial, simulate
 
 TASKS = {"sagittal7": ("squat", "sit-to-stand", "sway"), "fullbody": ("squat", "gait")}
 TASKS["squat7"] = TASKS["sagittal7"]

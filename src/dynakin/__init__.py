@@ -11,10 +11,19 @@ if not _cpu.supported():
     )
 
 from dynakin.errors import DynakinError
-from dynakin.filter import Estimator, Noise, Sample, presets
-from dynakin.model import Bounds, ModelDefinition, Priors, Subject, initialise, load_model, load_opensim
-from dynakin.recordings import GroundFrame, Recording, read
-from dynakin.results import Estimate
+from dynakin.filter import presets
+from dynakin.filter.estimator import Estimator
+from dynakin.filter.noise import Noise
+from dynakin.filter.samples import Sample
+from dynakin.model.calibration.initialise import initialise
+from dynakin.model.definition import ModelDefinition, load_model
+from dynakin.model.opensim.definition import load_opensim
+from dynakin.model.priors import Bounds, Priors
+from dynakin.model.subject import Subject
+from dynakin.recordings.frame import GroundFrame
+from dynakin.recordings.read import read
+from dynakin.recordings.recording import Recording
+from dynakin.results.estimate import Estimate
 
 __version__ = metadata.version("dynakin")
 

@@ -9,23 +9,19 @@ from typing import Any, Literal, Self
 from pydantic import Field, model_validator
 
 from dynakin.errors import ConfigError, ModelError
-from dynakin.filter import Estimator, Noise, presets
-from dynakin.filter.extend import QUANTITIES, Quantity
-from dynakin.model import (
-    Bounds,
-    CarriedLoad,
-    Definition,
-    OpenSimOptions,
-    Priors,
-    Subject,
-    available_models,
-    load_model,
-)
+from dynakin.filter import presets
+from dynakin.filter.augment import QUANTITIES, Quantity
+from dynakin.filter.estimator import Estimator
+from dynakin.filter.noise import Noise
+from dynakin.model.calibration.loads import CarriedLoad
+from dynakin.model.definition import Definition, available_models, load_model
 from dynakin.model.identified import IdentifiedSubject, read_identified
-from dynakin.model.subject import Sex
+from dynakin.model.opensim.definition import OpenSimOptions
+from dynakin.model.priors import Bounds, Priors
+from dynakin.model.subject import Sex, Subject
 from dynakin.model.validation import Strict, nearest, read_toml, validate
-from dynakin.recordings import PlateLoad
-from dynakin.recordings.textfile import is_file
+from dynakin.recordings.formats.textfile import is_file
+from dynakin.recordings.plates.loads import PlateLoad
 
 # Keys that name files: relative to the configuration file that they stand in.
 _PATHS = ("trial", "forces", "static", "parameters", "output")

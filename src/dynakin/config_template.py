@@ -11,8 +11,10 @@ import tomli_w
 from pydantic import BaseModel
 
 from dynakin.config import RunConfig
-from dynakin.filter import Noise, presets
-from dynakin.model import Bounds, OpenSimOptions, Priors
+from dynakin.filter import presets
+from dynakin.filter.noise import Noise
+from dynakin.model.opensim.definition import OpenSimOptions
+from dynakin.model.priors import Bounds, Priors
 
 _HEADER = """\
 # Configuration of `dynakin run`. Keys with a # right before them hold their default or, where there is none, an

@@ -10,10 +10,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynakin.batch import read_dataset
-from dynakin.cli import main
+from dynakin.cli.app import main
 from dynakin.errors import ConfigError
-from dynakin.simulation import simulate
+from dynakin.simulation.trial import simulate
+from dynakin.studies.batch.dataset import read_dataset
 
 SUBJECTS, TRIALS, SECONDS, RATE_HZ = 8, 3, 5.0, 50.0
 CORRUPT, SWAPPED = "S3/squat_2", "S6/squat_1"

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynakin.cli import main
-from dynakin.recordings import Plate
-from dynakin.simulation import simulate
+from dynakin.cli.app import main
+from dynakin.recordings.recording import Plate
+from dynakin.simulation.trial import simulate
 
 Said = pytest.CaptureFixture[str]
 SUBJECT = 'mass_kg = 70.0\nheight_m = 1.75\nsex = "male"\n'

@@ -8,10 +8,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynakin.cli import main
-from dynakin.recordings import Recording, read
-from dynakin.results import write_storage, write_trc
-from dynakin.simulation import simulate_squat
+from dynakin.cli.app import main
+from dynakin.recordings.read import read
+from dynakin.recordings.recording import Recording
+from dynakin.results.files.markers import write_trc
+from dynakin.results.files.storage import write_storage
+from dynakin.simulation.trial import simulate_squat
 
 Refused = Callable[..., str]
 

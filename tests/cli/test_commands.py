@@ -11,9 +11,10 @@ from pathlib import Path
 import pytest
 
 import dynakin
-from dynakin.cli import main
-from dynakin.model import available_marker_sets, available_models
-from dynakin.results import OUTPUT_FILES
+from dynakin.cli.app import main
+from dynakin.model.definition import available_models
+from dynakin.model.markers.marker_set import available_marker_sets
+from dynakin.results.files.folder import OUTPUT_FILES
 
 Said = pytest.CaptureFixture[str]
 

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from dynakin.cli import main
-from dynakin.simulation import save_trial, simulate_squat
+from dynakin.cli.app import main
+from dynakin.simulation.output import save_trial
+from dynakin.simulation.trial import simulate_squat
 
 Said = pytest.CaptureFixture[str]
 

@@ -9,12 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynakin.cli import main
 from dynakin.cli import run as run_module
-from dynakin.recordings import Recording
-from dynakin.report import figures
-from dynakin.results import OUTPUT_FILES, write_storage, write_trc
-from dynakin.simulation import SimulatedTrial, simulate_squat
+from dynakin.cli.app import main
+from dynakin.recordings.recording import Recording
+from dynakin.report.paper_figures import figures
+from dynakin.results.files.folder import OUTPUT_FILES
+from dynakin.results.files.markers import write_trc
+from dynakin.results.files.storage import write_storage
+from dynakin.simulation.trial import SimulatedTrial, simulate_squat
 
 SUBJECT = ["--model", "sagittal7", "--markers", "opencap", "--mass", "70", "--height", "1.75"]
 Said = pytest.CaptureFixture[str]

@@ -9,10 +9,10 @@ from pathlib import Path
 
 import pytest
 
-from dynakin.cli import main
-from dynakin.recordings import Recording
-from dynakin.simulation import simulate_squat
-from dynakin.stream.recorder import recorded
+from dynakin.cli.app import main
+from dynakin.recordings.recording import Recording
+from dynakin.simulation.trial import simulate_squat
+from dynakin.stream.sinks.recorder import recorded
 
 Said = pytest.CaptureFixture[str]
 PERSON = ["--model", "sagittal7", "--markers", "opencap", "--mass", "70", "--height", "1.75", "--sex", "male"]

@@ -15,8 +15,8 @@ from pathlib import Path
 
 import pytest
 
-from dynakin.cli import main
-from dynakin.stream.recorder import recorded
+from dynakin.cli.app import main
+from dynakin.stream.sinks.recorder import recorded
 
 LIVE = "import sys; from dynakin.cli import main; sys.exit(main(sys.argv[1:]))"
 

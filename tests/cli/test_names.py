@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from dynakin.cli import main
-from dynakin.recordings import read, read_table
-from dynakin.results import write_storage, write_trc
-from dynakin.simulation import simulate_squat
+from dynakin.cli.app import main
+from dynakin.recordings.formats.mot import read_table
+from dynakin.recordings.read import read
+from dynakin.results.files.markers import write_trc
+from dynakin.results.files.storage import write_storage
+from dynakin.simulation.trial import simulate_squat
 
 Said = pytest.CaptureFixture[str]
 NAMES = ("marker/r_A/B/x", "inertia/thigh/leg/mass")
@@ -47,7 +49,7 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     model = _segments_renamed((package / "builtin" / "sagittal7.toml").read_text(), "thigh", "thigh/leg")
     assert model.count("thigh/leg") == 2
     (folder / "model.toml").write_text(model)
-    markers = (package / "marker_sets" / "opencap.toml").read_text()
+    markers = (package / "markers" / "opencap.toml").read_text()
     (folder / "markers.toml").write_text(markers.replace('_knee"', '_A/B"').replace('"KNEE"', '"A/B"'))
     return folder
 

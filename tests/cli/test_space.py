@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from dynakin.cli import main
-from dynakin.results import OUTPUT_FILES
-from dynakin.simulation import simulate
+from dynakin.cli.app import main
+from dynakin.results.files.folder import OUTPUT_FILES
+from dynakin.simulation.trial import simulate
 
 SUBJECT = ["--model", "fullbody", "--mass", "70", "--height", "1.75", "--sex", "male"]
 # a squat on two plates; a walk over three of them, which stand in the middle third of its way

@@ -5,8 +5,9 @@ from __future__ import annotations
 import pytest
 
 import dynakin
-from dynakin.comparison import Setup, Trial, compare_trial
-from dynakin.simulation import SimulatedTrial, simulate_squat
+from dynakin.simulation.trial import SimulatedTrial, simulate_squat
+from dynakin.validation.methods import Trial, compare_trial
+from dynakin.validation.setup import Setup
 
 
 @pytest.fixture(scope="session")

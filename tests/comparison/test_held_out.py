@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from dynakin import _core
-from dynakin.comparison import Identified, Setup, halves, identify_on, judge, predict_blind
-from dynakin.comparison.freeze import final_values, freeze, initial_values
 from dynakin.errors import LostError, RecordingError
-from dynakin.recordings import Plate, Recording
-from dynakin.simulation import SimulatedTrial
+from dynakin.recordings.recording import Plate, Recording
+from dynakin.simulation.trial import SimulatedTrial
+from dynakin.validation.freeze import final_values, freeze, initial_values
+from dynakin.validation.held_out import Identified, halves, identify_on, judge, predict_blind
+from dynakin.validation.setup import Setup
 
 
 @pytest.fixture(scope="module")

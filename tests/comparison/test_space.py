@@ -6,16 +6,17 @@ import numpy as np
 import pytest
 
 import dynakin
-from dynakin.comparison import Setup, judge
-from dynakin.comparison.held_out import Blind, measured_wrench
-from dynakin.comparison.unseen import _Trial
-from dynakin.filter import Estimator
-from dynakin.model import InitialModel
-from dynakin.recordings import Recording
-from dynakin.recordings.foot_loads import foot_loads
-from dynakin.results import COMPONENTS, evaluation_window
-from dynakin.simulation import simulate
-from dynakin.tuning import prepare
+from dynakin.filter.estimator import Estimator
+from dynakin.model.calibration.initial import InitialModel
+from dynakin.recordings.feet.loads import foot_loads
+from dynakin.recordings.recording import Recording
+from dynakin.results.estimate import COMPONENTS
+from dynakin.results.measures.metrics import evaluation_window
+from dynakin.simulation.trial import simulate
+from dynakin.studies.tuning.trial import prepare
+from dynakin.validation.held_out import Blind, judge, measured_wrench
+from dynakin.validation.setup import Setup
+from dynakin.validation.unseen import _Trial
 
 WRONG = 1e6
 

@@ -11,19 +11,13 @@ import numpy as np
 import pytest
 
 import dynakin
-from dynakin.comparison import (
-    Setup,
-    Spread,
-    Trial,
-    angle_differences,
-    compare_trial,
-    marker_fit,
-    moment_differences,
-    save_comparison,
-    spread,
-    table2,
-)
 from dynakin.errors import ConfigError, OutputError
+from dynakin.validation.differences import angle_differences, moment_differences
+from dynakin.validation.files import save_comparison
+from dynakin.validation.methods import Trial, compare_trial
+from dynakin.validation.setup import Setup
+from dynakin.validation.statistics import Spread, spread
+from dynakin.validation.table2 import marker_fit, table2
 
 IN_PLANE = np.array([True, True, False])
 

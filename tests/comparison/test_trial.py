@@ -9,14 +9,17 @@ import numpy as np
 import pytest
 
 import dynakin
-from dynakin.comparison import Setup, Trial, trial_of
 from dynakin.errors import ModelError, RecordingError
 from dynakin.model.identified import IdentifiedSubject
-from dynakin.recordings import find_ground_frame
-from dynakin.reference import PlanarChain, classical_angles, landmark_paths
-from dynakin.results.mean_curves import MEASURED
-from dynakin.results.repetitions import body_paths, find_repetitions
-from dynakin.simulation import SimulatedTrial
+from dynakin.recordings.frame import find_ground_frame
+from dynakin.results.measures.mean_curves import MEASURED
+from dynakin.results.measures.repetitions import body_paths, find_repetitions
+from dynakin.simulation.trial import SimulatedTrial
+from dynakin.validation.methods import Trial, trial_of
+from dynakin.validation.reference.chain import PlanarChain
+from dynakin.validation.reference.classical import classical_angles
+from dynakin.validation.reference.landmark_paths import landmark_paths
+from dynakin.validation.setup import Setup
 
 
 @pytest.fixture(scope="module")

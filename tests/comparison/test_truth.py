@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from dynakin.comparison.truth import FIGURES, LEG, truth_errors
-from dynakin.simulation import simulate_squat
+from dynakin.simulation.trial import simulate_squat
+from dynakin.validation.truth import FIGURES, LEG, truth_errors
 
 
 @pytest.fixture(scope="module")

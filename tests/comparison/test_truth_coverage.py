@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from dynakin.comparison.coverage import block_coverage, coverage, independent, parameter_coverage
-from dynakin.comparison.truth import parameter_errors
-from dynakin.results import Parameter
-from dynakin.simulation import simulate_squat
+from dynakin.results.records import Parameter
+from dynakin.simulation.trial import simulate_squat
+from dynakin.validation.coverage import block_coverage, coverage, independent, parameter_coverage
+from dynakin.validation.truth import parameter_errors
 
 NAMES = ("hip", "knee")
 

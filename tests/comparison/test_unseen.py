@@ -7,11 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dynakin.comparison import Setup, unseen, unseen_figures
-from dynakin.comparison.extrapolation import extrapolated, held, line, persisted
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.filter import presets
-from dynakin.simulation import SensorNoise, SimulatedTrial, simulate_squat
+from dynakin.simulation.sensors.sizes import SensorNoise
+from dynakin.simulation.trial import SimulatedTrial, simulate_squat
+from dynakin.validation.extrapolation import extrapolated, held, line, persisted
+from dynakin.validation.setup import Setup
+from dynakin.validation.unseen import unseen, unseen_figures
 
 
 def test_a_straight_line_is_extrapolated_exactly_and_persistence_lags_by_the_span() -> None:

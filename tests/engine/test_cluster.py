@@ -7,8 +7,10 @@ import signal
 
 import pytest
 
-from dynakin.engine import Task, open_pool, work
 from dynakin.errors import ConfigError
+from dynakin.studies.engine.pools import open_pool
+from dynakin.studies.engine.tasks import Task
+from dynakin.studies.engine.work import work
 from engine import tasks_of_tests as functions
 
 distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed")
@@ -44,6 +46,6 @@ def test_a_worker_that_is_killed_on_the_way_changes_nothing(cluster):
 
 
 def test_a_scheduler_that_does_not_answer_is_named(monkeypatch):
-    monkeypatch.setattr("dynakin.engine.cluster.TIMEOUT_S", 0.5)
+    monkeypatch.setattr("dynakin.studies.engine.cluster.TIMEOUT_S", 0.5)
     with pytest.raises(ConfigError, match=r"--scheduler tcp://127\.0\.0\.1:9: no scheduler answers"):
         open_pool("dask", scheduler="tcp://127.0.0.1:9")

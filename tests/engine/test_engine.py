@@ -7,8 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from dynakin.engine import Journal, Task, open_pool, work
 from dynakin.errors import ConfigError, OutputError
+from dynakin.studies.engine.journal import Journal
+from dynakin.studies.engine.pools import open_pool
+from dynakin.studies.engine.tasks import Task
+from dynakin.studies.engine.work import work
 from engine import tasks_of_tests as functions
 
 SHARED = {"base": 1.1}

@@ -8,8 +8,8 @@ from functools import cache
 import numpy as np
 
 import dynakin
-from dynakin.recordings import Recording
-from dynakin.simulation import simulate
+from dynakin.recordings.recording import Recording
+from dynakin.simulation.trial import simulate
 
 GAPS_S = (0.5, 1.0, 2.0, 5.0, 10.0, 60.0, 300.0)
 LATER_S = 2.4  # of the movement that pass at most, unseen: it differs from the one before

@@ -12,8 +12,9 @@ import dynakin
 from dynakin.errors import ConfigError
 from dynakin.filter.samples import recording_arrays
 from dynakin.report.insights import insights
-from dynakin.results import Estimate
-from dynakin.simulation import SensorNoise, SimulatedTrial, simulate_squat
+from dynakin.results.estimate import Estimate
+from dynakin.simulation.sensors.sizes import SensorNoise
+from dynakin.simulation.trial import SimulatedTrial, simulate_squat
 
 START_S = 3.0
 
@@ -223,7 +224,7 @@ def test_a_joint_that_nobody_sees_is_held_and_comes_back(trial: SimulatedTrial) 
 
 
 def test_every_output_has_a_deviation_in_the_files(smoothed: Estimate, tmp_path) -> None:
-    from dynakin.recordings import read_table
+    from dynakin.recordings.formats.mot import read_table
 
     smoothed.save(tmp_path / "out")
     table = read_table(tmp_path / "out" / "uncertainty.sto")

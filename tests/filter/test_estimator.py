@@ -10,7 +10,8 @@ import pytest
 
 import dynakin
 from dynakin.errors import ConfigError, DivergenceError, RecordingError
-from dynakin.simulation import SensorNoise, SimulatedTrial, simulate_squat
+from dynakin.simulation.sensors.sizes import SensorNoise
+from dynakin.simulation.trial import SimulatedTrial, simulate_squat
 
 SUBJECT = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
 

@@ -16,12 +16,14 @@ from oracle.state import Layout
 
 from dynakin import _core
 from dynakin.errors import ModelError
-from dynakin.filter import FootWrenches
 from dynakin.filter.assemble import assemble
+from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.filter.smoothing import smoothed
-from dynakin.recordings import GroundFrame, Plate, Recording, read_table
-from dynakin.results import Estimate
-from dynakin.results.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
+from dynakin.recordings.formats.mot import read_table
+from dynakin.recordings.frame import GroundFrame
+from dynakin.recordings.recording import Plate, Recording
+from dynakin.results.estimate import Estimate
+from dynakin.results.measures.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
 
 FRAMES = 60
 SPEC = floating_model(5)

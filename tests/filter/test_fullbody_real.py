@@ -8,10 +8,12 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin import _core, read
-from dynakin.filter import Estimator
-from dynakin.model import Subject, load_model
-from dynakin.recordings import Recording, read_table
-from dynakin.results import Estimate
+from dynakin.filter.estimator import Estimator
+from dynakin.model.definition import load_model
+from dynakin.model.subject import Subject
+from dynakin.recordings.formats.mot import read_table
+from dynakin.recordings.recording import Recording
+from dynakin.results.estimate import Estimate
 
 Array = npt.NDArray[np.float64]
 

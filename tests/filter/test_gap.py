@@ -11,7 +11,9 @@ from filter.gaps import Followed as Run
 from scipy.spatial.transform import Rotation
 
 import dynakin
-from dynakin.stream import Callback, Live, LiveFrame, Replay
+from dynakin.stream.session import Live
+from dynakin.stream.sinks.base import Callback, LiveFrame
+from dynakin.stream.sources.replay import Replay
 
 STOP_S, AFTER_S = 6.0, 2.0
 LENGTH_S = STOP_S + LATER_S + AFTER_S

@@ -12,12 +12,13 @@ import dynakin
 from dynakin import Estimate, Estimator, Subject, load_model
 from dynakin.filter.closure import closure
 from dynakin.filter.total_wrench import Ground
-from dynakin.recordings import GroundFrame, Plate, Recording
-from dynakin.recordings.foot_loads import UNKNOWN as FOOT_UNKNOWN
-from dynakin.recordings.foot_loads import foot_loads
-from dynakin.results.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
-from dynakin.results.sources import ABSENT, DERIVED
-from dynakin.simulation import simulate
+from dynakin.recordings.feet.loads import UNKNOWN as FOOT_UNKNOWN
+from dynakin.recordings.feet.loads import foot_loads
+from dynakin.recordings.frame import GroundFrame
+from dynakin.recordings.recording import Plate, Recording
+from dynakin.results.measures.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
+from dynakin.results.measures.sources import ABSENT, DERIVED
+from dynakin.simulation.trial import simulate
 from dynakin.units import GRAVITY_M_S2
 
 WEIGHT = 70.0 * GRAVITY_M_S2

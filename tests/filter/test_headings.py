@@ -12,14 +12,15 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from dynakin import read
-from dynakin.filter import Estimator
-from dynakin.model import Subject, load_model
-from dynakin.recordings import Recording
-from dynakin.results import Estimate
-from dynakin.results.angles import angle_columns, with_angles
-from dynakin.results.facing import PELVIS, facing, nearly_singular
+from dynakin.filter.estimator import Estimator
+from dynakin.model.definition import load_model
+from dynakin.model.subject import Subject
+from dynakin.recordings.recording import Recording
+from dynakin.results.estimate import Estimate
 from dynakin.results.failures import Failures
-from dynakin.results.tracking import without_lost
+from dynakin.results.measures.angles import angle_columns, with_angles
+from dynakin.results.measures.facing import PELVIS, facing, nearly_singular
+from dynakin.results.measures.tracking import without_lost
 
 Array = npt.NDArray[np.float64]
 QUARTER = Rotation.from_euler("Y", 90.0, degrees=True).as_matrix()

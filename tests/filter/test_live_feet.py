@@ -9,12 +9,11 @@ import pytest
 
 from dynakin import Estimator, Subject, load_model
 from dynakin.errors import ModelError
-from dynakin.filter import Sample
-from dynakin.filter.samples import recording_arrays
+from dynakin.filter.samples import Sample, recording_arrays
 from dynakin.filter.total_wrench import foot_wrenches
-from dynakin.recordings import Recording
-from dynakin.recordings.foot_loads import foot_loads
-from dynakin.simulation import simulate
+from dynakin.recordings.feet.loads import foot_loads
+from dynakin.recordings.recording import Recording
+from dynakin.simulation.trial import simulate
 
 
 def test_step_by_step_moments_bands_and_the_delayed_are_those_of_the_run() -> None:

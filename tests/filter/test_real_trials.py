@@ -9,7 +9,7 @@ import pytest
 
 import dynakin
 from dynakin.errors import ModelError
-from dynakin.results.sources import ABSENT
+from dynakin.results.measures.sources import ABSENT
 
 
 @pytest.fixture(scope="module")

@@ -11,15 +11,20 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel
 
-from dynakin.batch import read_dataset
 from dynakin.config import make_config, read_config
 from dynakin.errors import DynakinError
 from dynakin.filter import presets
-from dynakin.model import load_marker_set, load_model, load_table
+from dynakin.model.definition import load_model
 from dynakin.model.identified import read_identified
+from dynakin.model.markers.marker_set import load_marker_set
 from dynakin.model.opensim.export import read_values
-from dynakin.recordings import Plate, Recording, check_plates, find_ground_frame, read
+from dynakin.model.table import load_table
+from dynakin.recordings.frame import find_ground_frame
+from dynakin.recordings.plates.checks import check_plates
+from dynakin.recordings.read import read
+from dynakin.recordings.recording import Plate, Recording
 from dynakin.stream.start import read_known
+from dynakin.studies.batch.dataset import read_dataset
 
 from .mutate import mutated_c3d, mutated_text
 

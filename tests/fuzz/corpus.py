@@ -13,9 +13,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "recordings"))
 
 from made_recordings import write_c3d
 
-from dynakin.recordings import Recording
-from dynakin.results import write_storage, write_trc
-from dynakin.simulation import simulate_squat
+from dynakin.recordings.recording import Recording
+from dynakin.results.files.markers import write_trc
+from dynakin.results.files.storage import write_storage
+from dynakin.simulation.trial import simulate_squat
 
 FRAMES, MARKERS = 24, 8
 LINES, LARGEST = 80, 1_000_000  # of real files: more of the same would only take longer
@@ -77,7 +78,7 @@ def make(folder: Path) -> None:
     _c3d(folder / "c3d_plates.c3d", markers, values)
     _c3d(folder / "c3d_plain.c3d", markers, None)
     package = resources.files("dynakin.model")
-    for kind, inside in (("model", "builtin"), ("set", "marker_sets"), ("table", "tables")):
+    for kind, inside in (("model", "builtin"), ("set", "markers"), ("table", "tables")):
         for entry in (package / inside).iterdir():
             if entry.name.endswith((".toml", ".csv")):
                 (folder / f"{kind}_{entry.name}").write_text(entry.read_text())

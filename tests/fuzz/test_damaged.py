@@ -12,15 +12,23 @@ import pytest
 
 from dynakin.config import make_config, read_config
 from dynakin.errors import ConfigError, DynakinError, ModelError, OutputError, RecordingError
-from dynakin.filter import Estimator, Sample, presets
-from dynakin.model import Subject, load_marker_set, load_model, load_table
+from dynakin.filter import presets
+from dynakin.filter.estimator import Estimator
+from dynakin.filter.samples import Sample
+from dynakin.model.definition import load_model
+from dynakin.model.markers.marker_set import load_marker_set
+from dynakin.model.subject import Subject
+from dynakin.model.table import load_table
 from dynakin.model.validation import read_toml
-from dynakin.recordings import Plate, Recording, read, read_table, read_trc
-from dynakin.results import check_output_writable
-from dynakin.simulation import SimulatedTrial, simulate_squat
-from dynakin.stream.packets import MarkerPacket, PlatePacket
-from dynakin.stream.record_format import packet_record, text_record
-from dynakin.stream.recorder import FILE, recorded
+from dynakin.recordings.formats.mot import read_table
+from dynakin.recordings.formats.trc import read_trc
+from dynakin.recordings.read import read
+from dynakin.recordings.recording import Plate, Recording
+from dynakin.results.files.folder import check_output_writable
+from dynakin.simulation.trial import SimulatedTrial, simulate_squat
+from dynakin.stream.sinks.record_format import packet_record, text_record
+from dynakin.stream.sinks.recorder import FILE, recorded
+from dynakin.stream.sources.packets import MarkerPacket, PlatePacket
 
 from .corpus import OSIM_3, OSIM_4, make
 

@@ -9,15 +9,17 @@ import numpy as np
 import pytest
 
 from dynakin import Estimate, Estimator, Subject, load_model
-from dynakin.identifiability import Identifiability, estimator_of, identifiability
-from dynakin.identifiability.measured import MeasuredModel
+from dynakin.identification.observability.measured import MeasuredModel
+from dynakin.identification.observability.person import estimator_of
+from dynakin.identification.observability.trial import Identifiability, identifiability
 from dynakin.model.definition import _FOLDER
-from dynakin.simulation import Spread, simulate
-from dynakin.simulation.bodies import choose_body
+from dynakin.simulation.bodies.registry import choose_body
+from dynakin.simulation.bodies.subject import Spread
 from dynakin.simulation.jets import sinusoids, step
 from dynakin.simulation.mechanics import Motion
-from dynakin.simulation.squat import squat_movement
+from dynakin.simulation.motions.squat import squat_movement
 from dynakin.simulation.streams import Streams
+from dynakin.simulation.trial import simulate
 
 SEED, DURATION_S, MASS_KG, HEIGHT_M = 3, 12.0, 70.0, 1.75
 

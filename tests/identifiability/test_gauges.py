@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from dynakin import _core, load_model
-from dynakin.identifiability import Gauge, estimator_of
-from dynakin.identifiability.gauge_words import gauge_in_words, gauges_in_words
-from dynakin.identifiability.gauges import ZERO, gauges_of, sparse_basis
-from dynakin.identifiability.measured import MeasuredModel
+from dynakin.identification.observability.gauge_words import gauge_in_words, gauges_in_words
+from dynakin.identification.observability.gauges import ZERO, Gauge, gauges_of, sparse_basis
+from dynakin.identification.observability.measured import MeasuredModel
+from dynakin.identification.observability.person import estimator_of
 from identifiability.conftest import changed_model
 
 

@@ -10,11 +10,12 @@ import pytest
 
 from dynakin import _core, load_model
 from dynakin.errors import ConfigError, DynakinError, ModelError
-from dynakin.filter import Estimator
-from dynakin.identifiability import estimator_of, structure_of
-from dynakin.identifiability.base import base_of, in_no_base_parameter, told_alone
-from dynakin.identifiability.element_words import base_words
-from dynakin.identifiability.measured import MeasuredModel
+from dynakin.filter.estimator import Estimator
+from dynakin.identification.observability.base import base_of, in_no_base_parameter, told_alone
+from dynakin.identification.observability.element_words import base_words
+from dynakin.identification.observability.measured import MeasuredModel
+from dynakin.identification.observability.person import estimator_of
+from dynakin.identification.observability.structure import structure_of
 from identifiability.conftest import changed_model
 
 FIXED_FOOT = (

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from dynakin.identifiability.excitation import Bench
-from dynakin.results.learned import judged, learned
+from dynakin.identification.observability.excitation import Bench
+from dynakin.results.measures.posterior import judged, learned
 from identifiability.conftest import Told, estimated_squat
 
 

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import pytest
 
 import dynakin
-from dynakin.identification import Common, Identified, MeasuredTrial, identify_subject, measure_all
-from dynakin.simulation import SimulatedTrial, simulate
+from dynakin.identification.subject import Identified, identify_subject
+from dynakin.identification.trials import Common, MeasuredTrial, measure_all
+from dynakin.simulation.trial import SimulatedTrial, simulate
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,9 @@ from hypothesis import strategies as st
 
 import dynakin
 from dynakin.errors import ModelError
-from dynakin.identification import PlanarBodies, Unknowns, bodies_of
-from dynakin.simulation import simulate
+from dynakin.identification.bodies import PlanarBodies, bodies_of
+from dynakin.identification.unknowns import Unknowns
+from dynakin.simulation.trial import simulate
 from identification.conftest import Case
 
 _M, _C, _R = np.array([2.0, 30.0, 38.0]), np.array([[0.1, 0.0], [0.0, 0.2], [0.02, 0.3]]), np.array([0.05, 0.1, 0.2])

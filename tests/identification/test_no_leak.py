@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from dynakin.errors import ModelError
-from dynakin.identification import Common, MeasuredTrial, foretell, measure_all, rms_of
-from dynakin.identification.decision import parts_of
-from dynakin.recordings import Recording
+from dynakin.identification.decision import foretell, parts_of, rms_of
+from dynakin.identification.trials import Common, MeasuredTrial, measure_all
+from dynakin.recordings.recording import Recording
 from identification.conftest import Case, estimator
 
 

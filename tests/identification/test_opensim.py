@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 import dynakin
-from dynakin.identification import identify_subject
-from dynakin.model import Subject, load_opensim
+from dynakin.identification.subject import identify_subject
 from dynakin.model.inertia import RigidBody
+from dynakin.model.opensim.definition import load_opensim
+from dynakin.model.subject import Subject
 
 
 def test_squats_and_standing(data_dir: Path) -> None:

@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dynakin.identification import BodyPriors, SpatialBodies
+from dynakin.identification.body_priors import BodyPriors
+from dynakin.identification.spatial_bodies import SpatialBodies
 from dynakin.model.inertia import RigidBody
 
 _RNG = np.random.default_rng(7)

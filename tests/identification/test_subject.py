@@ -8,20 +8,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynakin.cli import main
+from dynakin.cli.app import main
 from dynakin.errors import LostError, ModelError
-from dynakin.filter.extend import initial_covariance
-from dynakin.identification import (
-    Decision,
-    Identified,
-    change_between,
-    change_in_words,
-    identify_subject,
-    measure_all,
-)
-from dynakin.identification.decision import parts_of
+from dynakin.filter.augment import initial_covariance
+from dynakin.identification.change import change_between, change_in_words
+from dynakin.identification.decision import Decision, parts_of
+from dynakin.identification.subject import Identified, identify_subject
+from dynakin.identification.trials import measure_all
 from dynakin.model.identified import read_identified, with_identified
-from dynakin.recordings import Recording
+from dynakin.recordings.recording import Recording
 from identification.conftest import Case, estimator
 
 

@@ -9,10 +9,12 @@ import pytest
 
 import dynakin
 from dynakin.errors import RecordingError
-from dynakin.filter.extend import initial_covariance
-from dynakin.identification import Common, Identified, foretell, identify_subject, measure_all, rms_of
+from dynakin.filter.augment import initial_covariance
+from dynakin.identification.decision import foretell, rms_of
+from dynakin.identification.subject import Identified, identify_subject
+from dynakin.identification.trials import Common, measure_all
 from dynakin.model.inertia import RigidBody
-from dynakin.simulation import simulate
+from dynakin.simulation.trial import simulate
 
 
 def estimator() -> dynakin.Estimator:

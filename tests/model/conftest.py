@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from dynakin.recordings import Recording
+from dynakin.recordings.recording import Recording
 
 Array = npt.NDArray[np.float64]
 

@@ -8,9 +8,11 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin import _core
-from dynakin.model import InitialModel, Subject, initialise, load_model
-from dynakin.model.definition import ModelDefinition
-from dynakin.recordings import Plate, Recording
+from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.initialise import initialise
+from dynakin.model.definition import ModelDefinition, load_model
+from dynakin.model.subject import Subject
+from dynakin.recordings.recording import Plate, Recording
 
 Array = npt.NDArray[np.float64]
 

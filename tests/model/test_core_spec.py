@@ -7,8 +7,10 @@ import pickle
 import numpy as np
 import pytest
 
-from dynakin.model import Subject, initialise, load_model
-from dynakin.recordings import Recording
+from dynakin.model.calibration.initialise import initialise
+from dynakin.model.definition import load_model
+from dynakin.model.subject import Subject
+from dynakin.recordings.recording import Recording
 
 from .conftest import make, stand
 

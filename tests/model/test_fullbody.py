@@ -7,9 +7,11 @@ import pytest
 
 from dynakin import _core
 from dynakin.errors import ModelError
-from dynakin.filter import Estimator
-from dynakin.model import initialise, load_model
-from dynakin.recordings import GroundFrame, Recording
+from dynakin.filter.estimator import Estimator
+from dynakin.model.calibration.initialise import initialise
+from dynakin.model.definition import load_model
+from dynakin.recordings.frame import GroundFrame
+from dynakin.recordings.recording import Recording
 from model.made_in_space import RATE, definition, measured, recording_of, standing, standing_places, states
 
 LABORATORY = GroundFrame(np.eye(3), np.zeros(3), "+Y", np.array([1.0, 0.0, 0.0]))

@@ -9,11 +9,15 @@ import numpy as np
 import pytest
 
 from dynakin.errors import ModelError
-from dynakin.model import Bounds, Priors, Subject, load_marker_set, load_model, measure
-from dynakin.model.body import find_height
-from dynakin.model.frames import Trial
-from dynakin.model.marker_set import match_markers
-from dynakin.recordings import Recording, find_ground_frame
+from dynakin.model.calibration.body import find_height
+from dynakin.model.calibration.frames import Trial
+from dynakin.model.calibration.measure import measure
+from dynakin.model.definition import load_model
+from dynakin.model.markers.marker_set import load_marker_set, match_markers
+from dynakin.model.priors import Bounds, Priors
+from dynakin.model.subject import Subject
+from dynakin.recordings.frame import find_ground_frame
+from dynakin.recordings.recording import Recording
 
 from .conftest import FOOT_DIRECTION, LENGTHS, make, stand
 
@@ -288,7 +292,7 @@ def test_a_users_own_spatial_tree(tmp_path: Path, standing_person: Recording) ->
     """Given a free-floating leg in space with a locked axis, when measured, then its coordinates are the
     leg's."""
     (tmp_path / "leg.toml").write_text(SPATIAL, encoding="utf-8")
-    source = Path(load_model("sagittal7").path).parents[1] / "marker_sets" / "opencap.toml"
+    source = Path(load_model("sagittal7").path).parents[1] / "markers" / "opencap.toml"
     hips = "".join(f'\n{s}_hip = [{{ mean = ["HJC"], sides = "{s}" }}]' for s in ("left", "right"))
     text = source.read_text(encoding="utf-8").replace("\n[landmarks]\n", f"\n[landmarks]{hips}\n")
     (tmp_path / "set.toml").write_text(text, encoding="utf-8")

@@ -13,9 +13,11 @@ from dynakin import _core
 from dynakin.cli.run import configure
 from dynakin.config import make_config
 from dynakin.errors import ConfigError, ModelError, RecordingError
-from dynakin.model import CarriedLoad, InitialModel, initialise, with_loads
-from dynakin.recordings import PlateLoad, without_plate_loads
-from dynakin.simulation import SimulatedTrial, simulate_squat
+from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.initialise import initialise
+from dynakin.model.calibration.loads import CarriedLoad, with_loads
+from dynakin.recordings.plates.loads import PlateLoad, without_plate_loads
+from dynakin.simulation.trial import SimulatedTrial, simulate_squat
 
 SUBJECT = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
 BARBELL = CarriedLoad(

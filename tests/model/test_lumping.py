@@ -10,13 +10,14 @@ import numpy.typing as npt
 import pytest
 
 from dynakin.errors import ModelError
-from dynakin.model import Subject, load_model, measure
+from dynakin.model.calibration.measure import Measured, measure
+from dynakin.model.definition import load_model
 from dynakin.model.inertia import RigidBody
 from dynakin.model.lumping import part_length
-from dynakin.model.measure import Measured
 from dynakin.model.plan import ModelPlan
+from dynakin.model.subject import Subject
 from dynakin.model.table import PAIRED, load_table
-from dynakin.recordings import Recording
+from dynakin.recordings.recording import Recording
 
 Array = npt.NDArray[np.float64]
 PERSON = Subject(mass_kg=70.0, height_m=1.75, sex="female")

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from dynakin.errors import ModelError
-from dynakin.model.landmarks import LandmarkFinder
-from dynakin.model.marker_set import MarkerMatch, choose_marker_set, load_marker_set, match_markers
+from dynakin.model.calibration.landmarks import LandmarkFinder
+from dynakin.model.markers.marker_set import MarkerMatch, choose_marker_set, load_marker_set, match_markers
 
 PELVIS = {
     ("ASI", "right"): np.array([0.0, 1.0, 0.12]),

@@ -8,7 +8,7 @@ import pytest
 
 from dynakin import _core
 from dynakin.errors import ModelError
-from dynakin.model.pose_start import start_posture
+from dynakin.model.calibration.pose_start import start_posture
 
 Array = npt.NDArray[np.float64]
 LIMITS_DEG = {"flexion": (-30.0, 120.0), "adduction": (-40.0, 30.0), "rotation": (-40.0, 40.0), "knee": (0.0, 140.0)}

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dynakin.model.posture import axes_from, joint_motion, solve_joint
+from dynakin.model.calibration.posture import axes_from, joint_motion, solve_joint
 from dynakin.model.schema import Axis, Segment
 
 

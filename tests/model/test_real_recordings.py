@@ -8,8 +8,12 @@ import numpy as np
 import pytest
 
 from dynakin.errors import ModelError
-from dynakin.model import Subject, load_model, measure
-from dynakin.recordings import Recording, read, read_table
+from dynakin.model.calibration.measure import measure
+from dynakin.model.definition import load_model
+from dynakin.model.subject import Subject
+from dynakin.recordings.formats.mot import read_table
+from dynakin.recordings.read import read
+from dynakin.recordings.recording import Recording
 
 OPENCAP = "opencap_subject4"
 PIG = "plugin_gait"

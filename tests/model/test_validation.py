@@ -7,7 +7,9 @@ from pathlib import Path
 import pytest
 
 from dynakin.errors import ModelError
-from dynakin.model import Subject, available_models, load_marker_set, load_model
+from dynakin.model.definition import available_models, load_model
+from dynakin.model.markers.marker_set import load_marker_set
+from dynakin.model.subject import Subject
 
 SOURCE = Path(__file__).resolve().parents[2] / "src" / "dynakin" / "model"
 
@@ -92,7 +94,7 @@ def test_unknown_names_suggest_the_nearest() -> None:
     ],
 )
 def test_a_wrong_marker_set_names_the_key(tmp_path: Path, old: str, new: str, words: list[str]) -> None:
-    path = changed(tmp_path, "marker_sets", "opencap", old, new)
+    path = changed(tmp_path, "markers", "opencap", old, new)
     with pytest.raises(ModelError) as error:
         load_marker_set(path)
     for word in [str(path), *words]:

@@ -11,7 +11,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "results"))
 
 from synthetic_estimate import make_estimate
 
-from dynakin.results import Estimate
+from dynakin.results.estimate import Estimate
 
 
 @pytest.fixture(scope="session")

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dynakin.results import Estimate, laboratory_markers
-from dynakin.results.motion_files import write_moments
+from dynakin.results.estimate import Estimate
+from dynakin.results.files.markers import laboratory_markers
+from dynakin.results.files.motion import write_moments
 
 opensim: Any = pytest.importorskip("opensim", reason="OpenSim is not installed (pip install opensim)")
 pytestmark = pytest.mark.peers

@@ -10,11 +10,14 @@ import numpy.typing as npt
 import pytest
 
 from dynakin import read
-from dynakin.filter import Estimator, presets
-from dynakin.model import OpenSimDefinition, Subject, load_model
+from dynakin.filter import presets
+from dynakin.filter.estimator import Estimator
+from dynakin.model.definition import load_model
+from dynakin.model.opensim.definition import OpenSimDefinition
 from dynakin.model.opensim.export import of_definition, of_initial
 from dynakin.model.opensim.write import write_osim
-from dynakin.results import Estimate
+from dynakin.model.subject import Subject
+from dynakin.results.estimate import Estimate
 
 opensim: Any = pytest.importorskip("opensim", reason="OpenSim is not installed (pip install opensim)")
 pytestmark = pytest.mark.peers

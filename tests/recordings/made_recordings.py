@@ -8,7 +8,8 @@ from pathlib import Path
 import ezc3d
 import numpy as np
 
-from dynakin.recordings import Plate, Recording, Surface, plate_from_wrench
+from dynakin.recordings.plates.pressure import Surface, plate_from_wrench
+from dynakin.recordings.recording import Plate, Recording
 
 TRC_TOP = (
     "PathFileType\t4\t(X/Y/Z)\ttrial.trc\n"

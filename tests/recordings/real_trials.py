@@ -6,7 +6,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 from dynakin.errors import DynakinError
-from dynakin.recordings import Recording, read
+from dynakin.recordings.read import read
+from dynakin.recordings.recording import Recording
 
 
 def forces_of(trial: Path) -> Path | None:

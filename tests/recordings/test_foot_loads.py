@@ -10,8 +10,9 @@ import pytest
 
 from dynakin import read
 from dynakin.errors import ConfigError
-from dynakin.recordings import GroundFrame, Plate, Recording, find_ground_frame
-from dynakin.recordings.foot_loads import MEASURED, OFF_PLATE, REASONS, SHARED, SWING, foot_loads, saturated
+from dynakin.recordings.feet.loads import MEASURED, OFF_PLATE, REASONS, SHARED, SWING, foot_loads, saturated
+from dynakin.recordings.frame import GroundFrame, find_ground_frame
+from dynakin.recordings.recording import Plate, Recording
 
 LABORATORY = GroundFrame(np.eye(3), np.zeros(3), "+Y", np.array([1.0, 0.0, 0.0]))
 T = 400

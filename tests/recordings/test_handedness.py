@@ -14,8 +14,9 @@ from real_trials import real_trials
 from scipy.spatial.transform import Rotation
 
 from dynakin.errors import RecordingError
-from dynakin.recordings import Recording, find_ground_frame
+from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.handedness import refuse_mirrored
+from dynakin.recordings.recording import Recording
 
 Y_UP = np.array([0.0, 1.0, 0.0])
 

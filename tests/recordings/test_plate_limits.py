@@ -11,9 +11,11 @@ from made_recordings import standing
 from real_trials import real_trials
 
 from dynakin.errors import RecordingError
-from dynakin.recordings import Plate, Recording, check_plates, find_ground_frame
-from dynakin.recordings.plate_limits import beyond_limits
-from dynakin.recordings.pressure import Surface, plate_from_wrench
+from dynakin.recordings.frame import find_ground_frame
+from dynakin.recordings.plates.checks import check_plates
+from dynakin.recordings.plates.limits import beyond_limits
+from dynakin.recordings.plates.pressure import Surface, plate_from_wrench
+from dynakin.recordings.recording import Plate, Recording
 
 TURNED = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # Z up in the laboratory
 

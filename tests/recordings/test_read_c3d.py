@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from made_recordings import write, write_c3d
 
 from dynakin.errors import RecordingError
-from dynakin.recordings import read
+from dynakin.recordings.read import read
 
 T = 20
 PER_FRAME = 10

@@ -9,9 +9,9 @@ import pytest
 from made_recordings import write
 
 from dynakin.errors import ConfigError, RecordingError
-from dynakin.recordings import Recording, read, register_reader
-from dynakin.recordings.options import ReadOptions
-from dynakin.recordings.read import READERS
+from dynakin.recordings.plates.options import ReadOptions
+from dynakin.recordings.read import READERS, read, register_reader
+from dynakin.recordings.recording import Recording
 
 TEXT = """# standing
 time,RKNE_x,RKNE_y,RKNE_z,FP1_vx,FP1_vy,FP1_vz,FP1_px,FP1_py,FP1_pz,FP1_mx,FP1_my,FP1_mz

@@ -9,7 +9,7 @@ import pytest
 from made_recordings import TRC, TRC_TOP, write
 
 from dynakin.errors import RecordingError
-from dynakin.recordings import read
+from dynakin.recordings.read import read
 
 
 def test_plain_file_in_millimetres(tmp_path: Path) -> None:

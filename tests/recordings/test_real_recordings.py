@@ -9,7 +9,12 @@ import numpy as np
 import pytest
 
 from dynakin.errors import RecordingError
-from dynakin.recordings import Recording, check_plates, find_ground_frame, low_pass, read, standing_window
+from dynakin.recordings.frame import find_ground_frame
+from dynakin.recordings.plates.checks import check_plates
+from dynakin.recordings.read import read
+from dynakin.recordings.recording import Recording
+from dynakin.recordings.resampling import low_pass
+from dynakin.recordings.standing import standing_window
 
 G = 9.80665
 

@@ -8,11 +8,13 @@ import numpy as np
 import pytest
 
 import dynakin
-from dynakin.model import InitialModel, ModelDefinition
+from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.posture import Geometry
+from dynakin.model.definition import ModelDefinition
 from dynakin.model.plan import ModelPlan
-from dynakin.model.posture import Geometry
-from dynakin.reference import Kinematics, PlanarChain
-from dynakin.simulation import SensorNoise, SimulatedTrial, simulate_squat
+from dynakin.simulation.sensors.sizes import SensorNoise
+from dynakin.simulation.trial import SimulatedTrial, simulate_squat
+from dynakin.validation.reference.chain import Kinematics, PlanarChain
 
 MASS_KG = 70.0
 

@@ -9,9 +9,11 @@ import pytest
 
 import dynakin
 from dynakin.errors import ModelError
-from dynakin.model.posture import find_posture
-from dynakin.reference import PlanarChain, classical_angles, landmark_paths
-from dynakin.simulation import SimulatedTrial, simulate_squat
+from dynakin.model.calibration.posture import find_posture
+from dynakin.simulation.trial import SimulatedTrial, simulate_squat
+from dynakin.validation.reference.chain import PlanarChain
+from dynakin.validation.reference.classical import classical_angles
+from dynakin.validation.reference.landmark_paths import landmark_paths
 from reference.conftest import Perfect
 
 

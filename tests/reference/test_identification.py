@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from dynakin.errors import RecordingError
-from dynakin.model import Bounds
-from dynakin.reference import bodies_of, identify, predicted_wrench, table_dynamics
-from dynakin.reference.regressor import parameter_names, table_parameters, wrench_regressor
+from dynakin.model.priors import Bounds
+from dynakin.validation.reference.least_squares import bodies_of, identify, predicted_wrench
+from dynakin.validation.reference.regressor import parameter_names, table_parameters, wrench_regressor
+from dynakin.validation.reference.table_dynamics import table_dynamics
 from reference.conftest import MASS_KG, Perfect
 from reference.test_table_dynamics import PLANE, lively
 

@@ -10,9 +10,10 @@ import pytest
 
 import dynakin
 from dynakin.errors import ConfigError
-from dynakin.reference import identify, predicted_wrench, reference_methods
-from dynakin.results import signal_fit, truth_error
-from dynakin.simulation import simulate_squat
+from dynakin.results.measures.fit import signal_fit, truth_error
+from dynakin.simulation.trial import simulate_squat
+from dynakin.validation.reference.least_squares import identify, predicted_wrench
+from dynakin.validation.reference.methods import reference_methods
 from reference.conftest import MASS_KG, Perfect
 
 PLANE = ["fx", "fy", "mz"]

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from dynakin.errors import RecordingError
-from dynakin.reference import smooth
+from dynakin.recordings.smoothing import smooth
 
 TIME = np.arange(1001) / 100.0
 

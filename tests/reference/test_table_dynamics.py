@@ -7,9 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dynakin.reference import Kinematics, bodies_of, classical_angles, smooth, table_dynamics
-from dynakin.reference.classical import hinge_paths
-from dynakin.reference.regressor import parameter_names
+from dynakin.recordings.smoothing import smooth
+from dynakin.validation.reference.chain import Kinematics
+from dynakin.validation.reference.classical import classical_angles, hinge_paths
+from dynakin.validation.reference.least_squares import bodies_of
+from dynakin.validation.reference.regressor import parameter_names
+from dynakin.validation.reference.table_dynamics import table_dynamics
 from reference.conftest import Perfect
 
 PLANE = [0, 1, 5]

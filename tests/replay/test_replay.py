@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import dynakin
-from dynakin.simulation import simulate_squat
+from dynakin.simulation.trial import simulate_squat
 
 HERE = Path(__file__).parent
 # Frames and how far they may move, in standard deviations. The paper's gains hardly see the speeds, so rounding grows

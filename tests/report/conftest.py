@@ -13,8 +13,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "results"))
 
 from synthetic_estimate import SEGMENTS, make_estimate
 
-from dynakin.comparison import Method, Trial
-from dynakin.results import Estimate, evaluation_window, repetitions_of
+from dynakin.results.estimate import Estimate
+from dynakin.results.measures.metrics import evaluation_window
+from dynakin.results.measures.repetitions import repetitions_of
+from dynakin.validation.methods import Method, Trial
 
 JOINTS = ("toe", "ankle", "knee", "hip", "lumbar", "shoulder", "elbow")
 

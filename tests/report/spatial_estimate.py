@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from synthetic_estimate import make_estimate
 
-from dynakin.results import COMPONENTS, Estimate
+from dynakin.results.estimate import COMPONENTS, Estimate
 
 COORDINATES = {
     "pelvis_tilt": "pelvis",

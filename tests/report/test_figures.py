@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynakin.comparison import Trial
 from dynakin.errors import ConfigError, OutputError
 from dynakin.report.direct_labels import spread
-from dynakin.report.figures import FIGURES, save_figures
-from dynakin.report.movement_figures import middle_cycle
-from dynakin.results import Estimate
+from dynakin.report.paper_figures.figures import FIGURES, save_figures
+from dynakin.report.paper_figures.movement import middle_cycle
+from dynakin.results.estimate import Estimate
+from dynakin.validation.methods import Trial
 
 
 def words_in(path: Path) -> str:

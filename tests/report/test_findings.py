@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from dynakin.report.insights import Insight, insights
-from dynakin.results import Estimate, compute_metrics
+from dynakin.results.estimate import Estimate
+from dynakin.results.measures.metrics import compute_metrics
 
 
 def found(estimate: Estimate) -> dict[str, Insight]:

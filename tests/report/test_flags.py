@@ -13,19 +13,22 @@ import numpy as np
 import pytest
 from walking_estimate import make_walker
 
-from dynakin.comparison import Trial
-from dynakin.report import render_report, save_figures
 from dynakin.report.insights import in_short, insights
-from dynakin.report.method_sections import moment_part
-from dynakin.report.panels import Panel
+from dynakin.report.page import render_report
+from dynakin.report.paper_figures.figures import save_figures
 from dynakin.report.playback_spatial import spatial_playback
-from dynakin.report.sections import moment_section, wrench_section
-from dynakin.report.spatial_repetitions import spatial_repetition_section
-from dynakin.report.spatial_sections import foot_section, spatial_moment_section, spatial_wrench_section
-from dynakin.report.work_sections import asymmetry_section, power_section
-from dynakin.results import Estimate, Found, Repetition, compute_metrics
-from dynakin.results.mean_curves import mean_curves, signals
-from dynakin.results.sources import ABSENT, DERIVED, measured_moments
+from dynakin.report.sections.methods import moment_part
+from dynakin.report.sections.movement import moment_section, wrench_section
+from dynakin.report.sections.panels import Panel
+from dynakin.report.sections.spatial_repetitions import spatial_repetition_section
+from dynakin.report.sections.spatial_sections import foot_section, spatial_moment_section, spatial_wrench_section
+from dynakin.report.sections.work import asymmetry_section, power_section
+from dynakin.results.estimate import Estimate
+from dynakin.results.measures.mean_curves import mean_curves, signals
+from dynakin.results.measures.metrics import compute_metrics
+from dynakin.results.measures.repetitions import Found, Repetition
+from dynakin.results.measures.sources import ABSENT, DERIVED, measured_moments
+from dynakin.validation.methods import Trial
 
 DERIVED_WORDS = "derived from the motion"
 

@@ -9,7 +9,7 @@ import pytest
 
 from dynakin import Estimator, Subject, load_model, read
 from dynakin.report.playback import playback
-from dynakin.results import Estimate
+from dynakin.results.estimate import Estimate
 
 
 @pytest.fixture(scope="module")

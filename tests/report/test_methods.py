@@ -9,10 +9,15 @@ import numpy as np
 import pytest
 from test_report import Structure
 
-from dynakin.comparison import Spread, Trial, UnseenRow, angle_differences, moment_differences, table2
-from dynakin.report import render_comparison, render_report
+from dynakin.report.comparison_page import render_comparison
+from dynakin.report.page import render_report
 from dynakin.report.text_tables import table2_text, unseen_text
-from dynakin.results import Estimate
+from dynakin.results.estimate import Estimate
+from dynakin.validation.differences import angle_differences, moment_differences
+from dynakin.validation.methods import Trial
+from dynakin.validation.statistics import Spread
+from dynakin.validation.table2 import table2
+from dynakin.validation.unseen import UnseenRow
 
 SETTINGS = [{"model": "sagittal7", "presets": {"paper": {"force": 0.1}}, "forces": None}]
 

@@ -12,11 +12,11 @@ import pytest
 import xarray as xr
 from synthetic_estimate import make_estimate
 
-from dynakin.report import render_report
 from dynakin.report.body import chain_of, reaction
 from dynakin.report.colours import segment_colours
+from dynakin.report.page import render_report
 from dynakin.report.playback import playback
-from dynakin.results import Estimate
+from dynakin.results.estimate import Estimate
 
 
 def unpacked(packed: dict[str, Any]) -> np.ndarray:

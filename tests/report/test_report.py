@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 from synthetic_estimate import make_estimate
 
-from dynakin.report import render_report
 from dynakin.report.insights import in_short, insights
 from dynakin.report.labels import listed, moment_note, number, short_marker_names
+from dynakin.report.page import render_report
 from dynakin.report.plot import new_axes, thin, to_svg
-from dynakin.results import Estimate, compute_metrics
+from dynakin.results.estimate import Estimate
+from dynakin.results.measures.metrics import compute_metrics
 
 
 @pytest.fixture(scope="module")

@@ -10,8 +10,8 @@ import pytest
 import xarray as xr
 
 from dynakin.errors import ConfigError
-from dynakin.report import read_sensitivity, save_sensitivity_figure
-from dynakin.report.sensitivity import GAINS
+from dynakin.report.paper_figures.figures import save_sensitivity_figure
+from dynakin.report.paper_figures.sensitivity import GAINS, read_sensitivity
 
 HEADER = ",".join([*GAINS, "criterion"])
 EXPONENTS = np.arange(-6.0, 7.0, 3.0)

@@ -12,15 +12,17 @@ import numpy as np
 import pytest
 from spatial_estimate import MASS_KG, make_spatial
 
-from dynakin.report import render_report, save_figures
 from dynakin.report.chart import Bound, Line, chart
 from dynakin.report.colours import SIDE_COLOURS, side_of
+from dynakin.report.page import render_report
+from dynakin.report.paper_figures.figures import save_figures
 from dynakin.report.playback_spatial import spatial_playback
+from dynakin.report.sections.spatial_sections import foot_section, spatial_angle_section, spatial_moment_section
+from dynakin.report.sections.work import asymmetry_section, power_section
 from dynakin.report.sides import joints_of
-from dynakin.report.spatial_sections import foot_section, spatial_angle_section, spatial_moment_section
-from dynakin.report.work_sections import asymmetry_section, power_section
-from dynakin.results import Estimate, compute_metrics
-from dynakin.results.angles import with_angles
+from dynakin.results.estimate import Estimate
+from dynakin.results.measures.angles import with_angles
+from dynakin.results.measures.metrics import compute_metrics
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 from synthetic_estimate import make_estimate
 
-from dynakin.results import Estimate
+from dynakin.results.estimate import Estimate
 
 
 @pytest.fixture(scope="session")

@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from dynakin.recordings import GroundFrame, Plate, Recording
-from dynakin.results import AXES, COMPONENTS, Estimate, Event, Parameter, Timing
+from dynakin.recordings.frame import GroundFrame
+from dynakin.recordings.recording import Plate, Recording
+from dynakin.results.estimate import AXES, COMPONENTS, Estimate
+from dynakin.results.records import Event, Parameter, Timing
 
 COORDINATES = ("toe", "ankle", "knee", "hip", "lumbar", "shoulder", "elbow", "slide")
 SEGMENTS = ("foot", "shank", "thigh", "pelvis", "trunk", "upper_arm", "forearm")

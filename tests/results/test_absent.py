@@ -10,10 +10,10 @@ import numpy as np
 import xarray as xr
 
 from dynakin.absent import finite, with_nulls
-from dynakin.engine.folder import write_csv, write_json
-from dynakin.recordings import read_table
-from dynakin.results import Estimate
-from dynakin.results.storage_file import write_storage
+from dynakin.recordings.formats.mot import read_table
+from dynakin.results.estimate import Estimate
+from dynakin.results.files.storage import write_storage
+from dynakin.studies.engine.folder import write_csv, write_json
 
 TABLES = ("coordinates.mot", "speeds.sto", "moments.sto", "powers.sto", "wrench.sto", "uncertainty.sto")
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from synthetic_estimate import make_estimate
 
-from dynakin.results import Estimate
-from dynakin.results.adaptation import adaptation, constant_settling, misfit_settling, running_rms
+from dynakin.results.estimate import Estimate
+from dynakin.results.measures.adaptation import adaptation, constant_settling, misfit_settling, running_rms
 
 TIME = np.arange(2001) / 100.0
 RNG = np.random.default_rng(7)

@@ -11,13 +11,14 @@ import pytest
 import dynakin
 from dynakin.errors import RecordingError
 from dynakin.filter.zero import standing_zero
-from dynakin.recordings import read_table, standing_window
-from dynakin.results import Estimate
-from dynakin.results.angles import CONVENTIONS, convention_of, with_angles
-from dynakin.results.power import work_of
-from dynakin.results.pressure import centre_of_pressure
-from dynakin.results.symmetry import symmetry_index
-from dynakin.simulation import simulate_squat
+from dynakin.recordings.formats.mot import read_table
+from dynakin.recordings.standing import standing_window
+from dynakin.results.estimate import Estimate
+from dynakin.results.measures.angles import CONVENTIONS, convention_of, with_angles
+from dynakin.results.measures.power import work_of
+from dynakin.results.measures.pressure import centre_of_pressure
+from dynakin.results.measures.symmetry import symmetry_index
+from dynakin.simulation.trial import simulate_squat
 
 
 def test_signs_and_zero_of_the_table(estimate: Estimate, tmp_path: Path) -> None:

@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dynakin.results import Estimate
-from dynakin.results.bounds import bound_shares, counts_in_words, parameter_bounds
+from dynakin.results.estimate import Estimate
+from dynakin.results.measures.bounds import bound_shares, counts_in_words, parameter_bounds
 
 
 def held(estimate: Estimate, name: str, frames: np.ndarray) -> Estimate:

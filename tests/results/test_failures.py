@@ -16,9 +16,11 @@ from walking_estimate import make_walker
 import dynakin.report
 from dynakin.cli import summary
 from dynakin.errors import OutputError
-from dynakin.results import OUTPUT_FILES, Estimate, check_output_writable, metrics, save
+from dynakin.pipeline import save
+from dynakin.results.estimate import Estimate
 from dynakin.results.failures import Failures
-from dynakin.results.output_folder import check_folder_writable
+from dynakin.results.files.folder import OUTPUT_FILES, check_folder_writable, check_output_writable
+from dynakin.results.measures import metrics
 
 
 def broken(*_: object, **__: object) -> None:

@@ -11,8 +11,12 @@ import pytest
 import xarray as xr
 from synthetic_estimate import make_estimate
 
-from dynakin.recordings import read, read_table
-from dynakin.results import OUTPUT_FILES, Estimate, marker_rms_mm, wrench_fit, write_trc
+from dynakin.recordings.formats.mot import read_table
+from dynakin.recordings.read import read
+from dynakin.results.estimate import Estimate
+from dynakin.results.files.folder import OUTPUT_FILES
+from dynakin.results.files.markers import write_trc
+from dynakin.results.measures.fit import marker_rms_mm, wrench_fit
 
 
 @pytest.fixture(scope="module")

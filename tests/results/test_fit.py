@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dynakin.results import signal_fit, truth_error, wrench_fit
+from dynakin.results.measures.fit import signal_fit, truth_error, wrench_fit
 
 TIME = np.arange(1000) / 100.0
 SINE = np.sin(2.0 * np.pi * TIME)

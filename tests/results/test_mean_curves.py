@@ -8,8 +8,18 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynakin.results import Estimate, Repetition, estimate_curves, repetitions_of
-from dynakin.results.mean_curves import MEASURED, PERCENT, curve_points, mean_curves, normalised, signals, write_curves
+from dynakin.results.estimate import Estimate
+from dynakin.results.measures.mean_curves import (
+    MEASURED,
+    PERCENT,
+    curve_points,
+    estimate_curves,
+    mean_curves,
+    normalised,
+    signals,
+    write_curves,
+)
+from dynakin.results.measures.repetitions import Repetition, repetitions_of
 
 TIME = np.arange(0.0, 8.0, 0.01)
 ROTATION = np.array([True, False])

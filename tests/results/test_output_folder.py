@@ -8,9 +8,9 @@ import pytest
 from synthetic_estimate import make_estimate
 
 from dynakin.errors import OutputError
-from dynakin.results import Estimate, check_output_writable
-from dynakin.results import save as save_module
-from dynakin.results.output_folder import replacing
+from dynakin.pipeline import save as save_module
+from dynakin.results.estimate import Estimate
+from dynakin.results.files.folder import check_output_writable, replacing
 
 
 @pytest.fixture(scope="module")

@@ -10,9 +10,18 @@ import pytest
 
 import dynakin
 from dynakin.errors import ConfigError
-from dynakin.recordings import find_ground_frame
-from dynakin.results import Estimate, find_repetitions, repetitions_of
-from dynakin.results.repetitions import BodyPaths, body_paths, feet_pass, gait_cycles, initial_contacts, squats
+from dynakin.recordings.frame import find_ground_frame
+from dynakin.results.estimate import Estimate
+from dynakin.results.measures.repetitions import (
+    BodyPaths,
+    body_paths,
+    feet_pass,
+    find_repetitions,
+    gait_cycles,
+    initial_contacts,
+    repetitions_of,
+    squats,
+)
 
 TIME = np.arange(0.0, 20.0, 0.01)
 STEP_S = 1.1

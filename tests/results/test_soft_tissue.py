@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from dynakin.model.marker_set import available_marker_sets, load_marker_set
-from dynakin.results import Estimate
-from dynakin.results.soft_tissue import displacements, soft_tissue
-from dynakin.results.soft_tissue_sizes import published_amplitude_mm
-from dynakin.simulation.opencap_markers import OPENCAP
-from dynakin.simulation.plug_in_gait_markers import PLUG_IN_GAIT
-from dynakin.simulation.soft_tissue import regions
+from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
+from dynakin.results.estimate import Estimate
+from dynakin.results.measures.soft_tissue import displacements, soft_tissue
+from dynakin.results.measures.soft_tissue_sizes import published_amplitude_mm
+from dynakin.simulation.sensors.opencap_markers import OPENCAP
+from dynakin.simulation.sensors.plug_in_gait_markers import PLUG_IN_GAIT
+from dynakin.simulation.sensors.soft_tissue import regions
 
 KNEE = "S1:RKNE"
 

@@ -14,14 +14,16 @@ from rich.console import Console
 from walking_estimate import MASS_KG, STANCE_S, make_walker
 
 from dynakin.cli import summary
-from dynakin.recordings import read_table
+from dynakin.recordings.formats.mot import read_table
 from dynakin.report.insights import in_short, insights
-from dynakin.results import Estimate, Repetition, compute_metrics
-from dynakin.results.feet import NOT_MEASURED
-from dynakin.results.mean_curves import curve_points, mean_curves, signals, write_curves
-from dynakin.results.sources import ABSENT, DERIVED, legs_of, measured_moments, moment_figures, moment_sources
-from dynakin.results.stances import counted, phases
-from dynakin.results.tracking import without_lost
+from dynakin.results.estimate import Estimate
+from dynakin.results.measures.feet import NOT_MEASURED
+from dynakin.results.measures.mean_curves import curve_points, mean_curves, signals, write_curves
+from dynakin.results.measures.metrics import compute_metrics
+from dynakin.results.measures.repetitions import Repetition
+from dynakin.results.measures.sources import ABSENT, DERIVED, legs_of, measured_moments, moment_figures, moment_sources
+from dynakin.results.measures.stances import counted, phases
+from dynakin.results.measures.tracking import without_lost
 
 PEAK_N = 700.0
 ALL = (0, 1, 2, 3)

@@ -12,12 +12,13 @@ import xarray as xr
 from synthetic_estimate import make_estimate
 
 import dynakin
-from dynakin.cli import main
-from dynakin.comparison import Setup, compare_trial
+from dynakin.cli.app import main
 from dynakin.errors import LostError
-from dynakin.results import Estimate
-from dynakin.results.tracking import refuse_lost, tracking_of, without_lost
-from dynakin.simulation import SimulatedTrial, simulate_squat
+from dynakin.results.estimate import Estimate
+from dynakin.results.measures.tracking import refuse_lost, tracking_of, without_lost
+from dynakin.simulation.trial import SimulatedTrial, simulate_squat
+from dynakin.validation.methods import compare_trial
+from dynakin.validation.setup import Setup
 
 ARM = slice(7, 10)
 """Three of ten markers."""

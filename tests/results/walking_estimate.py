@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 from synthetic_estimate import make_estimate
 
-from dynakin.results import Estimate
-from dynakin.results.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
-from dynakin.results.sources import ABSENT, DERIVED
+from dynakin.results.estimate import Estimate
+from dynakin.results.measures.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
+from dynakin.results.measures.sources import ABSENT, DERIVED
 
 COORDINATES = {
     "pelvis_ty": "pelvis",

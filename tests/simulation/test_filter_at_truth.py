@@ -11,8 +11,9 @@ from trees import spatial_body, waving
 
 import dynakin
 from dynakin import _core
-from dynakin.simulation import SensorNoise, SimulatedTrial, simulate
-from dynakin.simulation.body import ten_numbers
+from dynakin.simulation.bodies.body import ten_numbers
+from dynakin.simulation.sensors.sizes import SensorNoise
+from dynakin.simulation.trial import SimulatedTrial, simulate
 
 PERFECT = SensorNoise.none()
 INERTIA = ("mass", "mx", "my", "mz", "ixx", "iyy", "izz", "ixy", "ixz", "iyz")

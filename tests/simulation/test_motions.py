@@ -9,9 +9,11 @@ import pytest
 from trees import inverse_dynamics
 
 from dynakin.errors import ConfigError, RecordingError
-from dynakin.results.storage_file import write_storage
-from dynakin.simulation import MOTIONS, Motion, SensorNoise, SimulatedTrial, simulate
-from dynakin.simulation.mechanics import kinematics
+from dynakin.results.files.storage import write_storage
+from dynakin.simulation.mechanics import Motion, kinematics
+from dynakin.simulation.motions.registry import MOTIONS
+from dynakin.simulation.sensors.sizes import SensorNoise
+from dynakin.simulation.trial import SimulatedTrial, simulate
 
 PERFECT = SensorNoise.none()
 MODELS = ("sagittal7", "squat7")

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from dynakin.errors import ConfigError
-from dynakin.simulation import SensorNoise, SimulatedTrial, load_sensors, simulate
+from dynakin.simulation.sensors.sizes import SensorNoise, load_sensors
+from dynakin.simulation.trial import SimulatedTrial, simulate
 
 PERFECT = SensorNoise.none()
 

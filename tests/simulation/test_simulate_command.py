@@ -7,8 +7,11 @@ from pathlib import Path
 
 import pytest
 
-from dynakin.cli import main
-from dynakin.simulation import TRIAL_FILES, SensorNoise, Spread, simulate
+from dynakin.cli.app import main
+from dynakin.simulation.bodies.subject import Spread
+from dynakin.simulation.output import TRIAL_FILES
+from dynakin.simulation.sensors.sizes import SensorNoise
+from dynakin.simulation.trial import simulate
 
 
 def test_it_writes_what_the_api_writes(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

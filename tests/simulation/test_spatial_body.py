@@ -7,8 +7,9 @@ import pytest
 from trees import inverse_dynamics, spatial_body, waving
 
 from dynakin.errors import ConfigError
-from dynakin.simulation import Motion, SensorNoise, SimulatedTrial, simulate
-from dynakin.simulation.mechanics import kinematics
+from dynakin.simulation.mechanics import Motion, kinematics
+from dynakin.simulation.sensors.sizes import SensorNoise
+from dynakin.simulation.trial import SimulatedTrial, simulate
 
 RATE_HZ = 200.0
 MIDDLE = {"knee_r": 0.4, "knee_l": 0.4, "elbow_r": 0.5, "elbow_l": 0.5}

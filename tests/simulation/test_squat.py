@@ -6,10 +6,11 @@ import numpy as np
 import pytest
 
 from dynakin.errors import ConfigError
-from dynakin.recordings import standing_window
-from dynakin.simulation import SensorNoise, SimulatedTrial, simulate_squat
+from dynakin.recordings.standing import standing_window
 from dynakin.simulation.mechanics import Motion, kinematics
-from dynakin.simulation.soft_tissue import regions
+from dynakin.simulation.sensors.sizes import SensorNoise
+from dynakin.simulation.sensors.soft_tissue import regions
+from dynakin.simulation.trial import SimulatedTrial, simulate_squat
 
 
 @pytest.fixture(scope="module")

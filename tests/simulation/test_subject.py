@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from dynakin.errors import ConfigError
-from dynakin.simulation import Spread, draw_subject, sagittal, squat_chain
-from dynakin.simulation.subject import affine, mass_com_inertia, pseudo_inertia
+from dynakin.simulation.bodies import sagittal, squat_chain
+from dynakin.simulation.bodies.subject import Spread, affine, draw_subject, mass_com_inertia, pseudo_inertia
 
 
 @pytest.mark.parametrize("chain", [sagittal, squat_chain])

@@ -9,13 +9,14 @@ import pytest
 from trees import inverse_dynamics
 
 from dynakin.errors import ConfigError
-from dynakin.model import load_model
-from dynakin.simulation import Motion, SensorNoise, SimulatedTrial, simulate
+from dynakin.model.definition import load_model
+from dynakin.simulation.bodies.whole_body import Sole
 from dynakin.simulation.jets import Jet
-from dynakin.simulation.leg_closure import close_legs, knee_flexion
-from dynakin.simulation.mechanics import kinematics
+from dynakin.simulation.mechanics import Motion, kinematics
+from dynakin.simulation.motions.leg_closure import close_legs, knee_flexion
+from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.support import Support, split_between
-from dynakin.simulation.whole_body import Sole
+from dynakin.simulation.trial import SimulatedTrial, simulate
 
 PERFECT = SensorNoise.none()
 MOTIONS = ("squat", "gait")

@@ -8,9 +8,18 @@ from types import ModuleType
 import numpy as np
 from numpy.typing import NDArray
 
-from dynakin.simulation import Axis, Contact, Motion, Segment, SimulatedBody, SimulatedSubject, Site, draw_subject
-from dynakin.simulation.mechanics import kinematics
-from dynakin.simulation.subject import LUMBAR_DIRECTION, T12_ON_TORSO, affine, mass_com_inertia, symmetric
+from dynakin.simulation.bodies.body import Contact, SimulatedBody
+from dynakin.simulation.bodies.subject import (
+    LUMBAR_DIRECTION,
+    T12_ON_TORSO,
+    SimulatedSubject,
+    affine,
+    draw_subject,
+    mass_com_inertia,
+    symmetric,
+)
+from dynakin.simulation.mechanics import Axis, Motion, Segment, kinematics
+from dynakin.simulation.sensors.markers import Site
 
 Array = NDArray[np.float64]
 UP = np.array([0.0, 1.0, 0.0])

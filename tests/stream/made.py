@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from dynakin.stream import Fused, Fusion, MarkerPacket, PlatePacket, StreamInfo
+from dynakin.stream.fusion import Fused, Fusion
+from dynakin.stream.sources.packets import MarkerPacket, PlatePacket, StreamInfo
 
 MARKERS = StreamInfo(("a", "b"), 100.0, "one")
 PLATES = StreamInfo(("left",), 1000.0, "one")

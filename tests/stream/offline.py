@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from dynakin.stream import Live
+from dynakin.stream.session import Live
 
 
 def offline_states(

@@ -10,7 +10,7 @@ import time
 
 import numpy as np
 
-from dynakin.recordings import Recording
+from dynakin.recordings.recording import Recording
 
 MISSING = struct.pack("<I", 0xFFFFFFFF) * 3
 ERROR, COMMAND, XML, DATA, NO_MORE_DATA = range(5)

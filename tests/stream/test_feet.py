@@ -9,11 +9,13 @@ import pytest
 
 import dynakin
 from dynakin.filter import presets
-from dynakin.recordings.foot_loads import foot_loads
-from dynakin.results.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
-from dynakin.simulation import SimulatedTrial, simulate
-from dynakin.stream import Callback, Live, LiveFrame, Replay
+from dynakin.recordings.feet.loads import foot_loads
+from dynakin.results.measures.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
+from dynakin.simulation.trial import SimulatedTrial, simulate
 from dynakin.stream.feet import LiveFeet
+from dynakin.stream.session import Live
+from dynakin.stream.sinks.base import Callback, LiveFrame
+from dynakin.stream.sources.replay import Replay
 
 from .offline import offline_states
 

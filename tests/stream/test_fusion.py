@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from dynakin.errors import StreamError
-from dynakin.recordings import resample
-from dynakin.stream import Fusion, MarkerPacket, PlatePacket, StreamInfo
+from dynakin.recordings.resampling import resample
+from dynakin.stream.fusion import Fusion
+from dynakin.stream.sources.packets import MarkerPacket, PlatePacket, StreamInfo
 
 from .made import MARKERS, PLATES, block, frame, play, times
 

@@ -14,16 +14,19 @@ import pytest
 
 import dynakin
 from dynakin.errors import StreamError
-from dynakin.recordings import DEFAULT_THRESHOLD_N, Recording
+from dynakin.recordings.plates.pressure import DEFAULT_THRESHOLD_N
+from dynakin.recordings.recording import Recording
 from dynakin.recordings.resampling import CausalLowPass, latest_before
-from dynakin.simulation import simulate_squat
-from dynakin.stream import Callback, Live, LiveFrame, MarkerPacket, Packet, PlatePacket, Sink
+from dynakin.simulation.trial import simulate_squat
+from dynakin.stream.session import Live
+from dynakin.stream.sinks.base import Callback, LiveFrame, Sink
+from dynakin.stream.sources.packets import MarkerPacket, Packet, PlatePacket
 
 from .offline import offline_states
 
 pylsl = pytest.importorskip("pylsl")
-from dynakin.stream.lsl_sink import LslSink  # noqa: E402
-from dynakin.stream.lsl_source import LslSource  # noqa: E402
+from dynakin.stream.sinks.lsl import LslSink  # noqa: E402
+from dynakin.stream.sources.lsl import LslSource  # noqa: E402
 
 OFFSET_S = 4321.0
 

@@ -10,11 +10,13 @@ import numpy as np
 import pytest
 
 import dynakin
-from dynakin.simulation import simulate_squat
-from dynakin.stream import Callback, Live, LiveFrame, Replay, Sink, Started
+from dynakin.simulation.trial import simulate_squat
+from dynakin.stream.session import Live
+from dynakin.stream.sinks.base import Callback, LiveFrame, Sink, Started
+from dynakin.stream.sources.replay import Replay
 
 pylsl = pytest.importorskip("pylsl")
-from dynakin.stream.lsl_sink import LslSink  # noqa: E402
+from dynakin.stream.sinks.lsl import LslSink  # noqa: E402
 
 UNITS = {
     "coordinates": {"knee": "rad"},

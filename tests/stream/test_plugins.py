@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from dynakin.errors import ConfigError
-from dynakin.stream import SINKS, SOURCES, plugin
+from dynakin.stream.sources.plugins import SINKS, SOURCES, plugin
 
 MODULE = """
 from dynakin.stream import MarkerPacket, Sink, StreamInfo, Streams

@@ -11,15 +11,19 @@ import pytest
 
 import dynakin
 from dynakin.errors import ConfigError, StreamError
-from dynakin.recordings import Recording, resample
-from dynakin.simulation import simulate_squat
-from dynakin.stream import SOURCES, Callback, Live, LiveFrame, MarkerPacket, Packet, PlatePacket, plugin
+from dynakin.recordings.recording import Recording
+from dynakin.recordings.resampling import resample
+from dynakin.simulation.trial import simulate_squat
+from dynakin.stream.session import Live
+from dynakin.stream.sinks.base import Callback, LiveFrame
+from dynakin.stream.sources.packets import MarkerPacket, Packet, PlatePacket
+from dynakin.stream.sources.plugins import SOURCES, plugin
 
 from .offline import offline_states
 from .qtm_server import QtmServer
 
 pytest.importorskip("qtm_rt")
-from dynakin.stream.qtm_source import QtmSource
+from dynakin.stream.sources.qtm import QtmSource
 
 
 @pytest.fixture(scope="module")

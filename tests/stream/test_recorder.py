@@ -14,11 +14,14 @@ import numpy as np
 import pytest
 
 from dynakin.errors import OutputError, RecordingError
-from dynakin.recordings import Recording
-from dynakin.simulation import simulate_squat
-from dynakin.stream import Callback, Live, LiveFrame, Packet, PlatePacket, Replay, Sink
-from dynakin.stream.recorder import FILE, Recorder, finish, recorded
+from dynakin.recordings.recording import Recording
+from dynakin.simulation.trial import simulate_squat
+from dynakin.stream.session import Live
 from dynakin.stream.settings import estimator_of
+from dynakin.stream.sinks.base import Callback, LiveFrame, Sink
+from dynakin.stream.sinks.recorder import FILE, Recorder, finish, recorded
+from dynakin.stream.sources.packets import Packet, PlatePacket
+from dynakin.stream.sources.replay import Replay
 
 from .made import MARKERS, PLATES, block, frame
 
@@ -29,7 +32,7 @@ import sys, time
 sys.path.insert(0, {tests!r})
 from dynakin.simulation import simulate_squat
 from dynakin.stream import Callback, Live, LiveFrame, Packet, PlatePacket, Replay, Sink
-from dynakin.stream.recorder import Recorder
+from dynakin.stream.sinks.recorder import Recorder
 from dataclasses import replace
 source = Replay(simulate_squat(seed=1, duration_s=8.0).recording, loop=True)
 recorder = Recorder({folder!r}, {settings!r})
@@ -117,7 +120,7 @@ def test_a_writer_killed_goes_on_in_the_same_file(tmp_path: Path) -> None:
 
 
 def recorded_times(folder: Path) -> list[float]:
-    from dynakin.stream.record_format import read_records
+    from dynakin.stream.sinks.record_format import read_records
 
     return [r.time_s for r in read_records(folder / FILE) if hasattr(r, "positions")]
 

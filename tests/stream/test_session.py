@@ -12,23 +12,16 @@ import pytest
 
 import dynakin
 from dynakin.errors import ModelError, StreamError
-from dynakin.recordings import Recording
-from dynakin.simulation import simulate_squat
-from dynakin.stream import (
-    Callback,
-    Fusion,
-    Live,
-    LiveFrame,
-    MarkerPacket,
-    Packet,
-    PlatePacket,
-    Replay,
-    Sink,
-    Streams,
-    start,
-)
+from dynakin.recordings.recording import Recording
+from dynakin.simulation.trial import simulate_squat
+from dynakin.stream import start
+from dynakin.stream.fusion import Fusion
 from dynakin.stream.monitor import Monitor
-from dynakin.stream.recorder import Recorder, recorded
+from dynakin.stream.session import Live
+from dynakin.stream.sinks.base import Callback, LiveFrame, Sink
+from dynakin.stream.sinks.recorder import Recorder, recorded
+from dynakin.stream.sources.packets import MarkerPacket, Packet, PlatePacket, Streams
+from dynakin.stream.sources.replay import Replay
 from dynakin.stream.start import quietest
 
 

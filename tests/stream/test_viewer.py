@@ -15,12 +15,13 @@ import pytest
 
 import dynakin
 from dynakin.errors import ConfigError
-from dynakin.recordings import Recording
-from dynakin.simulation import simulate_squat
-from dynakin.stream import Callback, Live, LiveFrame, Replay, Started
-from dynakin.stream.latest import Latest
-from dynakin.stream.picture import Picture, arrow, as_text, in_words, split, status_text
-from dynakin.stream.sinks import Status
+from dynakin.recordings.recording import Recording
+from dynakin.simulation.trial import simulate_squat
+from dynakin.stream.session import Live
+from dynakin.stream.sinks.base import Callback, LiveFrame, Started, Status
+from dynakin.stream.sources.replay import Replay
+from dynakin.stream.viewer.latest import Latest
+from dynakin.stream.viewer.picture import Picture, arrow, as_text, in_words, split, status_text
 
 
 def test_the_reader_gets_the_newest_once() -> None:
@@ -82,7 +83,7 @@ def test_the_page_is_served_to_this_machine_and_ends_with_the_session(
     squat: Recording, capsys: pytest.CaptureFixture[str]
 ) -> None:
     pytest.importorskip("viser")
-    from dynakin.stream.viewer import Viewer
+    from dynakin.stream.viewer.sink import Viewer
 
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
@@ -121,7 +122,7 @@ def connects(url: str, origin: str | None, host: str | None = None) -> bool:
 def test_only_the_page_itself_reads_the_stream_and_presses_buttons(squat: Recording) -> None:
     """A page of another site that the browser has open, one under a name that was pointed here, and a bare client."""
     pytest.importorskip("viser")
-    from dynakin.stream.viewer import Viewer
+    from dynakin.stream.viewer.sink import Viewer
 
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
@@ -163,7 +164,7 @@ def test_only_the_page_itself_reads_the_stream_and_presses_buttons(squat: Record
 )
 def test_hosts_and_origins_that_are_our_own(served: str, host: str, origin: str, taken: bool) -> None:
     pytest.importorskip("websockets")
-    from dynakin.stream.own_origin import refusal
+    from dynakin.stream.viewer.own_origin import refusal
 
     assert (refusal(served, [host], [origin], websocket=True) is None) is taken
     assert (refusal(served, [host], [], websocket=False) is None) is taken
@@ -180,7 +181,7 @@ def test_names_are_shown_as_they_are() -> None:
 
 
 def test_without_viser_it_is_said_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    from dynakin.stream import viewer
+    from dynakin.stream.viewer import sink as viewer
 
     monkeypatch.setattr(viewer.importlib.util, "find_spec", lambda name: None)
     with pytest.raises(ConfigError, match=r"needs viser, which is not installed; pip install 'dynakin\[live\]'"):
@@ -188,7 +189,7 @@ def test_without_viser_it_is_said_how_to_get_it(monkeypatch: pytest.MonkeyPatch)
 
 
 def test_a_port_in_use_is_passed_over() -> None:
-    from dynakin.stream.viewer import _free_port
+    from dynakin.stream.viewer.sink import _free_port
 
     with socket.create_server(("127.0.0.1", 0)) as taken:
         port = taken.getsockname()[1]

@@ -17,9 +17,11 @@ from typing import Any
 
 import pytest
 
-from dynakin.simulation import simulate_squat
-from dynakin.stream import Callback, Live, LiveFrame, Replay, Started
+from dynakin.simulation.trial import simulate_squat
+from dynakin.stream.session import Live
 from dynakin.stream.settings import estimator_of
+from dynakin.stream.sinks.base import Callback, LiveFrame, Started
+from dynakin.stream.sources.replay import Replay
 
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
 SETTINGS = {"model": "sagittal7", "markers": "opencap", "mass_kg": 70.0, "height_m": 1.75, "sex": "male"}
@@ -86,7 +88,7 @@ def browser() -> Iterator[Browser]:
 
 
 def test_names_from_files_are_text_on_the_page(browser: Browser, tmp_path: Path) -> None:
-    from dynakin.stream.viewer import Viewer
+    from dynakin.stream.viewer.sink import Viewer
 
     frames: list[LiveFrame] = []
     live = Live(

@@ -5,10 +5,13 @@ from __future__ import annotations
 import pytest
 
 import dynakin
-from dynakin.filter import Estimator, Noise, presets
-from dynakin.recordings import Recording
-from dynakin.simulation import simulate
-from dynakin.tuning import Shared, prepare
+from dynakin.filter import presets
+from dynakin.filter.estimator import Estimator
+from dynakin.filter.noise import Noise
+from dynakin.recordings.recording import Recording
+from dynakin.simulation.trial import simulate
+from dynakin.studies.tuning.score import Shared
+from dynakin.studies.tuning.trial import prepare
 
 
 @pytest.fixture(scope="session")

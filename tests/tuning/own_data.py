@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from dynakin import _core
-from dynakin.filter import Noise, presets
+from dynakin.filter import presets
+from dynakin.filter.augment import continuous_noise, initial_covariance
 from dynakin.filter.core_filter import core_filter
-from dynakin.filter.extend import continuous_noise, initial_covariance
-from dynakin.tuning import TuningTrial
+from dynakin.filter.noise import Noise
+from dynakin.studies.tuning.trial import TuningTrial
 
 Array = np.ndarray
 RATE_HZ, FRAMES = 50.0, 150

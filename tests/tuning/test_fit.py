@@ -8,16 +8,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynakin.cli import main
-from dynakin.engine import Journal, open_pool
+from dynakin.cli.app import main
 from dynakin.errors import ConfigError
 from dynakin.filter import presets
-from dynakin.simulation import simulate
-from dynakin.tuning import Shared
-from dynakin.tuning.advice import recommendation
-from dynakin.tuning.fit import Fit, Fitter, belongs_to_fit, usual_names
-from dynakin.tuning.likelihood import REACH, Likelihood
-from dynakin.tuning.optimise import curvature, deviations, minimise
+from dynakin.simulation.trial import simulate
+from dynakin.studies.engine.journal import Journal
+from dynakin.studies.engine.pools import open_pool
+from dynakin.studies.tuning.advice import recommendation
+from dynakin.studies.tuning.fit import Fit, Fitter, belongs_to_fit, usual_names
+from dynakin.studies.tuning.likelihood import REACH, Likelihood
+from dynakin.studies.tuning.optimise import curvature, deviations, minimise
+from dynakin.studies.tuning.score import Shared
 from tuning.own_data import own_noise, own_trial
 
 WRONG = {"jerk": 5.0, "soft_tissue": 0.3, "marker_sd_m": 3.0, "force": 0.2, "plate_force": 4.0}

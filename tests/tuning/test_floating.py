@@ -5,13 +5,16 @@ from __future__ import annotations
 import pytest
 
 import dynakin
-from dynakin.engine import open_pool
 from dynakin.errors import ConfigError
-from dynakin.filter import Estimator, presets
-from dynakin.simulation import simulate
-from dynakin.tuning import Shared, axis, prepare, run_grid
-from dynakin.tuning.fit import Fitter, usual_names
-from dynakin.tuning.settings import value_of
+from dynakin.filter import presets
+from dynakin.filter.estimator import Estimator
+from dynakin.simulation.trial import simulate
+from dynakin.studies.engine.pools import open_pool
+from dynakin.studies.tuning.fit import Fitter, usual_names
+from dynakin.studies.tuning.grid import axis, run_grid
+from dynakin.studies.tuning.score import Shared
+from dynakin.studies.tuning.settings import value_of
+from dynakin.studies.tuning.trial import prepare
 
 FLOATING = ("floating_jerk", "floating_jerk_translation", "floating_soft_tissue_time_s")
 FIXED = ("jerk", "jerk_translation", "soft_tissue_time_s")

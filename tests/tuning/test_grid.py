@@ -15,14 +15,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynakin.cli import main
-from dynakin.engine import Journal, open_pool
+from dynakin.cli.app import main
 from dynakin.errors import ConfigError, DynakinError
 from dynakin.filter import presets
-from dynakin.report import read_sensitivity
-from dynakin.simulation import simulate
-from dynakin.tuning import Shared, axis, belongs_to, paper_axes, run_grid
-from dynakin.tuning.grid import combinations
+from dynakin.report.paper_figures.sensitivity import read_sensitivity
+from dynakin.simulation.trial import simulate
+from dynakin.studies.engine.journal import Journal
+from dynakin.studies.engine.pools import open_pool
+from dynakin.studies.tuning.grid import axis, belongs_to, combinations, paper_axes, run_grid
+from dynakin.studies.tuning.score import Shared
 
 AXES = tuple(axis(name, 1e-4, 1e4, 3) for name in ("coordinate", "speed", "acceleration"))
 
@@ -142,7 +143,7 @@ def test_the_optimum_is_a_preset_that_run_takes(
 
 
 def test_the_table_of_the_papers_gains_is_figure_3s_file(paper: Shared, tmp_path: Path) -> None:
-    from dynakin.tuning.output import write_grid
+    from dynakin.studies.tuning.output import write_grid
 
     with open_pool("threads", 2) as pool:
         grid = run_grid(paper, AXES, pool)

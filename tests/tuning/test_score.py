@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from dynakin.errors import ConfigError
-from dynakin.filter import Estimator, presets
-from dynakin.recordings import Recording
-from dynakin.results import marker_rms_mm, signal_fit
-from dynakin.tuning import Shared, prepare
-from dynakin.tuning.score import figures_of, score_task
-from dynakin.tuning.settings import changed, check_setting, value_of
-from dynakin.tuning.trial import undoubting
+from dynakin.filter import presets
+from dynakin.filter.estimator import Estimator
+from dynakin.recordings.recording import Recording
+from dynakin.results.measures.fit import marker_rms_mm, signal_fit
+from dynakin.studies.tuning.score import Shared, figures_of, score_task
+from dynakin.studies.tuning.settings import changed, check_setting, value_of
+from dynakin.studies.tuning.trial import prepare, undoubting
 
 
 def test_the_papers_criterion_is_the_sum_of_what_run_reports(paper: Shared, definition, recording: Recording) -> None:

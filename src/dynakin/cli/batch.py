@@ -7,17 +7,18 @@ from typing import Annotated
 
 import typer
 
-from dynakin.batch import read_dataset, run_batch
-from dynakin.batch.output import write_batch
-from dynakin.batch.process import Options, belongs_to
 from dynakin.cli.console import as_table, busy, out, progress_bar
 from dynakin.cli.options import Backend, Jobs, Scheduler
-from dynakin.engine import Journal, open_pool
-from dynakin.engine.folder import ROWS, open_folder
 from dynakin.errors import ConfigError, DynakinError
-from dynakin.reference import CUTOFF_HZ
+from dynakin.recordings.smoothing import CUTOFF_HZ
 from dynakin.report.text_tables import table2_text
 from dynakin.results.naming import plural
+from dynakin.studies.batch.dataset import read_dataset
+from dynakin.studies.batch.output import write_batch
+from dynakin.studies.batch.process import Options, belongs_to, run_batch
+from dynakin.studies.engine.folder import ROWS, open_folder
+from dynakin.studies.engine.journal import Journal
+from dynakin.studies.engine.pools import open_pool
 
 
 def batch(

@@ -15,29 +15,20 @@ from rich.text import Text
 from dynakin.cli.console import out, table
 from dynakin.cli.options import Force, Forward, Height, Markers, Mass, Sex, Side, Static, Vertical, forward_direction
 from dynakin.errors import DynakinError
-from dynakin.model import (
-    Definition,
-    InitialModel,
-    OpenSimDefinition,
-    Subject,
-    available_marker_sets,
-    available_models,
-    initialise,
-    load_marker_set,
-    load_model,
-    measure,
-)
-from dynakin.model.marker_schema import MarkerSetFile
-from dynakin.model.measure import Measured
-from dynakin.recordings import (
-    GroundFrame,
-    Recording,
-    check_plates,
-    find_ground_frame,
-    plain_name,
-    read,
-    standing_window,
-)
+from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.initialise import initialise
+from dynakin.model.calibration.measure import Measured, measure
+from dynakin.model.definition import Definition, available_models, load_model
+from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
+from dynakin.model.markers.schema import MarkerSetFile
+from dynakin.model.opensim.definition import OpenSimDefinition
+from dynakin.model.subject import Subject
+from dynakin.recordings.frame import GroundFrame, find_ground_frame
+from dynakin.recordings.landmarks import plain_name
+from dynakin.recordings.plates.checks import check_plates
+from dynakin.recordings.read import read
+from dynakin.recordings.recording import Recording
+from dynakin.recordings.standing import standing_window
 
 
 def check(

@@ -30,27 +30,17 @@ from dynakin.cli.options import (
     Trials,
     Vertical,
 )
-from dynakin.comparison import (
-    HORIZON_S,
-    Trial,
-    angle_differences,
-    check_comparison_folder,
-    compare_trial,
-    identify_on,
-    judge,
-    merged,
-    moment_differences,
-    predict_blind,
-    save_comparison,
-    table2,
-    unseen,
-    unseen_figures,
-)
-from dynakin.comparison.case import Case
-from dynakin.reference import CUTOFF_HZ
-from dynakin.report import render_comparison
+from dynakin.recordings.smoothing import CUTOFF_HZ
+from dynakin.report.comparison_page import render_comparison
 from dynakin.report.text_tables import angle_text, moment_text, table2_text, unseen_text
-from dynakin.results.mean_curves import curve_points
+from dynakin.results.measures.mean_curves import curve_points
+from dynakin.validation.case import Case
+from dynakin.validation.differences import angle_differences, moment_differences
+from dynakin.validation.files import check_comparison_folder, save_comparison
+from dynakin.validation.held_out import identify_on, judge, predict_blind
+from dynakin.validation.methods import Trial, compare_trial
+from dynakin.validation.table2 import merged, table2
+from dynakin.validation.unseen import HORIZON_S, unseen, unseen_figures
 
 HORIZON_MS = 1000.0 * HORIZON_S
 

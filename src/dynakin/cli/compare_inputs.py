@@ -8,10 +8,10 @@ from pathlib import Path
 from typing import Any
 
 from dynakin.cli.options import forward_direction
-from dynakin.comparison import halves
-from dynakin.comparison.case import Case, case_of
 from dynakin.config import make_config, read_config
 from dynakin.errors import ConfigError
+from dynakin.validation.case import Case, case_of
+from dynakin.validation.held_out import halves
 
 
 def chosen_trials(

@@ -13,16 +13,21 @@ from rich.table import Table
 
 from dynakin.cli.console import busy, out, progress_bar, table
 from dynakin.cli.summary import print_summary
-from dynakin.comparison import trial_of
-from dynakin.comparison.coverage import block_coverage, parameter_coverage
-from dynakin.comparison.truth import FIGURES, LEG, parameter_errors, truth_errors
-from dynakin.filter import Estimator, presets
-from dynakin.identifiability import identifiability
-from dynakin.model import Subject, load_model
-from dynakin.results import Estimate, check_output_writable, evaluation_window, truth_error
+from dynakin.filter import presets
+from dynakin.filter.estimator import Estimator
+from dynakin.identification.observability.trial import identifiability
+from dynakin.model.definition import load_model
+from dynakin.model.subject import Subject
+from dynakin.results.estimate import Estimate
+from dynakin.results.files.folder import check_output_writable
+from dynakin.results.measures.fit import truth_error
+from dynakin.results.measures.metrics import evaluation_window
+from dynakin.validation.coverage import block_coverage, parameter_coverage
+from dynakin.validation.methods import trial_of
+from dynakin.validation.truth import FIGURES, LEG, parameter_errors, truth_errors
 
 if TYPE_CHECKING:
-    from dynakin.simulation import Truth
+    from dynakin.simulation.truth import Truth
 
 
 def demo(
@@ -31,7 +36,7 @@ def demo(
     duration: Annotated[float, typer.Option(help="Length of the simulated trial, s.")] = 20.0,
 ) -> None:
     """Simulate a squat, estimate it, and compare the estimate and the reference methods with the truth."""
-    from dynakin.simulation import simulate_squat  # no other command needs it
+    from dynakin.simulation.trial import simulate_squat
 
     check_output_writable(output)
     trial = simulate_squat(seed=seed, duration_s=duration)

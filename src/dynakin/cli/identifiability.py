@@ -7,11 +7,13 @@ from pathlib import Path
 from rich.table import Table
 
 from dynakin.cli.console import out, progress_bar, table
-from dynakin.filter import Estimator
-from dynakin.identifiability import Identifiability, Structure, estimator_of, identifiability, structure_of
-from dynakin.model import ModelDefinition
-from dynakin.recordings import read
-from dynakin.results.learned import JUDGEMENT_WORDS, judged
+from dynakin.filter.estimator import Estimator
+from dynakin.identification.observability.person import estimator_of
+from dynakin.identification.observability.structure import Structure, structure_of
+from dynakin.identification.observability.trial import Identifiability, identifiability
+from dynakin.model.definition import ModelDefinition
+from dynakin.recordings.read import read
+from dynakin.results.measures.posterior import JUDGEMENT_WORDS, judged
 from dynakin.results.naming import number, sentence
 
 

@@ -22,12 +22,15 @@ from dynakin.cli.options import (
     forward_direction,
 )
 from dynakin.errors import ConfigError
-from dynakin.filter import Estimator
-from dynakin.identification import Identified, change_between, change_in_words, identify_subject
+from dynakin.filter.estimator import Estimator
+from dynakin.identification.change import change_between, change_in_words
 from dynakin.identification.report import base_in_words, segment_rows
-from dynakin.model import Subject, load_model
+from dynakin.identification.subject import Identified, identify_subject
+from dynakin.model.definition import load_model
 from dynakin.model.identified import read_identified
-from dynakin.recordings import Recording, read
+from dynakin.model.subject import Subject
+from dynakin.recordings.read import read
+from dynakin.recordings.recording import Recording
 
 
 def identify(

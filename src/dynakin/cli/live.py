@@ -26,12 +26,14 @@ from dynakin.cli.options import (
 from dynakin.cli.run import estimated
 from dynakin.cli.summary import print_summary
 from dynakin.errors import ConfigError
-from dynakin.recordings import read
-from dynakin.recordings.read import FORCE_READERS
-from dynakin.stream import SINKS, SOURCES, Live, Replay, Sink, plugin
+from dynakin.recordings.read import FORCE_READERS, read
 from dynakin.stream.fusion import DELAY_S
-from dynakin.stream.recorder import Recorder, finish
+from dynakin.stream.session import Live
 from dynakin.stream.settings import estimator_of
+from dynakin.stream.sinks.base import Sink
+from dynakin.stream.sinks.recorder import Recorder, finish
+from dynakin.stream.sources.plugins import SINKS, SOURCES, plugin
+from dynakin.stream.sources.replay import Replay
 from dynakin.stream.start import read_known
 
 # Seconds of standing that are asked for, and how long they are waited for.
@@ -175,7 +177,7 @@ def _sinks(
         sinks.append(Recorder(record, settings))
     if view:
         try:
-            from dynakin.stream.viewer import Viewer
+            from dynakin.stream.viewer.sink import Viewer
         except ImportError as error:
             raise ConfigError(
                 f"--view needs a package that is not here ({error}); pip install 'dynakin[live]', or make live"

@@ -14,19 +14,13 @@ from dynakin.cli.console import out, table
 from dynakin.cli.identifiability import print_identifiability
 from dynakin.cli.opensim_model import export_model, print_opensim
 from dynakin.cli.options import Force, Height, Markers, Mass, Sex
-from dynakin.model import (
-    ModelDefinition,
-    OpenSimDefinition,
-    Subject,
-    available_marker_sets,
-    available_models,
-    load_marker_set,
-    load_model,
-)
-from dynakin.model.definition import load_built_in_or_toml
-from dynakin.model.marker_schema import Marker, MarkerSetFile
+from dynakin.model.definition import ModelDefinition, available_models, load_built_in_or_toml, load_model
+from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
+from dynakin.model.markers.schema import Marker, MarkerSetFile
+from dynakin.model.opensim.definition import OpenSimDefinition
 from dynakin.model.schema import ModelFile
 from dynakin.model.schema import Segment as ModelSegment
+from dynakin.model.subject import Subject
 
 
 def model(
@@ -171,7 +165,7 @@ def _markers(model: ModelFile, marker_set: MarkerSetFile) -> Table:
 
 
 def _states(model: ModelFile) -> Table:
-    from dynakin.model import Bounds
+    from dynakin.model.priors import Bounds
 
     bounds = Bounds()
     free = sum(not c.locked for c in model.coordinates)

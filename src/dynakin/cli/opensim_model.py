@@ -11,11 +11,13 @@ from rich.table import Table
 from rich.tree import Tree
 
 from dynakin.cli.console import table
-from dynakin.model import Definition, OpenSimDefinition, initialise
+from dynakin.model.calibration.initialise import initialise
+from dynakin.model.definition import Definition
+from dynakin.model.opensim.definition import OpenSimDefinition
 from dynakin.model.opensim.export import mass_of_run, of_definition, of_initial, read_values
 from dynakin.model.opensim.spec import free_coordinates, placements, used_scales
 from dynakin.model.opensim.write import write_osim
-from dynakin.recordings import read
+from dynakin.recordings.read import read
 
 
 def print_opensim(console: Console, definition: OpenSimDefinition) -> None:

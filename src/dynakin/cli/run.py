@@ -31,18 +31,20 @@ from dynakin.cli.options import (
     forward_direction,
 )
 from dynakin.cli.summary import print_summary
-from dynakin.comparison import Trial, trial_of
 from dynakin.config import RunConfig, make_config, read_config
 from dynakin.errors import DynakinError
 from dynakin.filter import presets
 from dynakin.filter.zero import asked_angles
-from dynakin.identifiability import Identifiability, identifiability
-from dynakin.recordings import read, without_plate_loads
-from dynakin.report import read_sensitivity, save_figures
-from dynakin.results import Estimate, check_output_writable
+from dynakin.identification.observability.trial import Identifiability, identifiability
+from dynakin.recordings.plates.loads import without_plate_loads
+from dynakin.recordings.read import read
+from dynakin.report.paper_figures.figures import save_figures
+from dynakin.report.paper_figures.sensitivity import read_sensitivity
+from dynakin.results.estimate import Estimate
 from dynakin.results.failures import Failures
-from dynakin.results.output_folder import check_folder_writable
-from dynakin.results.tracking import refuse_lost
+from dynakin.results.files.folder import check_folder_writable, check_output_writable
+from dynakin.results.measures.tracking import refuse_lost
+from dynakin.validation.methods import Trial, trial_of
 
 LARGEST_BENCH = 250
 """States up to which a run also tells what the recording says of the constants: it filters a dozen motions more."""

@@ -11,17 +11,14 @@ from rich.table import Table
 
 from dynakin.cli.console import busy, out, table
 from dynakin.errors import ConfigError
-from dynakin.simulation import (
-    BODIES,
-    MOTIONS,
-    MOTIONS_IN_SPACE,
-    SimulatedTrial,
-    Spread,
-    check_trial_folder,
-    load_sensors,
-)
-from dynakin.simulation import simulate as simulate_trial
-from dynakin.simulation.motion_file import CUTOFF_HZ
+from dynakin.simulation.bodies.registry import BODIES
+from dynakin.simulation.bodies.subject import Spread
+from dynakin.simulation.motions.motion_file import CUTOFF_HZ
+from dynakin.simulation.motions.registry import MOTIONS, MOTIONS_IN_SPACE
+from dynakin.simulation.output import check_trial_folder
+from dynakin.simulation.sensors.sizes import load_sensors
+from dynakin.simulation.trial import SimulatedTrial
+from dynakin.simulation.trial import simulate as simulate_trial
 
 _MOTIONS = f"{', '.join(MOTIONS)} (fullbody: {', '.join(MOTIONS_IN_SPACE)})"
 

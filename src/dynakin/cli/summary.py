@@ -9,13 +9,13 @@ from rich.console import Console
 from rich.table import Table
 
 from dynakin.cli.console import out, table
-from dynakin.results import Estimate
-from dynakin.results.bounds import counts_in_words
+from dynakin.results.estimate import Estimate
 from dynakin.results.failures import Failures
-from dynakin.results.metrics import known_metrics
+from dynakin.results.measures.bounds import counts_in_words
+from dynakin.results.measures.metrics import known_metrics
+from dynakin.results.measures.sources import UNKNOWN
 from dynakin.results.naming import sentence
 from dynakin.results.records import NOT_SMOOTHED, doubts_mass
-from dynakin.results.sources import UNKNOWN
 
 
 def print_summary(estimate: Estimate, folder: Path) -> None:

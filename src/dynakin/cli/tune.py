@@ -33,20 +33,23 @@ from dynakin.cli.options import (
     Trials,
     Vertical,
 )
-from dynakin.comparison.case import Case
-from dynakin.engine import Journal, open_pool
-from dynakin.engine.folder import ROWS, open_folder
 from dynakin.errors import ConfigError
 from dynakin.filter import presets
-from dynakin.reference import CUTOFF_HZ
-from dynakin.report import Sensitivity, save_sensitivity_figures
-from dynakin.report.sensitivity import GAIN_NAMES, GAIN_UNITS
-from dynakin.report.tuning_tables import criteria_text, figures_text, grid_text, settings_text
-from dynakin.tuning import CRITERIA, Axis, Grid, Shared, axis, belongs_to, paper_axes, prepare, run_grid
-from dynakin.tuning.advice import recommendation
-from dynakin.tuning.fit import Fitter, belongs_to_fit, usual_names
-from dynakin.tuning.output import write_fit, write_grid
-from dynakin.tuning.settings import UNITS
+from dynakin.recordings.smoothing import CUTOFF_HZ
+from dynakin.report.paper_figures.figures import save_sensitivity_figures
+from dynakin.report.paper_figures.sensitivity import GAIN_NAMES, GAIN_UNITS, Sensitivity
+from dynakin.studies.engine.folder import ROWS, open_folder
+from dynakin.studies.engine.journal import Journal
+from dynakin.studies.engine.pools import open_pool
+from dynakin.studies.tuning.advice import recommendation
+from dynakin.studies.tuning.fit import Fitter, belongs_to_fit, usual_names
+from dynakin.studies.tuning.grid import Axis, Grid, axis, belongs_to, paper_axes, run_grid
+from dynakin.studies.tuning.output import write_fit, write_grid
+from dynakin.studies.tuning.score import CRITERIA, Shared
+from dynakin.studies.tuning.settings import UNITS
+from dynakin.studies.tuning.tables import criteria_text, figures_text, grid_text, settings_text
+from dynakin.studies.tuning.trial import prepare
+from dynakin.validation.case import Case
 
 tune = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Choose noise settings by measurement.")
 

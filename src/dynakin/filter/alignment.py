@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.model import InitialModel
+from dynakin.model.calibration.initial import InitialModel
 
 Array = npt.NDArray[np.float64]
 

@@ -9,18 +9,19 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from dynakin import _core
+import dynakin._core as _core
 from dynakin.absent import finite
 from dynakin.filter.events import events_of
 from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.filter.parameters import parameters_of
 from dynakin.filter.sources import with_sources
 from dynakin.filter.total_wrench import ELSEWHERE
-from dynakin.model import InitialModel
-from dynakin.recordings import Recording
-from dynakin.results import AXES, COMPONENTS, Estimate, Timing
-from dynakin.results.facing import nearly_singular
-from dynakin.results.feet import MEASURED
+from dynakin.model.calibration.initial import InitialModel
+from dynakin.recordings.recording import Recording
+from dynakin.results.estimate import AXES, COMPONENTS, Estimate
+from dynakin.results.measures.facing import nearly_singular
+from dynakin.results.measures.feet import MEASURED
+from dynakin.results.records import Timing
 
 Array = npt.NDArray[np.float64]
 

@@ -7,11 +7,11 @@ from collections.abc import Collection
 import numpy as np
 import numpy.typing as npt
 
-from dynakin import _core
+import dynakin._core as _core
 from dynakin.errors import ConfigError
-from dynakin.filter.extend import QUANTITIES, Quantity, continuous_noise, extended, initial_covariance
+from dynakin.filter.augment import QUANTITIES, Quantity, continuous_noise, extended, initial_covariance
 from dynakin.filter.noise import Noise, gate_limits
-from dynakin.model import InitialModel
+from dynakin.model.calibration.initial import InitialModel
 
 Array = npt.NDArray[np.float64]
 

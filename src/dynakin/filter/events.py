@@ -6,10 +6,9 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from dynakin.model import InitialModel
-from dynakin.recordings.foot_contact import runs
-from dynakin.results import Event, Parameter
-from dynakin.results.records import REFUSED, TRACKING, EventKind
+from dynakin.model.calibration.initial import InitialModel
+from dynakin.recordings.feet.contact import runs
+from dynakin.results.records import REFUSED, TRACKING, Event, EventKind, Parameter
 
 
 def events_of(

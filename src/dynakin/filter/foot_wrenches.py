@@ -8,10 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from dynakin import _core
+import dynakin._core as _core
 from dynakin.errors import ModelError
 from dynakin.filter.alignment import in_step
-from dynakin.results.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
+from dynakin.results.measures.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
 
 Array = npt.NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dynakin import _core
+import dynakin._core as _core
 
 Array = npt.NDArray[np.float64]
 

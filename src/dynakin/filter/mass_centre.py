@@ -9,9 +9,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy import signal
 
-from dynakin import _core
-from dynakin.model import InitialModel
-from dynakin.recordings.foot_contact import runs
+import dynakin._core as _core
+from dynakin.model.calibration.initial import InitialModel
+from dynakin.recordings.feet.contact import runs
 from dynakin.recordings.recording import rate_of
 
 Array = npt.NDArray[np.float64]

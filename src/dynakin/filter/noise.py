@@ -10,7 +10,7 @@ import numpy.typing as npt
 from pydantic import BaseModel, ConfigDict, Field
 from scipy.stats import chi2
 
-from dynakin import _core
+import dynakin._core as _core
 
 Array = npt.NDArray[np.float64]
 Variance = Annotated[float, Field(ge=0.0, allow_inf_nan=False)]

@@ -6,9 +6,8 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.elements import element
-from dynakin.model import InitialModel
-from dynakin.results import Parameter
-from dynakin.results.records import ParameterKind
+from dynakin.model.calibration.initial import InitialModel
+from dynakin.results.records import Parameter, ParameterKind
 
 Array = npt.NDArray[np.float64]
 

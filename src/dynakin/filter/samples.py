@@ -10,9 +10,9 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import RecordingError
-from dynakin.model import InitialModel
-from dynakin.recordings import Recording
+from dynakin.model.calibration.initial import InitialModel
 from dynakin.recordings.limits import FARTHEST_M, LARGEST_MOMENT_NM
+from dynakin.recordings.recording import Recording
 
 Array = npt.NDArray[np.float64]
 

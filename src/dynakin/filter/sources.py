@@ -7,8 +7,8 @@ import numpy.typing as npt
 import xarray as xr
 
 from dynakin.filter.foot_wrenches import FootWrenches
-from dynakin.results.feet import NOT_MEASURED
-from dynakin.results.sources import ABSENT, DERIVED, MEASURED
+from dynakin.results.measures.feet import NOT_MEASURED
+from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED
 
 Flags = npt.NDArray[np.bool_]
 Codes = npt.NDArray[np.uint8]

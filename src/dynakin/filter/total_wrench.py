@@ -12,13 +12,14 @@ from dynakin.errors import RecordingError
 from dynakin.filter.closure import EXCESS, Closure, closure
 from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.filter.noise import Noise
-from dynakin.model import InitialModel
-from dynakin.recordings import PlateCheck, Recording, check_plates
-from dynakin.recordings import foot_loads as on_plates
-from dynakin.recordings.feet import distance_to_hull
-from dynakin.recordings.foot_contact import runs
-from dynakin.recordings.foot_loads import LOADED_N, NEAR_M, FootLoads, foot_loads
-from dynakin.results.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
+from dynakin.model.calibration.initial import InitialModel
+from dynakin.recordings.feet import loads as on_plates
+from dynakin.recordings.feet.contact import runs
+from dynakin.recordings.feet.distance import distance_to_hull
+from dynakin.recordings.feet.loads import LOADED_N, NEAR_M, FootLoads, foot_loads
+from dynakin.recordings.plates.checks import PlateCheck, check_plates
+from dynakin.recordings.recording import Recording
+from dynakin.results.measures.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]

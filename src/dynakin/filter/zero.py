@@ -10,10 +10,13 @@ import numpy as np
 from dynakin.errors import RecordingError
 from dynakin.filter.samples import recording_arrays
 from dynakin.filter.smoothing import can_smooth
-from dynakin.model import InitialModel, initialise, with_loads
-from dynakin.recordings import Recording, standing_window
-from dynakin.results import Estimate
-from dynakin.results.angles import Signs, mean_angles, with_angles
+from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.initialise import initialise
+from dynakin.model.calibration.loads import with_loads
+from dynakin.recordings.recording import Recording
+from dynakin.recordings.standing import standing_window
+from dynakin.results.estimate import Estimate
+from dynakin.results.measures.angles import Signs, mean_angles, with_angles
 
 if TYPE_CHECKING:
     from dynakin.filter.estimator import Estimator

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from dynakin.errors import ModelError
 from dynakin.identification.body_priors import BodyPriors, masses_of
 from dynakin.identification.spatial_bodies import SpatialBodies
-from dynakin.model import InitialModel
+from dynakin.model.calibration.initial import InitialModel
 from dynakin.model.inertia import INERTIA_NAMES, PLANAR_INERTIA
 
 Array = npt.NDArray[np.float64]

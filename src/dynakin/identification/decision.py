@@ -17,7 +17,7 @@ import numpy.typing as npt
 from dynakin.identification.batch import Posterior, at_start, identify_batch
 from dynakin.identification.trials import Common, MeasuredTrial, Movement, about, middle_of
 from dynakin.identification.unknowns import Unknowns
-from dynakin.results import COMPONENTS
+from dynakin.results.estimate import COMPONENTS
 
 Array = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from dynakin.identification.batch import Posterior
 from dynakin.identification.decision import Decision
 from dynakin.model.identified import Batch
-from dynakin.results.learned import judged
+from dynakin.results.measures.posterior import judged
 from dynakin.results.naming import listed, number, words
 
 Array = npt.NDArray[np.float64]

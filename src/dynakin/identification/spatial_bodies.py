@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from dynakin.errors import ModelError
 from dynakin.identification.body_priors import BodyPriors, masses_of, paired_with
-from dynakin.model import InitialModel
+from dynakin.model.calibration.initial import InitialModel
 from dynakin.model.inertia import INERTIA_NAMES, RigidBody
 
 Array = npt.NDArray[np.float64]

@@ -9,16 +9,16 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import LostError
-from dynakin.filter import Estimator
-from dynakin.identifiability.base import base_of
-from dynakin.identifiability.element_words import base_words
-from dynakin.identifiability.measured import MeasuredModel
+from dynakin.filter.estimator import Estimator
 from dynakin.identification.batch import Posterior
 from dynakin.identification.decision import Decision, decide, estimate
+from dynakin.identification.observability.base import base_of
+from dynakin.identification.observability.element_words import base_words
+from dynakin.identification.observability.measured import MeasuredModel
 from dynakin.identification.report import in_words
 from dynakin.identification.trials import Common, MeasuredTrial, measure_all
 from dynakin.model.identified import Batch, IdentifiedSubject
-from dynakin.recordings import Recording
+from dynakin.recordings.recording import Recording
 
 Array = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]

@@ -8,16 +8,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from dynakin import _core
-from dynakin.comparison.freeze import freeze, initial_values
-from dynakin.comparison.held_out import as_estimate, marker_paths, measured_wrench, start_as
+import dynakin._core as _core
 from dynakin.errors import LostError, ModelError, RecordingError
-from dynakin.filter import Estimator
-from dynakin.model import InitialModel, OpenSimDefinition
-from dynakin.recordings import GroundFrame, Recording
-from dynakin.recordings.foot_loads import LOADED_N
+from dynakin.filter.estimator import Estimator
+from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.opensim.definition import OpenSimDefinition
+from dynakin.recordings.feet.loads import LOADED_N
+from dynakin.recordings.frame import GroundFrame
+from dynakin.recordings.recording import Recording
 from dynakin.recordings.smoothing import CUTOFF_HZ, smooth
 from dynakin.units import GRAVITY_M_S2
+from dynakin.validation.freeze import freeze, initial_values
+from dynakin.validation.held_out import as_estimate, marker_paths, measured_wrench, start_as
 
 Array = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dynakin import _core
+import dynakin._core as _core
 from dynakin.identification.bodies import Bodies, bodies_of
 from dynakin.identification.body_priors import BodyPriors
 from dynakin.identification.trials import Common

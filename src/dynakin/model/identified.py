@@ -11,10 +11,10 @@ import numpy as np
 import tomli_w
 from pydantic import Field, model_validator
 
-from dynakin import _core
+import dynakin._core as _core
 from dynakin.errors import ModelError
+from dynakin.model.calibration.initial import InitialModel, Together
 from dynakin.model.inertia import INERTIA_NAMES
-from dynakin.model.initial import InitialModel, Together
 from dynakin.model.validation import Strict, read_toml, validate
 
 _WIDE = 3.0  # standard deviations that bounds leave on both sides

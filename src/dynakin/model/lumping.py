@@ -17,9 +17,9 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ModelError
+from dynakin.model.calibration.posture import Posture, axes_from
 from dynakin.model.inertia import RigidBody
 from dynakin.model.mirroring import SUFFIXES
-from dynakin.model.posture import Posture, axes_from
 from dynakin.model.schema import ModelFile, Segment
 from dynakin.model.table import PAIRED, BodyTable, Part
 

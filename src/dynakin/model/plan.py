@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.model.calibration.posture import Geometry
 from dynakin.model.inertia import INERTIA_NAMES, PLANAR_INERTIA, RigidBody
-from dynakin.model.posture import Geometry
 from dynakin.model.priors import Bounds, Interval, Priors
 from dynakin.model.schema import ModelFile
 from dynakin.model.state_priors import state_bounds, state_prior

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from dynakin import _core
+import dynakin._core as _core
 from dynakin.model.plan import ModelPlan
 
 Array = npt.NDArray[np.float64]

@@ -23,7 +23,7 @@ import numpy.typing as npt
 from dynakin.errors import ModelError
 from dynakin.model.subject import Sex
 from dynakin.model.validation import nearest
-from dynakin.recordings.textfile import LARGEST_TEXT, is_file, read_bytes
+from dynakin.recordings.formats.textfile import LARGEST_TEXT, is_file, read_bytes
 
 Array = npt.NDArray[np.float64]
 BUILTIN = ("dumas", "deleva")

@@ -13,7 +13,7 @@ from typing import Annotated, Any, TypeVar
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, model_validator
 
 from dynakin.errors import DynakinError, ModelError
-from dynakin.recordings.textfile import LARGEST_TEXT, read_bytes
+from dynakin.recordings.formats.textfile import LARGEST_TEXT, read_bytes
 
 _MOST_PARTS = 64  # of a dotted key: ours have three; the standard library's reader needs their square in time
 _LONG_KEY = re.compile(

@@ -5,9 +5,9 @@ other file.
 """
 
 from dynakin.report.comparison_page import render_comparison
-from dynakin.report.figures import save_figures, save_sensitivity_figure, save_sensitivity_figures
 from dynakin.report.page import render_report, write_report
-from dynakin.report.sensitivity import Sensitivity, read_sensitivity
+from dynakin.report.paper_figures.figures import save_figures, save_sensitivity_figure, save_sensitivity_figures
+from dynakin.report.paper_figures.sensitivity import Sensitivity, read_sensitivity
 
 __all__ = [
     "Sensitivity",

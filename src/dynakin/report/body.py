@@ -8,7 +8,7 @@ import numpy as np
 
 from dynakin.elements import element
 from dynakin.report.colours import segment_colours
-from dynakin.results import Estimate
+from dynakin.results.estimate import Estimate
 
 # Below this share of the largest vertical force the point of action is noise, and no arrow is drawn.
 _LOADED = 0.05

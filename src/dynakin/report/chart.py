@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.ticker import MaxNLocator
 
-from dynakin.report.panels import Panel
 from dynakin.report.plot import GRID, LIMIT, thin, with_next
+from dynakin.report.sections.panels import Panel
 
 Array = npt.NDArray[np.float64]
 Place = Callable[[Array], Array]

@@ -8,18 +8,19 @@ from typing import Any, Literal
 import numpy as np
 import tomli_w
 
-from dynakin.comparison import Row, Trial, UnseenRow
-from dynakin.comparison.table2 import MARKERS
 from dynakin.report.insights import Insight
 from dynakin.report.labels import listed, number, plural, sentence
-from dynakin.report.method_sections import ABOUT_METHODS, ABOUT_TABLE2, angle_part, moment_part, wrench_part
 from dynakin.report.page import render_page
-from dynakin.report.repetition_sections import repetition_section
-from dynakin.report.section import Section
+from dynakin.report.sections.methods import ABOUT_METHODS, ABOUT_TABLE2, angle_part, moment_part, wrench_part
+from dynakin.report.sections.repetitions import repetition_section
+from dynakin.report.sections.section import Section
 from dynakin.report.text_tables import angle_text, moment_text, name_of, table2_text, unseen_text
-from dynakin.results import COMPONENTS
-from dynakin.results.config_file import plain
-from dynakin.results.versions import versions
+from dynakin.results.estimate import COMPONENTS
+from dynakin.results.files.config import plain
+from dynakin.results.files.versions import versions
+from dynakin.validation.methods import Trial
+from dynakin.validation.table2 import MARKERS, Row
+from dynakin.validation.unseen import UnseenRow
 
 _FREE = ("persistence", "linear")
 """Methods that cost nothing."""
@@ -46,7 +47,7 @@ def render_comparison(
 
     Args:
         trials: what all methods made of each; none where only parameters were judged (``held_out``).
-        tables: rows by the name of their file, as `dynakin.comparison.save_comparison` takes them.
+        tables: rows by the name of their file, as `dynakin.validation.save_comparison` takes them.
         settings: of each recording that was read. names: theirs.
         notes: sentences on what was left out, beside the trials' own.
     """

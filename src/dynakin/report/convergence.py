@@ -7,8 +7,9 @@ from typing import Literal
 
 import numpy as np
 
-from dynakin.results import Estimate, Parameter
-from dynakin.results.adaptation import BAND, constant_groups
+from dynakin.results.estimate import Estimate
+from dynakin.results.measures.adaptation import BAND, constant_groups
+from dynakin.results.records import Parameter
 
 # A constant that still moves by more than that in the last quarter has not settled: over a recording as long again it
 # would move by several per cent.

@@ -16,14 +16,14 @@ from dynakin.report.labels import (
     short_marker_names,
     words,
 )
-from dynakin.report.section import needs
-from dynakin.results import Estimate
-from dynakin.results.bounds import counts_in_words
-from dynakin.results.consistency import CONSISTENT
+from dynakin.report.sections.section import needs
+from dynakin.results.estimate import Estimate
 from dynakin.results.failures import FAILED, LOG
-from dynakin.results.metrics import ADAPTATION_S, evaluation_window, speed_consistency, window_consistency
+from dynakin.results.measures.bounds import counts_in_words
+from dynakin.results.measures.consistency import CONSISTENT
+from dynakin.results.measures.metrics import ADAPTATION_S, evaluation_window, speed_consistency, window_consistency
+from dynakin.results.measures.soft_tissue import excess_in_words
 from dynakin.results.records import doubts_mass
-from dynakin.results.soft_tissue import excess_in_words
 
 # Expected one frame ahead against seen: further apart than this, the estimate follows the measurements.
 FOLLOWING = 4.0

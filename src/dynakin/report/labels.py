@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dynakin.elements import element
-from dynakin.results import Estimate, Parameter
+from dynakin.results.estimate import Estimate
 from dynakin.results.naming import INERTIA_WORDS, listed, number, plural, sentence, words
+from dynakin.results.records import Parameter
 
 __all__ = [
     "COMPONENT_LABELS",

@@ -12,15 +12,16 @@ from dynakin.report.insights import in_short, insights, what_was_run
 from dynakin.report.labels import is_planar, listed, number, parameter_label, short_marker_names
 from dynakin.report.playback import playback
 from dynakin.report.playback_spatial import spatial_playback
-from dynakin.report.sections import sections
-from dynakin.results import Estimate, compute_metrics
-from dynakin.results.config_file import plain
-from dynakin.results.facing import facing
-from dynakin.results.sources import UNKNOWN
-from dynakin.results.versions import versions
+from dynakin.report.sections.movement import sections
+from dynakin.results.estimate import Estimate
+from dynakin.results.files.config import plain
+from dynakin.results.files.versions import versions
+from dynakin.results.measures.facing import facing
+from dynakin.results.measures.metrics import compute_metrics
+from dynakin.results.measures.sources import UNKNOWN
 
 if TYPE_CHECKING:
-    from dynakin.comparison import Trial
+    from dynakin.validation.methods import Trial
 
 KEY_LABELS = {
     "measured": "measured",
@@ -46,7 +47,7 @@ def render_report(estimate: Estimate, *, metrics: dict[str, Any] | None = None, 
     """The report of a run as one HTML text that needs nothing else.
 
     Args:
-        comparison: this estimate beside the reference methods (`dynakin.comparison.trial_of`).
+        comparison: this estimate beside the reference methods (`dynakin.validation.trial_of`).
     """
     estimate = facing(estimate)
     metrics = metrics or compute_metrics(estimate)

@@ -16,10 +16,10 @@ from dynakin.report.labels import short_marker_names
 from dynakin.report.playback import curve_of, frames_shown, packed
 from dynakin.report.plot import MEASURED
 from dynakin.report.sides import Joint, joints_of
-from dynakin.results import Estimate
-from dynakin.results.feet import foot_sources
-from dynakin.results.pressure import centre_of_pressure
-from dynakin.results.sources import DERIVED, moment_sources, wrench_sources
+from dynakin.results.estimate import Estimate
+from dynakin.results.measures.feet import foot_sources
+from dynakin.results.measures.pressure import centre_of_pressure
+from dynakin.results.measures.sources import DERIVED, moment_sources, wrench_sources
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]

@@ -8,10 +8,10 @@ import numpy as np
 
 from dynakin.report.colours import side_of
 from dynakin.report.labels import sentence, words
-from dynakin.results import Estimate
-from dynakin.results.power import root_coordinates
-from dynakin.results.sources import legs_of
-from dynakin.results.symmetry import paired
+from dynakin.results.estimate import Estimate
+from dynakin.results.measures.power import root_coordinates
+from dynakin.results.measures.sources import legs_of
+from dynakin.results.measures.symmetry import paired
 
 REGIONS = ("Legs", "Trunk and head", "Arms", "Whole body")
 

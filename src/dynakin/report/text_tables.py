@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from dynakin.comparison import AngleDifference, MomentDifference, Row, Spread, UnseenRow
-from dynakin.comparison.table2 import MARKERS
-from dynakin.results import COMPONENTS
+from dynakin.results.estimate import COMPONENTS
+from dynakin.validation.differences import AngleDifference, MomentDifference
+from dynakin.validation.statistics import Spread
+from dynakin.validation.table2 import MARKERS, Row
+from dynakin.validation.unseen import UnseenRow
 
 
 @dataclass(frozen=True)

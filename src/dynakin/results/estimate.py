@@ -14,11 +14,12 @@ import xarray as xr
 from dynakin.results.records import Event, Parameter, Timing
 
 if TYPE_CHECKING:
-    from dynakin.comparison import Trial
-    from dynakin.identifiability import Identifiability
-    from dynakin.recordings import GroundFrame, Recording
+    from dynakin.identification.observability.trial import Identifiability
+    from dynakin.recordings.frame import GroundFrame
+    from dynakin.recordings.recording import Recording
     from dynakin.results.failures import Failures
-    from dynakin.results.tracking import Tracking
+    from dynakin.results.measures.tracking import Tracking
+    from dynakin.validation.methods import Trial
 
 AXES = ("x", "y", "z")
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
@@ -63,7 +64,7 @@ class Estimate:
     wrenches: ``foot_contact`` is 0 in the air, 1 measured, 2 not measured. ``moment_source`` and ``joint_source`` are 0
     where a moment or a joint's load is measured (with all the ground's reactions behind it), 1 where it is derived from
     the motion, because one of them is not, and 2 where it is absent (NaN); where they are missing all is measured
-    (`dynakin.results.sources`).
+    (`dynakin.results.measures.sources`).
 
     ``lost`` (time,) is true in frames in which the filter lost the person: everything that was estimated there is NaN,
     but for ``state`` and ``state_sd``, which keep what the filter held.
@@ -81,7 +82,7 @@ class Estimate:
     model_name: str
     messages: list[str] = field(default_factory=list)
     tracking: Tracking | None = None
-    """How the person was followed (`results.tracking`), as judged when it was estimated."""
+    """How the person was followed (`results.measures.tracking`), as judged when it was estimated."""
 
     @property
     def time(self) -> np.ndarray:
@@ -118,7 +119,7 @@ class Estimate:
 
     @property
     def lost(self) -> np.ndarray:
-        """(T,) bool: frames in which the person was lost (`results.tracking`). What was estimated there is NaN."""
+        """(T,) bool: frames in which the person was lost (`results.measures.tracking`); their estimates are NaN."""
         if "lost" not in self.data:
             return np.zeros(len(self.time), dtype=bool)
         return np.asarray(self.data["lost"].values, dtype=bool)
@@ -126,7 +127,7 @@ class Estimate:
     @property
     def why_lost(self) -> str | None:
         """Why the trial as a whole is no estimate, with times; None where it is one. `Estimator.run` does not raise."""
-        from dynakin.results.tracking import why_lost
+        from dynakin.results.measures.tracking import why_lost
 
         return why_lost(self)
 
@@ -169,29 +170,29 @@ class Estimate:
     @cached_property
     def floor_height_m(self) -> float:
         """Height of the plates' surface over the ground's origin, m."""
-        from dynakin.results.pressure import floor_height
+        from dynakin.results.measures.pressure import floor_height
 
         return floor_height(self.recording, self.ground)
 
     def centre_of_pressure(self, foot: str | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Centre of pressure (T, 3) m, ground frame, and free moment (T,) N m, of a foot or of the estimated total
-        wrench; NaN below `dynakin.results.pressure.LOADED_N` and where a model does not tell.
+        wrench; NaN below `dynakin.results.measures.pressure.LOADED_N` and where a model does not tell.
 
         Raises:
             KeyError: no such foot.
         """
-        from dynakin.results.pressure import centre_of_pressure
+        from dynakin.results.measures.pressure import centre_of_pressure
 
         wrench = self.data["wrench_estimated"] if foot is None else self.data["foot_wrench"].sel(foot=foot)
         return centre_of_pressure(wrench.transpose("time", "component").values, self.floor_height_m)
 
     def metrics(self) -> dict[str, Any]:
-        """The content of ``metrics.json`` (see `dynakin.results.metrics`); computed once, a copy is given."""
+        """The content of ``metrics.json`` (see `dynakin.results.measures.metrics`); computed once, a copy is given."""
         return deepcopy(self._metrics)
 
     @cached_property
     def _metrics(self) -> dict[str, Any]:
-        from dynakin.results.metrics import compute_metrics
+        from dynakin.results.measures.metrics import compute_metrics
 
         return compute_metrics(self)
 
@@ -212,10 +213,10 @@ class Estimate:
         nothing but an earlier output of dynakin.
 
         Args:
-            comparison: this estimate beside the reference methods (`dynakin.comparison.trial_of`), for the report and
+            comparison: this estimate beside the reference methods (`dynakin.validation.trial_of`), for the report and
                 for ``repetitions.csv``.
-            identifiability: what this trial tells and what would tell more (`dynakin.identifiability`), for the report
-                and for ``metrics.json``.
+            identifiability: what this trial observes of the constants (`dynakin.identification.observability`), for the
+                report and for ``metrics.json``.
             keep_lost: write a trial that was lost too, its lost frames empty.
             failures: takes the stages that fail (a figure, the page); all else is written, and `failures.log`.
 
@@ -225,8 +226,8 @@ class Estimate:
             OutputError: the folder cannot be written or holds something else; or some stage failed and ``failures`` is
                 not given: all else is saved then.
         """
-        from dynakin.results.save import save_estimate
-        from dynakin.results.tracking import refuse_lost
+        from dynakin.pipeline.save import save_estimate
+        from dynakin.results.measures.tracking import refuse_lost
 
         if not keep_lost:
             refuse_lost(self, "keep_lost=True")

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynakin.errors import ConfigError
-from dynakin.simulation.body import Contact, SimulatedBody
+from dynakin.simulation.bodies.body import Contact, SimulatedBody
 from dynakin.simulation.mechanics import Dynamics, Motion, TreeMotion, dynamics, kinematics
-from dynakin.simulation.movement import Movement, Seat
+from dynakin.simulation.motions.movement import Movement, Seat
 from dynakin.simulation.support import pressed, split_between
 
 Array = NDArray[np.float64]

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynakin.absent import with_nulls
-from dynakin.recordings import Plate
-from dynakin.results.marker_file import write_trc
-from dynakin.results.output_folder import FolderKind, check_output_writable, replacing
-from dynakin.results.storage_file import write_storage
-from dynakin.results.versions import versions
+from dynakin.recordings.recording import Plate
+from dynakin.results.files.folder import FolderKind, check_output_writable, replacing
+from dynakin.results.files.markers import write_trc
+from dynakin.results.files.storage import write_storage
+from dynakin.results.files.versions import versions
 
 if TYPE_CHECKING:
     from dynakin.simulation.trial import SimulatedTrial

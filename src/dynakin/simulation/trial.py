@@ -11,20 +11,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynakin.errors import ConfigError
-from dynakin.recordings import Recording
-from dynakin.simulation.bodies import choose_body
-from dynakin.simulation.body import SimulatedBody
+from dynakin.recordings.recording import Recording
+from dynakin.simulation.bodies.body import SimulatedBody
+from dynakin.simulation.bodies.registry import choose_body
+from dynakin.simulation.bodies.subject import Spread
 from dynakin.simulation.contacts import mechanical_state
 from dynakin.simulation.mechanics import Motion
-from dynakin.simulation.motion_file import CUTOFF_HZ
-from dynakin.simulation.motions import choose_movement
-from dynakin.simulation.movement import Movement
+from dynakin.simulation.motions.motion_file import CUTOFF_HZ
+from dynakin.simulation.motions.movement import Movement
+from dynakin.simulation.motions.registry import choose_movement
 from dynakin.simulation.output import save_trial
-from dynakin.simulation.plates import sense_plates
-from dynakin.simulation.sensed_markers import sense_markers
-from dynakin.simulation.sensors import SensorNoise
+from dynakin.simulation.sensors.plates import sense_plates
+from dynakin.simulation.sensors.sensed_markers import sense_markers
+from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.streams import Streams
-from dynakin.simulation.subject import Spread
 from dynakin.simulation.truth import Truth, all_parameters, label_arrays
 
 Array = NDArray[np.float64]

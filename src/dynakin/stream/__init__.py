@@ -1,18 +1,12 @@
 """Live use: sources, fusion by time stamp, the session with its guided start, and sinks."""
 
-from dynakin.stream.fusion import Fused, Fusion
-from dynakin.stream.packets import MarkerPacket, Packet, PlatePacket, Source, StreamInfo, Streams
-from dynakin.stream.plugins import SINKS, SOURCES, plugin
-from dynakin.stream.replay import Replay
 from dynakin.stream.session import Live
-from dynakin.stream.sinks import Callback, LiveFrame, Sink, Started, Status
+from dynakin.stream.sinks.base import Callback, LiveFrame, Sink
+from dynakin.stream.sources.packets import MarkerPacket, Packet, PlatePacket, StreamInfo, Streams
+from dynakin.stream.sources.replay import Replay
 
 __all__ = [
-    "SINKS",
-    "SOURCES",
     "Callback",
-    "Fused",
-    "Fusion",
     "Live",
     "LiveFrame",
     "MarkerPacket",
@@ -20,10 +14,6 @@ __all__ = [
     "PlatePacket",
     "Replay",
     "Sink",
-    "Source",
-    "Started",
-    "Status",
     "StreamInfo",
     "Streams",
-    "plugin",
 ]

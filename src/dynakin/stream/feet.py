@@ -7,13 +7,14 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from dynakin import _core
-from dynakin.filter import FootWrenches, Noise
+import dynakin._core as _core
+from dynakin.filter.foot_wrenches import FootWrenches
+from dynakin.filter.noise import Noise
 from dynakin.filter.total_wrench import foot_wrenches
-from dynakin.model import InitialModel
-from dynakin.recordings.feet import distance_to_hull
-from dynakin.recordings.foot_contact import AFTER_S, ALOFT_M, NEAR_FLOOR_M, SLOW_M_S
-from dynakin.recordings.foot_loads import (
+from dynakin.model.calibration.initial import InitialModel
+from dynakin.recordings.feet.contact import AFTER_S, ALOFT_M, NEAR_FLOOR_M, SLOW_M_S
+from dynakin.recordings.feet.distance import distance_to_hull
+from dynakin.recordings.feet.loads import (
     BETWEEN_M,
     EMPTY_N,
     FLAT_FRAMES,
@@ -35,7 +36,7 @@ _DT_S = (0.001, 0.05)  # how far ahead the feet are predicted
 class LiveFeet:
     """Gives each plate to the feet that stand on it, frame by frame, from the estimate before the step.
 
-    Offline (`recordings.foot_loads`) whole stances are seen; here a stance is what has been seen of it so far, with the
+    Offline (`recordings.feet.loads`) whole stances are seen; here a stance is what has been seen of it so far, with the
     same thresholds: a foot stands where a marker is near its lowest place and slow, and for a while after (push-off). A
     stance that no plate has carried yet is beside the plates.
 
@@ -176,7 +177,7 @@ class LiveFeet:
 
 
 class _Range:
-    """Whether plates are at the end of their range, as `recordings.foot_loads.saturated` tells it afterwards."""
+    """Whether plates are at the end of their range, as `recordings.feet.loads.saturated` tells it afterwards."""
 
     def __init__(self, plates: int) -> None:
         self._top = np.full(plates, FOREIGN_N)

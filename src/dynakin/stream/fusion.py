@@ -8,13 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import StreamError
-from dynakin.filter import Sample
-from dynakin.recordings import DEFAULT_THRESHOLD_N
+from dynakin.filter.samples import Sample
 from dynakin.recordings.limits import FARTHEST_M
-from dynakin.stream.clock import Clock, offset_between
-from dynakin.stream.in_order import Counts, InOrder
-from dynakin.stream.packets import MarkerPacket, Packet, PlatePacket, StreamInfo
+from dynakin.recordings.plates.pressure import DEFAULT_THRESHOLD_N
 from dynakin.stream.plate_samples import PlateSamples
+from dynakin.stream.sources.clock import Clock, offset_between
+from dynakin.stream.sources.in_order import Counts, InOrder
+from dynakin.stream.sources.packets import MarkerPacket, Packet, PlatePacket, StreamInfo
 
 Array = npt.NDArray[np.float64]
 

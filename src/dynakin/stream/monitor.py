@@ -9,10 +9,11 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.filter import Estimator, StepEstimate
-from dynakin.model import InitialModel
+from dynakin.filter.estimator import Estimator
+from dynakin.filter.live import StepEstimate
+from dynakin.model.calibration.initial import InitialModel
 from dynakin.stream.fusion import Fused, Fusion
-from dynakin.stream.sinks import Status
+from dynakin.stream.sinks.base import Status
 
 Array = npt.NDArray[np.float64]
 

@@ -9,14 +9,15 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from dynakin.errors import DivergenceError, DynakinError, ModelError, StreamError
-from dynakin.filter import Estimator, Sample
-from dynakin.recordings import Recording
+from dynakin.filter.estimator import Estimator
+from dynakin.filter.samples import Sample
+from dynakin.recordings.recording import Recording
 from dynakin.stream.feet import LiveFeet
 from dynakin.stream.fusion import DELAY_S, Fused, Fusion
 from dynakin.stream.monitor import Monitor
-from dynakin.stream.packets import Source
-from dynakin.stream.reader import Notice, Reader
-from dynakin.stream.sinks import LiveFrame, Sink, Started, Status
+from dynakin.stream.sinks.base import LiveFrame, Sink, Started, Status
+from dynakin.stream.sources.packets import Source
+from dynakin.stream.sources.reader import Notice, Reader
 from dynakin.stream.start import begin, check_labels, quietest, recording_of, stands, unknown_mass
 
 _POLL_S = 0.005

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from dynakin.config import make_config
-from dynakin.filter import Estimator
+from dynakin.filter.estimator import Estimator
 
 
 def estimator_of(settings: dict[str, Any], lag: int = 0) -> Estimator:

@@ -10,24 +10,18 @@ from pathlib import Path
 import numpy as np
 
 from dynakin.errors import ModelError, RecordingError
-from dynakin.filter import Estimator
-from dynakin.model import Definition, InitialModel
-from dynakin.model.body import steady_load
-from dynakin.model.definition import ModelDefinition
-from dynakin.model.marker_set import choose_marker_set, match_markers
-from dynakin.recordings import (
-    DEFAULT_PAIRS,
-    DEFAULT_THRESHOLD_N,
-    Plate,
-    Recording,
-    Surface,
-    check_plates,
-    find_ground_frame,
-    plate_from_wrench,
-    standing_window,
-)
-from dynakin.recordings.plates import LOADED_N
-from dynakin.recordings.textfile import LARGEST_TEXT, read_bytes
+from dynakin.filter.estimator import Estimator
+from dynakin.model.calibration.body import steady_load
+from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.definition import Definition, ModelDefinition
+from dynakin.model.markers.marker_set import choose_marker_set, match_markers
+from dynakin.recordings.formats.textfile import LARGEST_TEXT, read_bytes
+from dynakin.recordings.frame import find_ground_frame
+from dynakin.recordings.landmarks import DEFAULT_PAIRS
+from dynakin.recordings.plates.checks import LOADED_N, check_plates
+from dynakin.recordings.plates.pressure import DEFAULT_THRESHOLD_N, Surface, plate_from_wrench
+from dynakin.recordings.recording import Plate, Recording
+from dynakin.recordings.standing import standing_window
 from dynakin.recordings.vertical import axis_vector, find_vertical
 from dynakin.stream.fusion import Fused
 

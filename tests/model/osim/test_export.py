@@ -150,7 +150,8 @@ def test_opensim_loads_what_is_written(name: str, data_dir: Path, tmp_path: Path
 
 def test_opensim_loads_a_built_in_model_measured_on_a_person(tmp_path: Path) -> None:
     pytest.importorskip("opensim", reason="OpenSim is not installed (pip install opensim)")
-    from dynakin.simulation import save_trial, simulate
+    from dynakin.simulation.output import save_trial
+    from dynakin.simulation.trial import simulate
 
     from .peer import Peer
 

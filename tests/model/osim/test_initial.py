@@ -12,11 +12,15 @@ import dynakin
 from dynakin import _core
 from dynakin.errors import ModelError
 from dynakin.filter import presets
-from dynakin.model import InitialModel, Subject, initialise, load_model, load_opensim
+from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.initialise import initialise
+from dynakin.model.definition import load_model
+from dynakin.model.opensim.definition import load_opensim
 from dynakin.model.opensim.initial import feet_of, limits_of
 from dynakin.model.opensim.read import read_osim
 from dynakin.model.opensim.skin import skin_of
-from dynakin.recordings import Recording
+from dynakin.model.subject import Subject
+from dynakin.recordings.recording import Recording
 
 from .files import small_model, version_4
 

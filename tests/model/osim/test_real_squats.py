@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 import dynakin
-from dynakin.filter.extend import Quantity
+from dynakin.filter.augment import Quantity
 from dynakin.filter.samples import recording_arrays
-from dynakin.model import Subject, load_opensim
+from dynakin.model.opensim.definition import load_opensim
+from dynakin.model.subject import Subject
 
 OPENSIM_MM = 10.48
 """OpenSim's inverse kinematics with equal weights: RMS of 3-D distances, missing markers left out (`make peers`)."""

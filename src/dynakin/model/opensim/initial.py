@@ -8,22 +8,23 @@ from types import SimpleNamespace
 import numpy as np
 import numpy.typing as npt
 
-from dynakin import _core
+import dynakin._core as _core
 from dynakin.errors import ModelError
-from dynakin.model.body import find_mass
+from dynakin.model.calibration.body import find_mass
+from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.pose_start import start_posture
 from dynakin.model.inertia import INERTIA_NAMES
-from dynakin.model.initial import InitialModel
 from dynakin.model.opensim.definition import OpenSimDefinition
 from dynakin.model.opensim.description import Marker, OpenSimModel
 from dynakin.model.opensim.sites import sites, with_mass
 from dynakin.model.opensim.skin import skin_of
 from dynakin.model.opensim.spec import free_coordinates, to_spec, unseen
-from dynakin.model.pose_start import start_posture
 from dynakin.model.priors import Bounds, Interval, Priors
 from dynakin.model.spec import in_layout
 from dynakin.model.state_priors import state_bounds, state_prior
-from dynakin.recordings import GroundFrame, Recording, find_ground_frame, find_laboratory_frame
+from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_laboratory_frame
 from dynakin.recordings.landmarks import DEFAULT_PAIRS, FacingPairs
+from dynakin.recordings.recording import Recording
 
 Array = npt.NDArray[np.float64]
 
@@ -49,7 +50,7 @@ def lay_on(
 ) -> InitialModel:
     """`dynakin.initialise` of an OpenSim model; arguments and errors as there. The ground is the laboratory, Y up; X is
     forward where it is asked for, or where the file holds the body so that it cannot head anywhere."""
-    from dynakin.model.initialise import first_centre_of_pressure
+    from dynakin.model.calibration.initialise import first_centre_of_pressure
 
     source, options, messages = definition.source, definition.options, list(definition.source.left_out)
     _refuse_other_gravity(source)

@@ -10,7 +10,8 @@ from dynakin.errors import ModelError
 from dynakin.model.opensim.definition import OpenSimDefinition
 from dynakin.model.opensim.description import GROUND, Marker, OpenSimModel
 from dynakin.model.validation import nearest
-from dynakin.recordings import Recording, plain_name
+from dynakin.recordings.landmarks import plain_name
+from dynakin.recordings.recording import Recording
 
 _FEWEST = 3
 

@@ -6,8 +6,8 @@ from functools import cache
 
 import numpy as np
 
-from dynakin.model.marker_set import available_marker_sets, load_marker_set
-from dynakin.recordings import plain_name
+from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
+from dynakin.recordings.landmarks import plain_name
 
 # Parts of a body's name, and the segment of the marker sets whose markers stand for it; the first that fits counts.
 _SEGMENTS = (

@@ -1,0 +1,140 @@
+"""From the model that was measured to the one that is filtered: soft tissue, plate errors, what is known at first."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from copy import copy
+from dataclasses import replace
+from typing import Literal, get_args
+
+import numpy as np
+import numpy.typing as npt
+
+import dynakin._core as _core
+from dynakin.filter.noise import Noise
+from dynakin.model.calibration.initial import InitialModel
+
+Array = npt.NDArray[np.float64]
+Quantity = Literal["lengths", "markers", "soft_tissue", "inertia"]
+QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
+"""Parameters that can be estimated: segment lengths, marker places, displacements of skin and flesh, inertia."""
+
+
+def extended(initial: InitialModel, noise: Noise, estimate: Collection[Quantity] = QUANTITIES) -> InitialModel:
+    """The same model with the states that these noise settings ask for; places, bounds and priors follow their names.
+
+    Displacements of soft tissue and errors of the plates start at 0 with the standard deviations declared. Of places
+    that are held, what is not known of them is noise of their markers.
+
+    Args:
+        estimate: kinds of parameters to estimate; the others stay where the model has them.
+    """
+    spec = copy(initial.spec)  # the same measured model serves other settings, in other threads
+    sd = noise.soft_tissue_sd(initial.soft_tissue_m) * ("soft_tissue" in estimate)
+    markers = spec.markers
+    for marker, value in zip(markers, sd, strict=True):
+        marker.soft_tissue = [bool(axis and value > 0.0) for axis in marker.measured]
+        if "markers" not in estimate:
+            marker.estimated = [False] * 3
+    spec.markers = markers
+    _hold(spec, estimate)
+    spec.wrench_offset = [
+        bool(seen and value > 0.0) for seen, value in zip(spec.wrench_measured, noise.plate_sd(), strict=True)
+    ]
+    spec.wrench_delay = noise.plate_delay_s > 0.0
+    names = list(_core.Model(spec).layout.names)
+    first = dict(zip(initial.names, range(len(initial.names)), strict=True))
+    added = _added_sd(spec, noise, sd)
+
+    def carried(values: Array, otherwise: float) -> Array:
+        return np.array([values[first[name]] if name in first else otherwise for name in names])
+
+    unknown = np.zeros(len(markers)) if "markers" in estimate else _place_sd(initial, first)
+    return replace(
+        initial,
+        spec=spec,
+        unmodelled_m=np.hypot(initial.unmodelled_m, unknown),
+        names=tuple(names),
+        x0=carried(initial.x0, 0.0),
+        sd0=np.array([initial.sd0[first[name]] if name in first else added[name] for name in names]),
+        lower=carried(initial.lower, -np.inf),
+        upper=carried(initial.upper, np.inf),
+        table=carried(initial.table, np.nan),
+    )
+
+
+def _place_sd(initial: InitialModel, first: dict[str, int]) -> Array:
+    """Prior standard deviation (M,) m of each marker's place, the mean over its axes; 0 where it is no state."""
+    found = np.zeros(len(initial.spec.markers))
+    for k, marker in enumerate(initial.spec.markers):
+        places = [first[name] for axis in "xyz" if (name := f"marker/{marker.name}/{axis}") in first]
+        if places:
+            found[k] = np.sqrt(np.mean(initial.sd0[places] ** 2))
+    return found
+
+
+def _hold(spec: _core.ModelSpec, estimate: Collection[Quantity]) -> None:
+    if "lengths" not in estimate:
+        parameters = spec.parameters
+        for parameter in parameters:
+            parameter.estimated = False
+        spec.parameters = parameters
+    if "inertia" not in estimate:
+        segments = spec.segments
+        for segment in segments:
+            segment.inertia_estimated = [False] * 10
+        spec.segments = segments
+
+
+def _added_sd(spec: _core.ModelSpec, noise: Noise, soft_tissue: Array) -> dict[str, float]:
+    sd = {
+        f"soft_tissue/{marker.name}/{axis}": float(value)
+        for marker, value in zip(spec.markers, soft_tissue, strict=True)
+        for axis in "xyz"
+    }
+    sd |= {
+        f"plates/{name}": float(value)
+        for name, value in zip(("fx", "fy", "fz", "mx", "my", "mz"), noise.plate_sd(), strict=True)
+    }
+    return sd | {"plates/delay": noise.plate_delay_s}
+
+
+def initial_covariance(initial: InitialModel, noise: Noise) -> Array:
+    """P0 (n, n): the priors, and with `total_mass_use` "prior" the total mass as one piece of information on it."""
+    covariance = np.diag(initial.sd0**2)
+    if initial.together is not None:
+        place = {name: k for k, name in enumerate(initial.names)}
+        known = [k for k, name in enumerate(initial.together.names) if name in place]
+        at = [place[initial.together.names[k]] for k in known]
+        covariance[np.ix_(at, at)] = initial.together.covariance[np.ix_(known, known)]
+    if noise.total_mass_use == "frame":
+        return covariance
+    masses = np.array([float(name.startswith("inertia/") and name.endswith("/mass")) for name in initial.names])
+    spread = covariance @ masses
+    variance = float(masses @ spread)
+    if variance > 0.0:
+        covariance -= np.outer(spread, spread) / (variance + noise.total_mass)
+    return covariance
+
+
+def continuous_noise(initial: InitialModel, noise: Noise, layout: _core.StateLayout) -> tuple[Array, Array]:
+    """Density (n,) of the white noise that drives each element, and the rate (n,) 1/s at which it decays."""
+    density, decay = np.zeros(layout.size), np.zeros(layout.size)
+    kinds = {axis.coordinate: axis.kind for segment in initial.spec.segments for axis in segment.axes}
+    jerk = noise.jerk_densities(floating=bool(initial.feet))
+    offset, size = layout.blocks["accelerations"]
+    for k in range(offset, offset + size):
+        coordinate = layout.names[k].removesuffix("/acceleration")
+        density[k] = jerk[kinds[coordinate]]
+    offset, size = layout.blocks["lengths"]
+    density[offset : offset + size] = noise.length_drift
+    skin_s = noise.soft_tissue_time_s
+    if initial.feet and noise.floating_soft_tissue_time_s is not None:
+        skin_s = noise.floating_soft_tissue_time_s
+    for block, time in (("soft_tissue", skin_s), ("plates", noise.plate_time_s)):
+        offset, size = layout.blocks[block]
+        for k in range(offset, offset + size):
+            if layout.names[k] != "plates/delay":
+                decay[k] = 1.0 / time
+                density[k] = 2.0 * initial.sd0[k] ** 2 / time
+    return density, decay

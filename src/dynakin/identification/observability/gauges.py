@@ -1,0 +1,194 @@
+"""Gauges: directions of the constants and of the coordinates' zeros along which no measurement changes.
+
+The derivatives of markers and wrench are stacked over random postures, in units of the sensors' and of the prior
+standard deviations; the null space, found by SVD, holds the gauges. A shift of a coordinate's zero is a column of its
+own: the filter estimates each coordinate anew at each frame, so such a shift costs nothing.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import linprog
+
+from dynakin.errors import ModelError
+from dynakin.identification.observability.measured import MeasuredModel
+
+Array = npt.NDArray[np.float64]
+
+ZERO = "zero/"
+_POSTURES = 60
+_UNSEEN = 1e-9
+"""Of the largest singular value: the derivatives are exact to rounding (1e-14); the weakest direction that a posture
+shows lies above 1e-6."""
+_NOTHING = 1e-7  # of the largest entry of a direction: less is rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Gauge:
+    """One direction: change by name (m, rad, kg, kg m, kg m^2, N, N m), zero/knee for a coordinate's zero.
+
+    The largest change, in units of the prior standard deviations, is 1.
+    """
+
+    direction: dict[str, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Gauges:
+    """All gauges of a model.
+
+    Attributes:
+        names: (c,) what was looked at. singular_values: (c,) of the stack, signal over noise of a prior standard
+            deviation in 60 random postures; those of the gauges are rounding.
+        found: as many as there are independent ones, each with as few names in it as possible.
+    """
+
+    names: tuple[str, ...]
+    singular_values: Array
+    found: tuple[Gauge, ...]
+
+
+def gauges_of(measured: MeasuredModel, postures: int = _POSTURES) -> Gauges:
+    """Stack, decompose, and write the null space in directions of few names."""
+    names, sd, columns = _columns(measured)
+    last = np.array([name.startswith(("soft_tissue/", "plates/")) for name in names])
+    rows = []
+    for x in measured.random_states(postures, seed=1):
+        wrench = _with_offsets(measured, measured.wrench_rows(x)) / measured.wrench_sigma()[:, None]
+        rows.append(np.vstack([measured.marker_rows(x), wrench])[:, columns] * sd)
+    triangle = np.linalg.qr(np.vstack(rows), mode="r")  # columns that are all 0 stay so
+    _, singular, right = np.linalg.svd(triangle)
+    null = right[int((singular > _UNSEEN * singular[0]).sum()) :]
+    found = (_gauge(names, sd, direction) for direction in sparse_basis(null, last))
+    return Gauges(names, singular, tuple(found))
+
+
+def _columns(measured: MeasuredModel) -> tuple[tuple[str, ...], Array, list[int]]:
+    """Names, prior standard deviations and columns of the state: constants, what has a mean of its own, zeros."""
+    blocks = ("lengths", "markers", "soft_tissue", "inertia", "plates")
+    columns = [k for block in blocks for k in range(measured.core.layout.size)[measured.block(block)]]
+    columns = [k for k in columns if measured.names[k] != "plates/delay"]
+    names = [measured.names[k] for k in columns]
+    zeros = list(range(measured.core.layout.size)[measured.block("coordinates")])
+    names += [ZERO + measured.names[k] for k in zeros]
+    columns += zeros
+    return tuple(names), np.sqrt(np.diag(measured.prior)[columns]), columns
+
+
+def _with_offsets(measured: MeasuredModel, rows: Array) -> Array:
+    """A plate's constant error is added to its component."""
+    components = [
+        f"plates/{name}"
+        for name, seen in zip(("fx", "fy", "fz", "mx", "my", "mz"), measured.initial.spec.wrench_measured, strict=True)
+        if seen
+    ]
+    for k, name in enumerate(components):
+        if name in measured.names:
+            rows[k, measured.names.index(name)] = 1.0
+    return rows
+
+
+def _gauge(names: tuple[str, ...], sd: Array, direction: Array) -> Gauge:
+    largest = np.abs(direction).max()
+    kept = np.flatnonzero(np.abs(direction) > _NOTHING * largest)
+    sign = np.sign(direction[kept[0]])
+    return Gauge({names[k]: float(sign * sd[k] * direction[k] / largest) for k in kept})
+
+
+def sparse_basis(null: Array, last: Array | None = None) -> list[Array]:
+    """A basis of the rows of ``null`` (d, c) with few entries each.
+
+    For each entry in turn the vector of least 1-norm in which it is 1 (a linear programme, which finds sparse vectors),
+    and what is left of two of them when one entry of both is cancelled; of all these, those with the fewest entries
+    that are independent of each other.
+
+    Args:
+        last: (c,) bool, entries that are left out where as few others do.
+    """
+    candidates = []
+    for part in _parts(null):
+        found = [_least(null, part, k) for k in part]
+        candidates += found + _cancelled(found)
+    masked = np.zeros(null.shape[1], dtype=bool) if last is None else last
+    candidates.sort(key=lambda v: (_count(v), _count(v[masked])))
+    basis: list[Array] = []
+    kept = np.zeros((0, null.shape[1]))
+    for candidate in candidates:
+        left = candidate / np.linalg.norm(candidate)
+        left = left - kept.T @ (kept @ left)
+        size = np.linalg.norm(left)
+        if size > 1e-6:
+            basis.append(candidate)
+            kept = np.vstack([kept, left / size])
+        if len(basis) == len(null):
+            break
+    return basis
+
+
+def _count(vector: Array) -> int:
+    return int((np.abs(vector) > _NOTHING).sum())
+
+
+def _cancelled(vectors: list[Array]) -> list[Array]:
+    """What is left of each pair when one entry of both is cancelled, where that is less than either had."""
+    found = []
+    for i, a in enumerate(vectors):
+        for b in vectors[:i]:
+            for k in np.flatnonzero((np.abs(a) > _NOTHING) & (np.abs(b) > _NOTHING)):
+                rest = a - a[k] / b[k] * b
+                size = np.abs(rest).max()
+                if size > 1e-5:  # else both are the same direction
+                    rest = np.where(np.abs(rest) > _NOTHING * size, rest / size, 0.0)
+                    if _count(rest) <= max(_count(a), _count(b)):
+                        found.append(rest)
+    return found
+
+
+def _parts(null: Array) -> list[list[int]]:
+    """Entries that some direction ties to each other, in groups; entries that are 0 in all of them in none."""
+    tied = np.abs(null.T @ null) > _NOTHING
+    groups: list[list[int]] = []
+    left = [k for k in range(null.shape[1]) if tied[k, k]]
+    while left:
+        group, fringe = [], [left[0]]
+        while fringe:
+            k = fringe.pop()
+            if k in left:
+                left.remove(k)
+                group.append(k)
+                fringe += [int(j) for j in np.flatnonzero(tied[k])]
+        groups.append(sorted(group))
+    return groups
+
+
+def _least(null: Array, part: list[int], k: int) -> Array:
+    """The combination of the rows of ``null`` of least 1-norm among those whose entry k is 1."""
+    B = null[:, part].T  # (c, d)
+    B = np.linalg.svd(B, full_matrices=False)[0][:, : np.linalg.matrix_rank(B, tol=_NOTHING)]
+    c, d = B.shape
+    eye = np.eye(c)
+    for method in ("highs", "highs-ipm"):  # the simplex method gives up on some of a whole body's
+        fit = linprog(
+            np.concatenate([np.zeros(d), np.ones(c)]),
+            A_ub=np.block([[B, -eye], [-B, -eye]]),
+            b_ub=np.zeros(2 * c),
+            A_eq=np.concatenate([B[part.index(k)], np.zeros(c)])[None],
+            b_eq=[1.0],
+            bounds=[(None, None)] * d + [(0.0, None)] * c,
+            method=method,
+        )
+        if fit.x is not None:
+            break
+    else:
+        raise ModelError(f"identifiability: a sparse direction of {c} numbers was not found: {fit.message}")
+    # The solver stops at 1e-7 or so: what is nearly 0 is put to 0 by solving for the rest exactly.
+    vector = B @ fit.x[:d]
+    zero = np.abs(vector) < 1e-5
+    free = np.linalg.svd(B[zero])[2][np.linalg.matrix_rank(B[zero], tol=1e-6) :] if zero.any() else np.eye(d)
+    exact = B @ (free.T @ np.linalg.lstsq((B @ free.T)[[part.index(k)]], np.ones(1), rcond=None)[0])
+    whole = np.zeros(null.shape[1])
+    whole[part] = exact if np.abs(exact - vector).max() < 1e-4 else vector
+    return whole

@@ -1,0 +1,53 @@
+"""A person for whom a model can be looked at when there is no recording: one who is simulated, as the table has it."""
+
+from __future__ import annotations
+
+from dynakin.errors import DynakinError, ModelError
+from dynakin.filter.estimator import Estimator
+from dynakin.model.definition import ModelDefinition
+from dynakin.simulation.bodies.registry import BODIES
+from dynakin.simulation.bodies.subject import Spread
+from dynakin.simulation.sensors.sizes import SensorNoise
+from dynakin.simulation.trial import simulate
+
+MASS_KG, HEIGHT_M = 70.0, 1.75
+
+
+def estimator_of(definition: ModelDefinition) -> Estimator:
+    """An estimator of the model, started on a simulated recording of somebody of that mass, height and sex.
+
+    Which lengths and places the markers have does not matter to ranks and gauges; the simulated bodies carry the
+    built-in marker sets.
+
+    Raises:
+        ModelError: none of the simulated recordings has the markers that the model needs.
+    """
+    who, why = definition.subject, ""
+    started: list[Estimator] = []
+    for body in sorted(BODIES, key=lambda name: name != definition.name):
+        trial = simulate(
+            body,
+            duration_s=5.0,
+            mass_kg=who.mass_kg or MASS_KG,
+            height_m=who.height_m or HEIGHT_M,
+            sex=who.sex,
+            noise=SensorNoise.none(),
+            spread=Spread().times(0.0),
+        )
+        estimator = Estimator(definition)
+        try:
+            estimator.start(trial.recording)
+        except DynakinError as error:
+            why = why or error.message
+        else:
+            started.append(estimator)
+    if not started:
+        raise ModelError(
+            f"model {definition.name}: cannot be measured on a simulated person ({why}); expected --trial FILE"
+        )
+    return max(started, key=_free)  # a joint without markers beyond it is locked; of equals the first
+
+
+def _free(estimator: Estimator) -> int:
+    assert estimator.initial is not None
+    return sum(not coordinate.locked for coordinate in estimator.initial.spec.coordinates)

@@ -1,0 +1,146 @@
+"""What a trial told, what it could not tell, and what would."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.filter.estimator import Estimator
+from dynakin.identification.observability.advice import advice_in_words, gains_of
+from dynakin.identification.observability.base import base_of, base_spread
+from dynakin.identification.observability.excitation import Bench, Excitation
+from dynakin.identification.observability.structure import Structure, structure_of
+from dynakin.results.estimate import Estimate
+from dynakin.results.measures.posterior import judged, learned, share_of
+from dynakin.validation.reference.base_parameters import BaseParameters
+
+Array = npt.NDArray[np.float64]
+
+_MOST_FRAMES = 1000  # of the trial's motion for its condition number
+
+
+@dataclass(frozen=True, eq=False)
+class BaseParameterTold:
+    """One base parameter and what the trial told of it; value and standard deviations in its unit."""
+
+    name: str
+    words: str
+    value: float
+    prior_sd: float
+    sd: float
+
+    @property
+    def share(self) -> float:
+        """Standard deviation at the end over that before the first frame."""
+        return self.sd / self.prior_sd if self.prior_sd > 0.0 else 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Identifiability:
+    """Everything about what one trial tells.
+
+    Attributes:
+        structure: what the model's measurements can tell at all.
+        condition: of the base parameters over the trial's motion.
+        base: base parameters as told. told: the block of `dynakin.results.measures.posterior`.
+        tried: motions that were tried in place of the trial's, gains: factors on standard deviations (motion -> name).
+        advice: sentences.
+    """
+
+    structure: Structure
+    condition: float
+    base: tuple[BaseParameterTold, ...]
+    told: dict[str, Any]
+    tried: tuple[Excitation, ...]
+    gains: dict[str, dict[str, float]]
+    advice: tuple[str, ...]
+
+    def in_words(self) -> list[str]:
+        """The trial's figures in sentences."""
+        known = [entry for entry in self.base if judged(entry.share) == "known"]
+        nothing = [entry for entry in self.base if judged(entry.share) == "nothing"]
+        return [
+            self.told["verdict"],
+            f"Of {len(self.base)} base parameters {len(known)} are known from the data, "
+            f"{len(self.base) - len(known) - len(nothing)} in part, and of {len(nothing)} the data say nothing; "
+            f"condition number {self.condition:.2g} over this motion, {self.structure.base.condition:.2g} over random "
+            "motion.",
+        ]
+
+    def as_dict(self) -> dict[str, Any]:
+        """The block ``identifiability`` of ``metrics.json``."""
+        structure = self.structure.as_dict()
+        gauges = structure.pop("gauges")
+        base = {
+            entry.name: {
+                "words": entry.words,
+                "value": entry.value,
+                "prior_sd": entry.prior_sd,
+                "sd": entry.sd,
+                "share": entry.share,
+                "judgement": judged(entry.share),
+            }
+            for entry in self.base
+        }
+        return {
+            **self.told,
+            "base_parameters": {
+                **structure,
+                "condition_random": structure["condition"],
+                "condition": self.condition,
+                "parameters": base,
+            },
+            "gauges": gauges,
+            "excitation": {
+                "what": "factor by which a motion would shrink a standard deviation, each under its best motion",
+                "tried": {e.name: e.words for e in self.tried},
+                "gains": self.gains,
+            },
+            "advice": list(self.advice),
+        }
+
+
+def identifiability(
+    estimator: Estimator, estimate: Estimate, progress: Callable[[int, int], None] | None = None
+) -> Identifiability:
+    """What a trial told of the constants, and what would tell more.
+
+    Args:
+        estimator: after its `run`. estimate: what it gave.
+        progress: called with (motions tried, in all).
+
+    Raises:
+        ConfigError: the estimator was not started.
+    """
+    structure, bench = structure_of(estimator), Bench(estimator, estimate)
+    shares = {p.name: share for p in estimate.parameters if (share := share_of(p)) is not None}
+    now, tried = bench.try_all(progress)
+    ended = estimate.data["state_sd"].isel(time=-1).values
+    gains = gains_of(bench.measured.names, ended, now, tried, shares)
+    states = bench.states(bench.trial)
+    return Identifiability(
+        structure=structure,
+        condition=base_of(bench.measured, states[:: max(1, len(states) // _MOST_FRAMES)]).condition,
+        base=_base_told(structure.base, structure.base_in_words, estimate),
+        told=learned(estimate),
+        tried=tuple(tried),
+        gains=gains,
+        advice=tuple(advice_in_words(bench, tried, gains, shares, structure.alone)),
+    )
+
+
+def _base_told(base: BaseParameters, words: tuple[str, ...], estimate: Estimate) -> tuple[BaseParameterTold, ...]:
+    over = list(base.over)
+    values = base.K @ estimate.data["state"].isel(time=-1).sel(element=over).values
+    prior, after = (
+        base_spread(base, estimate.data[f"{when}_covariance"].sel(element=over, element_=over).values)
+        for when in ("initial", "final")
+    )
+    return tuple(
+        BaseParameterTold(*entry[:2], *(float(number) for number in entry[2:]))
+        for entry in zip(base.names, words, values, prior, after, strict=True)
+    )

@@ -1,0 +1,171 @@
+"""Mass and height of the person where they are not told."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.errors import ModelError
+from dynakin.model.calibration.frames import Trial
+from dynakin.model.subject import Subject
+from dynakin.recordings.feet.loads import foot_loads
+from dynakin.recordings.frame import GroundFrame
+from dynakin.recordings.plates.checks import check_plates
+from dynakin.recordings.recording import Recording
+from dynakin.units import GRAVITY_M_S2
+
+Array = npt.NDArray[np.float64]
+
+_LEAST_S = 5.0
+"""Of a movement that is to weigh a person: its mean force is the weight but for the momentum gained, and 2 m/s gained
+over 5 s are 4 %."""
+_STEADY = 0.3
+"""Part of its mean by which the load may vary: squats do by a quarter. Running, a seat that bears part of the weight,
+a step beside the plates or a box beside them do by more."""
+_BODY_MASS_INDEX = (10.0, 60.0)
+"""kg/m2; what lies beyond is no weight of a person of that height who stood on the plates."""
+_OTHER_LEVEL_M = 0.08  # a heel that has left the floor, or a toe that dips, is nearer
+_STANDS_M_S = 0.1
+"""Speed of the lowest marker below which a foot stands: in the air it points down, which adds 0.2 m to a height."""
+
+
+class OnPlates(Protocol):
+    """A recording and its ground frame: a ``Trial``, say."""
+
+    @property
+    def recording(self) -> Recording: ...
+    @property
+    def ground(self) -> GroundFrame: ...
+
+
+def find_mass(subject: Subject, trials: Sequence[OnPlates]) -> tuple[float, str]:
+    """Mass (kg) and where it comes from: given, from the plates while standing still, from the file, or, with a
+    warning, from the plates' mean over a movement that is long and steady enough.
+
+    Raises:
+        ModelError: none of these; the message says why the plates do not show it.
+    """
+    if subject.mass_kg is not None:
+        return subject.mass_kg, f"Mass {subject.mass_kg:.2f} kg: given."
+    reasons, means = [], []
+    for trial in trials:
+        recording = trial.recording
+        if not recording.plates:
+            reasons.append(f"{recording.name} has no force plates")
+            continue
+        check = check_plates(recording, trial.ground)
+        if check.refusal is not None:
+            reasons.append(f"{recording.name}: {check.refusal}")
+        elif check.mass_kg_from_plates is None:
+            mean, why = steady_load(recording, trial.ground)
+            reasons.append(f"nobody stands still on the plates of {recording.name}, and {why}")
+            if mean is not None:
+                means.append((mean, recording.name))
+        else:
+            mass = float(check.mass_kg_from_plates)
+            return mass, f"Mass {mass:.2f} kg: from the plates of {recording.name} while standing still."
+    for trial in trials:
+        told = trial.recording.subject.get("mass_kg")
+        if told:
+            return told, f"Mass {told:.2f} kg: from the file {trial.recording.name}."
+    for mass, name in means:
+        return mass, (
+            f"Warning: mass {mass:.2f} kg from the mean vertical force of {name}, in which nobody stands still; wrong "
+            "where anything but the plates bears the person. Give the mass if it is known."
+        )
+    raise ModelError(
+        f"mass_kg is not given and cannot be found ({'; '.join(reasons)}); expected mass_kg of the subject (--mass)"
+    )
+
+
+def steady_load(recording: Recording, ground: GroundFrame) -> tuple[float | None, str]:
+    """Mean load (kg) of the frames in which every foot that stands is on a plate, and why it is no weight; None where
+    these are few, or it varies too much."""
+    loads = foot_loads(recording, ground)
+    push = loads.wrench[..., 1].sum(axis=1)[loads.total_known]
+    push = push[np.isfinite(push)]
+    seconds = len(push) / recording.rate
+    if seconds < _LEAST_S or not push.mean() > 0.0:
+        return None, f"{seconds:.1f} s of a movement on them weigh nobody, expected {_LEAST_S:g} s"
+    low, high = np.percentile(push, (5.0, 95.0)) / push.mean()
+    if low < 1.0 - _STEADY or high > 1.0 + _STEADY:
+        return None, f"their load goes from {100.0 * low:.0f} to {100.0 * high:.0f} % of its mean, which is no weight"
+    return float(push.mean()) / GRAVITY_M_S2, "its mean is used"
+
+
+def check_body_mass(subject: Subject, mass_kg: float, height_m: float | None) -> None:
+    """
+    Raises:
+        ModelError: a mass that was not given is none of a person of that height, or a height none of that mass.
+    """
+    if height_m is None or (subject.mass_kg is not None and subject.height_m is not None):
+        return
+    index, (low, high) = mass_kg / height_m**2, _BODY_MASS_INDEX
+    if not low <= index <= high:
+        if subject.mass_kg is not None:
+            raise ModelError(
+                f"height_m is not given, and {height_m:.2f} m by markers or file is no height of a person of "
+                f"{mass_kg:.1f} kg ({index:.0f} kg/m2, expected {low:g} to {high:g}); expected height_m of the subject "
+                "(--height)"
+            )
+        raise ModelError(
+            f"mass_kg is not given, and {mass_kg:.1f} kg by plates or file is no mass of a person of {height_m:.2f} m "
+            f"({index:.0f} kg/m2, expected {low:g} to {high:g}); expected mass_kg of the subject (--mass)"
+        )
+
+
+def find_height(subject: Subject, recordings: list[Recording], trial: Trial) -> tuple[float | None, str]:
+    """Height (m) and where it comes from; None with the reason where nothing tells.
+
+    Estimated from the marker set's ``height_marker`` (the acromion) where it is highest over the lowest marker of the
+    recording, divided by its fraction of the body height: a person who never stands upright comes out too small, and
+    the lowest marker lies 1 to 3 cm over the floor, which makes it 1 to 2 % too small as well. Where that marker is on
+    another level than the foot that stands (a box, stairs), the lowest one of the same frame takes its place.
+    """
+    if subject.height_m is not None:
+        return subject.height_m, f"Height {subject.height_m:.2f} m: given."
+    for recording in recordings:
+        told = recording.subject.get("height_m")
+        if told:
+            return told, f"Height {told:.2f} m: from the file {recording.name}."
+    marker_set = trial.match.marker_set
+    tops = [
+        path
+        for key, path in trial.paths.items()
+        if key[0] == marker_set.height_marker and np.isfinite(path).all(axis=1).any()
+    ]
+    over = _over_the_foot(trial, tops) if tops else np.empty(0)
+    if not len(over) or marker_set.height_fraction is None:
+        return None, f"height_m is not given and {marker_set.height_marker or 'no marker'} does not tell it."
+    top, lowest = np.mean([np.nanpercentile(path[:, 1], 99.0) for path in tops]), "lowest marker"
+    reach = float(top - np.nanmin([np.nanpercentile(path[:, 1], 1.0) for path in _seen(trial)]))
+    if reach - np.percentile(over, 99.0) > _OTHER_LEVEL_M:
+        reach, lowest = float(np.percentile(over, 99.0)), "lowest marker of the same frame"
+    height = reach / marker_set.height_fraction
+    return height, (
+        f"Height {height:.2f} m: not given, estimated from {marker_set.height_marker} (where it is highest) "
+        f"over the {lowest}, divided by {marker_set.height_fraction:g} "
+        f"({marker_set.height_source})."
+    )
+
+
+def _seen(trial: Trial) -> list[Array]:
+    return [path for path in trial.paths.values() if np.isfinite(path).all(axis=1).any()]
+
+
+def _over_the_foot(trial: Trial, tops: list[Array]) -> Array:
+    """Heights (K,) m of the mean of markers (T, 3) over the lowest one, in the frames in which that one stands still,
+    or in all where it never does, as on a treadmill."""
+    time, places = trial.recording.time, np.stack(list(trial.paths.values()), axis=1)
+    heights = np.where(np.isfinite(places[..., 1]), places[..., 1], np.inf)
+    lowest = heights.argmin(axis=1)
+    over = np.mean(tops, axis=0)[:, 1] - heights.min(axis=1)
+    seen = np.isfinite(over)
+    if len(time) < 2:
+        return np.asarray(over[seen])
+    speed = np.linalg.norm(np.gradient(places, time, axis=0), axis=2)[np.arange(len(time)), lowest]
+    still = seen & (speed < _STANDS_M_S)  # NaN beside a gap: not known to be still
+    return np.asarray(over[still if still.any() else seen])

@@ -1,0 +1,99 @@
+"""What a measured model is held against: fixed feet, masses, and the sentences that report it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynakin.errors import ModelError
+from dynakin.model.calibration.frames import Trial
+from dynakin.model.calibration.landmarks import LandmarkFinder
+from dynakin.model.calibration.posture import Geometry
+from dynakin.model.inertia import RigidBody
+from dynakin.model.lumping import PlacedPart
+from dynakin.model.plan import ModelPlan
+from dynakin.model.schema import ModelFile
+
+
+def refuse_moving_origin(model: ModelFile, trial: Trial, finder: LandmarkFinder) -> None:
+    """Refuse a trial in which the landmark that the model holds fixed in the ground moves, on either foot.
+
+    Raises:
+        ModelError: with the distance, the norm of the 10 to 90 percentile ranges (a marker that is
+            swapped or flies off for a moment has not moved) of its three coordinates.
+    """
+    limit, name = model.ground.fixed_within_m, model.ground.origin
+    if limit is None or name is None:
+        return
+    for side in ("right", "left"):  # lumped models hold both feet to be fixed
+        each = LandmarkFinder(trial.match, side, finder.sex, finder.planar)
+        for key in sorted(each.markers_of(name)):
+            path = trial.paths[key][np.isfinite(trial.paths[key]).all(axis=1)]
+            low, high = np.percentile(path, [10.0, 90.0], axis=0)
+            moved = float(np.linalg.norm(high - low))
+            if moved > limit:
+                raise ModelError(
+                    f"{trial.match.where}: marker {trial.match.names[key]} moves {1000 * moved:.0f} mm "
+                    "during the trial, but "
+                    f"model {model.name} holds the {name} fixed in the ground (at most {1000 * limit:.0f} "
+                    "mm): walking and "
+                    "other movements of the feet need a model that is not rooted there"
+                )
+
+
+def reach(model: ModelFile, name: str, geometry: Geometry, parts: list[PlacedPart]) -> float:
+    """Length of a segment for the bounds of its first moments: to the next joint, else over its parts."""
+    own = next(segment for segment in model.segments if segment.name == name)
+    joints = [np.linalg.norm(geometry.placement(s)) for s in model.segments if s.parent == name]
+    if joints:
+        return float(max(joints))
+    lengths = [part.length for part in parts] or [0.0]
+    return float(sum(lengths) if own.straight is not None else max(lengths))
+
+
+def check_masses(
+    model: ModelFile,
+    bodies: dict[str, RigidBody],
+    parts: dict[str, list[PlacedPart]],
+    mass_kg: float,
+    height_m: float | None,
+    messages: list[str],
+) -> None:
+    """Say which lengths of the table came from the height, and whether the segments hold the whole body.
+
+    Raises:
+        ModelError: a length has to come from the height, and the height is not known.
+    """
+    for segment, entries in parts.items():
+        by_height = [part for part in entries if not part.measured]
+        if by_height and height_m is None:
+            raise ModelError(
+                f"height_m is needed: no markers give the length of {by_height[0].name} (segment {segment})"
+            )
+        for part in by_height:
+            text = f"Length of {part.name} for the inertia table: {1000 * part.length:.0f} mm, from the height."
+            if text not in messages:  # right and left say the same
+                messages.append(text)
+    total = sum(body.mass for body in bodies.values())
+    if abs(total - mass_kg) > 1e-9 * mass_kg:
+        messages.append(f"The segments of model {model.name} hold {total:.2f} kg of the body's {mass_kg:.2f} kg.")
+
+
+def report(model: ModelFile, plan: ModelPlan, mass_kg: float, messages: list[str]) -> None:
+    """Say the lengths and masses that were found."""
+    lengths = ", ".join(f"{name} {1000 * value:.0f}" for name, value in plan.geometry.lengths.items())
+    masses = ", ".join(f"{name} {body.mass:.2f}" for name, body in plan.bodies.items())
+    messages.append(f"Lengths (mm): {lengths}.")
+    messages.append(f"Masses (kg, {'both sides; ' if model.planar else ''}{mass_kg:.2f} in all): {masses}.")
+    if model.planar:
+        messages.append(
+            "Markers are projected on the sagittal plane (forward and up); sideways motion is not modelled."
+        )
+
+
+def fixed_lengths(model: ModelFile, bare: set[str]) -> frozenset[str]:
+    """Lengths that are not estimated: by the file, or because nothing on their segment is measured."""
+    fixed = {length.name for length in model.lengths if not length.estimated}
+    for segment in model.segments:
+        if segment.parent in bare:
+            fixed |= {term.length for term in segment.placement}
+    return frozenset(fixed)

@@ -1,0 +1,148 @@
+"""What a model in space needs of the core when it is measured: its posture in the trial, markers seen later."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+import dynakin._core as _core
+from dynakin.errors import ModelError
+from dynakin.model.calibration.frames import Trial
+from dynakin.model.calibration.pose_start import Interval, PoseFit, near, start_posture
+from dynakin.model.calibration.sites import Candidate, site_of
+from dynakin.model.plan import ModelPlan, Site
+from dynakin.model.spec import to_core
+
+Array = npt.NDArray[np.float64]
+
+_SEEN = 0.6
+"""Share of the markers that a frame must show to start from it."""
+_SPEED_FRAMES, _SPEED_S = 9, 0.1
+"""Frames from which the first speeds are taken, and the time that they may span."""
+_AVERAGED, _TURNS = 20, 3
+"""Frames over which marker places are averaged, and how often: the third turn gains 1 to 3 % more."""
+_FAIR_M = 0.03
+"""Skin moves so far in a deep squat: a fit as good as that has not gone astray."""
+_FRAMES = 5
+"""Frames on which a marker is placed that the calibration does not show."""
+
+
+@dataclass(frozen=True)
+class Started:
+    """A plan that stands where the trial begins, and the speeds (rad/s, m/s) of its coordinates there."""
+
+    plan: ModelPlan
+    speeds: dict[str, float]
+    messages: list[str]
+
+
+def started(plan: ModelPlan, trial: Trial, unplaced: tuple[Candidate, ...], still: bool) -> Started:
+    """The plan with its coordinates fitted to the trial's first frame, and with the markers seen only later.
+
+    Args:
+        still: the marker places were measured on a person who stood still. Where not, they are averaged over the trial:
+            the first frames of a step show skin and feet as they are at that instant only.
+
+    Raises:
+        ModelError: no frame shows enough markers, or they do not fit the model.
+    """
+    limits = {c.name: c.limits for c in plan.model.coordinates if np.isfinite(c.limits).any()}
+    messages: list[str] = []
+    paths = _paths(trial, plan.sites)
+    model = _core.Model(to_core(plan))
+    extra: list[Site] = []
+    for candidate in unplaced:
+        path = trial.ground.points_to_ground(trial.recording.marker(candidate.recorded))
+        both = np.flatnonzero(np.isfinite(path).all(axis=1) & _enough(paths))
+        if not len(both):
+            messages.append(f"Marker {candidate.recorded} left out: never seen together with most of the others.")
+            continue
+        chosen = both[np.unique(np.linspace(0, len(both) - 1, _FRAMES).astype(int))]
+        k = model.segment_names.index(candidate.segment)
+        found = []
+        for frame in chosen:
+            fit = start_posture(model, paths[frame], limits=limits, good_m=_FAIR_M, where=trial.match.where)
+            R, p = _core.segment_poses(model, fit.x)
+            found.append(R[k].T @ (path[frame] - p[k]))
+        extra.append(site_of(candidate, np.median(found, axis=0), in_space=True))
+        messages.append(f"Marker {candidate.recorded} is not seen in the calibration frames: placed from later ones.")
+    if extra:
+        plan = replace(plan, sites=(*plan.sites, *extra))
+        model, paths = _core.Model(to_core(plan)), _paths(trial, plan.sites)
+    if not still:
+        plan, how = _averaged(plan, paths, limits)
+        model = _core.Model(to_core(plan))
+        messages += how
+    usable = np.flatnonzero(_enough(paths))
+    if not len(usable):
+        raise ModelError(f"{trial.match.where}: no frame shows {100 * _SEEN:.0f} % of the {len(plan.sites)} markers")
+    first = int(usable[0])
+    if first > 0:
+        messages.append(f"Start from frame {first} ({trial.recording.time[first]:.2f} s): markers are missing before.")
+    fit = start_posture(model, paths[first], limits=limits, where=trial.match.where)
+    messages.append(f"Start: all coordinates fitted to the markers, {1000.0 * fit.rms_m:.1f} mm (root mean square).")
+    speeds = _speeds(model, paths, trial, first, fit, limits)
+    return Started(replace(plan, start=fit.coordinates), speeds, messages)
+
+
+def _averaged(plan: ModelPlan, paths: Array, limits: dict[str, Interval]) -> tuple[ModelPlan, list[str]]:
+    """Marker places as their mean over frames of the trial, postures fitted and places averaged by turns."""
+    usable = np.flatnonzero(_enough(paths))
+    frames = usable[np.unique(np.linspace(0, len(usable) - 1, _AVERAGED).astype(int))] if len(usable) else usable
+    rms: list[float] = []
+    for _ in range(_TURNS):
+        model = _core.Model(to_core(plan))
+        fits, found = [], []
+        for frame in frames:
+            fit = start_posture(model, paths[frame], limits=limits, good_m=_FAIR_M, where=f"frame {frame + 1}")
+            R, p = _core.segment_poses(model, fit.x)
+            on = [model.segment_names.index(site.segment) for site in plan.sites]
+            found.append([R[s].T @ (paths[frame, k] - p[s]) for k, s in enumerate(on)])
+            fits.append(fit.rms_m)
+        rms.append(1000.0 * float(np.sqrt(np.mean(np.square(fits)))))
+        places = np.array(found)
+        seen = [places[np.isfinite(places[:, k]).all(axis=1), k] for k in range(len(plan.sites))]
+        means = [own.mean(axis=0) if len(own) else None for own in seen]
+        plan = replace(
+            plan,
+            sites=tuple(
+                site if mean is None else replace(site, position=mean)
+                for site, mean in zip(plan.sites, means, strict=True)
+            ),
+        )
+    return plan, [
+        f"Marker places: averaged over {len(frames)} frames of the trial, in {_TURNS} turns (rigid fit {rms[0]:.1f} mm "
+        f"before, {rms[-1]:.1f} mm in the last turn)."
+    ]
+
+
+def _speeds(
+    model: _core.Model, paths: Array, trial: Trial, first: int, fit: PoseFit, limits: dict[str, Interval]
+) -> dict[str, float]:
+    """Rates of the coordinates at the first frame, by a parabola through the next ones; people start in mid-stride."""
+    time = trial.recording.time
+    frames = [k for k in range(first, min(first + _SPEED_FRAMES, len(time))) if np.isfinite(paths[k]).any()]
+    frames = [k for k in frames if time[k] - time[first] <= _SPEED_S]
+    if len(frames) < 4:
+        return {}
+    start, values = fit.x, [fit.coordinates]
+    for frame in frames[1:]:
+        start, found = near(model, start, paths[frame], limits)
+        values.append(found)
+    t = time[frames] - time[first]
+    powers = np.stack([np.ones_like(t), t, t**2], axis=1)
+    table = np.array([[value[name] for name in fit.coordinates] for value in values])
+    slopes = np.linalg.lstsq(powers, table, rcond=None)[0][1]
+    return dict(zip(fit.coordinates, map(float, slopes), strict=True))
+
+
+def _paths(trial: Trial, sites: tuple[Site, ...]) -> Array:
+    recorded = [trial.recording.marker(site.recorded) for site in sites]
+    return trial.ground.points_to_ground(np.stack(recorded, axis=1))
+
+
+def _enough(paths: Array) -> npt.NDArray[np.bool_]:
+    seen = np.isfinite(paths).all(axis=2)
+    return np.asarray(np.count_nonzero(seen, axis=1) >= max(3, _SEEN * paths.shape[1]))

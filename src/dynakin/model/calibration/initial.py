@@ -1,0 +1,100 @@
+"""The outcome of an initialisation: what the filter starts from."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.errors import ModelError
+from dynakin.model.lumping import PlacedPart
+from dynakin.model.plan import ModelPlan
+from dynakin.recordings.frame import GroundFrame
+
+if TYPE_CHECKING:
+    import dynakin._core as _core
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Together:
+    """Prior covariance (k, k) of elements of the state that are known together, by name."""
+
+    names: tuple[str, ...]
+    covariance: Array
+
+
+@dataclass(frozen=True, eq=False)
+class InitialModel:
+    """A model measured on one person, and the state from which the filter starts; order of n: the core's
+    layout.
+
+    Attributes:
+        spec: the core's specification.
+        names: (n,) names of the state's elements.
+        x0: (n,) state at the first usable frame; speeds and accelerations 0.
+        sd0: (n,) prior standard deviations.
+        lower, upper: (n,) bounds of (9), infinite where there are none.
+        table: (n,) values of the inertia table, NaN for elements that it does not hold.
+        marker_variance: (M,) m^2, R of each marker as its set gives it.
+        soft_tissue_m: (M,) declared size of the displacement of skin and flesh under each marker.
+        ground: ground frame whose origin is the model's ground landmark (the toe).
+        plate_centre: (3,) m, ground frame: mean centre of pressure of the first second, the ground's origin where
+            nothing was measured.
+        recorded_markers: names in the recording, in the order of spec.markers.
+        side: "right", "left" or "both".
+        mass_kg, height_m: as used; height None where nothing needed it.
+        parts: the table's parts in each segment, as placed.
+        messages: sentences on what was found, left out, locked or assumed.
+        plan: the same as plain data; None for an OpenSim model.
+        feet: "right", "left" -> segment on which the ground acts; empty for a model fixed in the ground.
+        unmodelled_m: (M,) standard deviation of what neither a state nor the cameras explain of each marker; it is
+            added to the noise of the cameras.
+        dimensionless: geometry parameters that are factors, not lengths.
+        carried_kg: mass of the known loads (`model.calibration.loads`), not in ``mass_kg``.
+        together: prior covariance of elements that were identified before; the others are independent.
+    """
+
+    spec: _core.ModelSpec
+    names: tuple[str, ...]
+    x0: Array
+    sd0: Array
+    lower: Array
+    upper: Array
+    table: Array
+    marker_variance: Array
+    soft_tissue_m: Array
+    ground: GroundFrame
+    plate_centre: Array
+    recorded_markers: tuple[str, ...]
+    side: str
+    mass_kg: float
+    height_m: float | None
+    parts: dict[str, list[PlacedPart]]
+    messages: tuple[str, ...]
+    plan: ModelPlan | None
+    feet: dict[str, str] = field(default_factory=dict)
+    unmodelled_m: Array | float = 0.0
+    dimensionless: frozenset[str] = frozenset()
+    carried_kg: float = 0.0
+    together: Together | None = None
+
+    @property
+    def weighed_kg(self) -> float:
+        """What the plates carry: the person and the known loads, kg."""
+        return self.mass_kg + self.carried_kg
+
+    def measured_plan(self) -> ModelPlan:
+        """The plan.
+
+        Raises:
+            ModelError: there is none, for an OpenSim model.
+        """
+        if self.plan is None:
+            raise ModelError(
+                f"model {self.spec.name} comes from an OpenSim file; expected a built-in model or a .toml file for this"
+            )
+        return self.plan

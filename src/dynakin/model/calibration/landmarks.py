@@ -1,0 +1,255 @@
+"""Landmarks (joint centres and the ends of segments) from markers, by the recipes of a marker set."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.errors import ModelError
+from dynakin.model.calibration.beside import lateral, offset_point
+from dynakin.model.markers.marker_set import MarkerKey, MarkerMatch
+from dynakin.model.markers.schema import Offset, PelvisRegression, PolarRegression, Recipe, by_sex
+from dynakin.model.mirroring import SUFFIXES
+from dynakin.model.subject import Sex
+
+Array = npt.NDArray[np.float64]
+Positions = dict[MarkerKey, Array]
+"""Marker positions (3,) m in the ground frame, by marker and side."""
+
+SIDES = ("right", "left")
+
+
+def _sides(recipe: Recipe, side: str) -> tuple[str, ...]:
+    """The sides whose markers a recipe takes when it is asked for one side."""
+    return {"own": (side,), "both": SIDES}.get(recipe.sides, (recipe.sides,))
+
+
+_NOWHERE: Array = np.full(3, np.nan)
+_FLOOR = ("floor", "over_floor")
+
+
+@dataclass
+class LandmarkFinder:
+    """Evaluates the landmarks of one side ("right", "left", or "both": the middle of the two).
+
+    A recipe is chosen by what the recording has at all, not frame by frame, so that a landmark never jumps
+    between two definitions within a trial.
+    """
+
+    match: MarkerMatch
+    side: str
+    sex: Sex | None
+    planar: bool
+    in_space: bool = False  # the recipes of models in space, each side apart
+    height_m: float | None = None  # for joint widths
+    sole: Mapping[str, float] = field(default_factory=dict)  # side -> slope (rad) of heel to toe on a flat foot
+    _chosen: dict[tuple[str, str], Recipe | None] = field(default_factory=dict)
+
+    @property
+    def _recipes(self) -> dict[str, tuple[Recipe, ...]]:
+        return self.match.marker_set.recipes(not self.in_space)
+
+    def _key(self, marker: str, side: str) -> MarkerKey | None:
+        return next((key for key in ((marker, side), (marker, "centre")) if key in self.match.names), None)
+
+    def _available(self, source: str, sides: tuple[str, ...]) -> bool:
+        if source in self._recipes:
+            return all(self.recipe(source, side) is not None for side in sides)
+        return any(self._key(source, side) is not None for side in sides)
+
+    def _possible(self, recipe: Recipe, side: str) -> bool:
+        if recipe.pelvis is not None:
+            both = all(self._key(recipe.pelvis.asis, s) for s in SIDES)
+            return both and any(self._key(recipe.pelvis.psis, s) for s in SIDES)
+        if recipe.offset is not None:
+            across = [name for name in (recipe.offset.asis, recipe.offset.scale) if name]
+            if not all(self._key(name, s) for name in across for s in SIDES):
+                return False
+        return all(self._available(source, _sides(recipe, side)) for source in recipe.inputs)
+
+    def recipe(self, name: str, side: str) -> Recipe | None:
+        """The first recipe of a landmark whose markers the recording has, None where there is none."""
+        if (name, side) not in self._chosen:
+            recipes = self._recipes.get(name, ())
+            self._chosen[name, side] = next((r for r in recipes if self._possible(r, side)), None)
+        return self._chosen[name, side]
+
+    def _sides_of(self, name: str) -> list[str]:
+        wanted = SIDES if self.side == "both" else (self.side,)
+        return [side for side in wanted if self.recipe(name, side) is not None]
+
+    def known(self, name: str) -> bool:
+        """Whether the recording has the markers for this landmark."""
+        return name.startswith(_FLOOR) or bool(self._sides_of(name))
+
+    def require(self, name: str, why: str) -> None:
+        """Refuse, in one line, a recording without the markers for this landmark.
+
+        Raises:
+            ModelError: names the landmark, the marker, the aliases tried and what the recording has.
+        """
+        if self.known(name):
+            return
+        marker_set = self.match.marker_set
+        if name not in self._recipes:
+            raise ModelError(f"marker set {marker_set.name}: no landmark {name!r}, which {why} needs")
+        side = SIDES[0] if self.side == "both" else self.side
+        raise ModelError(f"{self.match.where}: {why} needs landmark {name!r}: {self._first_absent(name, side)}")
+
+    def _first_absent(self, name: str, side: str) -> str:
+        recipe = self._recipes[name][0]
+        for source in recipe.inputs:
+            if source in self._recipes:
+                if self.recipe(source, side) is None:
+                    return self._first_absent(source, side)
+            elif any(self._key(source, s) is None for s in (SIDES if recipe.pelvis else (side,))):
+                return self.match.absent(source)
+        raise AssertionError(f"landmark {name} is there")  # callers ask only for what is lacking
+
+    def markers_of(self, name: str) -> set[MarkerKey]:
+        """Every marker that the landmark's value depends on."""
+        keys: set[MarkerKey] = set()
+        for side in self._sides_of(name) if not name.startswith(_FLOOR) else ():
+            keys |= self._markers_of(name, side)
+        return keys
+
+    def _markers_of(self, name: str, side: str) -> set[MarkerKey]:
+        recipe = self.recipe(name, side)
+        assert recipe is not None
+        keys: set[MarkerKey] = set()
+        for source in recipe.inputs:
+            if source in self._recipes:
+                for s in _sides(recipe, side):
+                    keys |= self._markers_of(source, s)
+            else:
+                across = recipe.offset is not None and source in (recipe.offset.asis, recipe.offset.scale)
+                sides = SIDES if recipe.pelvis is not None or across else _sides(recipe, side)
+                keys |= {key for s in sides if (key := self._key(source, s)) is not None}
+        return keys
+
+    def find(self, positions: Positions) -> dict[str, Array]:
+        """Every landmark that can be had, (3,) m in the ground frame (z = 0 where the model is planar)."""
+        found: dict[str, Array] = {}
+        for name in self._recipes:
+            values = [self._value(name, side, positions) for side in self._sides_of(name)]
+            values = [value for value in values if np.isfinite(value).all()]
+            if values:
+                point = np.mean(values, axis=0)
+                found[name] = np.array([point[0], point[1], 0.0]) if self.planar else point
+        return found
+
+    def find_in_space(self, positions: Positions) -> dict[str, Array]:
+        """Every landmark in space, (3,) m, ground frame: its middle under its name, each side's with _r and _l.
+
+        ``floor`` and ``over_floor``: a line at right angles to the sole.
+        """
+        found: dict[str, Array] = {}
+        for name in self._recipes:
+            values = {s: self._value(name, s, positions) for s in SIDES if self.recipe(name, s) is not None}
+            values = {s: value for s, value in values.items() if np.isfinite(value).all()}
+            found |= {f"{name}{SUFFIXES[s]}": value for s, value in values.items()}
+            if len(values) == len(SIDES):
+                found[name] = np.mean(list(values.values()), axis=0)
+        for side, suffix in SUFFIXES.items():
+            ends = [found.get(f"{name}{suffix}") for name in ("heel", "toe")]
+            up = np.array([0.0, 1.0, 0.0])
+            if ends[0] is not None and ends[1] is not None:
+                up = off_sole(ends[1] - ends[0], self.sole.get(side))
+            found |= {f"floor{suffix}": np.zeros(3), f"over_floor{suffix}": up}
+        return found
+
+    def of_side(self, name: str) -> tuple[LandmarkFinder, str]:
+        """The finder and the plain name for a landmark that is asked for with its side (hip_r)."""
+        for side, suffix in SUFFIXES.items():
+            if self.in_space and name.endswith(suffix) and name not in self._recipes:
+                return replace(self, side=side, _chosen=dict(self._chosen)), name.removesuffix(suffix)
+        return self, name
+
+    def _value(self, name: str, side: str, positions: Positions) -> Array:
+        recipe = self.recipe(name, side)
+        assert recipe is not None
+
+        def point(source: str) -> Array:
+            sides = _sides(recipe, side)
+            if source in self._recipes:
+                return np.asarray(np.mean([self._value(source, s, positions) for s in sides], axis=0))
+            keys = {key for s in sides if (key := self._key(source, s)) is not None}
+            return np.asarray(np.mean([positions.get(key, _NOWHERE) for key in sorted(keys)], axis=0))
+
+        if recipe.mean is not None:
+            return np.asarray(np.mean([point(source) for source in recipe.mean], axis=0))
+        if recipe.pelvis is not None:
+            return self._pelvis(recipe.pelvis, _sides(recipe, side)[0], positions)
+        if recipe.polar is not None:
+            return self._polar(recipe.polar, [point(source) for source in recipe.inputs])
+        if recipe.offset is not None:
+            return self._offset(recipe.offset, side, point, positions)
+        assert recipe.fraction is not None
+        start, end = (point(source) for source in recipe.fraction.between)
+        return start + by_sex(recipe.fraction.male, recipe.fraction.female, self.sex) * (end - start)
+
+    def _pelvis(self, regression: PelvisRegression, side: str, positions: Positions) -> Array:
+        right, left = (positions.get((regression.asis, s), _NOWHERE) for s in SIDES)
+        back = np.mean(
+            [positions.get(k, _NOWHERE) for s in SIDES if (k := self._key(regression.psis, s)) is not None],
+            axis=0,
+        )
+        front = 0.5 * (right + left)
+        width, depth = float(np.linalg.norm(right - left)), float(np.linalg.norm(front - back))
+        z = (right - left) / width
+        y = np.cross(z, front - back)
+        y /= np.linalg.norm(y)
+        axes = np.column_stack([np.cross(y, z), y, z])  # ISB pelvis frame in the ground
+        male, female = (
+            np.array(c.width) * width + np.array(c.depth) * depth + np.array(c.constant_m)
+            for c in (regression.male, regression.female)
+        )
+        local = male if self.sex == "male" else female if self.sex == "female" else 0.5 * (male + female)
+        if side == "left":
+            local = local * np.array([1.0, 1.0, -1.0])
+        return np.asarray(front + axes @ local)
+
+    def _polar(self, regression: PolarRegression, points: list[Array]) -> Array:
+        origin, start, end, scale_from, scale_to = points
+        direction = np.array([end[0] - start[0], end[1] - start[1], end[2] - start[2] if self.in_space else 0.0])
+        direction /= np.linalg.norm(direction)
+        angle = np.deg2rad(by_sex(regression.male.angle_deg, regression.female.angle_deg, self.sex))
+        turned = np.array([
+            np.cos(angle) * direction[0] - np.sin(angle) * direction[1],
+            np.sin(angle) * direction[0] + np.cos(angle) * direction[1],
+            direction[2],
+        ])  # fmt: skip
+        coefficient = by_sex(regression.male.coefficient, regression.female.coefficient, self.sex)
+        return np.asarray(origin + coefficient * np.linalg.norm(scale_to - scale_from) * turned)
+
+    def _offset(self, offset: Offset, side: str, point: Callable[[str], Array], positions: Positions) -> Array:
+        def apart(marker: str) -> Array:
+            """From the other side's to one's own."""
+            other = SIDES[1 - SIDES.index(side)]
+            return positions.get((marker, side), _NOWHERE) - positions.get((marker, other), _NOWHERE)
+
+        foot = [point(name) for name in offset.foot] if offset.foot else None
+        across = lateral(apart(offset.asis), foot, side) if offset.inward else None
+        size = self.height_m if offset.scale is None else float(np.linalg.norm(apart(offset.scale)))
+        if size is None:
+            raise ModelError(f"{self.match.where}: height_m is needed: the joint under {offset.origin} has one marker")
+        return offset_point(offset, point, across, side, size)
+
+
+def slope(heel_to_toe: Array) -> Array:
+    """Elevation (rad) of lines (..., 3) over the horizontal."""
+    return np.asarray(np.arctan2(heel_to_toe[..., 1], np.hypot(heel_to_toe[..., 0], heel_to_toe[..., 2])))
+
+
+def off_sole(heel_to_toe: Array, flat: float | None) -> Array:
+    """Direction (3,) at right angles to the sole, from the line between its markers and that line's slope when flat.
+
+    Without a slope the foot is taken to be flat.
+    """
+    pitch = 0.0 if flat is None else float(slope(heel_to_toe)) - flat
+    ahead = heel_to_toe * np.array([1.0, 0.0, 1.0])
+    ahead = ahead / np.linalg.norm(ahead)
+    return np.asarray(np.cos(pitch) * np.array([0.0, 1.0, 0.0]) - np.sin(pitch) * ahead)

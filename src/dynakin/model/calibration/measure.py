@@ -1,0 +1,245 @@
+"""Measures a model on a recording without the compiled core: lengths, marker places, inertia, first
+posture."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.errors import ModelError
+from dynakin.model.calibration.body import check_body_mass, find_height, find_mass
+from dynakin.model.calibration.checks import check_masses, fixed_lengths, reach, refuse_moving_origin, report
+from dynakin.model.calibration.frames import Trial, choose_side
+from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder, slope
+from dynakin.model.calibration.posture import Geometry, Posture, find_geometry, find_posture, frame_landmarks
+from dynakin.model.calibration.sites import Candidate, candidates, find_locks, place_sites
+from dynakin.model.definition import ModelDefinition
+from dynakin.model.lumping import PlacedPart, segment_bodies
+from dynakin.model.markers.marker_set import MarkerKey, MarkerMatch, choose_marker_set, match_markers
+from dynakin.model.plan import ModelPlan
+from dynakin.model.schema import ModelFile
+from dynakin.recordings.feet.contact import foot_contact
+from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_laboratory_frame
+from dynakin.recordings.recording import Recording
+from dynakin.recordings.standing import standing_window
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """What ``measure`` found beside the plan itself; attributes as in ``InitialModel``."""
+
+    ground: GroundFrame
+    side: str
+    mass_kg: float
+    height_m: float | None
+    parts: dict[str, list[PlacedPart]]
+    messages: tuple[str, ...]
+    trial: Trial
+    unplaced: tuple[Candidate, ...]  # markers of a model in space that the calibration frames do not show
+    still: bool  # the person stands still in the calibration frames
+
+
+def measure(
+    definition: ModelDefinition,
+    recording: Recording,
+    ground: GroundFrame | None = None,
+    *,
+    static: Recording | None = None,
+    side: str = "auto",
+    vertical: str = "auto",
+    forward: str | tuple[float, float, float] = "auto",
+) -> tuple[ModelPlan, Measured]:
+    """All of ``initialise`` that needs no compiled core; arguments and errors as there."""
+    model, subject, messages = definition.model, definition.subject, []
+    marker_set = definition.marker_set or choose_marker_set(recording.marker_names)
+    if definition.marker_set is None:
+        messages.append(f"Marker set {marker_set.name}: chosen by the recording's marker names.")
+
+    def matched(entry: Recording, frame: GroundFrame | None) -> Trial:
+        seen = [bool(np.isfinite(entry.marker(name)).all(axis=1).any()) for name in entry.marker_names]
+        match = match_markers(marker_set, entry.marker_names, seen, str(entry.path or entry.name))
+        find = find_laboratory_frame if model.floating else find_ground_frame
+        found = frame or find(entry, vertical=vertical, forward=forward, pairs=match.facing_pairs)
+        return Trial.of(entry, match, found)
+
+    as_asked = matched(recording, ground)
+    messages += as_asked.ground.how
+    trial = as_asked.facing() if model.floating else as_asked  # what is measured on landmarks takes X for forward
+    if not model.sided:
+        side, how = choose_side(trial.match, recording, side)
+        messages.append(how)
+    else:
+        side = "both"
+    chosen, left_out = candidates(model, trial.match, side)
+    locks, bare, locked = find_locks(model, trial.match, chosen)
+    messages += left_out + locked
+
+    source = trial
+    if static is not None:
+        source = matched(static, None).facing() if model.floating else matched(static, None)
+    # A planar model starts from the trial's own landmarks; in space it starts from markers (pose_start).
+    common = source.match if model.sided else _common(trial.match, source.match)
+    finder = LandmarkFinder(common, side, subject.sex, model.planar, in_space=model.sided)
+    if model.sided:
+        entries = [r for r in (static, recording) if r is not None]
+        finder.height_m, _ = find_height(subject, entries, source)
+        finder.sole = flat_slopes(source)
+    needed = needed_markers(model, finder, locks)
+    refuse_moving_origin(model, trial, finder)
+    wished = needed | table_markers(definition, finder)
+    if static is None or not model.sided:  # else the trial may lack markers that only the standing person wears
+        frames, which = trial.calibration_frames(needed, wished)
+        trial = _at_origin(model, trial, finder, frames)
+    if static is not None:
+        frames, which = source.calibration_frames(needed, wished)
+    source = trial if static is None else _at_origin(model, source, finder, frames)
+    messages.append(f"Lengths and marker places: {which}.")
+    standing = source.median(frames)
+    landmarks = finder.find_in_space(standing) if model.sided else finder.find(standing)
+
+    mass_kg, how = find_mass(subject, [source, trial] if static is not None else [trial])
+    messages.append(how)
+    height_m, how = find_height(subject, [r for r in (static, recording) if r is not None], source)
+    messages.append(how)
+    check_body_mass(subject, mass_kg, height_m)
+    if subject.sex is None:
+        messages.append(
+            "Sex not given: regressions and table are the mean of both sexes (masses, centres, signed tensors)."
+        )
+
+    unmeasured = _unmeasured_lengths(definition, landmarks, height_m, messages)
+    geometry, posture = find_geometry(model, landmarks, locks, unmeasured)
+    sites, placed = place_sites(chosen, (source, posture, frames), trial, finder, geometry, model, needed)
+    messages += placed
+    bodies, parts = segment_bodies(
+        model, definition.table, landmarks, posture, mass_kg, height_m if height_m is not None else np.nan
+    )
+    check_masses(model, bodies, parts, mass_kg, height_m, messages)
+    start = posture if model.sided else _first_posture(model, geometry, finder, trial, needed, posture, messages)
+    plan = ModelPlan(
+        model, geometry, start.coordinates, fixed_lengths(model, bare), bodies,
+        {s.name: reach(model, s.name, geometry, parts[s.name]) for s in model.segments}, tuple(sites),
+    )  # fmt: skip
+    report(model, plan, mass_kg, messages)
+    placed_names = {site.recorded for site in sites}
+    window = standing_window(source.recording)
+    still = window is not None and window.start <= frames[0] < window.stop
+    left = tuple(c for c in chosen if c.recorded not in placed_names)
+    trial = as_asked if model.floating else trial
+    return plan, Measured(trial.ground, side, mass_kg, height_m, parts, tuple(messages), trial, left, still)
+
+
+def _common(match: MarkerMatch, other: MarkerMatch) -> MarkerMatch:
+    """Only markers that both recordings have, so that a joint centre is the same recipe in both."""
+    if other is match:
+        return match
+    names = {key: name for key, name in match.names.items() if key in other.names}
+    recorded = tuple(name for name in match.recorded if name in other.recorded)
+    return MarkerMatch(match.marker_set, names, recorded, f"{match.where} with {other.where}")
+
+
+def needed_markers(model: ModelFile, finder: LandmarkFinder, locks: dict[str, float | None]) -> set[MarkerKey]:
+    """Markers of every landmark that the lengths and frames need; refuses a recording without one of them."""
+    wanted: dict[str, str] = {}
+    for segment in model.segments:
+        if segment.axes and all(locks.get(axis.coordinate) is not None for axis in segment.axes):
+            continue  # its pose follows from its parent's
+        for name in frame_landmarks(segment):
+            wanted.setdefault(name, f"segment {segment.name!r} of model {model.name}")
+    if model.ground.origin:
+        wanted.setdefault(model.ground.origin, f"the ground origin of model {model.name}")
+    keys: set[MarkerKey] = set()
+    for name, why in wanted.items():
+        own, plain = finder.of_side(name)
+        own.require(plain, why)
+        keys |= own.markers_of(plain)
+    for length in model.lengths:
+        if length.between is not None and all(finder.known(name) for name in length.between):
+            keys |= finder.markers_of(length.between[0]) | finder.markers_of(length.between[1])
+    return keys
+
+
+def flat_slopes(trial: Trial) -> dict[str, float]:
+    """Side -> slope (rad) of the line from heel to toe while that foot stands flat; none for a foot that never does."""
+    found: dict[str, float] = {}
+    pair = trial.match.marker_set.heel_toe
+    for side in SIDES:
+        names = [trial.match.names.get((name, side)) for name in pair or ()]
+        contact = foot_contact(trial.recording, trial.ground, [n for n in names if n]) if all(names) else None
+        if contact is None or contact.touching.shape[1] != 2:
+            continue
+        flat = contact.touching.all(axis=1)
+        if flat.any():
+            heel, toe = (trial.ground.points_to_ground(trial.recording.marker(str(n))) for n in names)
+            found[side] = float(np.median(slope((toe - heel)[flat])))
+    return found
+
+
+def table_markers(definition: ModelDefinition, finder: LandmarkFinder) -> set[MarkerKey]:
+    """Markers of the landmarks at which the inertia table's parts lie, as far as the recording has them."""
+    names: set[str] = set()
+    for segment in definition.model.segments:
+        for part in (definition.table.part(name) for name in segment.parts):
+            for point in (part.axis_from, part.axis_to, part.origin, part.length_from, part.length_to):
+                names |= {point.start, point.end}
+    keys: set[MarkerKey] = set()
+    for name in sorted(names):
+        keys |= finder.markers_of(name)
+    return keys
+
+
+def _at_origin(model: ModelFile, trial: Trial, finder: LandmarkFinder, frames: npt.NDArray[np.intp]) -> Trial:
+    if model.ground.origin is None:
+        return trial
+    # the middle of the landmark's markers, out of plane as well, so that the ground origin is a point of the
+    # laboratory
+    keys = sorted(finder.markers_of(model.ground.origin))
+    spatial = LandmarkFinder(trial.match, finder.side, finder.sex, planar=False)
+    origin_G = spatial.find(trial.median(frames))[model.ground.origin]
+    assert keys and np.isfinite(origin_G).all()
+    return trial.about(trial.ground.points_to_laboratory(origin_G))
+
+
+def _unmeasured_lengths(
+    definition: ModelDefinition, landmarks: dict[str, Array], height_m: float | None, messages: list[str]
+) -> dict[str, float]:
+    found: dict[str, float] = {}
+    for length in definition.model.lengths:
+        if length.between is None or all(name in landmarks for pair in length.pairs() for name in pair):
+            continue
+        part = definition.table.parts.get(length.name)
+        if part is None or part.length_per_height is None or height_m is None:
+            raise ModelError(
+                f"length {length.name!r}: its landmarks {' and '.join(length.between)} are not measured, "
+                "and neither the table "
+                f"{definition.table.name} nor the subject's height gives it"
+            )
+        found[length.name] = part.length_per_height * height_m
+        messages.append(
+            f"Length {length.name}: {1000 * found[length.name]:.0f} mm from the height "
+            f"({definition.table.name}), no markers."
+        )
+    return found
+
+
+def _first_posture(
+    model: ModelFile,
+    geometry: Geometry,
+    finder: LandmarkFinder,
+    trial: Trial,
+    needed: set[MarkerKey],
+    standing: Posture,
+    messages: list[str],
+) -> Posture:
+    usable = np.flatnonzero(trial.usable(needed))
+    if not len(usable):
+        raise ModelError(f"{trial.match.where}: no frame shows all markers of the joint centres")
+    first = int(usable[0])
+    if first > 0:
+        messages.append(f"Start from frame {first} ({trial.recording.time[first]:.2f} s): markers are missing before.")
+    positions = trial.median(np.array([first]))
+    return find_posture(model, geometry, finder.find(positions), standing)

@@ -1,0 +1,343 @@
+"""Coordinates of a spatial model that fit measured marker places: a start from any pose and heading.
+
+The body is laid on the markers as a whole (Kabsch 1976, Acta Cryst A32:922-923), then all free coordinates are fitted
+by bounded least squares with the core's analytic derivatives; limbs that do not fit are started again elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
+
+import dynakin._core as _core
+from dynakin.errors import ModelError
+
+Array = npt.NDArray[np.float64]
+Interval = tuple[float, float]
+
+GOOD_M = 0.010
+"""Root mean square distance from which on nothing else is tried: less than skin moves."""
+BAD_M = 0.060
+"""Beyond this a fit is refused: nominal marker places on an unscaled body err by 20 to 40 mm."""
+MIRROR_RATIO = 0.6
+"""A mirror image that fits this much better, on a fit that is not good, is what was measured."""
+_UNITS = 3.0  # the markers' spread against the model's, beyond which the unit is wrong
+_REST = 1e-3  # m a radian: draws what no marker tells of to where it was, moves what one does by nothing
+_RESTARTS = 4
+_ARM = 0.3  # m, at which an angle counts as a distance
+
+
+@dataclass(frozen=True, eq=False)
+class PoseFit:
+    """Where the fit ended.
+
+    Attributes:
+        coordinates: name -> rad or m, of all coordinates, locked ones as they are.
+        x: (n,) the model's initial state with these coordinates.
+        distance_m: (M,) of each marker from where it was measured, NaN where it was not.
+        rms_m: root mean square of these (3-D distances).
+    """
+
+    coordinates: dict[str, float]
+    x: Array
+    distance_m: Array
+    rms_m: float
+
+
+def start_posture(
+    model: _core.Model,
+    markers: Array,
+    *,
+    limits: Mapping[str, Interval] | None = None,
+    good_m: float = GOOD_M,
+    bad_m: float = BAD_M,
+    where: str = "start",
+) -> PoseFit:
+    """Fit the free coordinates of a model to one frame's markers, or to the median of a few frames.
+
+    Args:
+        model: lengths, marker places and locked coordinates are taken as its specification has them; its coordinates
+            are the first guess of the joints. A root with three translations and three rotations may be anywhere and
+            head anywhere.
+        markers: (M, 3) or (T, M, 3) m, ground frame, in the order of the model's markers; NaN: not seen.
+        limits: name -> (lower, upper) rad or m of coordinates that have any.
+        good_m: root mean square distance from which on nothing else is tried.
+        bad_m: root mean square distance from which the fit is refused.
+        where: opens the messages (a file's name).
+
+    Raises:
+        ModelError: fewer than three markers, or a bad fit; the message tells wrong units, swapped sides or the markers
+            that are furthest off.
+    """
+    measured = np.asarray(markers, dtype=float)
+    if measured.ndim == 3:
+        measured = _median(measured)
+    body = _Body(model, measured, dict(limits or {}), where, good_m)
+    best = body.fit()
+    _refuse(body, best, bad_m, where)
+    x = np.array(model.initial_state(), dtype=float)
+    x[: body.n_free] = best.q
+    q, _, _ = _core.coordinates(model, x)
+    names = model.coordinate_names
+    return PoseFit(dict(zip(names, map(float, q), strict=True)), x, body.distances(best.q), best.rms)
+
+
+def near(
+    model: _core.Model, x: Array, markers: Array, limits: Mapping[str, Interval]
+) -> tuple[Array, dict[str, float]]:
+    """State (n,) and coordinates of the fit that is reached from a state x (n,), one frame (M, 3) later, say.
+
+    Raises:
+        ModelError: fewer than three markers.
+    """
+    body = _Body(model, np.asarray(markers, dtype=float), dict(limits), "next frame")
+    q = body.solve(x[: body.n_free], wrap=False).q
+    state = np.array(x, dtype=float)
+    state[: body.n_free] = q
+    values, _, _ = _core.coordinates(model, state)
+    return state, dict(zip(model.coordinate_names, map(float, values), strict=True))
+
+
+def _median(frames: Array) -> Array:
+    """Median (M, 3) over frames (T, M, 3), NaN where a marker is in none."""
+    found = np.full(frames.shape[1:], np.nan)
+    for k in range(frames.shape[1]):
+        seen = frames[np.isfinite(frames[:, k]).all(axis=1), k]
+        if len(seen):
+            found[k] = np.median(seen, axis=0)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    q: Array  # (n_free,)
+    rms: float
+
+
+class _Body:
+    """The model with everything fixed but its coordinates, and the markers that it is laid on."""
+
+    def __init__(
+        self, model: _core.Model, measured: Array, limits: dict[str, Interval], where: str, good_m: float = GOOD_M
+    ) -> None:
+        self.good_m = good_m
+        self.model = _core.Model(_bare(model.spec))
+        spec = self.model.spec
+        if measured.shape != (len(spec.markers), 3):
+            raise ModelError(f"{where}: markers have shape {measured.shape}, expected ({len(spec.markers)}, 3)")
+        self.measured = measured
+        self.seen: npt.NDArray[np.bool_] = np.asarray(np.isfinite(measured).all(axis=1))
+        if np.count_nonzero(self.seen) < 3:
+            raise ModelError(f"{where}: {np.count_nonzero(self.seen)} markers are seen, expected at least 3")
+        self.names = [marker.name for marker in spec.markers]
+        self.rows = np.array([marker.measured for marker in spec.markers]) & self.seen[:, None]
+        free = [c for c in spec.coordinates if not c.locked]
+        self.n_free = len(free)
+        self.x0 = np.array(self.model.initial_state(), dtype=float)
+        bounds = np.array([limits.get(c.name, (-np.inf, np.inf)) for c in free]).reshape(-1, 2)
+        self.lower, self.upper = bounds.T
+        self.rest = np.clip(self.x0[: self.n_free], self.lower, self.upper)
+        order = {c.name: k for k, c in enumerate(free)}
+        kinds = {axis.coordinate: axis.kind for s in spec.segments for axis in s.axes}
+        self.turns = np.array([kinds[c.name] == "rotation" for c in free])
+        self.paths, self.base = _paths(spec, order)
+        self.roots = [k for k, s in enumerate(spec.segments) if s.parent == "ground"]
+        self.segment_of = [[s.name for s in spec.segments].index(m.segment) for m in spec.markers]
+        self.pull = np.where(self.turns, _REST, 0.0)
+        self.pull[self.base] = 0.0
+
+    @property
+    def floating(self) -> bool:
+        turns = int(self.turns[self.base].sum())
+        return len(self.roots) == 1 and turns == 3 and len(self.base) == 6
+
+    def state(self, q: Array) -> Array:
+        x = self.x0.copy()
+        x[: self.n_free] = q
+        return x
+
+    def distances(self, q: Array) -> Array:
+        gap = _core.marker_positions(self.model, self.state(q)) - self.measured
+        return np.where(self.seen, np.sqrt((np.where(self.rows, gap, 0.0) ** 2).sum(axis=1)), np.nan)
+
+    def residual(self, q: Array) -> Array:
+        gap = (_core.marker_positions(self.model, self.state(q)) - self.measured)[self.rows]
+        return np.concatenate([np.asarray(gap), self.pull * (q - self.rest)])
+
+    def jacobian(self, q: Array) -> Array:
+        rows = _core.marker_jacobian(self.model, self.state(q))[self.rows.ravel(), : self.n_free]
+        return np.vstack([rows, np.diag(self.pull)])
+
+    def solve(self, start: Array, wrap: bool = True) -> _Fit:
+        """Bounded least squares over all free coordinates."""
+        free = self.lower < self.upper
+        q = np.clip(start, self.lower, self.upper)
+
+        def full(part: Array) -> Array:
+            q[free] = part
+            return q
+
+        found = least_squares(
+            lambda part: self.residual(full(part)),
+            q[free],
+            jac=lambda part: self.jacobian(full(part))[:, free],
+            bounds=(self.lower[free], self.upper[free]),
+            x_scale=np.where(self.turns[free], 1.0, _ARM),
+            max_nfev=200,
+        )
+        end = full(found.x).copy()
+        endless = self.turns & np.isinf(self.lower) & np.isinf(self.upper) & wrap
+        end[endless] = (end[endless] + np.pi) % (2.0 * np.pi) - np.pi
+        return _Fit(end, float(np.sqrt(np.nanmean(self.distances(end) ** 2))))
+
+    def fit(self) -> _Fit:
+        """The best of several starts; the first good one where there is one."""
+        best: _Fit | None = None
+        for start in self.starts():
+            found = self.mended(self.solve(start))
+            best = found if best is None or found.rms < best.rms else best
+            if best.rms < self.good_m:
+                break
+        assert best is not None
+        return best
+
+    def starts(self) -> Iterator[Array]:
+        """First guesses: the body at rest laid on the markers as a whole, its root alone, then other headings."""
+        if not self.floating:
+            yield self.rest
+            return
+        at_rest = _core.marker_positions(self.model, self.state(self.rest))
+        root = self.seen & (np.array(self.segment_of) == self.roots[0])
+        poses = [
+            pose for chosen in (self.seen, root) if (pose := laid(at_rest[chosen], self.measured[chosen])) is not None
+        ]
+        centre, here = at_rest[self.seen].mean(axis=0), self.measured[self.seen].mean(axis=0)
+        up = -np.array(self.model.spec.gravity)
+        up = up / np.linalg.norm(up) if np.any(up) else np.array([0.0, 1.0, 0.0])
+        for angle in np.deg2rad([0.0, 90.0, 180.0, 270.0]):
+            turn = Rotation.from_rotvec(angle * up).as_matrix()
+            poses.append((turn, here - turn @ centre))
+        for pose in poses:
+            yield self.moved(*pose)
+
+    def moved(self, turn: Array, shift: Array) -> Array:
+        """The rest posture carried along by a rigid motion: the root's coordinates for p -> turn p + shift."""
+        R, p = (part[self.roots[0]] for part in _core.segment_poses(self.model, self.state(self.rest)))
+        R_to, p_to = turn @ R, turn @ p + shift
+
+        def gap(part: Array) -> Array:
+            q = self.rest.copy()
+            q[self.base] = part
+            R_now, p_now = (a[self.roots[0]] for a in _core.segment_poses(self.model, self.state(q)))
+            return np.concatenate([p_now - p_to, _ARM * (R_now - R_to).ravel()])
+
+        angles = self.turns[self.base]
+        best, least = self.rest.copy(), (np.inf, np.inf)
+        for k in range(-1, 3 * int(angles.sum())):  # half a turn off is a saddle: quarter turns of each angle too
+            start = self.rest[self.base].copy()
+            if k >= 0:
+                start[np.flatnonzero(angles)[k // 3]] += 0.5 * np.pi * (k % 3 + 1)
+            found = least_squares(gap, start)
+            end = np.where(angles, (found.x + np.pi) % (2.0 * np.pi) - np.pi, found.x)
+            # Three angles have two readings of every pose; the one with the smaller turns is meant.
+            rank = (round(float(found.cost), 9), float(np.abs(end - self.rest[self.base])[angles].sum()))
+            if rank < least:
+                least, best[self.base] = rank, end
+        return np.asarray(best)
+
+    def mended(self, fit: _Fit) -> _Fit:
+        """Starts the joints above the segment that fits worst again, elsewhere within their limits."""
+        rng = np.random.default_rng(0)  # the same start for the same markers
+        for _ in range(_RESTARTS):
+            if fit.rms < self.good_m:
+                break
+            away = self.distances(fit.q)
+            worst = self.segment_of[int(np.nanargmax(away))]
+            again = [k for k in self.paths[worst] if k not in set(self.base.tolist())]
+            if not again:
+                break
+            start = fit.q.copy()
+            low = np.where(np.isfinite(self.lower), self.lower, self.rest - np.where(self.turns, np.pi, 0.1))
+            high = np.where(np.isfinite(self.upper), self.upper, self.rest + np.where(self.turns, np.pi, 0.1))
+            start[again] = rng.uniform(low[again], high[again])
+            found = self.solve(start)
+            fit = found if found.rms < fit.rms else fit
+        return fit
+
+
+def laid(points: Array, targets: Array) -> tuple[Array, Array] | None:
+    """Rotation (3, 3) and shift (3,) m that lay points (K, 3) best on targets (K, 3); None where they lie in a line."""
+    if len(points) < 3:
+        return None
+    a, b = points - points.mean(axis=0), targets - targets.mean(axis=0)
+    u, size, vt = np.linalg.svd(b.T @ a)
+    if size[1] < 1e-6 * size[0]:
+        return None
+    turn = u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))]) @ vt
+    return turn, targets.mean(axis=0) - turn @ points.mean(axis=0)
+
+
+def _bare(spec: _core.ModelSpec) -> _core.ModelSpec:
+    """The same model with nothing in its state but coordinates, speeds and accelerations."""
+    parameters, segments, markers = spec.parameters, spec.segments, spec.markers
+    for parameter in parameters:
+        parameter.estimated = False
+    for segment in segments:
+        segment.inertia_estimated = [False] * 10
+    for marker in markers:
+        marker.estimated = marker.soft_tissue = [False] * 3
+    spec.parameters, spec.segments, spec.markers = parameters, segments, markers
+    spec.wrench_offset, spec.wrench_delay = [False] * 6, False
+    return spec
+
+
+def _paths(spec: _core.ModelSpec, order: dict[str, int]) -> tuple[list[list[int]], npt.NDArray[np.intp]]:
+    """Free coordinates that move each segment, and those of the root."""
+    found: dict[str, list[int]] = {"ground": []}
+    base: list[int] = []
+    for segment in spec.segments:
+        own = [order[axis.coordinate] for axis in segment.axes if axis.coordinate in order]
+        found[segment.name] = list(dict.fromkeys([*found[segment.parent], *own]))
+        if segment.parent == "ground":
+            base += own
+    return [found[s.name] for s in spec.segments], np.array(list(dict.fromkeys(base)), dtype=np.intp)
+
+
+def _refuse(body: _Body, fit: _Fit, bad_m: float, where: str) -> None:
+    """Raises a ModelError that tells what is wrong, where the fit is bad."""
+    if fit.rms < body.good_m:
+        return
+    found = f"{where}: the model fits the markers to {1000.0 * fit.rms:.0f} mm only (root mean square)"
+    at_rest, own = _core.marker_positions(body.model, body.state(body.rest))[body.seen], body.measured[body.seen]
+    spread = float(np.sqrt(own.var(axis=0).sum() / at_rest.var(axis=0).sum()))
+    if not 1.0 / _UNITS < spread < _UNITS:
+        raise ModelError(f"{found}: they lie {spread:.3g} times as far apart as the model's, expected metres")
+    mirrored = _mirror(body).fit()
+    if mirrored.rms < MIRROR_RATIO * fit.rms:
+        raise ModelError(
+            f"{found}, and its mirror image to {1000.0 * mirrored.rms:.0f} mm: left and right are swapped, "
+            "or an axis of the laboratory points the wrong way"
+        )
+    if fit.rms < bad_m:
+        return
+    away = body.distances(fit.q)
+    worst = [k for k in np.argsort(-np.nan_to_num(away))[:3] if np.isfinite(away[k])]
+    raise ModelError(
+        f"{found}, expected less than {1000.0 * bad_m:.0f} mm: furthest off are "
+        + ", ".join(f"{body.names[k]} ({1000.0 * away[k]:.0f} mm)" for k in worst)
+    )
+
+
+def _mirror(body: _Body) -> _Body:
+    """The same body with its markers seen in a mirror (upright, across the ground's z)."""
+    limits = {c.name: (low, high) for c, low, high in zip(_free(body), body.lower, body.upper, strict=True)}
+    return _Body(body.model, body.measured * np.array([1.0, 1.0, -1.0]), limits, "mirror")
+
+
+def _free(body: _Body) -> list[_core.CoordinateSpec]:
+    return [c for c in body.model.spec.coordinates if not c.locked]

@@ -1,0 +1,155 @@
+"""Which markers become sites of the model, and where they sit on their segments."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynakin.errors import ModelError
+from dynakin.model.calibration.frames import FIRST_FRAMES, Trial
+from dynakin.model.calibration.landmarks import LandmarkFinder
+from dynakin.model.calibration.posture import Geometry, Posture, find_posture
+from dynakin.model.markers.marker_set import MarkerKey, MarkerMatch
+from dynakin.model.markers.schema import Marker
+from dynakin.model.mirroring import SUFFIXES
+from dynakin.model.plan import Site
+from dynakin.model.schema import ModelFile
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A marker of the recording and the segment of the model that it belongs to."""
+
+    marker: Marker
+    key: MarkerKey
+    recorded: str
+    segment: str
+
+
+def candidates(model: ModelFile, match: MarkerMatch, side: str) -> tuple[list[Candidate], list[str]]:
+    """Markers of the chosen side on the model's segments, and sentences on those that are left out."""
+    sites = match.sites(side, not model.sided)
+    homes = {key: _home(model, m.segment, key[1]) for m, key, _ in sites}
+    chosen = [Candidate(m, key, name, home) for m, key, name in sites if (home := homes[key]) is not None]
+    messages = [
+        f"Marker {name} left out: model {model.name} has no segment {marker.segment!r}."
+        for marker, key, name in sites
+        if homes[key] is None
+    ]
+    sides = ("right", "left", "centre") if side == "both" else (side, "centre")
+    absent = [
+        marker.aliases(s)[0]
+        for marker in match.marker_set.markers
+        for s in sides
+        if marker.measures(not model.sided) and marker.aliases(s) and (marker.name, s) not in match.names
+    ]
+    if absent:
+        messages.append(f"Markers that the recording lacks, left out: {', '.join(absent)}.")
+    return chosen, messages
+
+
+def _home(model: ModelFile, name: str, side: str) -> str | None:
+    """The segment that has this part of the body, or this name, on this side."""
+    own = [s for s in model.segments if s.side in (None, side)]
+    plain = next((s.name for s in own if name in (s.name, s.name.removesuffix(SUFFIXES.get(side, "")))), None)
+    return plain or next((s.name for s in own if name in s.parts), None)
+
+
+def find_locks(
+    model: ModelFile, match: MarkerMatch, chosen: list[Candidate]
+) -> tuple[dict[str, float | None], set[str], list[str]]:
+    """Coordinates to lock because a segment has no markers, these segments, and sentences on it.
+
+    Raises:
+        ModelError: a segment without markers whose model file does not say what to do then.
+    """
+    counts = {segment.name: 0 for segment in model.segments}
+    for candidate in chosen:
+        counts[candidate.segment] += 1
+    by_name = {segment.name: segment for segment in model.segments}
+    locks: dict[str, float | None] = {
+        c.name: None if c.as_measured else c.value or 0.0 for c in model.coordinates if c.locked
+    }
+    bare: set[str] = set()
+    messages: list[str] = []
+    for name, count in counts.items():
+        segment = by_name[name]
+        if count == 1:
+            one = next(c.recorded for c in chosen if c.segment == name)
+            messages.append(f"Segment {name} has one marker only ({one}): its angle leans on its neighbours.")
+        if count or all(locks.get(axis.coordinate) is not None for axis in segment.axes):
+            continue
+        rule = segment.without_markers
+        if rule is None:
+            parts = {name, *segment.parts}
+            fitting = [m for m in match.marker_set.markers if m.segment in parts and m.measures(not model.sided)]
+            tried = ", ".join(alias for m in fitting for alias in (*m.right, *m.left, *m.centre))
+            raise ModelError(
+                f"{match.where}: segment {name!r} has no marker (tried "
+                f"{tried or 'none, the set has none on it'}) "
+                f"and its model file has no without_markers rule; it has {', '.join(match.recorded)}"
+            )
+        bare.add(name)
+        joint = segment if rule.lock_to == segment.parent else by_name[rule.lock_to]
+        value = None if rule.value_deg is None else float(np.deg2rad(rule.value_deg))
+        for axis in joint.axes:
+            locks.setdefault(axis.coordinate, value)
+        names = ", ".join(axis.coordinate for axis in joint.axes)
+        at = "the angle found while standing" if rule.value_deg is None else f"{rule.value_deg:g} deg"
+        messages.append(f"Segment {name} has no markers: locked to {rule.lock_to} (coordinate {names} at {at}).")
+    return locks, bare, messages
+
+
+def place_sites(
+    chosen: list[Candidate],
+    calibration: tuple[Trial, Posture, np.ndarray],
+    trial: Trial,
+    finder: LandmarkFinder,
+    geometry: Geometry,
+    model: ModelFile,
+    needed: set[MarkerKey],
+) -> tuple[list[Site], list[str]]:
+    """Local positions from the calibration frames; from later frames for a marker that is not seen there.
+
+    Args:
+        calibration: trial, standing posture and frames on which the model was measured.
+        needed: markers of the landmarks, all seen in frames that can give a posture.
+    """
+    source, posture, frames = calibration
+    standing = source.median(frames)
+    flat = np.array([1.0, 1.0, 0.0 if model.planar else 1.0])
+    sites: list[Site] = []
+    messages: list[str] = []
+    for c in chosen:
+        point = standing.get(c.key)
+        if point is not None and np.isfinite(point).all():
+            local = posture.to_local(c.segment, point * flat)
+        elif model.sided:
+            continue  # placed from frames that show it, once the rest of the body stands (`in_space`)
+        else:
+            later = np.flatnonzero(trial.usable(needed | {c.key}))[:FIRST_FRAMES]
+            if not len(later):
+                messages.append(
+                    f"Marker {c.recorded} left out: never seen together with the markers of the joint centres."
+                )
+                continue
+            found = []
+            for frame in later:
+                now = find_posture(model, geometry, finder.find(trial.median(np.array([frame]))), posture)
+                found.append(now.to_local(c.segment, trial.paths[c.key][frame] * flat))
+            local = np.median(found, axis=0)
+            messages.append(
+                f"Marker {c.recorded} is not seen in the calibration frames: placed from "
+                f"{trial.recording.time[later[0]]:.2f} s on."
+            )
+        sites.append(site_of(c, local, model.sided))
+    return sites, messages
+
+
+def site_of(candidate: Candidate, local: np.ndarray, in_space: bool) -> Site:
+    """A marker of the set at its place (3,) m on its segment."""
+    marker = candidate.marker
+    assert marker.variance is not None  # the schema asks for it
+    name = marker.aliases(candidate.key[1])[0]
+    return Site(name, candidate.recorded, candidate.segment, local, marker.variance, marker.soft_tissue_m(not in_space))

@@ -1,0 +1,1 @@
+"""When each foot stands, and which plate bears it."""

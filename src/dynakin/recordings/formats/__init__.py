@@ -1,0 +1,1 @@
+"""One reader a file format: C3D, TRC, MOT and STO, CSV."""

@@ -1,0 +1,137 @@
+"""MOT and STO, OpenSim's text tables (coordinates, ground forces).
+
+Both generations of headers are read: ``nRows=..``, ``nColumns=..``, ``inDegrees=yes|no`` (any order, other
+lines are remarks) and SIMM's older ``name``, ``datacolumns``, ``datarows``, ``range``; each ends with
+``endheader``, then one line of column names beginning with ``time``, then the numbers, parted by tabs or
+blanks.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from dynakin.errors import RecordingError
+from dynakin.recordings.formats.textfile import check_time, check_unique, parse_row, read_lines, split_cells
+from dynakin.recordings.recording import Array
+
+_ENTRY = re.compile(
+    r"^\s*(nRows|nColumns|inDegrees|datarows|datacolumns|name|range|version)\s*[=:\s]\s*(.+?)\s*$", re.I
+)
+_SYNONYMS = {"datarows": "nrows", "datacolumns": "ncolumns"}
+
+
+@dataclass(frozen=True, eq=False)
+class Table:
+    """A table of columns over time, values as the file has them.
+
+    Attributes:
+        names: K column names, without time.
+        time: (T,) s.
+        values: (T, K).
+        in_degrees: what the header says of angles; None where it says nothing.
+        path: the file.
+        notes: what the reader found odd.
+    """
+
+    names: tuple[str, ...]
+    time: Array
+    values: Array
+    in_degrees: bool | None
+    path: Path
+    notes: tuple[str, ...] = ()
+
+    def column(self, name: str) -> Array:
+        """One column (T,) as the file has it; RecordingError lists the columns if it is not there."""
+        if name not in self.names:
+            raise RecordingError(f"{self.path}: no column {name!r}; it has {', '.join(self.names)}")
+        return self.values[:, self.names.index(name)]
+
+    def radians(self, rotations: Iterable[str]) -> Table:
+        """The same table with the columns named in ``rotations`` in radians; the others (translations) stay.
+
+        Raises:
+            RecordingError: the header does not tell ``inDegrees``.
+        """
+        if self.in_degrees is None:
+            raise RecordingError(f"{self.path}: header has no inDegrees line, expected inDegrees=yes or inDegrees=no")
+        wanted = set(rotations)
+        factor = np.array([np.pi / 180 if self.in_degrees and name in wanted else 1.0 for name in self.names])
+        return Table(self.names, self.time, self.values * factor, False, self.path, self.notes)
+
+
+def read_table(path: str | Path) -> Table:
+    """Read a MOT or STO file.
+
+    Raises:
+        RecordingError: no column line beginning with time, wrong column count (line, found, expected), fewer
+            rows than the header promises (a truncated file), a column given twice, time that does not
+            increase.
+    """
+    path = Path(path)
+    lines = read_lines(path)
+    top = _names_line(lines, path)
+    header: dict[str, str] = {}
+    for line in lines[:top]:
+        if entry := _ENTRY.match(line):
+            key = entry[1].casefold()
+            header.setdefault(_SYNONYMS.get(key, key), entry[2])
+    columns = split_cells(lines[top].rstrip())
+    check_unique(columns, "column", path)
+
+    rows, numbers = [], []
+    for k in range(top + 1, len(lines)):
+        if lines[k].strip():
+            cells = split_cells(lines[k])
+            rows.append(parse_row(cells, columns, path, k + 1))
+            numbers.append(k + 1)
+    if not rows:
+        raise RecordingError(f"{path}: has no rows of numbers after line {top + 1}")
+    table = np.array(rows)
+    check_time(table[:, 0], numbers, path)
+    notes = _count_notes(header, len(rows), len(columns), path)
+    return Table(tuple(columns[1:]), table[:, 0], table[:, 1:], _in_degrees(header, path), path, tuple(notes))
+
+
+def _names_line(lines: list[str], path: Path) -> int:
+    end = next((k for k, line in enumerate(lines) if line.strip().casefold() == "endheader"), -1)
+    for k in range(end + 1, len(lines)):
+        if cells := split_cells(lines[k].rstrip()):
+            if cells[0].casefold() == "time":
+                return k
+            if end >= 0 and any(cells):
+                raise RecordingError(f"{path}, line {k + 1}: found column {cells[0]!r} first, expected 'time'")
+    raise RecordingError(f"{path}: is not a MOT or STO table, found no line of column names that begins with 'time'")
+
+
+def _count_notes(header: dict[str, str], rows: int, columns: int, path: Path) -> list[str]:
+    notes = []
+    said_rows, said_columns = header.get("nrows", ""), header.get("ncolumns", "")
+    if said_columns and _count(said_columns) not in (None, columns):
+        notes.append(f"{path.name}: the header says {said_columns} columns, the file names {columns}.")
+    said = _count(said_rows)
+    if said is not None and said > rows:
+        raise RecordingError(f"{path}: found {rows} rows, expected the {said_rows} of its header (truncated?)")
+    if said is not None and said < rows:
+        notes.append(f"{path.name}: the header says {said_rows} rows, the file holds {rows}: all are used.")
+    return notes
+
+
+def _count(word: str) -> float | None:
+    """A whole number, infinite where no file is so long; None for what is none ("²", say)."""
+    if not (word.isascii() and word.isdigit()):
+        return None
+    return int(word) if len(word) < 18 else float("inf")
+
+
+def _in_degrees(header: dict[str, str], path: Path) -> bool | None:
+    word = header.get("indegrees")
+    if word is None:
+        return None
+    if word.casefold() not in ("yes", "no", "true", "false", "1", "0"):
+        raise RecordingError(f"{path}: found inDegrees={word}, expected yes or no")
+    return word.casefold() in ("yes", "true", "1")

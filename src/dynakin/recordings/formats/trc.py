@@ -1,0 +1,128 @@
+"""TRC, the text format of OpenSim and Motion Analysis for marker trajectories.
+
+A whole valid file (cells are parted by tabs, a blank cell is a missing value)::
+
+    PathFileType  4           (X/Y/Z)    trial.trc
+    DataRate      CameraRate  NumFrames  NumMarkers  Units  OrigDataRate  OrigDataStartFrame  OrigNumFrames
+    100           100         2          2           mm     100           1                   2
+    Frame#        Time        RKNE                   RANK
+                              X1   Y1   Z1           X2   Y2   Z2
+
+    1             0.00        1.0  2.0  3.0          4.0  5.0  6.0
+    2             0.01                               4.0  5.0  6.0
+"""
+
+from __future__ import annotations
+
+import re
+from itertools import pairwise
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from dynakin.errors import RecordingError
+from dynakin.recordings.formats.textfile import check_time, check_unique, parse_row, read_lines, split_cells, trial_name
+from dynakin.recordings.formats.trajectories import clean_markers, timing_notes
+from dynakin.recordings.plates.options import ReadOptions
+from dynakin.recordings.recording import Array, Recording
+from dynakin.units import length_factor
+
+_AXES_ROW = re.compile(r"^[XYZ]_?\d*$", re.IGNORECASE)
+
+
+def read_trc(path: Path, options: ReadOptions | None = None) -> Recording:
+    """Read a TRC file; ``options`` concern plates only, which the format does not have.
+
+    Raises:
+        RecordingError: not a TRC, wrong column count (with line, found and expected), unknown unit, time that
+            does not increase, a marker name given twice.
+    """
+    path = Path(path)
+    lines = read_lines(path)
+    top = next((k for k, line in enumerate(lines[:40]) if _is_names_row(line)), None)
+    if top is None:
+        raise RecordingError(f"{path}: is not a TRC file, found no line that starts with 'Frame#' and 'Time'")
+    names = tuple(cell for cell in split_cells(lines[top])[2:] if cell)
+    if not names:
+        raise RecordingError(f"{path}, line {top + 1}: found no marker names after 'Frame#' and 'Time'")
+    check_unique(names, "marker", path)
+    header = _header(lines[:top])
+
+    columns = ["Frame#", "Time", *(f"{name} {axis}" for name in names for axis in "xyz")]
+    rows: list[list[float]] = []
+    numbers: list[int] = []
+    for k in range(top + 1, len(lines)):
+        cells = split_cells(lines[k])
+        filled = [cell for cell in cells if cell]
+        if not filled or (not rows and all(_AXES_ROW.match(cell) for cell in filled)):
+            continue
+        rows.append(parse_row(cells, columns, path, k + 1))
+        numbers.append(k + 1)
+    if not rows:
+        raise RecordingError(f"{path}: has no frames, expected rows of numbers after line {top + 1}")
+    table = np.array(rows)
+    time = table[:, 1]
+    check_time(time, numbers, path)
+
+    notes = _count_notes(header, len(rows), len(names)) + timing_notes(time, _number(header.get("datarate")))
+    raw = table[:, 2:].reshape(len(rows), len(names), 3)
+    factor, unit, unit_notes = _unit(header.get("units", ""), raw, path)
+    markers, marker_notes = clean_markers(names, raw * factor)
+    return Recording(
+        name=trial_name(path),
+        path=path,
+        time=time,
+        marker_names=names,
+        markers=markers,
+        length_unit=unit,
+        notes=tuple(notes + unit_notes + marker_notes),
+    )
+
+
+def _is_names_row(line: str) -> bool:
+    cells = split_cells(line)
+    return len(cells) > 1 and cells[0].casefold().startswith("frame") and cells[1].casefold().startswith("time")
+
+
+def _header(lines: list[str]) -> dict[str, str]:
+    """Keys of the header (lower case) and the values in the next filled line, cell by cell."""
+    filled = [split_cells(line) for line in lines if line.strip()]
+    for keys, values in pairwise(filled):
+        if any(key.casefold() in ("datarate", "units", "numframes") for key in keys):
+            given = [value for value in values if value]  # some programs part them by two tabs
+            told = given if len(given) == len([key for key in keys if key]) else values
+            return {key.casefold(): value for key, value in zip(keys, told, strict=False) if key}
+    return {}
+
+
+def _number(text: str | None) -> float | None:
+    try:
+        return float(text) if text else None
+    except ValueError:
+        return None
+
+
+def _count_notes(header: dict[str, str], frames: int, markers: int) -> list[str]:
+    notes = []
+    for key, found, word in (("numframes", frames, "frames"), ("nummarkers", markers, "markers")):
+        said = _number(header.get(key))
+        if said is not None and said != found:
+            notes.append(f"The header says {said:g} {word}, the file holds {found}: the latter are used.")
+    return notes
+
+
+def _unit(word: str, raw: Array, path: Path) -> tuple[float, Literal["mm", "m"], list[str]]:
+    """Metres per unit of the file, the unit to write back in, and notes."""
+    if not word:
+        # A person's markers span 0.2 to 10 m, so the two units cannot be mistaken for each other.
+        span = np.nanmax(np.ptp(raw[~np.isnan(raw).any(axis=2)], axis=0)) if np.isfinite(raw).any() else 0.0
+        unit: Literal["mm", "m"] = "mm" if span > 50 else "m"
+        note = f"The header names no length unit: {unit} taken, as the markers span {span:.4g} of them."
+        return (1e-3 if unit == "mm" else 1.0), unit, [note]
+    factor = length_factor(word)
+    if factor is None:
+        raise RecordingError(f"{path}: found length unit {word!r} in the header, expected mm, cm or m")
+    if factor == 1e-2:
+        return factor, "m", ["The file is in centimetres; markers are written back in metres."]
+    return factor, ("mm" if factor == 1e-3 else "m"), []

@@ -1,0 +1,273 @@
+"""Are the force plates' data what they should be? Checked before a run uses them; each finding gives its
+number."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import combinations, pairwise
+
+import numpy as np
+
+from dynakin.recordings.feet.distance import DEFAULT_FOOT_MARKERS, distance_to_hull, foot_outline
+from dynakin.recordings.frame import GroundFrame
+from dynakin.recordings.plates.limits import beyond_limits
+from dynakin.recordings.recording import Array, Plate, Recording
+from dynakin.recordings.standing import standing_window
+from dynakin.units import GRAVITY_M_S2
+
+LOADED_N = 50.0
+"""A plate whose vertical force is above this in a frame carries a foot."""
+MASS_WARNING = 0.05
+"""Relative difference between declared mass and the plates' from which it is said."""
+MASS_MEAN_RATIO = (0.6, 1.1)
+"""The same for the mean of a movement: steps beside the plates make it smaller, nothing makes it larger than
+m g."""
+MASS_RATIO_REFUSED = (0.2, 5.0)
+"""Plates' mass over declared mass beyond which the units or plates must be wrong."""
+MASS_REFUSED_KG = (5.0, 400.0)
+"""The plates' mass itself, where none is declared: not a person's beyond these."""
+COP_WARNING_M, COP_REFUSED_M = 0.10, 0.30
+"""Centre of pressure outside the outline of the markers of the nearest foot: a shoe is some cm wider than
+these."""
+APART_WARNING, APART_FRAMES, APART_S = 0.03, 0.95, 0.5
+"""Forces on two plates that push the feet apart: by which part of the load, in which part of the frames, for how long.
+Legs push outwards, so the ground pushes the feet together: by 0.07 to 0.2 of the load in all frames of all of our
+recordings, standing, squatting and in double support."""
+TILT_WARNING_DEG = 10.0
+"""Standing force against the vertical; flat standing gives 1 to 3 deg."""
+FREE_MOMENT_WARNING_M = 0.05
+"""Free moment over vertical force: two feet twisting on the ground rarely exceed 10 N m at 400 N."""
+
+
+@dataclass(frozen=True)
+class PlateCheck:
+    """What ``check_plates`` found.
+
+    Attributes:
+        ok: neither a warning nor a refusal.
+        mass_kg_from_plates: standing vertical force over g; None where the person does not stand still on
+            plates.
+        mean_mass_kg: the same from the mean over all loaded frames of a movement; right only where it ends as it
+            began and nothing but the ground pushes. None where the person stands still, or nothing is loaded.
+        messages: sentences with numbers; those of something wrong begin with "Warning:".
+        refusal: why the plates cannot be used, None where they can. The caller decides what follows from it.
+    """
+
+    ok: bool
+    mass_kg_from_plates: float | None
+    mean_mass_kg: float | None
+    messages: tuple[str, ...]
+    refusal: str | None
+
+
+@dataclass
+class _Findings:
+    messages: list[str] = field(default_factory=list)
+    refusals: list[str] = field(default_factory=list)
+
+    def say(self, text: str) -> None:
+        self.messages.append(text)
+
+    def warn(self, text: str) -> None:
+        self.messages.append(f"Warning: {text}")
+
+    def refuse(self, text: str) -> None:
+        self.refusals.append(text)
+
+
+def check_plates(
+    recording: Recording,
+    ground: GroundFrame,
+    mass_kg: float | None = None,
+    foot_markers: dict[str, list[str]] | None = None,
+) -> PlateCheck:
+    """Check the plates while the person stands still: the vertical force is positive and near m g, each
+    centre of pressure lies under a foot, the force is near vertical, the free moment acts about the vertical
+    and is small.
+
+    Over all frames, no plate may be beyond the limits of friction or of its own edges (`plate_limits`).
+
+    Where nobody stands still, the mean over all loaded frames takes its place for all but the mass, which is
+    only told.
+
+    Args:
+        ground: tells the vertical; its origin does not matter.
+        mass_kg: declared body mass, None if it is to come from the plates.
+        foot_markers: foot -> names of its markers; Plug-in-Gait's and OpenCap's where not given.
+    """
+    if not recording.plates:
+        return PlateCheck(False, None, None, (), "no force plates in this recording, expected at least one")
+    findings = _Findings()
+    standing = _on_plates(standing_window(recording), recording, ground)
+    frames = standing if standing is not None else slice(None)
+    mass = _check_vertical(recording, ground, mass_kg, standing, findings)
+    feet = _feet(recording, ground, foot_markers or DEFAULT_FOOT_MARKERS, findings)
+    under: dict[str, str] = {}
+    for plate in recording.plates:
+        if (beyond := beyond_limits(plate, recording, ground)) is not None:
+            findings.refuse(beyond)
+        push = ground.vectors_to_ground(plate.force)[frames, 1]
+        loaded = np.flatnonzero(np.abs(np.nan_to_num(push)) > LOADED_N) + (frames.start or 0)
+        if not len(loaded):
+            findings.say(f"{plate.name} carries nothing ({'standing' if standing else 'the whole recording'}).")
+            continue
+        foot = _check_pressure(plate, loaded, feet, ground, findings)
+        _check_free_moment(plate, loaded, ground, findings)
+        _check_level(plate, ground, findings)
+        if standing is not None and foot in under:
+            findings.warn(f"{under[foot]} and {plate.name} both have their centre of pressure under the {foot} foot.")
+        if foot:
+            under[foot] = plate.name
+    for one, other in combinations(recording.plates, 2):
+        _check_together(one, other, recording, ground, findings)
+    refusal = "; ".join(findings.refusals) or None
+    ok = refusal is None and not any(text.startswith("Warning:") for text in findings.messages)
+    standing_mass, mean_mass = (mass, None) if standing is not None else (None, mass)
+    return PlateCheck(ok, standing_mass, mean_mass, tuple(findings.messages), refusal)
+
+
+def _on_plates(standing: slice | None, recording: Recording, ground: GroundFrame) -> slice | None:
+    """The frames of standing, unless the plates are loaded at other times only: who stands is on a box then, say."""
+    total = ground.vectors_to_ground(np.sum([plate.force for plate in recording.plates], axis=0))
+    loaded = np.abs(np.nan_to_num(total[:, 1])) > LOADED_N
+    return None if standing is not None and loaded.any() and not loaded[standing].any() else standing
+
+
+def _check_vertical(
+    recording: Recording,
+    ground: GroundFrame,
+    mass_kg: float | None,
+    standing: slice | None,
+    findings: _Findings,
+) -> float | None:
+    total = ground.vectors_to_ground(np.sum([plate.force for plate in recording.plates], axis=0))
+    if standing is None:
+        loaded = total[np.abs(np.nan_to_num(total[:, 1])) > LOADED_N]
+        when = f"mean of {len(loaded)} loaded frames; the person does not stand still for 0.5 s"
+    else:
+        loaded = total[standing]
+        start, stop = recording.time[standing.start], recording.time[standing.stop - 1]
+        when = f"standing still from {start:.4g} s to {stop:.4g} s"
+    loaded = loaded[np.isfinite(loaded).all(axis=1)]
+    if not len(loaded):
+        findings.refuse(f"the plates carry no load: the vertical force stays below {LOADED_N:g} N")
+        return None
+    mean = loaded.mean(axis=0)
+    vertical = float(mean[1])
+    if vertical <= 0:
+        findings.refuse(
+            f"the vertical force is {vertical:.1f} N ({when}), expected a positive one near m g "
+            f"(ground on person, vertical axis {ground.vertical})"
+        )
+        return None
+    mass = vertical / GRAVITY_M_S2
+    findings.say(f"Vertical force {vertical:.1f} N, that is {mass:.2f} kg ({when}).")
+    tilt = float(np.degrees(np.arctan2(np.hypot(mean[0], mean[2]), vertical)))
+    if tilt > TILT_WARNING_DEG:
+        findings.warn(f"the mean force is {tilt:.0f} deg off the vertical {ground.vertical}, expected a few degrees.")
+    if mass_kg is not None:
+        _compare_mass(mass, mass_kg, standing is not None, findings)
+    elif standing is not None and not MASS_REFUSED_KG[0] < mass < MASS_REFUSED_KG[1]:
+        findings.refuse(
+            f"the plates read {mass:.3g} kg standing, expected a person's mass (nobody on the plates, or another unit "
+            "of the forces?)"
+        )
+    return mass
+
+
+def _compare_mass(mass: float, declared: float, standing: bool, findings: _Findings) -> None:
+    ratio = mass / declared
+    text = f"the plates read {mass:.2f} kg, the declared mass is {declared:g} kg ({100 * (ratio - 1):+.1f} %)"
+    if standing and not MASS_RATIO_REFUSED[0] < ratio < MASS_RATIO_REFUSED[1]:
+        findings.refuse(f"{text}; wrong unit, or a plate is missing")
+    elif standing and abs(ratio - 1) > MASS_WARNING:
+        findings.warn(f"{text}.")
+    elif not standing and not MASS_MEAN_RATIO[0] < ratio < MASS_MEAN_RATIO[1]:
+        findings.warn(f"{text}, on average over all loaded frames; another force may act on the plates.")
+    else:
+        findings.say(f"Mass: {text}.")
+
+
+def _feet(
+    recording: Recording, ground: GroundFrame, markers: dict[str, list[str]], findings: _Findings
+) -> dict[str, Array]:
+    outlines = {foot: foot_outline(recording, ground, names) for foot, names in markers.items()}
+    feet = {foot: outline for foot, outline in outlines.items() if np.isfinite(outline).any()}
+    if not feet:
+        findings.warn("no foot markers, so it was not checked that the centres of pressure lie under the feet.")
+    return feet
+
+
+def _check_pressure(
+    plate: Plate, loaded: np.ndarray, feet: dict[str, Array], ground: GroundFrame, findings: _Findings
+) -> str | None:
+    """Compare with the feet; gives the foot that stands on the plate, None where both or none do."""
+    cop = ground.points_to_ground(plate.cop[loaded])[:, [0, 2]]
+    if not feet or not np.isfinite(cop).any():
+        return None
+    distances = {foot: distance_to_hull(cop, outline[loaded]) for foot, outline in feet.items()}
+    medians = {foot: float(np.nanmedian(d)) for foot, d in distances.items() if np.isfinite(d).any()}
+    if not medians:
+        return None
+    foot = min(medians, key=lambda name: medians[name])
+    nearest = np.fmin.reduce([distances[name] for name in medians])
+    # While nobody stands still one plate may carry one foot after the other: each frame's nearest foot
+    # counts.
+    away = float(np.nanmedian(nearest))
+    if away <= COP_WARNING_M:
+        where = "within its outline" if away == 0 else f"{1000 * away:.0f} mm outside its markers' outline"
+        findings.say(f"{plate.name}: centre of pressure under the {foot} foot, {where}.")
+        return foot
+    both = distance_to_hull(cop, np.concatenate([outline[loaded] for outline in feet.values()], axis=1))
+    if float(np.nanmedian(both)) <= COP_WARNING_M:
+        findings.say(f"{plate.name}: centre of pressure between the feet, {1000 * away:.0f} mm from the {foot} one.")
+        return None
+    text = f"{plate.name}: centre of pressure {1000 * away:.0f} mm away from the nearest foot ({foot})"
+    if away > COP_REFUSED_M:
+        findings.refuse(f"{text}, expected it under the foot (at most {1000 * COP_REFUSED_M:.0f} mm)")
+    else:
+        findings.warn(f"{text}, expected at most {1000 * COP_WARNING_M:.0f} mm.")
+    return None
+
+
+def _check_together(one: Plate, other: Plate, recording: Recording, ground: GroundFrame, findings: _Findings) -> None:
+    """Whether two plates that stand beside each other have been exchanged: each one's forces at the other's place.
+
+    With feet alike loaded, centres of pressure and total wrench hardly show it; that the feet are pushed apart does.
+    """
+    forces = [np.nan_to_num(ground.vectors_to_ground(plate.force)) for plate in (one, other)]
+    apart = ground.points_to_ground(other.cop) - ground.points_to_ground(one.cop)
+    both = (forces[0][:, 1] > LOADED_N) & (forces[1][:, 1] > LOADED_N) & np.isfinite(apart).all(axis=1)
+    if recording.n_frames < 2 or np.count_nonzero(both) < APART_S * recording.rate:
+        return
+    along = apart[both][:, [0, 2]]
+    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
+    outwards = 0.5 * ((forces[1] - forces[0])[both][:, [0, 2]] * along).sum(axis=1)
+    load = 0.5 * float((forces[0] + forces[1])[both, 1].mean())
+    if np.mean(outwards > 0.0) > APART_FRAMES and outwards.mean() > APART_WARNING * load:
+        findings.warn(
+            f"{one.name} and {other.name} push the feet apart, with {outwards.mean():.0f} N each on average over "
+            f"{len(outwards)} frames, expected to push them together: have the two plates been exchanged?"
+        )
+
+
+def _check_free_moment(plate: Plate, loaded: np.ndarray, ground: GroundFrame, findings: _Findings) -> None:
+    free = ground.vectors_to_ground(plate.free_moment[loaded]).mean(axis=0)
+    push = float(ground.vectors_to_ground(plate.force[loaded])[:, 1].mean())
+    about, across = float(free[1]), float(np.hypot(free[0], free[2]))
+    findings.say(f"{plate.name}: free moment {about:.2f} N m about the vertical.")
+    if abs(about) > FREE_MOMENT_WARNING_M * abs(push):
+        findings.warn(f"{plate.name}: free moment {about:.1f} N m is large for a vertical force of {push:.0f} N.")
+    if across > 1.0 + 0.1 * abs(about):
+        findings.warn(f"{plate.name}: free moment has {across:.1f} N m about horizontal axes, expected none.")
+
+
+def _check_level(plate: Plate, ground: GroundFrame, findings: _Findings) -> None:
+    if plate.corners is None:
+        return
+    sides = [b - a for a, b in pairwise(plate.corners)]
+    normal = np.cross(sides[0], sides[1])
+    cosine = abs(float(normal @ ground.rotation[1])) / float(np.linalg.norm(normal))
+    tilt = float(np.degrees(np.arccos(min(1.0, cosine))))
+    if tilt > TILT_WARNING_DEG:
+        findings.warn(f"{plate.name}: its surface is tilted by {tilt:.0f} deg against the horizontal.")

@@ -1,0 +1,80 @@
+"""Known loads on a plate that are not the person's (a rail, a box): taken off its wrench."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import ClassVar
+
+import numpy as np
+
+from dynakin.errors import RecordingError
+from dynakin.recordings.landmarks import DEFAULT_PAIRS
+from dynakin.recordings.plates.pressure import DEFAULT_THRESHOLD_N, Surface, centre_of_pressure
+from dynakin.recordings.recording import Array, Plate, Recording
+from dynakin.recordings.vertical import axis_vector, find_vertical
+
+Vector3 = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class PlateLoad:
+    """A constant wrench that something else than the person leaves on a plate, laboratory frame.
+
+    Attributes:
+        plate: its name, as `dynakin check` shows it.
+        force_n: as the plate reads it (its reaction: a weight of 50 N reads +50 N along the vertical).
+        point_m: where the force acts.
+        moment_nm: beside that, about the point.
+    """
+
+    plate: str
+    force_n: Vector3
+    point_m: Vector3
+    moment_nm: Vector3 = (0.0, 0.0, 0.0)
+
+    __pydantic_config__: ClassVar = {"extra": "forbid", "allow_inf_nan": False}  # of a configuration
+
+
+def without_plate_loads(recording: Recording, loads: Sequence[PlateLoad], vertical: str = "auto") -> Recording:
+    """The recording with these wrenches taken off its plates, at all frames; centres of pressure are made anew.
+
+    Args:
+        vertical: laboratory axis that points up, the plates' normal; "auto": found.
+
+    Raises:
+        RecordingError: a plate that the recording does not have.
+    """
+    if not loads:
+        return recording
+    names = [plate.name for plate in recording.plates]
+    for load in loads:
+        if load.plate not in names:
+            raise RecordingError(
+                f"{recording.path or recording.name}: plate_loads: no plate {load.plate!r}, expected one of "
+                f"{', '.join(names) or 'none (there are no plates)'}"
+            )
+    axis = find_vertical(recording, DEFAULT_PAIRS)[0] if vertical.casefold() == "auto" else vertical
+    up = axis_vector(axis)
+    plates = tuple(
+        _relieved(plate, [load for load in loads if load.plate == plate.name], up) for plate in recording.plates
+    )
+    notes = tuple(
+        f"{load.plate}: a known load of {np.linalg.norm(load.force_n):.1f} N that is not the person's is taken off."
+        for load in loads
+    )
+    return recording.with_plates(plates, notes)
+
+
+def _relieved(plate: Plate, loads: Sequence[PlateLoad], up: Array) -> Plate:
+    if not loads:
+        return plate
+    force, moment = plate.force.copy(), plate.moment.copy()
+    for load in loads:
+        force -= load.force_n
+        moment -= np.cross(load.point_m, load.force_n) + load.moment_nm
+    points = plate.cop if plate.corners is None else plate.corners
+    seen = points[np.isfinite(points).all(axis=1)]
+    surface = Surface(np.median(seen, axis=0) if len(seen) else np.zeros(3), up)
+    cop, free = centre_of_pressure(force, moment, surface, DEFAULT_THRESHOLD_N)
+    return Plate(plate.name, force, moment, cop, free, plate.corners)

@@ -1,0 +1,1 @@
+"""The paper's figures for any run, as files for papers."""

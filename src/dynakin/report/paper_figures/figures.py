@@ -1,0 +1,126 @@
+"""The paper's figures for any run, and mean curves of its repetitions, as files for papers: `save_figures`."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import nullcontext
+from functools import partial
+from pathlib import Path
+
+import matplotlib as mpl
+from matplotlib.figure import Figure
+
+from dynakin.errors import ConfigError, OutputError
+from dynakin.report.paper_figures.movement import angles_figure, knee_moment_figure, markers_figure, wrench_figure
+from dynakin.report.paper_figures.parameters import inertias_figure, lengths_and_masses_figure
+from dynakin.report.paper_figures.repetitions import repetitions_figure
+from dynakin.report.paper_figures.sensitivity import Sensitivity, read_sensitivity, sensitivity_figure
+from dynakin.report.plot import FILE_STYLE
+from dynakin.results.estimate import Estimate
+from dynakin.results.failures import Failures
+from dynakin.results.measures.facing import facing
+from dynakin.validation.methods import Trial
+
+FORMATS = ("svg", "pdf", "png")
+_DATES: dict[str, dict[str, None]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {}}
+
+Draw = Callable[[Estimate, Trial | None], Figure | None]
+FIGURES: dict[str, Draw] = {
+    "figure4_markers": markers_figure,
+    "figure5_angles": angles_figure,
+    "figure6_wrench": wrench_figure,
+    "figure7_knee_moment": knee_moment_figure,
+    "figure8_lengths_and_masses": lengths_and_masses_figure,
+    "figure9_inertias": inertias_figure,
+    "repetitions": repetitions_figure,
+}
+"""File name -> what draws it; it gives None where the estimate has nothing to show."""
+SENSITIVITY_FIGURE = "figure3_sensitivity"
+
+
+def save_figures(
+    estimate: Estimate,
+    folder: str | Path,
+    formats: Sequence[str] = FORMATS,
+    *,
+    comparison: Trial | None = None,
+    sensitivity: Sensitivity | None = None,
+    failures: Failures | None = None,
+) -> list[Path]:
+    """Write Figures 4 to 9 of the paper for this run and its repetitions' mean curves, 300 dots an inch where dots
+    are needed.
+
+    Args:
+        folder: made where it is not there; files of the same names are replaced.
+        formats: some of svg, pdf, png.
+        comparison: this estimate beside the reference methods (`dynakin.validation.trial_of`): classical angles (Figure
+            5), the table's wrench (6) and moments (7) and their mean curves are drawn too.
+        sensitivity: a criterion over the gains (`read_sensitivity`): Figure 3 is drawn too.
+        failures: takes the figures that fail; the others are drawn.
+
+    Returns:
+        The files written, in the order of the paper; a figure without anything to show is left out.
+
+    Raises:
+        ConfigError: an unknown format, or a comparison of another recording.
+        OutputError: the folder cannot be written.
+    """
+    if comparison is not None and len(comparison.time) != len(estimate.time):
+        raise ConfigError(
+            f"comparison has {len(comparison.time)} frames, expected the estimate's {len(estimate.time)}: "
+            "make it from the same recording"
+        )
+    estimate = facing(estimate)
+    draws: dict[str, Callable[[], Figure | None]] = {
+        name: lambda draw=draw: draw(estimate, comparison)  # type: ignore[misc]
+        for name, draw in FIGURES.items()
+    }
+    if sensitivity is not None:
+        draws = {SENSITIVITY_FIGURE: lambda: sensitivity_figure(sensitivity), **draws}
+    return _write(draws, Path(folder), formats, failures)
+
+
+def save_sensitivity_figure(path: str | Path, folder: str | Path, formats: Sequence[str] = FORMATS) -> list[Path]:
+    """Write Figure 3 of the paper from a file of a criterion over the gains (see `read_sensitivity`).
+
+    Raises:
+        ConfigError: an unknown format, or no such file. OutputError: the folder cannot be written.
+    """
+    grid = read_sensitivity(path)
+    return _write({SENSITIVITY_FIGURE: lambda: sensitivity_figure(grid)}, Path(folder), formats)
+
+
+def save_sensitivity_figures(
+    grids: Mapping[str, Sensitivity], folder: str | Path, formats: Sequence[str] = FORMATS
+) -> list[Path]:
+    """Write one such figure a criterion, by the names of their files.
+
+    Raises:
+        ConfigError: an unknown format. OutputError: the folder cannot be written.
+    """
+    return _write({name: partial(sensitivity_figure, grid) for name, grid in grids.items()}, Path(folder), formats)
+
+
+def _write(
+    draws: dict[str, Callable[[], Figure | None]],
+    folder: Path,
+    formats: Sequence[str],
+    failures: Failures | None = None,
+) -> list[Path]:
+    unknown = [name for name in formats if name not in FORMATS]
+    if unknown:
+        raise ConfigError(f"formats: {unknown[0]!r} is not known, expected some of {', '.join(FORMATS)}")
+    written = []
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        for name, draw in draws.items():
+            guarded = nullcontext() if failures is None else failures.stage(f"figure {name}", writes=True)
+            with guarded, mpl.rc_context({**FILE_STYLE, "svg.hashsalt": name}):
+                figure = draw()
+                for form in formats if figure is not None else ():
+                    assert figure is not None
+                    figure.savefig(folder / f"{name}.{form}", dpi=300, metadata=_DATES[form])
+                    written.append(folder / f"{name}.{form}")
+    except OSError as error:
+        raise OutputError(f"{folder}: cannot write figures there ({error.strerror or error})") from error
+    return written

@@ -1,0 +1,266 @@
+"""Figures 4 to 7 of the paper: markers over a cycle, joint angles, wrench, knee moment."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+
+from dynakin.report.body import chain_of, colours_of, floor_height, marker_segments
+from dynakin.report.colours import SIDE_COLOURS, side_of
+from dynakin.report.labels import COMPONENT_LABELS, is_planar, moment_note, number, sentence, words
+from dynakin.report.method_styles import DERIVED_LINE, LineStyle, method_styles
+from dynakin.report.plot import ESTIMATED, INK, MEASURED, QUIET, draw_sourced
+from dynakin.report.sections.panels import band_is_too_wide
+from dynakin.report.sides import joints_of
+from dynakin.results.estimate import COMPONENTS, Estimate
+from dynakin.results.measures.fit import signal_fit
+from dynakin.results.measures.metrics import evaluation_window
+from dynakin.results.measures.repetitions import repetitions_of
+from dynakin.results.measures.sources import DERIVED, moment_sources, wrench_sources
+from dynakin.validation.differences import angle_differences, moment_differences
+from dynakin.validation.methods import AT, CLASSICAL, Method, Trial
+
+_PICTURES = 6
+
+
+def markers_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
+    """Figure 4: the stick figure and the markers, measured (hollow) and estimated (filled), over one cycle."""
+    cycle = middle_cycle(estimate)
+    frames = np.linspace(cycle.start, cycle.stop - 1, _PICTURES).astype(int)
+    chain, carriers = chain_of(estimate), marker_segments(estimate)
+    segments = dict.fromkeys([*(b.segment for b in chain.bones), *carriers.values()])
+    planar = is_planar(estimate)
+    colours = colours_of(estimate) if planar else {name: SIDE_COLOURS[side_of(name)] for name in segments}
+    measured = estimate.data["markers_measured"].values[:, :, :2]
+    estimated = estimate.data["markers_estimated"].values[:, :, :2]
+    paint = [colours.get(carriers.get(name, ""), INK) for name in estimate.marker_names]
+    shown = np.concatenate([measured[frames], estimated[frames], chain.points[frames][:, :, :2]], axis=1)
+    width = max(float(np.nanmax(shown[k, :, 0]) - np.nanmin(shown[k, :, 0])) for k in range(_PICTURES))
+    floor = floor_height(estimate)
+    figure = Figure(figsize=(7.2, 3.1), layout="constrained")
+    axes = figure.add_subplot()
+    for place, frame in enumerate(frames):
+        middle = 0.5 * (np.nanmax(shown[place, :, 0]) + np.nanmin(shown[place, :, 0]))
+        moved = np.array([1.22 * width * place - middle, 0.0])
+        lines = [chain.points[frame][[b.start, b.end], :2] + moved for b in chain.bones]
+        axes.add_collection(LineCollection(lines, colors=[colours[b.segment] for b in chain.bones], linewidths=3.2))
+        (x, y), seen = (estimated[frame] + moved).T, (measured[frame] + moved).T
+        axes.scatter(x, y, s=11, c=paint, zorder=3, linewidths=0)
+        axes.scatter(seen[0], seen[1], s=26, facecolors="none", edgecolors=INK, linewidths=0.7, zorder=4)
+        text = f"{estimate.time[frame]:.2f} s"
+        axes.text(1.22 * width * place, floor - 0.09, text, ha="center", va="top", color=QUIET)
+    span = (-0.62 * width, (1.22 * (_PICTURES - 1) + 0.62) * width)
+    axes.plot(span, [floor, floor], color="#b8c0c8", linewidth=1.0, zorder=0)
+    axes.plot([span[0], span[0] + 0.5], [floor - 0.32] * 2, color=QUIET, linewidth=1.6)
+    axes.text(span[0] + 0.55, floor - 0.32, "0.5 m", va="center", color=QUIET)
+    axes.set_aspect("equal")
+    axes.set_xlim(span)
+    axes.set_ylim(floor - 0.42, float(np.nanmax(shown[:, :, 1])) + 0.08)
+    axes.axis("off")
+    whose = "segment" if planar else "side"
+    axes.set_title(f"Markers over one cycle: measured (hollow) and estimated (filled, in the {whose}’s colour)")
+    names = dict.fromkeys(b.segment for b in chain.bones)
+    if not planar:  # thirty segments in six colours tell nothing, three colours do
+        colours = {side or "middle": colour for side, colour in SIDE_COLOURS.items()}
+        names = dict.fromkeys(colours)
+    letters = sum(len(name) + 4 for name in names)
+    at, step = span[0] + 1.0, (span[1] - span[0] - 1.0) / max(letters, 1 if planar else 60)
+    for name in names:
+        axes.text(at, floor - 0.32, words(name), color=colours[name], va="center", weight="bold")
+        at += (len(name) + 4) * step
+    return figure
+
+
+def angles_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
+    """Figure 5: every free coordinate with its band, beside the classical method's."""
+    free = [
+        k for k in range(len(estimate.coordinate_names)) if np.any(_by_coordinate(estimate, "coordinates_sd")[:, k])
+    ]
+    if not free:
+        return None
+    if not is_planar(estimate):
+        return _paired_angles_figure(estimate)
+    classical = _reference(comparison, CLASSICAL)
+    differences = {row.coordinate: row for row in angle_differences([] if comparison is None else [comparison])}
+    columns = min(4, len(free))
+    rows = -(-len(free) // columns)
+    figure = Figure(figsize=(7.2, 0.5 + 1.75 * rows), layout="constrained")
+    every = figure.subplots(rows, columns, squeeze=False).ravel()
+    values, sd = _by_coordinate(estimate, "coordinates"), _by_coordinate(estimate, "coordinates_sd")
+    for axes, k in zip(every, free, strict=False):
+        name = estimate.coordinate_names[k]
+        factor, unit = (180.0 / np.pi, "deg") if estimate.is_rotation()[k] else (1000.0, "mm")
+        title, notes = sentence(words(name)), []
+        if classical is not None:
+            _draw(axes, estimate.time, factor * classical.coordinates[:, k], classical, zorder=3)
+            notes.append(f"RMS difference {number(differences[name].rms.mean, unit)}")
+        axes.plot(estimate.time, factor * values[:, k], color=ESTIMATED, linewidth=1.2)
+        axes.margins(y=0.12)
+        half = 2.0 * factor * sd[:, k]
+        low, high = factor * values[:, k] - half, factor * values[:, k] + half
+        if not band_is_too_wide(factor * values[:, k], factor * sd[:, k]):
+            axes.fill_between(estimate.time, low, high, color=ESTIMATED, alpha=0.18, linewidth=0)
+            notes.append(f"2 sd: {number(float(np.median(half)), unit, digits=2)}")
+        else:  # it would press the line flat
+            notes.append(f"2 sd: {number(float(np.median(half)), unit, digits=2)} (too wide)")
+        axes.set_xlabel("\n".join(notes))
+        axes.set_title(f"{title}, {unit}")
+        axes.set_xlim(float(estimate.time[0]), float(estimate.time[-1]))
+    for axes in every[len(free) :]:
+        axes.set_visible(False)
+    figure.supxlabel("time, s", fontsize=8, color=QUIET)
+    _key(figure, every[0], band=True, other=classical)
+    return figure
+
+
+def _paired_angles_figure(estimate: Estimate) -> Figure:
+    """Figure 5 in space: right and left over each other, with their bands."""
+    joints = joints_of(estimate)
+    columns = min(4, len(joints))
+    rows = -(-len(joints) // columns)
+    figure = Figure(figsize=(7.2, 0.5 + 1.55 * rows), layout="constrained")
+    every = figure.subplots(rows, columns, squeeze=False).ravel()
+    values, sd = _by_coordinate(estimate, "coordinates"), _by_coordinate(estimate, "coordinates_sd")
+    for axes, joint in zip(every, joints, strict=False):
+        factor, unit = (180.0 / np.pi, "deg") if joint.rotation else (1000.0, "mm")
+        for side, k in joint.columns.items():
+            colour = SIDE_COLOURS[side]
+            axes.plot(estimate.time, factor * values[:, k], color=colour, linewidth=1.1)
+            if not band_is_too_wide(factor * values[:, k], factor * sd[:, k]):
+                low, high = (factor * (values[:, k] + sign * sd[:, k]) for sign in (-2.0, 2.0))
+                axes.fill_between(estimate.time, low, high, color=colour, alpha=0.18, linewidth=0)
+        axes.set_title(f"{joint.title}, {unit}")
+        axes.set_xlim(float(estimate.time[0]), float(estimate.time[-1]))
+    for axes in every[len(joints) :]:
+        axes.set_visible(False)
+    figure.supxlabel("time, s", fontsize=8, color=QUIET)
+    handles: list[Artist] = []
+    for side in dict.fromkeys(side for joint in joints for side in joint.columns):
+        handles += every[0].plot([], [], color=SIDE_COLOURS[side], linewidth=1.4, label=side or "middle")
+    handles.append(every[0].fill_between([], [], [], color=QUIET, alpha=0.18, label="± 2 standard deviations"))
+    figure.legend(handles=handles, loc="outside upper left", ncols=4, borderaxespad=0.2, columnspacing=1.8)
+    return figure
+
+
+def wrench_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
+    """Figure 6: the wrench as measured, estimated, and from the table and classical angles ("AT")."""
+    measured = estimate.data["wrench_measured"].transpose("time", "component").values
+    estimated = estimate.data["wrench_estimated"].transpose("time", "component").values
+    shown = [k for k in range(len(COMPONENTS)) if np.isfinite(estimated[:, k]).any()]
+    if not shown:
+        return None
+    at = _reference(comparison, AT)
+    derived = wrench_sources(estimate.data) == DERIVED
+    figure = Figure(figsize=(7.2, 0.5 + 1.35 * len(shown)), layout="constrained")
+    every = figure.subplots(len(shown), 1, sharex=True, squeeze=False).ravel()
+    window = evaluation_window(estimate.time)
+    for axes, k in zip(every, shown, strict=True):
+        title, unit = COMPONENT_LABELS[COMPONENTS[k]]
+        axes.plot(estimate.time, measured[:, k], color=MEASURED, linewidth=2.8, solid_capstyle="round")
+        if at is not None:
+            _draw(axes, estimate.time, at.wrench[:, k], at)
+        draw_sourced(axes, estimate.time, estimated[:, k], derived[:, k], color=ESTIMATED, linewidth=1.0)
+        rms = [f"EKF {number(signal_fit(measured[window, k], estimated[window, k]).rms, unit)}"]
+        if at is not None:
+            rms.append(f"AT {number(signal_fit(measured[window, k], at.wrench[window, k]).rms, unit)}")
+        axes.set_title(f"{title} {COMPONENTS[k]}, {unit}")
+        if np.isfinite(measured[:, k]).any():
+            axes.set_title(f"RMS difference: {', '.join(rms)}", loc="right", color=QUIET, weight="normal", fontsize=8)
+        axes.set_xlim(float(estimate.time[0]), float(estimate.time[-1]))
+    every[-1].set_xlabel("time, s")
+    _key(figure, every[0], measured=True, other=at, derived=bool(derived[:, shown].any()))
+    return figure
+
+
+def knee_moment_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
+    """Figure 7: the moment about each knee, estimated, and from the table and classical angles ("AT")."""
+    names = [name for name in estimate.coordinate_names if "knee" in name]
+    if not is_planar(estimate):
+        moved = {k for joint in joints_of(estimate) for k in joint.columns.values()}
+        names = [name for name in names if estimate.coordinate_names.index(name) in moved]
+    known = np.isfinite(_by_coordinate(estimate, "moments")).any(axis=0)
+    names = [name for name in names if known[estimate.coordinate_names.index(name)]]
+    if not names:
+        return None
+    source = moment_sources(estimate.data)[:, [estimate.coordinate_names.index(name) for name in names]]
+    figure = Figure(figsize=(4.6, 0.5 + 2.3 * len(names)), layout="constrained")
+    every = figure.subplots(len(names), 1, sharex=True, squeeze=False).ravel()
+    at = _reference(comparison, AT)
+    differences = {row.coordinate: row for row in moment_differences([] if comparison is None else [comparison])}
+    for axes, name, derived in zip(every, names, (source == DERIVED).T, strict=True):
+        moment = estimate.data["moments"].sel(coordinate=name).values
+        draw_sourced(axes, estimate.time, moment, derived, color=ESTIMATED, linewidth=1.2)
+        if "moments_sd" in estimate.data:
+            sd = np.where(derived, np.nan, estimate.data["moments_sd"].sel(coordinate=name).values)
+            axes.fill_between(estimate.time, moment - 2.0 * sd, moment + 2.0 * sd, color=ESTIMATED, alpha=0.2, lw=0)
+        note = moment_note(estimate, name)
+        axes.set_title(f"{sentence(words(name))} moment, N m{f' ({note})' if note else ''}")
+        if at is not None:
+            _draw(axes, estimate.time, at.moments[:, estimate.coordinate_names.index(name)], at)
+            row = differences[name]
+            axes.set_xlabel(
+                f"time, s\nRMS difference {number(row.rms.mean, 'N m')}, "
+                f"{number(row.nrms_rms_percent.mean, digits=2)} % of AT’s RMS"
+            )
+        else:
+            axes.set_xlabel("time, s")
+        axes.set_xlim(float(estimate.time[0]), float(estimate.time[-1]))
+    _key(figure, every[0], other=at, derived=bool((source == DERIVED).any()))
+    return figure
+
+
+def _by_coordinate(estimate: Estimate, name: str) -> np.ndarray:
+    return np.asarray(estimate.data[name].transpose("time", "coordinate").values)
+
+
+def middle_cycle(estimate: Estimate) -> slice:
+    """Frames of the middle repetition; the whole recording where nothing repeats."""
+    found = repetitions_of(estimate).items
+    if not found:
+        return slice(0, len(estimate.time))
+    middle = found[len(found) // 2]
+    return slice(middle.first, middle.last + 1)
+
+
+def _reference(comparison: Trial | None, kind: str) -> Method | None:
+    methods = [] if comparison is None else comparison.of_kind(kind)
+    return methods[0] if methods else None
+
+
+def _draw(axes: Axes, time: np.ndarray, values: np.ndarray, method: Method, zorder: float = 2.0) -> None:
+    style = _style(method)
+    axes.plot(time, values, color=style.colour, linewidth=style.width, linestyle=style.pattern, zorder=zorder)
+
+
+def _style(method: Method) -> LineStyle:
+    return method_styles([method.name])[method.name]
+
+
+def _key(
+    figure: Figure,
+    axes: Axes,
+    *,
+    measured: bool = False,
+    band: bool = False,
+    other: Method | None = None,
+    derived: bool = False,
+) -> None:
+    """One line of words above the panels, each with the line that it names."""
+    handles: list[Artist] = []
+    if measured:
+        handles += axes.plot([], [], color=MEASURED, linewidth=2.8, label="measured")
+    handles += axes.plot([], [], color=ESTIMATED, linewidth=1.4, label="EKF")
+    if derived:
+        pattern = DERIVED_LINE.pattern
+        handles += axes.plot([], [], color=ESTIMATED, linewidth=1.4, linestyle=pattern, label=DERIVED_LINE.label)
+    if band:
+        handles.append(axes.fill_between([], [], [], color=ESTIMATED, alpha=0.18, label="± 2 standard deviations"))
+    if other is not None:
+        style = _style(other)
+        handles += axes.plot(
+            [], [], color=style.colour, linewidth=style.width, linestyle=style.pattern, label=other.name
+        )
+    figure.legend(handles=handles, loc="outside upper left", ncols=4, borderaxespad=0.2, columnspacing=1.8)

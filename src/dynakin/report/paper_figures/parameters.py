@@ -1,0 +1,111 @@
+"""Figures 8 and 9 of the paper: how lengths, masses and inertias settle, each segment in its colour."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from dynakin.report.body import colours_of
+from dynakin.report.direct_labels import label_ends
+from dynakin.report.labels import number, signed_percent, words
+from dynakin.report.plot import LIMIT, QUIET, thin
+from dynakin.results.estimate import Estimate
+from dynakin.results.records import Parameter
+from dynakin.validation.methods import Trial
+
+_PANEL_IN = 2.35
+_INERTIAS = {f"i{a}{b}": f"{a}{b}" for a, b in ("xx", "yy", "zz")}
+
+
+def lengths_and_masses_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
+    """Figure 8: change of each segment's length and mass from its start, in per cent, with its band and bounds."""
+    groups = {
+        "Segment lengths": [p for p in estimate.parameters if p.kind == "length" and p.estimated],
+        "Segment masses": [p for p in _inertial(estimate) if p.name.endswith("/mass")],
+    }
+    return _figure(estimate, groups)
+
+
+def inertias_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
+    """Figure 9: change of each estimated moment of inertia, about the segment's origin, in per cent.
+
+    Products of inertia start close to zero: a change in per cent of them says nothing, so they are left out.
+    """
+    groups = {
+        f"Moments of inertia {label}": [p for p in _inertial(estimate) if p.name.endswith(f"/{key}")]
+        for key, label in _INERTIAS.items()
+    }
+    return _figure(estimate, groups)
+
+
+def _inertial(estimate: Estimate) -> list[Parameter]:
+    return [p for p in estimate.parameters if p.kind == "inertia" and p.estimated]
+
+
+def _figure(estimate: Estimate, groups: dict[str, list[Parameter]]) -> Figure | None:
+    groups = {title: kept for title, every in groups.items() if (kept := [p for p in every if p.initial != 0.0])}
+    if not groups:
+        return None
+    figure = Figure(figsize=(7.2, 0.35 + (_PANEL_IN + 0.65) * len(groups)), layout="constrained")
+    for axes, (title, parameters) in zip(
+        figure.subplots(len(groups), 1, squeeze=False).ravel(), groups.items(), strict=True
+    ):
+        _changes(axes, estimate, parameters)
+        axes.set_title(f"{title}, change from the start in %; at the end with ± 2 standard deviations")
+        axes.set_xlabel("time, s")
+    return figure
+
+
+def _changes(axes: Axes, estimate: Estimate, parameters: list[Parameter]) -> None:
+    colours, labels = colours_of(estimate), []
+    bounds: list[float] = []
+    reached = 1.0
+    changes: list[tuple[Parameter, np.ndarray, np.ndarray, np.ndarray]] = []
+    for p in parameters:
+        scale = 100.0 / abs(p.initial)
+        path = estimate.data["state"].sel(element=p.name).values
+        sd = np.hypot(estimate.data["state_sd"].sel(element=p.name).values, p.skin_sd)
+        time, change = thin(estimate.time, scale * (path - p.initial))
+        half = 2.0 * scale * np.interp(time, estimate.time, sd)
+        changes.append((p, time, change, half))
+        reached = max(reached, float(np.nanmax(np.abs(change))))
+    for p, time, change, half in changes:
+        scale = 100.0 / abs(p.initial)
+        low, high = (-np.inf if p.lower is None else p.lower), (np.inf if p.upper is None else p.upper)
+        colour = colours[p.segment]
+        if np.median(half) < reached:  # a band that fills the panel shows nothing; the label has its number
+            axes.fill_between(
+                time,
+                np.maximum(change - half, scale * (low - p.initial)),
+                np.minimum(change + half, scale * (high - p.initial)),
+                color=colour,
+                alpha=0.1,
+                linewidth=0,
+            )
+        axes.plot(time, change, color=colour, linewidth=1.4)
+        bounds += [scale * (bound - p.initial) for bound in (p.lower, p.upper) if bound is not None]
+        labels.append((_label(p), float(change[-1]), colour))
+    axes.set_xlim(float(estimate.time[0]), float(estimate.time[-1]))
+    axes.set_ylim(-1.18 * reached, 1.18 * reached)
+    for bound in sorted({round(bound, 6) for bound in bounds if abs(bound) <= 1.05 * reached}):
+        axes.axhline(bound, color=LIMIT, linewidth=0.9, linestyle=(0, (5, 3)))
+        axes.annotate(
+            f"bound {bound:+.0f} %".replace("-", "−"),
+            (0.01, bound),
+            xycoords=("axes fraction", "data"),
+            xytext=(0, 2 if bound > 0 else -2),
+            textcoords="offset points",
+            va="bottom" if bound > 0 else "top",
+            color=LIMIT,
+            fontsize=7,
+        )
+    axes.axhline(0.0, color=QUIET, linewidth=0.6)
+    label_ends(axes, labels, height_in=_PANEL_IN)
+
+
+def _label(p: Parameter) -> str:
+    change = signed_percent(p.change_percent() or 0.0)
+    factor, unit = (1000.0, "mm") if p.unit == "m" else (1.0, p.unit.replace("m2", "m²"))
+    band = number(2.0 * factor * p.sd, unit, digits=2)
+    return f"{words(p.segment)} {number(factor * p.value)} ± {band} ({change})"

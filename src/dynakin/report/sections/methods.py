@@ -1,0 +1,162 @@
+"""A trial by several methods: Table II, the wrench, angles and moments (the paper's Figures 5 to 7) as sections."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeVar
+
+import numpy as np
+
+from dynakin.report.labels import COMPONENT_LABELS, moment_note, number, sentence, words
+from dynakin.report.method_styles import DERIVED_LINE, LineStyle, method_styles
+from dynakin.report.sections.method_panels import overlaid
+from dynakin.report.sections.panels import Panel
+from dynakin.report.sections.section import Section
+from dynakin.report.text_tables import table2_text
+from dynakin.results.estimate import COMPONENTS
+from dynakin.results.measures.mean_curves import MEASURED
+from dynakin.results.measures.sources import DERIVED, moment_sources
+from dynakin.validation.differences import AngleDifference, MomentDifference, angle_differences, moment_differences
+from dynakin.validation.methods import AT, CLASSICAL, Method, Trial
+from dynakin.validation.statistics import Spread
+from dynakin.validation.table2 import table2
+
+_Difference = TypeVar("_Difference", AngleDifference, MomentDifference)
+ABOUT_TABLE2 = (
+    "How far each method is from what was measured. The filter was given these markers and plates, so its small "
+    "figures say that it follows them, not that its state is right; AT and the classical method see no plates."
+)
+ABOUT_METHODS = (
+    "AT: classical joint angles, low-passed and differentiated, on segments of constant length with the table’s "
+    "inertia. Classical: the same with joints that follow their landmarks."
+)
+
+
+def methods_section(trial: Trial) -> Section:
+    """All of one trial in one section: the filter's page."""
+    seconds = trial.time[trial.window]
+    title = f"Difference to what was measured, {seconds[0]:g} to {seconds[-1]:g} s"
+    rows = table2([trial])
+    referred = bool(trial.of_kind(AT) or trial.of_kind(CLASSICAL))
+    return Section(
+        "methods",
+        "Other methods",
+        f"{ABOUT_METHODS} {ABOUT_TABLE2}" if referred else "",
+        tables=[table2_text(rows, title), table2_text(rows, "Every marker", single_markers=True)] if referred else [],
+        notes=trial.notes,
+        parts=trial_parts(trial, "methods") if referred else [],
+    )
+
+
+def trial_parts(trial: Trial, key: str) -> list[Section]:
+    """Wrench, angles and moments over time by method; one without a reference method is left out."""
+    return [part for part in (wrench_part(trial, key), angle_part(trial, key), moment_part(trial, key)) if part.panels]
+
+
+def wrench_part(trial: Trial, key: str) -> Section:
+    """Figure 6: each modelled component as measured, by the filters and by AT."""
+    methods = [*trial.of_kind(AT), *trial.of_kind("EKF")]
+    rms = {(row.quantity, row.method): row.rms for row in table2([trial])}
+    derived = np.isnan(trial.measured_wrench) & np.isfinite(trial.measured_wrench).any(axis=0)
+    panels = []
+    for k, component in enumerate(COMPONENTS):
+        if not trial.of_kind(AT) or not np.isfinite(trial.measured_wrench[:, k]).any():
+            continue
+        title, unit = COMPONENT_LABELS[component]
+        lines = _lines(trial, methods, [method.wrench[:, k] for method in methods])
+        measured = (method_styles([MEASURED])[MEASURED], trial.measured_wrench[:, k])
+        note = _each({method.name: rms[component, method.name] for method in reversed(methods)}, unit)
+        panels.append(
+            overlaid(
+                f"{key}-{component}",
+                title,
+                unit,
+                trial.time,
+                [measured, *lines],
+                derived=derived[:, k],
+                note=f"RMS: {note}",
+            )
+        )
+    styles = _key(trial, [MEASURED], methods, derived=bool(derived.any()))
+    return Section(f"{key}-wrench", "Ground reaction by method", "", panels, lines=styles)
+
+
+def angle_part(trial: Trial, key: str) -> Section:
+    """Figure 5: each coordinate by the filters and by the classical method."""
+    methods = [*trial.of_kind("EKF"), *trial.of_kind(CLASSICAL)]
+    panels = []
+    for name, rows in _by_coordinate(angle_differences([trial])).items():
+        k = trial.coordinate_names.index(name)
+        if all(np.ptp(method.coordinates[:, k]) == 0.0 for method in trial.of_kind("EKF")):
+            continue  # locked
+        turn = bool(trial.rotation[k])
+        unit, scale = ("deg", np.degrees(1.0)) if turn else ("mm", 1000.0)
+        lines = _lines(trial, methods, [scale * method.coordinates[:, k] for method in methods])
+        note = f"RMS difference {_each({row.method: row.rms for row in rows}, unit)}"
+        if len(rows) == 1:
+            note += f", {number(rows[0].rms_about_mean.mean, unit)} about its mean"
+        panels.append(overlaid(f"{key}-angle-{name}", sentence(words(name)), unit, trial.time, lines, note=note))
+    return Section(
+        f"{key}-angles",
+        "Joint angles beside the classical method",
+        "A constant difference is mostly a matter of where zero is; what is left about the mean is the movement’s.",
+        panels,
+        lines=_key(trial, [], methods),
+    )
+
+
+def moment_part(trial: Trial, key: str) -> Section:
+    """Figure 7: joint moments by the filters and by AT, knees first, the other joints folded."""
+    methods = [*trial.of_kind("EKF"), *trial.of_kind(AT)]
+    panels: dict[str, Panel] = {}
+    estimate = next(iter(trial.estimates.values()))
+    derived = moment_sources(estimate.data) == DERIVED  # by the plates alone, so alike for all filters
+    for name, rows in _by_coordinate(moment_differences([trial])).items():
+        k = trial.coordinate_names.index(name)
+        unit = rows[0].unit
+        lines = _lines(trial, methods, [method.moments[:, k] for method in methods])
+        note = f"RMS difference {_each({row.method: row.rms for row in rows}, unit)}"
+        if len(rows) == 1:
+            note += f", {number(rows[0].nrms_rms_percent.mean, digits=2)} % of AT’s RMS"
+        about = moment_note(estimate, name)
+        note = f"{about}; {note}" if about else note
+        title = f"{sentence(words(name))} moment"
+        panels[name] = overlaid(
+            f"{key}-moment-{name}", title, unit, trial.time, lines, derived=derived[:, k], note=note
+        )
+    knees = [panel for name, panel in panels.items() if "knee" in name]
+    others = [panel for name, panel in panels.items() if "knee" not in name]
+    return Section(
+        f"{key}-moments",
+        "Joint moments against AT",
+        "Nothing measures a joint moment: the difference says how much hangs on the method.",
+        knees or others,
+        folded=others if knees else [],
+        folded_title="The other joints’ moments against AT",
+        lines=_key(trial, [], methods, derived=bool(derived.any())),
+    )
+
+
+def _lines(trial: Trial, methods: Sequence[Method], values: list[np.ndarray]) -> list[tuple[LineStyle, np.ndarray]]:
+    styles = method_styles(method.name for method in trial.methods)
+    return [(styles[method.name], signal) for method, signal in zip(methods, values, strict=True)]
+
+
+def _key(trial: Trial, more: list[str], methods: Sequence[Method], *, derived: bool = False) -> tuple[LineStyle, ...]:
+    styles = method_styles([MEASURED, *(method.name for method in trial.methods)])
+    own = tuple(styles[name] for name in [*more, *(method.name for method in methods)])
+    return (*own, DERIVED_LINE) if derived else own
+
+
+def _each(figures: dict[str, Spread], unit: str) -> str:
+    """`12.3 N` of one method; of several each with its name, the unit at the end."""
+    if len(figures) == 1:
+        return number(next(iter(figures.values())).mean, unit)
+    return ", ".join(f"{name} {number(value.mean)}" for name, value in figures.items()) + f" {unit}"
+
+
+def _by_coordinate(rows: Sequence[_Difference]) -> dict[str, list[_Difference]]:
+    found: dict[str, list[_Difference]] = {}
+    for row in rows:
+        found.setdefault(row.coordinate, []).append(row)
+    return found

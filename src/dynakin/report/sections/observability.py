@@ -1,0 +1,190 @@
+"""The section on what the recording tells of each constant, what it cannot tell, and what would tell more."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dynakin.elements import element
+from dynakin.report.labels import is_planar, number, parameter_label, sentence, short_marker_names, words
+from dynakin.report.plot import ESTIMATED, GRID, INK, MEASURED, QUIET, new_axes, to_svg
+from dynakin.report.sections.panels import Panel
+from dynakin.report.sections.section import Section
+from dynakin.report.text_tables import TextTable
+from dynakin.results.estimate import Estimate
+from dynakin.results.measures.posterior import JUDGEMENT_WORDS, KNOWN, NOTHING, group_of, told_in_words
+from dynakin.results.records import Parameter
+
+_ROW_IN = 0.155
+
+
+@dataclass(frozen=True)
+class ShareRow:
+    """One line of the figure: how much of the prior standard deviation is left, and both in words."""
+
+    label: str
+    share: float
+    sizes: str
+
+
+def identifiability_section(estimate: Estimate, metrics: Mapping[str, Any]) -> Section:
+    """Posterior against prior of every constant; base parameters, advice and gauges where they were looked for."""
+    block = metrics.get("identifiability") or {}
+    groups = _groups(estimate, block.get("parameters", {}))
+    base = block.get("base_parameters", {}).get("parameters", {})
+    if base:
+        groups["Base parameters"] = [
+            ShareRow(_base_label(name), entry["share"], _sizes(entry["prior_sd"], entry["sd"], _base_unit(name)))
+            for name, entry in base.items()
+        ]
+    if not groups:
+        return Section("identifiability", "What the recording tells", "")
+    left = {title: groups[title] for title in groups if title in ("Lengths", "Masses", "First moments")}
+    left |= {title: groups[title] for title in groups if title == "Moments of inertia"}
+    if not is_planar(estimate):  # in space there are nine numbers a segment, too many to look at one by one
+        left = {title: rows for title, rows in groups.items() if title in ("Lengths", "Masses")}
+        groups = left | {title: rows for title, rows in groups.items() if title == "Marker places"}
+    right = {title: rows for title, rows in groups.items() if title not in left}
+    parts = [
+        Section(f"identifiability-{anchor}", title, text, notes=tuple(sentence(note) for note in notes))
+        for anchor, title, text, notes in (
+            ("advice", "What would tell more", _ADVICE, block.get("advice", [])),
+            ("gauges", "What no measurement sees", _GAUGES, block.get("gauges", {}).get("words", [])),
+        )
+        if notes
+    ]
+    if base:
+        parts.insert(0, Section("identifiability-base", "Base parameters", _BASE, tables=[_base_table(base)]))
+    return Section(
+        "identifiability",
+        "What the recording tells",
+        "The standard deviation of each constant before the first frame is the whole line, what is left of it after "
+        f"the last frame the blue part. Up to the first mark ({KNOWN:g}) a value is the data’s, from the second "
+        f"({NOTHING:g}) on it is the prior’s. A base parameter is named after one of the numbers in it.",
+        wide=[_panel(f"told-{k}", rows) for k, rows in enumerate((left, right)) if rows],
+        notes=(*told_in_words(estimate), *_base_sentence(block)),
+        parts=parts,
+    )
+
+
+_BASE = (
+    "The ground reaction depends on the segments’ inertia through these sums only: what leaves them as they are, no "
+    "movement can tell."
+)
+_ADVICE = (
+    "Each motion was put through the same filter in place of this recording’s; a factor says how much smaller the "
+    "standard deviation would have ended."
+)
+_GAUGES = (
+    "Along these directions constants and angles’ zeros can move against each other without any change in markers or "
+    "plates. Only what is known beforehand holds them."
+)
+
+
+def _groups(estimate: Estimate, entries: Mapping[str, Mapping[str, Any]]) -> dict[str, list[ShareRow]]:
+    names = short_marker_names(estimate.marker_names)
+    found: dict[str, list[ShareRow]] = {}
+    of_marker: dict[str, list[Mapping[str, Any]]] = {}
+    recorded = _recorded(estimate)
+    for p in estimate.parameters:
+        if p.name not in entries or (group := group_of(p)) is None:
+            continue
+        entry = entries[p.name]
+        if group == "marker places":
+            of_marker.setdefault(element(p.name).owner, []).append(entry)
+        else:
+            sizes = _sizes(entry["prior_sd"], entry["sd"], p.unit)
+            found.setdefault(sentence(group), []).append(ShareRow(_label(p, names), entry["share"], sizes))
+    for marker, axes in of_marker.items():
+        prior, after = (float(np.sqrt(np.mean([axis[key] ** 2 for axis in axes]))) for key in ("prior_sd", "sd"))
+        label = names.get(recorded.get(marker, marker), marker)
+        found.setdefault("Marker places", []).append(ShareRow(label, after / prior, _sizes(prior, after, "m")))
+    return found
+
+
+def _recorded(estimate: Estimate) -> dict[str, str]:
+    """The model's marker names and the recording's, which stand in the same order."""
+    of_model = list(dict.fromkeys(element(p.name).owner for p in estimate.parameters if p.kind == "marker"))
+    return dict(zip(of_model, estimate.marker_names, strict=False))
+
+
+def _label(p: Parameter, names: dict[str, str]) -> str:
+    if p.kind == "length" or p.name.endswith("/mass"):
+        return words(p.segment)
+    return parameter_label(p, names).replace("first moment, ", "").replace("inertia zz", "").strip()
+
+
+def _sizes(prior: float, after: float, unit: str) -> str:
+    factor, unit = (1000.0, "mm") if unit == "m" else (1.0, unit.replace("m2", "m²"))
+    return f"{number(factor * prior, digits=2)} → {number(factor * after, unit, digits=2)}"
+
+
+def _base_label(name: str) -> str:
+    _, segment, kind = element(name)
+    short = {"mass": "mass", "mx": "forward", "my": "up", "mz": "right"}.get(kind, kind.replace("i", "inertia ", 1))
+    return f"{words(segment)} {short.replace('inertia zz', 'inertia')}"
+
+
+def _base_unit(name: str) -> str:
+    return {"mass": "kg", "mx": "kg m", "my": "kg m", "mz": "kg m"}.get(name.rpartition("/")[2], "kg m2")
+
+
+def _base_sentence(block: Mapping[str, Any]) -> list[str]:
+    found = block.get("base_parameters")
+    if not found:
+        return []
+    judgements = [entry["judgement"] for entry in found["parameters"].values()]
+    return [
+        f"The ground reaction depends on {found['rank']} sums of the {found['of']} inertial numbers (base parameters): "
+        f"{judgements.count('known')} of them are known from the data, {judgements.count('partly')} in part, of "
+        f"{judgements.count('nothing')} the data say nothing."
+    ]
+
+
+def _base_table(base: Mapping[str, Mapping[str, Any]]) -> TextTable:
+    rows = []
+    for name, entry in base.items():
+        numbers = (number(entry[key]) for key in ("value", "prior_sd", "sd"))
+        unit = _base_unit(name).replace("m2", "m²")
+        rows.append((sentence(entry["words"]), unit, *numbers, JUDGEMENT_WORDS[entry["judgement"]]))
+    headings = ("base parameter", "unit", "value", "sd before", "sd after", "")
+    return TextTable("The base parameters as the sums that they are", headings, rows, (2, 3, 4), folded=True)
+
+
+def _panel(key: str, groups: Mapping[str, Sequence[ShareRow]]) -> Panel:
+    count = sum(len(rows) for rows in groups.values()) + 1.6 * len(groups)
+    figure, axes = new_axes(4.3, 0.35 + _ROW_IN * count, fitted=True)
+    place, ticks, labels = 0.0, [], []
+    for title, rows in groups.items():
+        place -= 1.6
+        axes.annotate(
+            title, (0.0, place + 0.85), xytext=(0, 0), textcoords="offset points", color=INK, weight="bold", fontsize=8,
+            va="center",
+            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8},
+            zorder=4,
+        )  # fmt: skip
+        for row in rows:
+            shown = min(row.share, 1.0)
+            axes.plot([0.0, 1.0], [place, place], color=MEASURED, alpha=0.45, linewidth=3.2, solid_capstyle="butt")
+            axes.plot([0.0, shown], [place, place], color=ESTIMATED, linewidth=3.2, solid_capstyle="butt")
+            axes.annotate(
+                row.sizes, (1.0, place), xytext=(5, 0), textcoords="offset points", color=QUIET, fontsize=7, va="center"
+            )
+            ticks.append(place)
+            labels.append(row.label)
+            place -= 1.0
+    for mark in (KNOWN, NOTHING):
+        axes.axvline(mark, color=QUIET, linewidth=0.7, linestyle=(0, (4, 3)), zorder=3)
+    axes.set_yticks(ticks, labels, color=INK, fontsize=7.5)
+    axes.set_xlim(0.0, 1.0)
+    axes.set_ylim(place + 0.2, 0.2)
+    axes.set_xticks([0.0, KNOWN, NOTHING, 1.0], ["0", f"{KNOWN:g}", f"{NOTHING:g}", "1"])
+    axes.tick_params(axis="x", color=GRID)
+    axes.grid(False)
+    titles = [title if k == 0 else title.lower() for k, title in enumerate(groups)]
+    title = " and ".join([", ".join(titles[:-1]), titles[-1]] if len(titles) > 1 else titles)
+    note = "standard deviation left, as a part of the prior one; prior → end"
+    return Panel(title, note, to_svg(figure, key, f"{title}: standard deviation at the end over that before"))

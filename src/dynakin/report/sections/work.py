@@ -1,0 +1,153 @@
+"""Powers, work and how alike the sides are: sections of a body with a right and a left."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from dynakin.report.chart import Line, chart
+from dynakin.report.colours import SIDE_COLOURS
+from dynakin.report.labels import listed, number
+from dynakin.report.method_styles import DERIVED_LINE
+from dynakin.report.sections.section import NOTHING, Section, needs
+from dynakin.report.sections.spatial_sections import SIDE_LINES
+from dynakin.report.sides import Joint, joints_of
+from dynakin.report.text_tables import TextTable
+from dynakin.results.estimate import Estimate
+from dynakin.results.measures.sources import DERIVED, measured_moments, moment_sources
+
+_NOT_MEANT = 0.02
+"""Below this share of the largest of its kind a quantity is too small for a ratio of the sides to say anything."""
+
+
+@needs("work", otherwise=NOTHING)
+def power_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
+    """Power of the joints over the body mass, and the work of each coordinate."""
+    work, mass = metrics["work"], estimate.mass_kg
+    powers = estimate.powers() / (mass or 1.0)
+    drawn = np.asarray((np.nan_to_num(powers) != 0.0).any(axis=0))
+    joints = [
+        joint
+        for joint in joints_of(estimate)
+        if joint.region != "Whole body" and any(drawn[k] for k in joint.columns.values())
+    ]
+    if not joints:
+        return Section("powers", "Powers and work", "")
+    unit = "W/kg" if mass else "W"
+    derived = moment_sources(estimate.data) == DERIVED
+    panels = {"Legs": [], "": []}  # type: dict[str, list[Any]]
+    for joint in joints:
+        lines = [Line(powers[:, k], SIDE_COLOURS[side], dashed=derived[:, k]) for side, k in joint.columns.items()]
+        note = "; ".join(
+            f"{f'{side} ' if side else ''}peak {number(own['peak_w'] / (mass or 1.0), unit, digits=2)}"
+            for side, k in joint.columns.items()
+            if (own := work.get(_name(estimate, k)))
+        )
+        shown = chart(joint.name, unit, estimate.time, lines[::-1], note=note, least_range=0.05)
+        panels["Legs" if joint.region == "Legs" else ""].append(shown)
+    window = metrics["window"]
+    seconds = f"{window['start_s']:.4g} to {window['end_s']:.4g} s"
+    return Section(
+        "powers",
+        "Powers and work",
+        "Moment times speed: positive where energy is added to the body. Work is the sum of its positive and of its "
+        "negative parts. Peaks and work are those of measured moments: where a leg’s are not measured throughout, of "
+        "its stances and swings that are measured from end to end.",
+        panels["Legs"] or panels[""],
+        folded=panels[""] if panels["Legs"] else [],
+        folded_title="Powers of trunk and arms",
+        lines=(*SIDE_LINES, *((DERIVED_LINE,) if derived.any() else ())),
+        tables=[table for table in (_work_table(estimate, joints, work, f"Work, {seconds}"),) if table.rows],
+    )
+
+
+def _work_table(estimate: Estimate, joints: list[Joint], work: Mapping[str, Any], title: str) -> TextTable:
+    rows: list[tuple[str, ...]] = []
+    for joint in joints:
+        for side, k in joint.columns.items():
+            own = work.get(_name(estimate, k))
+            if own is None:
+                continue
+            cells = [number(own[key], digits=3) for key in ("positive_j", "negative_j")]
+            cells += [number(own[key], digits=2) for key in ("positive_j_per_kg", "negative_j_per_kg")]
+            cells += [number(own[key], digits=3) for key in ("peak_w", "lowest_w")] + [str(own["frames"])]
+            first = not rows or joint.name not in [row[0] for row in rows]
+            rows.append((joint.name if first else "", side or "–", *cells))
+    headings = ("", "side", "positive, J", "negative, J", "positive, J/kg", "negative, J/kg", "peak, W", "lowest, W")
+    return TextTable(title, (*headings, "frames"), rows, tuple(range(2, 9)), folded=len(rows) > 12)
+
+
+@needs("asymmetry", "work", otherwise=NOTHING)
+def asymmetry_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
+    """Symmetry indices of legs, and folded of arms."""
+    found = metrics["asymmetry"]
+    joints = [joint for joint in joints_of(estimate) if len(joint.columns) == 2]
+    small = _too_small(estimate, metrics, joints)
+    keys = ("range", "peak_moment", "positive_work", "negative_work")
+    tables = []
+    for region, folded in (("Legs", False), ("Arms", True)):
+        rows = []
+        for joint in joints:
+            if joint.region == region and joint.stem in found["coordinates"]:
+                own = found["coordinates"][joint.stem]
+                rows.append((joint.title, *(_percent(own[key], (joint.stem, key) in small) for key in keys)))
+        if rows:
+            headings = ("", "range", "peak moment", "positive work", "negative work")
+            tables.append(TextTable(f"{region}: symmetry index, %", headings, rows, (1, 2, 3, 4), folded))
+    if found["feet"] is not None:
+        row = ("Feet", *(_percent(found["feet"][key]) for key in ("peak_vertical_force", "impulse")))
+        tables.insert(0, TextTable("Feet: symmetry index, %", ("", "peak vertical force", "impulse"), [row], (1, 2)))
+    return Section(
+        "asymmetry",
+        "Right and left",
+        "Right less left over their mean, in per cent (Robinson, Herzog and Nigg 1987): positive where the right is "
+        "larger, 0 where they are alike. In brackets where both are small, so that the ratio says little."
+        + _compared(found),
+        tables=tables,
+    )
+
+
+def _compared(found: Mapping[str, Any]) -> str:
+    """What the sides’ moments and forces were compared over, or why they were not."""
+    stances, reason = found["stances"], found["reason"]
+    how = ""
+    if stances is not None and all(stances.values()):
+        each = listed([f"{count} of the {foot} foot" for foot, count in stances.items()])
+        how = f" Moments, work and forces of the legs are means over whole measured stances: {each}."
+    return how + (f" {reason}" if reason else "")
+
+
+def _too_small(estimate: Estimate, metrics: dict[str, Any], joints: list[Joint]) -> set[tuple[str, str]]:
+    """(stem, quantity) whose larger side is a small part of the body's largest."""
+    values, moments = (
+        estimate.data["coordinates"].transpose("time", "coordinate").values,
+        measured_moments(estimate.data),
+    )
+    sizes: dict[str, dict[str, float]] = {"range": {}, "peak_moment": {}, "positive_work": {}, "negative_work": {}}
+    for joint in joints:
+        columns = list(joint.columns.values())
+        sizes["range"][joint.stem] = max(float(np.ptp(values[:, k])) for k in columns)
+        sizes["peak_moment"][joint.stem] = max(float(np.nanmax(np.abs(moments[:, k]), initial=0.0)) for k in columns)
+        for key, entry in (("positive_work", "positive_j"), ("negative_work", "negative_j")):
+            each = [metrics["work"].get(_name(estimate, k), {}).get(entry) or 0.0 for k in columns]
+            sizes[key][joint.stem] = max(abs(value) for value in each)
+    return {
+        (stem, key)
+        for key, every in sizes.items()
+        for stem, value in every.items()
+        if value < _NOT_MEANT * max(every.values(), default=0.0)
+    }
+
+
+def _percent(value: float | None, small: bool = False) -> str:
+    if value is None:
+        return "–"
+    text = f"{value:+.0f}".replace("-", "−")
+    text = "0" if text in ("+0", "−0") else text
+    return f"({text})" if small else text
+
+
+def _name(estimate: Estimate, k: int) -> str:
+    return estimate.coordinate_names[k]

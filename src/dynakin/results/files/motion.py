@@ -1,0 +1,163 @@
+"""The motion tables of an output folder: coordinates, speeds, accelerations, moments and the wrench."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from dynakin.results.estimate import COMPONENTS, Estimate
+from dynakin.results.files.storage import write_storage
+from dynakin.results.measures.sources import ABSENT, NOTES, moment_sources
+
+
+def moment_columns(estimate: Estimate) -> list[str]:
+    """Column names of ``moments.sto``, as OpenSim's inverse dynamics writes them: `knee_moment`, `pelvis_tx_force`."""
+    return [
+        f"{name}_{'moment' if rotation else 'force'}"
+        for name, rotation in zip(estimate.coordinate_names, estimate.is_rotation(), strict=True)
+    ]
+
+
+def write_coordinates(estimate: Estimate, path: Path) -> None:
+    """``coordinates.mot``: degrees and metres."""
+    write_storage(
+        path,
+        "Coordinates",
+        estimate.time,
+        estimate.coordinate_names,
+        _in_degrees(estimate, "coordinates"),
+        in_degrees=True,
+        notes=["Rotations in degrees, translations in metres.", _frame(estimate)],
+    )
+
+
+def write_speeds(estimate: Estimate, path: Path) -> None:
+    """``speeds.sto``: degrees/s and m/s, with inDegrees=yes as OpenSim's own Kinematics analysis writes them."""
+    write_storage(
+        path,
+        "Speeds",
+        estimate.time,
+        estimate.coordinate_names,
+        _in_degrees(estimate, "speeds"),
+        in_degrees=True,
+        notes=["Rotations in degrees per second, translations in metres per second.", _frame(estimate)],
+    )
+
+
+def write_accelerations(estimate: Estimate, path: Path) -> None:
+    """``accelerations.sto``: degrees/s2 and m/s2, with inDegrees=yes as OpenSim's own Kinematics analysis does."""
+    write_storage(
+        path,
+        "Accelerations",
+        estimate.time,
+        estimate.coordinate_names,
+        _in_degrees(estimate, "accelerations"),
+        in_degrees=True,
+        notes=[
+            "Rotations in degrees per second squared, translations in metres per second squared.",
+            _frame(estimate),
+        ],
+    )
+
+
+def write_moments(estimate: Estimate, path: Path) -> None:
+    """``moments.sto``: N m about rotations, N along translations (radians: inDegrees=no)."""
+    write_storage(
+        path,
+        "Inverse Dynamics Generalized Forces",
+        estimate.time,
+        moment_columns(estimate),
+        estimate.data["moments"].transpose("time", "coordinate").values,
+        in_degrees=False,
+        notes=[
+            "Moments in N m, forces in N. In a model that lumps both sides, leg moments are the sum of both legs.",
+            "moments_source.sto says of each whether it is measured, derived or absent (nan).",
+        ],
+    )
+
+
+def write_moment_sources(estimate: Estimate, path: Path) -> None:
+    """``moments_source.sto``: the rows and columns of ``moments.sto``, each with the code of where it comes from."""
+    write_sources(path, "Sources of the moments", estimate, moment_columns(estimate), moment_sources(estimate.data))
+
+
+def write_sources(path: Path, title: str, estimate: Estimate, names: list[str], codes: np.ndarray) -> None:
+    """A table of codes (T, N), 0 measured, 1 derived, 2 absent, which the header explains."""
+    write_storage(path, title, estimate.time, names, codes.astype(float), in_degrees=False, notes=NOTES)
+
+
+def write_deviations(estimate: Estimate, path: Path) -> None:
+    """``uncertainty.sto``: one standard deviation of all that the other motion files hold.
+
+    Columns ``NAME``, ``NAME_speed``, ``NAME_acceleration`` in degrees or metres (a second, a second squared), moments
+    as in ``moments.sto``, ``fx`` ... ``mz`` in N and N m; what an estimate does not hold has no column.
+    """
+    names: list[str] = []
+    columns: list[np.ndarray] = []
+    for variable, suffix in (("coordinates", ""), ("speeds", "_speed"), ("accelerations", "_acceleration")):
+        if f"{variable}_sd" in estimate.data:
+            names += [f"{name}{suffix}" for name in estimate.coordinate_names]
+            columns.append(_in_degrees(estimate, f"{variable}_sd"))
+    if "moments_sd" in estimate.data:
+        names += moment_columns(estimate)
+        deviations = estimate.data["moments_sd"].transpose("time", "coordinate").values
+        columns.append(np.where(moment_sources(estimate.data) == ABSENT, np.nan, deviations))
+    if "wrench_sd" in estimate.data:
+        values = estimate.data["wrench_sd"].transpose("time", "component").values
+        known = np.isfinite(values).any(axis=0)
+        names += [name for name, seen in zip(COMPONENTS, known, strict=True) if seen]
+        columns.append(values[:, known])
+    write_storage(
+        path,
+        "Standard deviations",
+        estimate.time,
+        names,
+        np.hstack(columns) if columns else np.empty((len(estimate.time), 0)),
+        in_degrees=True,
+        notes=[
+            "One standard deviation, as the filter believes. Degrees, metres, seconds, N, N m.",
+            "Of moments that are derived or absent (moments_source.sto) too, nan where absent.",
+        ],
+    )
+
+
+def write_wrench(estimate: Estimate, path: Path) -> None:
+    """``wrench.sto``: N and N m, ground frame, about the model's ground origin, what the ground does to the person.
+
+    Columns ``fx_measured`` ... ``mz_measured``, ``fx_estimated`` ... ``mz_estimated``; a component that is never
+    measured, or that the model does not explain, has no column.
+    """
+    names: list[str] = []
+    columns: list[np.ndarray] = []
+    for kind in ("measured", "estimated"):
+        values = estimate.data[f"wrench_{kind}"].transpose("time", "component").values
+        for index, component in enumerate(COMPONENTS):
+            if np.isfinite(values[:, index]).any():
+                names.append(f"{component}_{kind}")
+                columns.append(values[:, index])
+    table = np.column_stack(columns) if columns else np.empty((len(estimate.time), 0))
+    write_storage(
+        path,
+        "External wrench",
+        estimate.time,
+        names,
+        table,
+        in_degrees=False,
+        notes=[
+            "Forces in N, moments in N m about the origin of the frame, acting from the ground on the person. "
+            "Estimated where it is not measured, derived from the motion.",
+            _frame(estimate),
+        ],
+    )
+
+
+def _frame(estimate: Estimate) -> str:
+    return f"Frame: {estimate.ground.in_words}."
+
+
+def _in_degrees(estimate: Estimate, variable: str) -> np.ndarray:
+    values = estimate.data[variable].transpose("time", "coordinate").values.astype(float, copy=True)
+    rotation = estimate.is_rotation()
+    values[:, rotation] = np.degrees(values[:, rotation])
+    return values

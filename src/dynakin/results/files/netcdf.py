@@ -1,0 +1,108 @@
+"""``estimate.nc``: all of an estimate as one labelled netCDF file; ``xarray.open_dataset`` reads it back."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import xarray as xr
+
+from dynakin.absent import finite, with_nulls
+from dynakin.results.estimate import Estimate
+from dynakin.results.files.versions import versions
+from dynakin.results.measures.metrics import SCHEMA_VERSION
+from dynakin.results.measures.sources import MEANINGS
+
+_UNITS = {
+    "coordinates": "rad or m, see coordinate_type",
+    "speeds": "rad/s or m/s, see coordinate_type",
+    "accelerations": "rad/s2 or m/s2, see coordinate_type",
+    "moments": "N m for rotations, N for translations",
+    "markers": "m",
+    "mass_centre_velocity": "m/s",
+    "mass_centre": "m",
+    "joint_loads": "N for fx fy fz, N m for mx my mz",
+    "foot_wrench": "N for fx fy fz, N m for mx my mz",
+    "foot_adjustment": "N for fx fy fz, N m for mx my mz",
+    "wrench": "N for fx fy fz, N m for mx my mz",
+    "nis": "1",
+    "n_rows": "1",
+    "log_likelihood": "1",
+}
+_FLAGS = {
+    "moment_source": (MEANINGS, "where each moment comes from; derived: from the motion"),
+    "joint_source": (MEANINGS, "where each joint's load comes from; derived: from the motion"),
+    "foot_contact": (("in_the_air", "measured", "not_measured"), "contact of each foot"),
+}
+"""Codes by CF's conventions for flags: what 0, 1 and 2 mean, and of what."""
+_FLAGGED = {"moments": "moment_source", "moments_sd": "moment_source", "joint_loads": "joint_source"} | dict.fromkeys(
+    ("foot_wrench", "foot_wrench_sd"), "foot_contact"
+)
+_PARAMETER_NUMBERS = ("value", "sd", "initial", "table", "lower", "upper")
+
+
+def full_dataset(estimate: Estimate) -> xr.Dataset:
+    """The arrays of the estimate with units, the parameters, the events, the ground frame and the configuration."""
+    data = estimate.data.copy()
+    for name, variable in data.data_vars.items():
+        unit = next((unit for stem, unit in _UNITS.items() if str(name).startswith(stem)), None)
+        if unit is not None:
+            variable.attrs["units"] = unit
+    for name in [name for name, variable in data.data_vars.items() if variable.dtype.kind == "f"]:
+        data[name] = data[name].copy(data=finite(data[name].values))
+    for name, (meanings, what) in _FLAGS.items():
+        if name in data:
+            data[name].attrs.update(
+                long_name=what,
+                flag_values=np.arange(len(meanings), dtype=data[name].dtype),
+                flag_meanings=" ".join(meanings),
+            )
+    for name, flag in _FLAGGED.items():
+        if name in data and flag in data:
+            data[name].attrs["ancillary_variables"] = flag
+    data["time"].attrs["units"] = "s"
+    parameters, events = estimate.parameters, estimate.events
+    data = data.assign_coords(parameter=[p.name for p in parameters])
+    for key in _PARAMETER_NUMBERS:
+        numbers = [np.nan if getattr(p, key) is None else getattr(p, key) for p in parameters]
+        data[f"parameter_{key}"] = ("parameter", finite(numbers))
+    for key in ("kind", "segment", "unit"):
+        data[f"parameter_{key}"] = (
+            "parameter",
+            np.array([getattr(p, key) for p in parameters], dtype=object),
+        )
+    for key in ("at_bound", "estimated"):
+        data[f"parameter_{key}"] = ("parameter", np.array([getattr(p, key) for p in parameters], dtype=bool))
+    if events:
+        data["event_time"] = ("event", np.array([e.time_s for e in events], dtype=float), {"units": "s"})
+        data["event_frame"] = ("event", np.array([e.frame for e in events], dtype=int))
+        for key in ("kind", "subject", "message"):
+            data[f"event_{key}"] = ("event", np.array([getattr(e, key) for e in events], dtype=object))
+    data["ground_rotation"] = (("axis", "laboratory_axis"), np.asarray(estimate.ground.rotation, dtype=float))
+    data["ground_origin"] = (
+        "laboratory_axis",
+        np.asarray(estimate.ground.origin_L, dtype=float),
+        {"units": "m"},
+    )
+    data.attrs.update(
+        title=f"dynakin estimate of {estimate.recording.name}",
+        schema_version=SCHEMA_VERSION,
+        dynakin_version=versions()["dynakin"],
+        model=estimate.model_name,
+        frame=f"{estimate.ground.in_words}; SI, radians",
+        messages="\n".join(estimate.messages),
+        configuration=json.dumps(with_nulls(estimate.config), default=str, allow_nan=False),
+    )
+    return data
+
+
+def write_netcdf(estimate: Estimate, path: Path) -> None:
+    """Write `full_dataset`, arrays compressed without loss."""
+    data = full_dataset(estimate)
+    encoding = {
+        name: {"zlib": True, "complevel": 4, "shuffle": True}
+        for name, variable in data.data_vars.items()
+        if variable.dtype.kind == "f" and variable.size > 1000
+    }
+    data.to_netcdf(path, engine="h5netcdf", encoding=encoding)

@@ -1,0 +1,1 @@
+"""What is read from an estimate: fit, consistency, power, symmetry, cycles, events."""

@@ -1,0 +1,106 @@
+"""Joint angles as clinics read them: from a standing zero, under clinical names and signs."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING, Literal, NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+if TYPE_CHECKING:
+    from dynakin.results.estimate import Estimate
+
+Array = npt.NDArray[np.float64]
+Signs = Literal["opensim", "clinical"]
+
+
+class Convention(NamedTuple):
+    """Clinical name of a coordinate, its sign beside OpenSim's, and what its two directions are called."""
+
+    name: str
+    sign: int
+    positive: str
+    negative: str
+
+
+# The directions are those of OpenSim's models since version 4 (Rajagopal et al. 2016) and of the built-in ones; the
+# clinical names are the International Society of Biomechanics' (Wu et al. 2002, 2005), whose pelvis tilts forwards and
+# whose trunk flexes forwards as positive.
+CONVENTIONS = {
+    "pelvis_tilt": Convention("pelvic_tilt", -1, "anterior", "posterior"),
+    "pelvis_list": Convention("pelvic_obliquity", -1, "right side up", "right side down"),
+    "pelvis_rotation": Convention("pelvic_rotation", 1, "right side forward", "right side backward"),
+    "hip_flexion": Convention("hip_flexion", 1, "flexion", "extension"),
+    "hip_adduction": Convention("hip_adduction", 1, "adduction", "abduction"),
+    "hip_rotation": Convention("hip_rotation", 1, "internal rotation", "external rotation"),
+    "hip": Convention("hip_flexion", 1, "flexion", "extension"),
+    "knee_angle": Convention("knee_flexion", 1, "flexion", "extension"),
+    "knee": Convention("knee_flexion", 1, "flexion", "extension"),
+    "ankle_angle": Convention("ankle_dorsiflexion", 1, "dorsiflexion", "plantarflexion"),
+    "ankle": Convention("ankle_dorsiflexion", 1, "dorsiflexion", "plantarflexion"),
+    "subtalar_angle": Convention("subtalar_inversion", 1, "inversion", "eversion"),
+    "lumbar_extension": Convention("trunk_flexion", -1, "flexion", "extension"),
+    "lumbar": Convention("trunk_flexion", -1, "flexion", "extension"),
+    "arm_flex": Convention("shoulder_flexion", 1, "flexion", "extension"),
+    "shoulder": Convention("shoulder_flexion", 1, "flexion", "extension"),
+    "arm_add": Convention("shoulder_adduction", 1, "adduction", "abduction"),
+    "elbow_flex": Convention("elbow_flexion", 1, "flexion", "extension"),
+    "elbow": Convention("elbow_flexion", 1, "flexion", "extension"),
+}
+
+
+def convention_of(coordinate: str) -> tuple[Convention, str] | None:
+    """Convention of a coordinate and its side ("_r", "_l" or nothing); None where it has no clinical name."""
+    side = coordinate[-2:] if coordinate.endswith(("_r", "_l")) else ""
+    found = CONVENTIONS.get(coordinate.removesuffix(side))
+    return None if found is None else (found, side)
+
+
+def mean_angles(names: Sequence[str], rotation: npt.NDArray[np.bool_], coordinates: Array) -> dict[str, float]:
+    """Mean over the frames of coordinates (T, C) of each that is a rotation, rad."""
+    return {n: float(v) for n, v, turns in zip(names, coordinates.mean(axis=0), rotation, strict=True) if turns}
+
+
+def with_angles(estimate: Estimate, zero: Mapping[str, float], signs: Signs) -> Estimate:
+    """The same estimate with joint angles to report: ``angles.sto`` and ``metrics.json`` (``angles``) show them.
+
+    Args:
+        zero: rad, by coordinate: what counts as 0 (`filter.zero.standing_zero`); those of the root, which places the
+            whole body, are left out, and those that are not named are 0.
+        signs: names and signs of the columns.
+    """
+    from dynakin.results.measures.power import root_coordinates
+
+    root = root_coordinates(estimate)
+    offset = [0.0 if name in root else zero.get(name, 0.0) for name in estimate.coordinate_names]
+    data = estimate.data.assign(zero_offset=("coordinate", np.array(offset)))
+    return replace(estimate, data=data.assign_attrs(angle_signs=signs))
+
+
+def angle_columns(estimate: Estimate) -> tuple[list[str], Array, list[str]]:
+    """Names, degrees (T, N) and a line on each of the joint angles that `with_angles` asked for: all rotations.
+
+    Those of the pelvis are against the way the person faces, not against the laboratory.
+    """
+    from dynakin.results.measures.facing import facing
+
+    estimate = facing(estimate)
+    values = np.degrees(estimate.data["coordinates"].transpose("time", "coordinate").values)
+    offset = np.degrees(estimate.data["zero_offset"].values)
+    clinical = estimate.data.attrs["angle_signs"] == "clinical"
+    names, columns, lines = [], [], []
+    for k in np.flatnonzero(estimate.is_rotation()):
+        name, sign = estimate.coordinate_names[k], 1
+        found = convention_of(name)
+        line = f"{name}: as the model has it"
+        if clinical and found is not None:
+            convention, side = found
+            sign = convention.sign
+            line = f"{convention.name}{side}: + {convention.positive}, - {convention.negative}"
+            name = convention.name + side
+        names.append(name)
+        columns.append(sign * (values[:, k] - offset[k]))
+        lines.append(f"{line}; zero at {sign * offset[k] + 0.0:.2f} deg of the model")
+    return names, np.column_stack(columns) if columns else np.empty((len(values), 0)), lines

@@ -1,0 +1,95 @@
+"""An estimate as seen by the person: X forward, Y up, Z to the right, for what is read along the way one faces.
+
+A body that is fixed nowhere is estimated, and written to files, in the laboratory's frame. Figures, cycles and clinical
+angles speak of forward and right; this is the one place that turns an estimate into them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+from scipy.spatial.transform import Rotation
+
+from dynakin.results.estimate import Estimate
+from dynakin.results.measures.power import root_coordinates
+
+Array = npt.NDArray[np.float64]
+
+PELVIS = ("pelvis_tilt", "pelvis_list", "pelvis_rotation")
+"""OpenSim's turns of the pelvis, about Z, X and Y in this order (Rajagopal et al. 2016)."""
+_SAME = 1e-6  # rad: how well these three turns must give the pelvis' axes to be what they are called
+_SINGULAR_DEG = 75.0
+"""Beyond this of the middle one of three turns the outer two act about nearly one axis: a fourth of what each of them
+does is left to tell them apart."""
+
+
+def facing(estimate: Estimate) -> Estimate:
+    """The same estimate along the way the person faces; itself where its ground has X forward already.
+
+    Positions, vectors, orientations and wrenches are turned about the ground's origin, and the pelvis' three turns
+    where they have OpenSim's names and order. Deviations of vectors are turned as if their components were independent.
+    Translations of the root, what is derived from coordinates by time and by force, and the filter's own state stay.
+    """
+    ground = estimate.ground.facing()
+    turn = ground.rotation @ estimate.ground.rotation.T  # R_FG
+    if not estimate.modelled_axes().all() or np.allclose(turn, np.eye(3), atol=1e-12):
+        return estimate
+    found = {}
+    for name, variable in estimate.data.data_vars.items():
+        last = next((axis for axis in ("component", "axis") if axis in variable.dims), None)
+        if last is None:
+            continue
+        ordered = (
+            variable.transpose(..., "axis", "axis_") if "axis_" in variable.dims else variable.transpose(..., last)
+        )
+        found[name] = (ordered.dims, _turned(ordered.values, turn, str(name), last), variable.attrs)
+    data = estimate.data.assign(found)
+    angles = _pelvis(estimate, turn)
+    if angles is not None:
+        data["coordinates"] = data["coordinates"].copy()
+        for name, values in zip(PELVIS, angles.T, strict=True):
+            data["coordinates"].loc[{"coordinate": name}] = values
+    return replace(estimate, data=data, ground=ground)
+
+
+def _turned(values: Array, turn: Array, name: str, last: str) -> Array:
+    if name == "joint_orientations":
+        return np.asarray(turn @ values)
+    vectors = values.reshape(*values.shape[:-1], -1, 3) if last == "component" else values
+    turned = np.sqrt(vectors**2 @ (turn**2).T) if name.endswith("_sd") else vectors @ turn.T
+    return np.asarray(turned.reshape(values.shape))
+
+
+def _pelvis(estimate: Estimate, turn: Array) -> Array | None:
+    """Tilt, list and rotation (T, 3) rad of the pelvis' axes, turned, NaN in lost frames; None where the model's are no
+    such turns."""
+    root = root_coordinates(estimate)
+    if not set(PELVIS) <= root:
+        return None
+    segment = str(estimate.data["coordinate_segment"].sel(coordinate=PELVIS[0]).values)
+    at = [str(name) for name in estimate.data["joint_segment"].values].index(segment)
+    R_GB = estimate.data["joint_orientations"].transpose("time", "joint", "axis", "axis_").values[:, at]
+    own = estimate.data["coordinates"].sel(coordinate=list(PELVIS)).transpose("time", "coordinate").values
+    known = np.isfinite(R_GB).all(axis=(1, 2))
+    if not known.any() or np.abs(Rotation.from_euler("ZXY", own[known]).as_matrix() - R_GB[known]).max() > _SAME:
+        return None
+    angles = np.full(own.shape, np.nan)
+    angles[known] = np.unwrap(Rotation.from_matrix(turn @ R_GB[known]).as_euler("ZXY"), axis=0)
+    return angles
+
+
+def nearly_singular(estimate: Estimate) -> list[str]:
+    """Says when the pelvis leans so far, against the laboratory's axes, that its turns can hardly be told apart."""
+    if not set(PELVIS) <= root_coordinates(estimate):
+        return []
+    middle = np.degrees(estimate.data["coordinates"].sel(coordinate=PELVIS[1]).values)
+    away = np.nan_to_num(np.abs((middle + 90.0) % 180.0 - 90.0))  # lost frames do not lean
+    if away.max() <= _SINGULAR_DEG:
+        return []
+    frame = int(np.argmax(away))
+    return [
+        f"Warning: {PELVIS[1]} reaches {middle[frame]:.0f} deg at {estimate.time[frame]:.2f} s: near 90 deg "
+        f"{PELVIS[0]} and {PELVIS[2]} turn about one axis. Give --forward, so that a forward lean is {PELVIS[0]}."
+    ]

@@ -1,0 +1,150 @@
+"""The feet's wrenches in figures: how far they were changed, and what no foot accounts for."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from dynakin.results.estimate import COMPONENTS
+from dynakin.results.measures import sources
+from dynakin.results.naming import plural
+from dynakin.units import GRAVITY_M_S2
+
+if TYPE_CHECKING:
+    from dynakin.results.estimate import Estimate
+
+IN_THE_AIR, MEASURED, NOT_MEASURED = range(3)
+"""Codes of ``foot_contact``: a foot's wrench is zero, is measured, or is not known."""
+ROUNDING = 1.0
+"""N or N m at the root up to which nothing is left there."""
+FLIGHT = 0.05
+"""Part of the weight up to which what is left in flight is an error of the motion; more carries the person."""
+
+
+def foot_sources(data: xr.Dataset) -> sources.Codes:
+    """(T, F) codes of `results.measures.sources` of the feet's wrenches: in the air they are known to be zero."""
+    contact = data["foot_contact"].transpose("time", "foot").values
+    known = np.isfinite(data["foot_wrench"].transpose("time", "foot", "component").values).all(axis=2)
+    codes = np.where(contact == NOT_MEASURED, sources.DERIVED, sources.MEASURED)
+    return np.where(known, codes, sources.ABSENT).astype(np.uint8)
+
+
+def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str, Any] | None:
+    """Over the frames ``window``; None where the moments were made without the feet's wrenches.
+
+    Returns:
+        ``adjustment_rms``: by foot and component, N and N m about the joint by which the foot hangs, over the frames
+        in which all contacts are measured, this one too; ``remainder_rms``, about the ground's origin, over the
+        ``flight_frames``, in which nothing touches the ground; ``derived_frames`` and ``unknown_frames``: those in
+        which a foot's wrench is derived, or not known; ``left_at_root``: the largest force (N) and moment about the
+        root (N m) that no contact gives, ``grounded`` where all contacts are measured and in ``flight``; ``verdict``.
+    """
+    if not estimate.foot_names or "foot_wrench" not in estimate.data:
+        return None
+    contact = estimate.data["foot_contact"].transpose("time", "foot").values[window]
+    adjusted = estimate.data["foot_adjustment"].transpose("time", "foot", "component").values[window]
+    adjusted = np.concatenate(
+        [adjusted[..., :3], adjusted[..., 3:] - np.cross(_joints(estimate)[window], adjusted[..., :3])], axis=-1
+    )
+    remainder = estimate.data["wrench_remainder"].transpose("time", "component").values[window]
+    codes = foot_sources(estimate.data)[window]
+    told = np.isfinite(remainder).all(axis=1)
+    flight = (contact == IN_THE_AIR).all(axis=1) & told
+    grounded = (contact != NOT_MEASURED).all(axis=1) & (contact == MEASURED).any(axis=1) & told
+    grounded &= _root_measured(estimate)[window]
+    known = (contact == MEASURED) & grounded[:, None] & np.isfinite(adjusted).all(axis=2)  # not where it is lost
+    rms = {
+        name: dict(zip(COMPONENTS, _rms(adjusted[known[:, k], k]), strict=True)) if known[:, k].any() else None
+        for k, name in enumerate(estimate.foot_names)
+    }
+    about_root = np.concatenate(
+        [remainder[:, :3], remainder[:, 3:] - np.cross(_root(estimate)[window], remainder[:, :3])], axis=-1
+    )
+    left = {"grounded": _largest(about_root[grounded]), "flight": _largest(about_root[flight])}
+    figures = {
+        "adjustment_rms": rms,
+        "remainder_rms": dict(zip(COMPONENTS, _rms(remainder[flight]), strict=True)) if flight.any() else None,
+        "flight_frames": int(flight.sum()),
+        "derived_frames": int((codes == sources.DERIVED).any(axis=1).sum()),
+        "unknown_frames": int((codes == sources.ABSENT).any(axis=1).sum()),
+        "left_at_root": left,
+    }
+    weight = GRAVITY_M_S2 * (estimate.mass_kg or 0.0)
+    return figures | {"verdict": _words(figures, int(grounded.sum()), len(contact), FLIGHT * weight)}
+
+
+def _joints(estimate: Estimate) -> np.ndarray:
+    """(T, F, 3) m: where each foot's segment hangs."""
+    segments = [str(name) for name in estimate.data["joint_segment"].values]
+    own = [segments.index(str(name)) for name in estimate.data["foot_segment"].values]
+    return np.asarray(estimate.data["joint_centres"].transpose("time", "joint", "axis").values[:, own])
+
+
+def _root(estimate: Estimate) -> np.ndarray:
+    """(T, 3) m: the joint by which the body hangs on the ground."""
+    root = int(np.flatnonzero(estimate.data["joint_parent"].values < 0)[0])
+    return np.asarray(estimate.data["joint_centres"].transpose("time", "joint", "axis").values[:, root])
+
+
+def _root_measured(estimate: Estimate) -> npt.NDArray[np.bool_]:
+    """(T,) frames in which every contact is: feet may stand on plates while a seat bears the rest."""
+    data = estimate.data
+    if "coordinate_segment" not in data.coords:
+        return np.ones(len(estimate.time), dtype=bool)
+    roots = data["joint_segment"].values[data["joint_parent"].values < 0]
+    own = np.isin(data["coordinate_segment"].values, roots)
+    return np.asarray((sources.moment_sources(data)[:, own] == sources.MEASURED).all(axis=1))
+
+
+def _rms(values: np.ndarray) -> list[float]:
+    return [float(v) for v in np.sqrt(np.mean(values**2, axis=0))]
+
+
+def _largest(wrench: np.ndarray) -> dict[str, float] | None:
+    """Of wrenches (N, 6); None where none is known."""
+    known = wrench[np.isfinite(wrench).all(axis=1)]
+    if not len(known):
+        return None
+    force, moment = (float(np.linalg.norm(part, axis=1).max()) for part in (known[:, :3], known[:, 3:]))
+    return {"force_n": force, "moment_nm": moment}
+
+
+def _words(figures: dict[str, Any], grounded: int, frames: int, weight_n: float) -> str:
+    """What is said goes by the numbers: nothing is left only where nothing is."""
+    left, text = figures["left_at_root"], []
+    if left["grounded"] is None:
+        text.append("In no frame are all contacts with the ground measured: what is left at the root is not known.")
+    else:
+        where = f"in the {grounded} of {frames} frames in which every contact with the ground is measured"
+        if max(left["grounded"].values()) <= ROUNDING:
+            changed = [
+                f"{name} foot {max(own['fx'], own['fy'], own['fz']):.1f} N and "
+                f"{max(own['mx'], own['my'], own['mz']):.1f} N m (about its joint)"
+                for name, own in figures["adjustment_rms"].items()
+                if own is not None
+            ]
+            text.append(
+                f"Nothing is left at the root {where}: the plates' wrenches were changed instead, RMS of the component "
+                f"that was changed most: {', '.join(changed)}."
+            )
+        else:
+            text.append(f"{_up_to(left['grounded'])} are left at the root {where}: no contact accounts for them.")
+    if left["flight"] is not None:
+        flight = plural(figures["flight_frames"], "frame")
+        large = left["flight"]["force_n"] > weight_n > 0.0
+        text.append(
+            f"{_up_to(left['flight'])} are left in flight ({flight} in which no foot touches the ground)"
+            + (": the model's error, or a contact that is not measured." if large else ".")
+        )
+    if count := figures["derived_frames"]:
+        text.append(f"In {count} of {frames} frames one contact was not measured: what hangs on it is derived.")
+    if count := figures["unknown_frames"]:
+        text.append(f"In {count} of {frames} frames the force on a foot is not known: what hangs on it is absent.")
+    return " ".join(text)
+
+
+def _up_to(left: dict[str, float]) -> str:
+    return f"Up to {left['force_n']:.0f} N and {left['moment_nm']:.0f} N m"

@@ -1,0 +1,148 @@
+"""How far each marker moves on its segment, beside what skin and flesh are known to do there."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from dynakin.elements import element
+from dynakin.recordings.landmarks import plain_name
+from dynakin.results.estimate import AXES, Estimate
+from dynakin.results.measures.soft_tissue_sizes import published_amplitude_mm
+from dynakin.results.naming import words
+
+# Published sizes are means over people at full squat; twice the size, measured from the marker's mean place, is more
+# than skin explains.
+EXCESS = 2.0
+# The least size that is compared with, whatever is declared (0 mm for a toe on the floor): cameras have noise too.
+FLOOR_MM = 3.0
+
+
+@dataclass(frozen=True)
+class MarkerDisplacement:
+    """Displacement of one marker on its segment over a window, mm; None where nothing is known or declared.
+
+    ``rms`` and ``largest`` are distances from the marker's mean place, ``offset`` that of its mean place from where it
+    was put at the start; ``declared`` is the size that ``source`` gives.
+    """
+
+    segment: str
+    rms: float | None
+    largest: float | None
+    offset: float | None
+    declared: float | None
+    source: str
+
+    def exceeds(self) -> bool:
+        """Whether it moves more than soft tissue explains."""
+        if self.largest is None or self.declared is None:
+            return False
+        return self.largest > EXCESS * max(self.declared, FLOOR_MM)
+
+
+def displacements(estimate: Estimate, window: np.ndarray) -> dict[str, MarkerDisplacement]:
+    """Displacement of each marker in use over the frames ``window`` (T,) bool in which it was measured.
+
+    It is the movement of the marker's estimated place on its segment; with the paper's filter that also takes up what
+    the model cannot explain. A filter with a state block ``soft_tissue`` (``soft_tissue/NAME/x``, m) has that added,
+    and declares its amplitudes in the variable ``soft_tissue_amplitude`` (marker,), m, of the estimate's data.
+    """
+    blocks = [state_paths(estimate, block) for block in ("marker", "soft_tissue")]
+    initial = {p.name: p.initial for p in estimate.parameters}
+    segments = {element(p.name).owner: p.segment for p in estimate.parameters if p.kind == "marker"}
+    measured = estimate.data["markers_measured"].transpose("time", "marker", "axis").values
+    seen = np.isfinite(measured[:, :, estimate.modelled_axes()]).all(axis=2)
+    found = {}
+    for k, (name, site) in enumerate(marker_sites(estimate)):
+        frames, segment = window & seen[:, k], segments.get(site, "")
+        paths = [1000.0 * sum(b[site][axis] for b in blocks if axis in b.get(site, {})) for axis in _axes(blocks, site)]
+        size, source = _declared(estimate, k, name, segment)
+        if not paths or not frames.any():
+            found[name] = MarkerDisplacement(segment, None, None, None, size, source)
+            continue
+        moved = np.stack(paths, axis=1)[frames]
+        distance = np.linalg.norm(moved - moved.mean(axis=0), axis=1)
+        start = [1000.0 * initial.get(f"marker/{site}/{axis}", np.nan) for axis in _axes(blocks, site)]
+        offset = float(np.linalg.norm(moved.mean(axis=0) - start))
+        found[name] = MarkerDisplacement(
+            segment,
+            float(np.sqrt(np.mean(distance**2))),
+            float(distance.max()),
+            offset if np.isfinite(offset) else None,
+            size,
+            source,
+        )
+    return found
+
+
+def soft_tissue(estimate: Estimate, window: np.ndarray) -> dict[str, Any]:
+    """The block ``soft_tissue`` of ``metrics.json``: each marker's displacement, and a sentence on those too far."""
+    markers = {
+        name: {
+            "segment": d.segment,
+            "rms_mm": d.rms,
+            "max_mm": d.largest,
+            "offset_mm": d.offset,
+            "declared_mm": d.declared,
+            "declared_by": d.source,
+            "exceeds": d.exceeds(),
+        }
+        for name, d in displacements(estimate, window).items()
+    }
+    return {
+        "what": "distance of each marker from its mean place on its segment over the window, mm, beside the declared "
+        "size; offset_mm: its mean place from where it was put at the start",
+        "markers": markers,
+        "verdict": excess_in_words(markers),
+    }
+
+
+def excess_in_words(markers: Mapping[str, Mapping[str, Any]], limit: int = 3) -> str:
+    """One sentence on the markers of that block that move too far, the worst first; empty where all are within."""
+    excess = [(name, m["max_mm"], m["declared_mm"], m["segment"]) for name, m in markers.items() if m["exceeds"]]
+    if not excess:
+        return ""
+    worst = sorted(excess, key=lambda entry: entry[1] - entry[2], reverse=True)
+    parts = [
+        f"{name} moves {largest:.0f} mm on the {words(segment)} (declared {declared:.0f} mm)"
+        for name, largest, declared, segment in worst[:limit]
+    ]
+    more = f" and {len(worst) - limit} more" if len(worst) > limit else ""
+    return f"{', '.join(parts)}{more}: more than soft tissue does, so the model does not fit there."
+
+
+def marker_sites(estimate: Estimate) -> list[tuple[str, str]]:
+    """Recorded name and name in the state of each marker, both in the model's order; the same where they differ in
+    number (a filter that does not estimate every place)."""
+    names = estimate.marker_names
+    sites = list(dict.fromkeys(element(p.name).owner for p in estimate.parameters if p.kind == "marker"))
+    if len(sites) == len(names):
+        return list(zip(names, sites, strict=True))
+    plain = {plain_name(site): site for site in sites}
+    return [(name, plain.get(plain_name(name), name)) for name in names]
+
+
+def _declared(estimate: Estimate, index: int, marker: str, segment: str) -> tuple[float | None, str]:
+    """Size in mm and who says so: the filter's own declaration, else the published one."""
+    if "soft_tissue_amplitude" in estimate.data:
+        return 1000.0 * float(estimate.data["soft_tissue_amplitude"].values[index]), "declared to the filter"
+    published = published_amplitude_mm(marker, segment)
+    return (None, "nothing declared") if published is None else (published[0], f"published: {published[1]}")
+
+
+def _axes(blocks: list[dict[str, dict[str, np.ndarray]]], site: str) -> list[str]:
+    return [axis for axis in AXES if any(axis in block.get(site, {}) for block in blocks)]
+
+
+def state_paths(estimate: Estimate, block: str) -> dict[str, dict[str, np.ndarray]]:
+    """Site -> axis -> (T,) m of the state's elements ``block/SITE/AXIS``."""
+    state = estimate.data["state"].transpose("time", "element").values
+    paths: dict[str, dict[str, np.ndarray]] = {}
+    for k, name in enumerate(str(name) for name in estimate.data["element"].values):
+        kind, site, axis = element(name)
+        if kind == block and axis in AXES:
+            paths.setdefault(site, {})[axis] = state[:, k]
+    return paths

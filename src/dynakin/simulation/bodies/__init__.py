@@ -1,0 +1,1 @@
+"""Simulated persons: segments, coordinates and the subjects drawn around a table."""

@@ -1,0 +1,78 @@
+"""Which bodies there are by name, and what a body of a user's own must fulfil."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable
+
+import numpy as np
+
+from dynakin.errors import ConfigError
+from dynakin.simulation.bodies import sagittal, squat_chain, whole_body
+from dynakin.simulation.bodies.body import SimulatedBody
+from dynakin.simulation.bodies.subject import SimulatedSubject, Spread, draw_subject
+from dynakin.simulation.sensors.whole_body_markers import SETS
+from dynakin.simulation.streams import Streams
+
+BODIES: dict[str, Callable[[SimulatedSubject, np.random.Generator], SimulatedBody]] = {
+    "sagittal7": sagittal.build_body,
+    "squat7": squat_chain.build_body,
+    "fullbody": whole_body.build_body,
+}
+"""Bodies by the name of the model whose coordinates they have: built of a subject, markers put on with the
+generator."""
+
+
+def choose_body(
+    model: str | SimulatedBody,
+    streams: Streams,
+    mass_kg: float,
+    height_m: float,
+    sex: str | None,
+    spread: Spread,
+    markers: str | None = None,
+) -> SimulatedBody:
+    """The body of that name, drawn around the table, with the markers of that set (None: its own); one of a user's
+    own is checked and taken as it is.
+
+    Raises:
+        ConfigError: no such body or marker set, a subject that cannot be, or a tree that does not hang together.
+    """
+    if markers is not None and (model != "fullbody" or markers not in SETS):
+        raise ConfigError(
+            f"simulation: markers is {markers!r} for {model if isinstance(model, str) else model.name!r}, expected "
+            f"{' or '.join(SETS)} for fullbody, nothing for the others, which have one set each"
+        )
+    if isinstance(model, SimulatedBody):
+        _check(model)
+        return model
+    if model not in BODIES:
+        near = difflib.get_close_matches(str(model), BODIES, n=1)
+        hint = f" (did you mean {near[0]!r}?)" if near else ""
+        raise ConfigError(f"simulation: model is {str(model)!r}{hint}, expected {' or '.join(BODIES)}")
+    subject = draw_subject(streams["subject"], mass_kg, height_m, sex, spread)
+    if markers is not None:
+        return whole_body.build_body(subject, streams["sites"], markers)
+    return BODIES[model](subject, streams["sites"])
+
+
+def _check(body: SimulatedBody) -> None:
+    where = f"simulated body {body.name!r}"
+    known: list[str] = []
+    for segment in body.tree:
+        if segment.parent is not None and segment.parent not in known:
+            raise ConfigError(
+                f"{where}: the parent of {segment.name!r} is {segment.parent!r}, expected a segment before it: "
+                f"{', '.join(known) or 'none yet'}"
+            )
+        if not segment.mass > 0.0:
+            raise ConfigError(f"{where}: the mass of {segment.name!r} is {segment.mass:g} kg, expected more than 0")
+        known.append(segment.name)
+    for what, name, segment_name in (
+        *(("marker", site.name, site.segment) for site in body.sites),
+        *(("contact", foot.name, foot.segment) for foot in body.feet if foot.segment is not None),
+    ):
+        if segment_name not in known:
+            raise ConfigError(f"{where}: {what} {name!r} is on {segment_name!r}, expected one of {', '.join(known)}")
+    if not 1 <= len(body.feet) <= 2:
+        raise ConfigError(f"{where}: {len(body.feet)} feet, expected one contact or the right and the left foot")

@@ -1,0 +1,1 @@
+"""Simulated motions, by name or from a coordinates file."""

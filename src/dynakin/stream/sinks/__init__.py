@@ -1,0 +1,1 @@
+"""Where live estimates go: streams, the recorder."""

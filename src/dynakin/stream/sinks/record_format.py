@@ -1,0 +1,80 @@
+"""The recorder's file: records one after the other, each with its length and checksum.
+
+A record is b"DKR1", its kind (one byte), the payload's length and CRC-32 (unsigned, 4 bytes each, little-endian), then
+the payload. Kind J: JSON, in UTF-8. Kind M: a frame of markers, float64: arrival, time, positions (M x 3). Kind F:
+samples of plates, float64: arrival, number K, times (K), wrenches (K x P x 6). A record that was cut off, or damaged,
+is passed over.
+"""
+
+from __future__ import annotations
+
+import json
+import struct
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from dynakin.recordings.formats.textfile import read_bytes
+from dynakin.stream.sources.packets import MarkerPacket, Packet, PlatePacket
+
+_MAGIC = b"DKR1"
+_HEAD = struct.Struct("<4scII")
+
+
+def text_record(content: dict[str, Any]) -> bytes:
+    """A record of kind J."""
+    return _record(b"J", json.dumps(content).encode())
+
+
+def packet_record(packet: Packet) -> bytes:
+    """A packet as it came."""
+    if isinstance(packet, MarkerPacket):
+        return _record(b"M", _bytes([packet.arrived_s, packet.time_s], packet.positions))
+    time = np.atleast_1d(packet.time_s)
+    return _record(b"F", _bytes([packet.arrived_s, float(len(time))], time, packet.wrenches))
+
+
+def read_records(path: Path) -> Iterator[dict[str, Any] | Packet]:
+    """Everything whole in the file, in its order.
+
+    Raises:
+        RecordingError: the file cannot be read.
+    """
+    data = read_bytes(path)
+    at = data.find(_MAGIC)
+    while 0 <= at <= len(data) - _HEAD.size:
+        _, kind, length, checksum = _HEAD.unpack_from(data, at)
+        payload = data[at + _HEAD.size : at + _HEAD.size + length]
+        if len(payload) == length and zlib.crc32(payload) == checksum:
+            if (content := _content(kind, payload)) is not None:
+                yield content
+            at += _HEAD.size + length
+            at = data.find(_MAGIC, at)
+        else:
+            at = data.find(_MAGIC, at + 1)
+
+
+def _content(kind: bytes, payload: bytes) -> dict[str, Any] | Packet | None:
+    """What a whole record holds; None where that is no packet."""
+    try:
+        if kind == b"J":
+            found = json.loads(payload)
+            return found if isinstance(found, dict) else None
+        numbers = np.frombuffer(payload, dtype="<f8").astype(float)
+        if kind == b"M":
+            return MarkerPacket(float(numbers[1]), numbers[2:].reshape(-1, 3), float(numbers[0]))
+        count = int(numbers[1])
+        return PlatePacket(numbers[2 : 2 + count], numbers[2 + count :].reshape(count, -1, 6), float(numbers[0]))
+    except (ValueError, LookupError, ArithmeticError, RecursionError):
+        return None
+
+
+def _record(kind: bytes, payload: bytes) -> bytes:
+    return _HEAD.pack(_MAGIC, kind, len(payload), zlib.crc32(payload)) + payload
+
+
+def _bytes(*parts: Any) -> bytes:
+    return b"".join(np.ascontiguousarray(part, dtype="<f8").tobytes() for part in parts)

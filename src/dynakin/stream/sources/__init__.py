@@ -1,0 +1,1 @@
+"""Where live samples come from: capture systems, replayed recordings, a simulated person."""

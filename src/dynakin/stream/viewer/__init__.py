@@ -1,0 +1,1 @@
+"""The live viewer: a process of its own that shows the newest estimate."""

@@ -1,0 +1,147 @@
+"""What the viewer shows of a frame, as plain numbers: the same order at both ends."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import asdict
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+import dynakin._core as _core
+from dynakin.stream.sinks.base import LiveFrame, Started, Status
+
+Array = npt.NDArray[np.float64]
+
+_LOADED_N = 20.0
+_SHOWN = ("length", "inertia")
+_NAMES, _NAME = 4, 40  # of a list of names, so many are shown, and so many characters of each
+
+
+class Picture:
+    """Makes the numbers of a frame, ground frame, SI.
+
+    Blocks, in this order: time (1); joint centres (S, 3); measured and estimated markers (M, 3) each; arrows (A, 6),
+    each a centre of pressure and a force, of the plates and, last, of the estimated total; coordinates, moments and the
+    moments' standard deviations (C); constants (K).
+    """
+
+    def __init__(self, started: Started, plates: int) -> None:
+        self.initial, self.model = started.initial, started.model
+        spec = self.initial.spec
+        segments = [segment.name for segment in spec.segments]
+        self._constants = [k for k, name in enumerate(self.initial.names) if name.split("/")[0] in _SHOWN]
+        self._constants = [k for k in self._constants if self.initial.names[k].split("/")[-1] not in _SMALL]
+        markers, axes = 3 * len(spec.markers), len(spec.coordinates)
+        sizes = (1, 3 * len(segments), markers, markers, 6 * (plates + 1), axes, axes, axes, len(self._constants))
+        self.sizes = dict(zip(BLOCKS, sizes, strict=True))
+        self._moment_sd = np.full(len(spec.coordinates), np.nan)
+        parents = [segments.index(s.parent) if s.parent in segments else -1 for s in spec.segments]
+        self.setup: dict[str, Any] = {
+            "model": spec.name,
+            "sizes": self.sizes,
+            "bones": [[parents[j], j] for j in range(len(segments)) if parents[j] >= 0],
+            "ends": self._ends(segments, parents),
+            "coordinates": [c.name for c in spec.coordinates],
+            "rotation": rotations(spec),
+            "locked": [c.locked for c in spec.coordinates],
+            "constants": [self.initial.names[k] for k in self._constants],
+            "begin": [float(self.initial.x0[k]) for k in self._constants],
+            "markers": list(self.initial.recorded_markers),
+        }
+
+    def numbers(self, frame: LiveFrame, deviations: Mapping[str, Array] | None) -> Array:
+        """The frame's numbers, all blocks after one another; deviations keep their last values where None."""
+        ground, estimate = self.initial.ground, frame.estimate
+        body = _core.whole_body(self.model, np.ascontiguousarray(frame.state[None]))
+        sample = frame.fused.sample.markers
+        measured = np.stack([np.asarray(sample[name], float) for name in self.initial.recorded_markers])
+        arrows = np.full((self.sizes["arrows"] // 6, 6), np.nan)
+        if frame.fused.wrenches is not None:
+            arrows[:-1] = [arrow(w) for w in ground.wrench_to_ground(frame.fused.wrenches)]
+        arrows[-1] = arrow(estimate.wrench)
+        if deviations is not None:
+            self._moment_sd = deviations["moments"]
+        parts = (
+            [estimate.time_s],
+            body["joint_centres"][0],
+            ground.points_to_ground(measured),
+            estimate.markers,
+            arrows,
+            estimate.coordinates,
+            estimate.moments,
+            self._moment_sd,
+            frame.state[self._constants],
+        )
+        return np.concatenate([np.ravel(part) for part in parts])
+
+    def _ends(self, segments: list[str], parents: list[int]) -> list[list[int]]:
+        """(joint, marker): a segment without a further joint is drawn to its farthest marker."""
+        centres = _core.whole_body(self.model, np.ascontiguousarray(self.initial.x0[None]))["joint_centres"][0]
+        places = _core.marker_positions(self.model, np.ascontiguousarray(self.initial.x0))
+        found = []
+        for joint, segment in enumerate(segments):
+            own = [k for k, marker in enumerate(self.initial.spec.markers) if marker.segment == segment]
+            if joint not in parents and own:
+                far = np.linalg.norm(places[own] - centres[joint], axis=1)
+                found.append([joint, own[int(np.argmax(far))]])
+        return found
+
+
+def status_text(status: Status) -> bytes:
+    """A status as JSON of a bounded length (2 kB): of each list of names its count and the first few, shortened."""
+    told = asdict(status)
+    for key, value in told.items():
+        if isinstance(value, tuple):
+            told[key] = {"count": len(value), "first": [name[:_NAME] for name in value[:_NAMES]]}
+    return json.dumps(told).encode()
+
+
+def in_words(names: Mapping[str, Any]) -> str:
+    """Names as `status_text` gives them: "a, b and 3 more", "none" without any."""
+    more = names["count"] - len(names["first"])
+    return (", ".join(names["first"]) or "none") + (f" and {more} more" if more else "")
+
+
+def as_text(text: str) -> str:
+    """Markdown that shows a text as it is: names come from files, and the page would take HTML, links and pictures of
+    this machine's files from them."""
+    return "".join(c if c.isalnum() or c == " " else f"&#{ord(c)};" if c.isprintable() else " " for c in text)
+
+
+def rotations(spec: _core.ModelSpec) -> list[bool]:
+    """Of each coordinate whether it turns: unless every axis that it moves is a translation."""
+    kinds: dict[str, set[str]] = {}
+    for segment in spec.segments:
+        for axis in segment.axes:
+            kinds.setdefault(axis.coordinate, set()).add(axis.kind)
+    return [kinds.get(c.name) != {"translation"} for c in spec.coordinates]
+
+
+BLOCKS = (
+    "time",
+    "joints",
+    "measured",
+    "estimated",
+    "arrows",
+    "angles",
+    "moments",
+    "moment_sd",
+    "constants",
+)
+_SMALL = ("mx", "my", "mz", "xx", "yy", "zz", "xy", "xz", "yz")  # moments of mass are little to look at
+
+
+def split(numbers: Array, sizes: Mapping[str, int]) -> dict[str, Array]:
+    """The blocks by name, flat."""
+    ends = np.cumsum([sizes[name] for name in BLOCKS])
+    return dict(zip(BLOCKS, np.split(numbers, ends[:-1]), strict=True))
+
+
+def arrow(wrench: Array) -> Array:
+    """Centre of pressure (3,) m on the ground's plane y = 0 and force (3,) N of a wrench (6,); NaN where unloaded."""
+    if not np.isfinite(wrench).all() or wrench[1] < _LOADED_N:
+        return np.full(6, np.nan)
+    return np.array([wrench[5] / wrench[1], 0.0, -wrench[3] / wrench[1], *wrench[:3]])

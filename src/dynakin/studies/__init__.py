@@ -1,0 +1,1 @@
+"""Many trials at once: batches and tunings, over all cores or a cluster."""

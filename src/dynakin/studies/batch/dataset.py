@@ -1,0 +1,159 @@
+"""DATASET.toml: which subjects and trials there are, as one configuration a trial."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from dynakin.config import RunConfig, read_config
+from dynakin.errors import ConfigError
+from dynakin.model.validation import nearest
+from dynakin.recordings.formats.textfile import is_file
+
+# Keys of their own; all others are those of a run's configuration and hold for everything below them.
+_OF_DATASET = ("subjects", "trials", "presets")
+_OF_SUBJECT = ("name", "folder", "trials")
+_NOT_HERE = ("trial", "ground", "identified", "versions", "grid")
+_PATTERN = "*.c3d"
+# Subjects and trials name folders of the results.
+_NO_FOLDER = re.compile(r"[/\\\x00-\x1f\x7f\ud800-\udfff]")
+_LONGEST_NAME = 200  # bytes; file systems take 255, with what is put before it while results are written
+
+
+@dataclass(frozen=True)
+class Session:
+    """One trial of one subject. content: the keys of its configuration, paths made whole."""
+
+    subject: str
+    trial: str
+    content: dict[str, Any]
+
+    @property
+    def name(self) -> str:
+        """As it is named in tables and messages."""
+        return f"{self.subject}/{self.trial}"
+
+
+@dataclass(frozen=True)
+class Dataset:
+    """What a dataset's file names. presets: to be worked on beside each other; empty: each configuration's own."""
+
+    path: Path
+    output: Path
+    presets: tuple[str, ...]
+    sessions: tuple[Session, ...]
+
+
+def read_dataset(path: Path, output: Path | None = None) -> Dataset:
+    """Read a dataset's file; what its trials hold is looked at when they are worked on.
+
+    Args:
+        output: folder of the results, instead of the one that the file names.
+
+    Raises:
+        ConfigError: the file cannot be read, a key is unknown or missing, no trial is found for a subject, or two
+            trials of a subject have one name.
+    """
+    content = read_config(path, paths=("output",))  # the others lie with subjects and trials
+    entries = content.get("subjects")
+    if not isinstance(entries, list) or not entries or not all(isinstance(entry, dict) for entry in entries):
+        raise ConfigError(f"{path}: no subjects, expected a table [[subjects]] for each")
+    if output is not None:
+        content["output"] = str(output)
+    if not isinstance(content.get("output"), str):
+        raise ConfigError(f'{path}: output is missing, expected output = "FOLDER"')
+    common = _run_keys(content, _OF_DATASET, f"{path}")
+    into = Path(common.pop("output"))
+    sessions: list[Session] = []
+    for number, entry in enumerate(entries, start=1):
+        sessions += _sessions(path, number, entry, common, content.get("trials", _PATTERN), into)
+    names = [session.name for session in sessions]
+    twice = next((name for name in names if names.count(name) > 1), None)
+    if twice is not None:
+        raise ConfigError(f"{path}: two trials are called {twice}, expected each name once (a trial may have a `name`)")
+    presets = content.get("presets", [])
+    if not isinstance(presets, list) or not all(isinstance(name, str) for name in presets):
+        raise ConfigError(f"{path}: presets is {presets!r}, expected a list of names")
+    return Dataset(path, into, tuple(presets), tuple(sessions))
+
+
+def _run_keys(content: dict[str, Any], own: tuple[str, ...], where: str) -> dict[str, Any]:
+    """Those keys that a run's configuration has."""
+    known = [key for key in RunConfig.model_fields if key not in _NOT_HERE]
+    for key in content:
+        if key not in own and key not in known:
+            expected = ", ".join((*own, *known))
+            raise ConfigError(f"{where}: unknown key {key!r}{nearest(key, [*own, *known])}; expected keys: {expected}")
+    return {key: value for key, value in content.items() if key not in own}
+
+
+def _sessions(
+    path: Path, number: int, entry: dict[str, Any], common: dict[str, Any], pattern: Any, output: Path
+) -> list[Session]:
+    name = entry.get("name")
+    if not isinstance(name, str):
+        raise ConfigError(f"{path}: subject {number} has no name, expected a text without /")
+    _check_name(f"{path}: subject {number}: name", name)
+    where = f"{path}: subject {name!r}"
+    keys = common | _run_keys(entry, _OF_SUBJECT, where)
+    folder = path.parent / str(entry.get("folder", name))
+    trials = entry.get("trials", pattern)
+    if isinstance(trials, str):
+        static = folder / str(keys["static"]) if "static" in keys else None
+        files = [file for file in _matching(folder, trials, f"{where}: trials") if file != static]
+        if not files:
+            raise ConfigError(f"{where}: no file {trials} in {folder}, expected at least one trial")
+        # trials in folders of their own are called by these
+        inner = ["_".join(file.parent.relative_to(folder).parts) for file in files]
+        alike = len({file.name for file in files}) < len(files)
+        trials = [
+            {"trial": str(file.relative_to(folder)), "name": (alike and where_in) or file.stem}
+            for file, where_in in zip(files, inner, strict=True)
+        ]
+    if not isinstance(trials, list) or not all(isinstance(t, dict) and isinstance(t.get("trial"), str) for t in trials):
+        raise ConfigError(f'{where}: trials, expected a pattern such as "*.c3d" or tables with `trial`')
+    return [_session(where, name, folder, dict(trial), keys, output) for trial in trials]
+
+
+def _matching(folder: Path, pattern: str, where: str) -> list[Path]:
+    """Files of a subject's folder, sorted; ``where`` names the key.
+
+    Raises:
+        ConfigError: a pattern that is none, or begins at the root.
+    """
+    if not pattern or Path(pattern).is_absolute():
+        raise ConfigError(f'{where} is {pattern!r}, expected a pattern inside {folder}, such as "*.c3d"')
+    try:
+        return sorted(file for file in folder.glob(pattern) if is_file(file))
+    except (OSError, ValueError, NotImplementedError, RuntimeError) as error:
+        raise ConfigError(f'{where} is {pattern!r} ({error}), expected a pattern such as "*.c3d"') from None
+
+
+def _check_name(where: str, name: str) -> None:
+    """
+    Raises:
+        ConfigError: a name that is no folder's inside another: results would be written elsewhere, or nowhere.
+    """
+    if not name.strip() or name in (".", "..") or _NO_FOLDER.search(name) or len(name.encode()) > _LONGEST_NAME:
+        raise ConfigError(
+            f"{where} is {name!r}, expected the name of a folder for results: text without / and \\, not . or .., "
+            f"of at most {_LONGEST_NAME} bytes"
+        )
+
+
+def _session(
+    where: str, subject: str, folder: Path, entry: dict[str, Any], keys: dict[str, Any], output: Path
+) -> Session:
+    entry_file = entry.pop("trial")
+    file = folder / entry_file
+    name = str(entry.pop("name", file.stem))
+    _check_name(f"{where}, trial {entry_file!r}: name", name)
+    content = keys | _run_keys(entry, (), f"{where}, trial {name!r}")
+    if "forces" in content:  # beside the trial; {trial} stands for its name
+        content["forces"] = str(file.parent / str(content["forces"]).replace("{trial}", file.stem))
+    for key in ("static", "parameters"):
+        if key in content:
+            content[key] = str(folder / str(content[key]))
+    return Session(subject, name, content | {"trial": str(file), "output": str(output / subject / name)})

@@ -1,0 +1,141 @@
+"""Every trial by itself, over all cores or a cluster, and what is true of all of them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from dynakin.config import make_config
+from dynakin.errors import DynakinError
+from dynakin.filter import presets
+from dynakin.recordings.smoothing import CUTOFF_HZ
+from dynakin.results.estimate import COMPONENTS
+from dynakin.results.failures import Failures
+from dynakin.results.files.versions import versions
+from dynakin.results.measures.fit import SignalFit
+from dynakin.studies.batch.dataset import Dataset, Session
+from dynakin.studies.engine.journal import Journal
+from dynakin.studies.engine.pools import Pool
+from dynakin.studies.engine.tasks import Failure, Task
+from dynakin.studies.engine.work import Progress, work
+from dynakin.validation.case import case_of
+from dynakin.validation.methods import estimate_each, trial_of, with_lost
+from dynakin.validation.table2 import MARKERS, Row, mean_fit, table2_of, trial_fits
+
+Fits = dict[tuple[str, str], SignalFit]
+
+
+@dataclass(frozen=True)
+class Options:
+    """How each trial is worked on. presets: beside each other; empty: each configuration's own. cutoff_hz: of the
+    reference methods. files: whether each trial's results are written too."""
+
+    presets: tuple[str, ...] = ()
+    cutoff_hz: float = CUTOFF_HZ
+    files: bool = True
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """What came of a dataset.
+
+    Attributes:
+        rows: by session: ``fits`` (quantity, method, figures of `SignalFit`), ``notes``, ``events``, ``nis_per_dof``.
+        failures: by session, why it gave nothing.
+    """
+
+    sessions: tuple[Session, ...]
+    rows: dict[str, dict[str, Any]]
+    failures: dict[str, Failure]
+
+    def fits(self) -> dict[str, Fits]:
+        """Fit of each (quantity, method), by session."""
+        return {name: {(q, m): SignalFit(*values) for q, m, *values in row["fits"]} for name, row in self.rows.items()}
+
+    def table2(self) -> list[Row]:
+        """The paper's Table II, mean and standard deviation over trials."""
+        return table2_of([_without_markers(fits) for fits in self.fits().values()])
+
+    def table2_of_subjects(self) -> list[Row]:
+        """The same over subjects, each the mean of its trials: what tells of people who were not measured."""
+        by_subject: dict[str, list[Fits]] = {}
+        for name, fits in self.fits().items():
+            by_subject.setdefault(name.split("/")[0], []).append(_without_markers(fits))
+        return table2_of([_mean(fits) for fits in by_subject.values()])
+
+
+def _without_markers(fits: Fits) -> Fits:
+    """Not marker by marker: subjects may wear other ones."""
+    return {key: fit for key, fit in fits.items() if key[0] in (MARKERS, *COMPONENTS)}
+
+
+def _mean(every: Sequence[Fits]) -> Fits:
+    keys = dict.fromkeys(key for fits in every for key in fits)
+    return {key: mean_fit([fits[key] for fits in every if key in fits]) for key in keys}
+
+
+def work_on(options: Options, payload: Session) -> dict[str, Any]:
+    """One trial: read, estimated, compared with the reference methods, and written where files are wanted."""
+    config = make_config(payload.content, payload.name)
+    case = case_of(config, options.presets, options.cutoff_hz)
+    estimates, lost, initial = estimate_each(case.recording, case.setup, static=case.static)
+    failures, trial = Failures(), None
+    with failures.stage("comparison with the reference methods"):
+        trial = with_lost(trial_of(estimates, initial, case.setup.definition, options.cutoff_hz), lost)
+    title, first = next(iter(estimates.items()))
+    if options.files:
+        Path(config.output).parent.mkdir(parents=True, exist_ok=True)
+        preset = next(name for name in (options.presets or [config.preset]) if presets.title(name) == title)
+        used = config.model_copy(update={"preset": preset}).as_used()
+        replace(first, config=used | first.config).save(config.output, comparison=trial, failures=failures)
+    if trial is None or failures.found:
+        saved = "the results are saved. " if options.files else ""
+        raise DynakinError(f"{saved}{' '.join(failures.messages())}")
+    metrics = {name: estimate.metrics() for name, estimate in estimates.items()}
+    return {
+        "fits": [[*key, *fit] for key, fit in trial_fits(trial).items()],
+        "notes": [*trial.notes, *first.messages],
+        "lost": lost,
+        "nis_per_dof": {name: m["consistency"]["mean_nis_per_dof"] for name, m in metrics.items()},
+        "events": {
+            name: {key: m["events"][key] for key in ("gated", "missing", "resets")} for name, m in metrics.items()
+        },
+        "parameters_at_bound": {name: m["events"]["parameters_at_bound"] for name, m in metrics.items()},
+    }
+
+
+def belongs_to(dataset: Dataset, options: Options) -> dict[str, Any]:
+    """All that the rows of a batch depend on, for its journal: settings, and the files with their sizes and times."""
+    return {
+        "what": "batch",
+        "dynakin": versions()["dynakin"],
+        "options": [*options.presets, options.cutoff_hz, options.files],
+        "sessions": [[s.name, s.content, *_stamps(s.content)] for s in dataset.sessions],
+    }
+
+
+def _stamps(content: Mapping[str, Any]) -> list[Any]:
+    found = []
+    for key in ("trial", "forces", "static", "parameters"):
+        file = Path(str(content.get(key, "")))
+        if file.is_file():
+            found.append([key, file.stat().st_size, file.stat().st_mtime_ns])
+    return found
+
+
+def run_batch(
+    dataset: Dataset,
+    options: Options,
+    pool: Pool,
+    *,
+    journal: Journal | None = None,
+    progress: Progress | None = None,
+) -> Batch:
+    """Work on all trials; what is wrong with one is kept in ``failures`` and stops nothing."""
+    tasks = [Task(session.name, session) for session in dataset.sessions]
+    outcomes = work(pool, work_on, options, tasks, journal=journal, progress=progress)
+    rows = {o.key: o.row for o in outcomes if o.row is not None}
+    failures = {o.key: o.failure for o in outcomes if o.failure is not None}
+    return Batch(dataset.sessions, rows, failures)

@@ -1,0 +1,80 @@
+"""Rows on disk as they come: what was done before a run was killed is not done again."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from pathlib import Path
+from typing import Any
+
+from dynakin.absent import with_nulls
+from dynakin.errors import OutputError
+from dynakin.studies.engine.tasks import Row
+
+VERSION = 1
+
+
+class Journal:
+    """A file of JSON lines: a heading that says what the rows belong to, then a row a task.
+
+    A line that was cut off by the end of its writer is dropped, and its task done again.
+
+    Args:
+        path: the file; made when the first row comes, in a folder that exists.
+        belongs_to: with_nulls data: everything on which the rows depend. Its digest stands in the heading.
+
+    Raises:
+        OutputError: the file cannot be read, is none of ours, or belongs to something else.
+    """
+
+    def __init__(self, path: Path, belongs_to: Any) -> None:
+        self.path = path
+        self._heading = {"dynakin_journal": VERSION, "belongs_to": digest(belongs_to)}
+        self.rows = self._read()
+
+    def _read(self) -> dict[str, Row]:
+        if not self.path.exists():
+            return {}
+        try:
+            text = self.path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise OutputError(f"{self.path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
+        whole = [line for line in text.splitlines(keepends=True) if line.endswith("\n")]
+        try:
+            heading, *rows = [json.loads(line) for line in whole] or [None]
+            found = {row["key"]: row["row"] for row in rows}
+        except (ValueError, TypeError, KeyError):
+            raise OutputError(f"{self.path}: is no journal of dynakin; name another folder") from None
+        if heading is None:  # killed before its heading was whole
+            self.path.unlink()
+            return {}
+        if heading != self._heading:
+            raise OutputError(
+                f"{self.path}: belongs to other settings, recordings or another version; name another folder, or "
+                "remove it"
+            )
+        kept = sum(len(line.encode()) for line in whole)
+        with self.path.open("r+b") as file:
+            file.truncate(kept)
+        return found
+
+    def add(self, key: str, row: Row) -> None:
+        """Append one row; it is on its way to the disk when this returns.
+
+        Raises:
+            OutputError: the file cannot be written.
+        """
+        self.rows[key] = row
+        try:
+            fresh = not self.path.exists()
+            with self.path.open("a", encoding="utf-8", newline="\n") as file:
+                if fresh:
+                    file.write(json.dumps(self._heading) + "\n")
+                file.write(json.dumps(with_nulls({"key": key, "row": row}), allow_nan=False) + "\n")
+        except OSError as error:
+            raise OutputError(f"{self.path}: cannot be written ({error.strerror or error})") from None
+
+
+def digest(content: Any) -> str:
+    """SHA-256 of plain data, whatever the order of its keys."""
+    return hashlib.sha256(json.dumps(content, sort_keys=True).encode()).hexdigest()

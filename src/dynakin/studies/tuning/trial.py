@@ -1,0 +1,127 @@
+"""A trial made ready to be filtered again and again: the same numbers for every setting, and nothing but plain data."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.filter.alignment import in_step
+from dynakin.filter.augment import QUANTITIES, Quantity
+from dynakin.filter.estimator import Estimator
+from dynakin.filter.noise import Noise
+from dynakin.model.calibration.initial import InitialModel
+from dynakin.recordings.recording import Recording
+from dynakin.results.measures.metrics import evaluation_window
+from dynakin.results.records import FOLLOWING, REFUSED
+from dynakin.studies.engine.journal import digest
+
+Array = npt.NDArray[np.float64]
+
+HORIZON_S = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class TuningTrial:
+    """What every setting is tried on. Pickles.
+
+    Attributes:
+        initial: the model as measured, without the states that a setting asks for.
+        time: (T,) s. markers: (T, M, 3) m, wrench: (T, 6), ground frame; NaN missing, or taken out.
+        first, end: the frames that count; those before are filtered too.
+        ahead: frames of the horizon of "100 ms ahead".
+        taken_out: sensors that the starting settings refused, summed over frames.
+        estimate: kinds of parameters that are estimated.
+    """
+
+    name: str
+    initial: InitialModel
+    time: Array
+    markers: Array
+    wrench: Array
+    first: int
+    end: int
+    ahead: int
+    taken_out: int = 0
+    estimate: tuple[Quantity, ...] = QUANTITIES
+
+    def counted(self, first: int, end: int) -> TuningTrial:
+        """The same, judged on other frames."""
+        return replace(self, first=first, end=end)
+
+    def halves(self) -> tuple[TuningTrial, TuningTrial]:
+        """The frames that count in two: the second half's figures then go on from what the first half taught."""
+        middle = (self.first + self.end) // 2
+        first = replace(self, name=f"{self.name}, first half", end=middle)
+        return first, replace(self, name=f"{self.name}, second half", first=middle)
+
+    def persistence(self) -> Array:
+        """RMS change (3M + 6,) of each channel over the horizon, in the frames that count: what holding the last
+        value is wrong by; NaN where nothing was measured."""
+        channels = np.hstack([self.markers.reshape(len(self.time), -1), self.wrench])
+        then = np.arange(max(self.first, self.ahead), self.end)
+        change = channels[then] - channels[then - self.ahead]
+        counts = np.isfinite(change).sum(axis=0)
+        squares = np.where(np.isfinite(change), change**2, 0.0).sum(axis=0)
+        return np.asarray(np.sqrt(np.divide(squares, counts, out=np.full(len(counts), np.nan), where=counts > 0)))
+
+    def identity(self) -> dict[str, object]:
+        """Plain data that stands for this trial where rows are kept."""
+        arrays = (self.time, self.markers, self.wrench, self.initial.x0, self.initial.sd0)
+        return {
+            "name": self.name,
+            "arrays": [digest([float(x).hex() for x in values.ravel()]) for values in arrays],
+            "estimate": list(self.estimate),
+            "counted": [self.first, self.end, self.ahead],
+        }
+
+
+def prepare(
+    recording: Recording, estimator: Estimator, *, static: Recording | None = None, horizon_s: float = HORIZON_S
+) -> TuningTrial:
+    """Read everything off a recording that does not depend on the settings to be tried.
+
+    The estimator's own settings start: plates that lag are brought into step, and what its gates refuse is taken out
+    once, so that every setting is judged by the same rows (a filter that refuses more would else look better).
+
+    Raises:
+        DynakinError: as `Estimator.run`.
+    """
+    initial = estimator.measure(recording, static=static)
+    extended = estimator.start_from(initial)
+    markers, wrench, _ = estimator.measured(recording, extended)
+    taken_out = 0
+    if _doubts(estimator.noise):
+        arrays, shift, _ = estimator.run_in_step(initial, recording.time, markers, wrench)
+        wrench = in_step(recording.time, wrench, shift) if shift else wrench
+        refused = arrays["verdicts"] == REFUSED
+        refused[arrays["tracking"] != FOLLOWING] = True
+        taken_out = int(refused.sum())
+        markers, wrench = markers.copy(), wrench.copy()
+        markers[refused[:, :-1]] = np.nan
+        wrench[refused[:, -1]] = np.nan
+    window = np.flatnonzero(evaluation_window(recording.time))
+    step = float(np.median(np.diff(recording.time)))
+    return TuningTrial(
+        recording.name,
+        initial,
+        np.ascontiguousarray(recording.time, dtype=float),
+        np.ascontiguousarray(markers),
+        np.ascontiguousarray(wrench),
+        int(window[0]),
+        len(recording.time),
+        max(1, round(horizon_s / step)),
+        taken_out,
+        estimator.estimate,
+    )
+
+
+def undoubting(noise: Noise) -> Noise:
+    """The same settings without gates and recovery: a trial that is ready needs none, and a filter that diverges is to
+    be seen to."""
+    return noise.model_copy(update={"marker_gate": 0.0, "wrench_gate": 0.0, "recover": False, "unseen_sd": None})
+
+
+def _doubts(noise: Noise) -> bool:
+    return noise.marker_gate > 0.0 or noise.wrench_gate > 0.0 or noise.recover or noise.plate_delay_s > 0.0

@@ -1,0 +1,285 @@
+"""Identified on one trial, frozen, judged on another from its markers alone: what a parameter is worth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.errors import LostError, ModelError, RecordingError
+from dynakin.filter.assemble import assemble
+from dynakin.filter.estimator import Estimator
+from dynakin.filter.smoothing import can_smooth
+from dynakin.filter.total_wrench import known_ground
+from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.initialise import initialise
+from dynakin.model.definition import Definition
+from dynakin.model.priors import Bounds, Priors
+from dynakin.recordings.frame import GroundFrame
+from dynakin.recordings.recording import Recording
+from dynakin.results.estimate import COMPONENTS, Estimate
+from dynakin.results.measures.fit import signal_fit
+from dynakin.results.measures.metrics import evaluation_window
+from dynakin.results.measures.tracking import without_lost
+from dynakin.validation.freeze import final_values, freeze, initial_values
+from dynakin.validation.reference.least_squares import identify, predicted_wrench
+from dynakin.validation.reference.methods import reference_methods
+from dynakin.validation.setup import Setup
+from dynakin.validation.statistics import spread
+from dynakin.validation.table2 import Row, unit_of
+
+Array = npt.NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """What was learned on the identifying trial.
+
+    initial: the model as measured there. estimates: by preset. static: the recording that lengths were measured on.
+    wrench: (T, 6) N and N m, the plates', as `measured_wrench`; ground: of the same laboratory, given to the judging
+    trial too where both are one recording.
+    """
+
+    recording: Recording
+    static: Recording | None
+    setup: Setup
+    initial: InitialModel
+    estimates: dict[str, Estimate]
+    wrench: Array
+    ground: GroundFrame | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Blind:
+    """Predictions of a trial's wrench from its markers; nothing in here has seen its plates.
+
+    start: the judging trial's own coordinates and ground frame. wrenches: (T, 6) N and N m by method. plates: as
+    `Setup.plates`, for judging.
+    """
+
+    recording: Recording
+    start: InitialModel
+    wrenches: dict[str, Array]
+    notes: tuple[str, ...]
+    plates: Mapping[str, str] | None = None
+
+
+def halves(recording: Recording) -> tuple[Recording, Recording]:
+    """First and second half of a trial.
+
+    Raises:
+        RecordingError: fewer than four frames.
+    """
+    if recording.n_frames < 4:
+        raise RecordingError(f"{recording.path or recording.name}: {recording.n_frames} frames, too few to halve")
+    middle = recording.n_frames // 2
+    times = recording.time
+    first = recording.window(times[0], times[middle - 1])
+    second = recording.window(times[middle], times[-1])
+    return replace(first, name=f"{first.name}, first half"), replace(second, name=f"{second.name}, second half")
+
+
+def identify_on(
+    recording: Recording, setup: Setup, *, static: Recording | None = None, same_recording: bool = False
+) -> Identified:
+    """Run every preset on the identifying trial.
+
+    Args:
+        same_recording: the judging trial is a part of the same recording, so its directions are this one's: a part may
+            begin in the middle of a movement.
+
+    Raises:
+        LostError: a filter lost the person. Other DynakinErrors: as `Estimator.run`.
+    """
+    estimates = {}
+    for preset in setup.noise:
+        estimator = setup.estimator(preset)
+        # only what it ends with is used, which smoothing does not change
+        estimates[preset] = estimator.run(recording, static=static, smooth=False)
+        _refuse_lost(estimates[preset], f"EKF ({preset})")
+    assert estimator.initial is not None
+    wrench = measured_wrench(recording, estimator.initial, setup.plates)
+    ground = estimator.initial.ground if same_recording else None
+    return Identified(recording, static, setup, estimator.initial, estimates, wrench, ground)
+
+
+def predict_blind(identified: Identified, recording: Recording) -> Blind:
+    """Every prediction of the judging trial's wrench. Its plates are taken away before anything else is done.
+
+    Filters: `EKF (preset), identified` and `EKF (preset), table`, lengths and inertia frozen at what the identifying
+    trial ended with, or at what was measured standing and the table. Reference: the table's inertia on classical
+    kinematics, then the same kinematics with least squares (in the bounds of (9), and free) and with each filter's
+    inertia. Persistence: the identifying trial's last wrench, and its mean.
+
+    Raises:
+        ModelError, RecordingError: the trial's markers do not fit the model. DivergenceError: from a filter. LostError:
+            a filter lost the person.
+    """
+    recording = replace(recording, plates=())
+    setup, measured = identified.setup, identified.initial
+    start = _start(identified, recording)
+    markers = marker_paths(recording, measured, start.ground)
+    blank = np.full((recording.n_frames, 6), np.nan)
+    coordinates = {c.name: float(c.value) for c in start.spec.coordinates}
+    found: dict[str, Array] = {}
+    for preset, estimate in identified.estimates.items():
+        for label, values in (("identified", final_values(estimate)), ("table", initial_values(measured))):
+            estimator = setup.estimator(preset)
+            estimator.start_from(freeze(measured, values, coordinates))
+            arrays = estimator.run_arrays(recording.time, markers, blank)
+            _refuse_lost(as_estimate(estimator, arrays, recording, markers), f"EKF ({preset}), {label}")
+            found[f"EKF ({preset}), {label}"] = arrays["wrench_estimated"]
+            if label == "identified" and can_smooth(setup.noise[preset]):
+                estimator.start_from(freeze(measured, values, coordinates))
+                arrays = estimator.run_smoothed_arrays(recording.time, markers, blank)
+                _refuse_lost(as_estimate(estimator, arrays, recording, markers), f"EKF ({preset}), smoothed")
+                found[f"EKF ({preset}), smoothed"] = arrays["wrench_estimated"]
+    notes: list[str] = []
+    try:
+        found |= _referred(identified, recording, start)
+    except ModelError as error:
+        notes.append(f"AT, the classical method and least squares are left out: {error.message}")
+    known = identified.wrench[np.isfinite(identified.wrench).all(axis=1)]
+    for label, guess in (("last", known[-1]), ("mean", known.mean(axis=0))):
+        found[f"persistence: {label}"] = np.repeat(guess[None], recording.n_frames, axis=0)
+    return Blind(recording, start, found, tuple(notes), setup.plates)
+
+
+def judge(blind: Blind, recording: Recording) -> list[Row]:
+    """The predictions against the plates of the same trial, over its window, where they tell the whole wrench; rows by
+    component, then method.
+
+    Raises:
+        RecordingError: as `measured_wrench`.
+    """
+    measured = measured_wrench(recording, blind.start, blind.plates)
+    window = evaluation_window(recording.time)
+    rows = []
+    for k in np.flatnonzero(blind.start.spec.wrench_measured):
+        for method, wrench in blind.wrenches.items():
+            fit = signal_fit(measured[window, k], wrench[window, k])
+            rows.append(Row(COMPONENTS[k], unit_of(COMPONENTS[k]), method, *(spread([figure]) for figure in fit)))
+    return rows
+
+
+def measured_wrench(recording: Recording, initial: InitialModel, plates: Mapping[str, str] | None = None) -> Array:
+    """The plates' total wrench (T, 6) N and N m about the ground origin; NaN where they do not tell all of it.
+
+    Args:
+        plates: plate -> foot, as `Estimator` takes it.
+
+    Raises:
+        RecordingError: there are no plates to identify on or to be judged by, they are refused, or in no frame do they
+            tell the whole wrench.
+    """
+    if not recording.plates:
+        raise RecordingError(
+            f"{recording.path or recording.name}: no force plates, expected at least one: the comparison needs them "
+            "(--forces)"
+        )
+    wrench = initial.ground.wrench_to_ground(recording.total_wrench())
+    known_ground(recording, initial, marker_paths(recording, initial, initial.ground), wrench, plates)
+    if not np.isfinite(wrench).all(axis=1).any():
+        where = recording.path or recording.name
+        raise RecordingError(f"{where}: in no frame do the plates tell the whole wrench, expected a second of them")
+    return wrench
+
+
+def marker_paths(recording: Recording, initial: InitialModel, ground: GroundFrame) -> Array:
+    """Paths (T, M, 3) m of the model's markers in the ground frame; one that the recording lacks is NaN."""
+    missing = np.full((recording.n_frames, 3), np.nan)
+    paths = [recording.marker(name) if name in recording.marker_names else missing for name in initial.recorded_markers]
+    return ground.points_to_ground(np.stack(paths, axis=1))
+
+
+def as_estimate(estimator: Estimator, arrays: Mapping[str, Array], recording: Recording, markers: Array) -> Estimate:
+    """What an estimator that was started by hand made of a recording's markers (T, M, 3) m alone, judged frame by frame
+    like any other estimate."""
+    assert estimator.initial is not None
+    measured = (markers, np.full((recording.n_frames, 6), np.nan))
+    covariances = (estimator.covariance, estimator.covariance)
+    return without_lost(
+        assemble(
+            arrays, estimator.core_model, estimator.initial, recording, measured, estimator.settings(), [], covariances
+        )
+    )
+
+
+def _refuse_lost(estimate: Estimate, method: str) -> None:
+    if (reason := estimate.why_lost) is not None:
+        where = estimate.recording.path or estimate.recording.name
+        raise LostError(f"{where}: {method}: {reason}; nothing is judged by it")
+
+
+def start_as(
+    measured: InitialModel,
+    definition: Definition,
+    recording: Recording,
+    ground: GroundFrame | None,
+    static: Recording,
+    *,
+    forward: str | tuple[float, float, float],
+    priors: Priors | None,
+    bounds: Bounds | None,
+) -> InitialModel:
+    """Where a trial begins on a model that was ``measured`` on another one: lengths, places and body as there.
+
+    Args:
+        definition: that was measured. ground: of the same laboratory, None: found. static: lengths come from it.
+        forward, priors, bounds: as for `initialise`.
+    """
+    known = {"mass_kg": measured.mass_kg, "height_m": measured.height_m}
+    return initialise(
+        replace(definition, subject=definition.subject.model_copy(update=known)),
+        recording,
+        ground,
+        static=static,
+        side=measured.side,
+        vertical=measured.ground.vertical,
+        forward=forward,
+        priors=priors,
+        bounds=bounds,
+    )
+
+
+def _start(identified: Identified, recording: Recording) -> InitialModel:
+    """Where the judging trial begins; lengths, places and body as measured for the identifying one."""
+    setup = identified.setup
+    return start_as(
+        identified.initial,
+        setup.definition,
+        recording,
+        identified.ground,
+        identified.static or identified.recording,
+        forward=setup.forward,
+        priors=setup.priors,
+        bounds=setup.bounds,
+    )
+
+
+def _referred(identified: Identified, recording: Recording, start: InitialModel) -> dict[str, Array]:
+    setup, measured = identified.setup, identified.initial
+    hertz = f"({setup.cutoff_hz:g} Hz)"
+    at = reference_methods(recording, start, setup.definition, setup.cutoff_hz)
+    learnt = reference_methods(identified.recording, measured, setup.definition, setup.cutoff_hz, lengths="frame")
+    fit = identify(
+        learnt.chain,
+        measured.measured_plan(),
+        learnt.kinematics,
+        identified.wrench,
+        mass_kg=measured.mass_kg,
+        bounds=setup.bounds,
+    )
+    inertia = {"table": fit.table, "least squares in bounds": fit.bounded, "least squares free": fit.free}
+    for preset, estimate in identified.estimates.items():
+        values = final_values(estimate)
+        inertia[f"inertia of EKF ({preset})"] = np.array(
+            [values.get(name, table) for name, table in zip(fit.names, fit.table, strict=True)]
+        )
+    moving = reference_methods(recording, start, setup.definition, setup.cutoff_hz, lengths="frame")
+    wrenches = {f"AT {hertz}": at.data["wrench_estimated"].transpose("time", "component").values}
+    for label, parameters in inertia.items():
+        wrenches[f"classical {hertz}, {label}"] = predicted_wrench(moving.chain, moving.kinematics, parameters)
+    return wrenches

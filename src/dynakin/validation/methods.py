@@ -1,0 +1,240 @@
+"""One trial worked on by every method, in arrays of the same shape: filters, the table ("AT"), the classical method."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from dynakin.errors import DynakinError, LostError, ModelError
+from dynakin.filter.zero import asked_angles
+from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.definition import Definition
+from dynakin.recordings.recording import Recording
+from dynakin.recordings.smoothing import CUTOFF_HZ
+from dynakin.results.estimate import COMPONENTS, Estimate
+from dynakin.results.measures.facing import facing
+from dynakin.results.measures.mean_curves import MEASURED, MeanCurve, mean_curves, signals
+from dynakin.results.measures.metrics import evaluation_window
+from dynakin.results.measures.repetitions import Found, repetitions_of
+from dynakin.results.measures.sources import measured_only, moment_sources, wrench_sources
+from dynakin.validation.reference.methods import Lengths, Reference, reference_methods
+from dynakin.validation.setup import Setup
+
+Array = npt.NDArray[np.float64]
+Mask = npt.NDArray[np.bool_]
+Progress = Callable[[int, int], None]
+
+AT = "AT"
+CLASSICAL = "classical"
+
+
+@dataclass(frozen=True, eq=False)
+class Method:
+    """What one method makes of a trial; ground frame, NaN where it says nothing.
+
+    Attributes:
+        name: "EKF (paper)", "AT (6 Hz)", ...; kind: "EKF", "AT" or "classical".
+        coordinates: (T, C) rad or m. moments: (T, C) N m or N.
+        markers: (T, M, 3) m. wrench: (T, 6) N and N m, ground on person, about the ground origin.
+        data: what it was taken from, named as `Estimate.data`, with speeds and accelerations too.
+    """
+
+    name: str
+    kind: str
+    coordinates: Array
+    moments: Array
+    markers: Array
+    wrench: Array
+    data: xr.Dataset
+
+    def measured_moments(self) -> Array:
+        """Moments (T, C), NaN where a contact behind them is not measured: what figures and mean curves take."""
+        return measured_only(self.moments, moment_sources(self.data))
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A recording with what all methods make of it.
+
+    Attributes:
+        window: (T,) bool, the frames that figures are taken over: after the adaptation.
+        measured_markers: (T, M, 3) m; measured_wrench: (T, 6).
+        axes: (3,) bool, ground axes that the model explains. rotation: (C,) bool.
+        repetitions: squats or gait cycles after the adaptation.
+        notes: what was left out and why.
+        estimates: of each preset, for whoever wants more. lost: presets that lost the person, and why.
+    """
+
+    name: str
+    time: Array
+    window: Mask
+    marker_names: tuple[str, ...]
+    coordinate_names: tuple[str, ...]
+    measured_markers: Array
+    measured_wrench: Array
+    axes: Mask
+    rotation: Mask
+    repetitions: Found
+    mass_kg: float
+    methods: tuple[Method, ...]
+    notes: tuple[str, ...]
+    estimates: dict[str, Estimate]
+    lost: dict[str, str] = field(default_factory=dict)
+
+    def of_kind(self, kind: str) -> list[Method]:
+        """The methods of one kind, in order."""
+        return [method for method in self.methods if method.kind == kind]
+
+    def curves(self) -> list[MeanCurve]:
+        """Mean curves of each method's coordinates, moments and wrench over the repetitions, and of the plates'."""
+        names, rotation = self.coordinate_names, self.rotation
+        methods = {
+            m.name: signals(
+                names, rotation, m.coordinates, m.measured_moments(), measured_only(m.wrench, wrench_sources(m.data))
+            )
+            for m in self.methods
+        }
+        methods[MEASURED] = signals(names, rotation, wrench=self.measured_wrench)
+        return mean_curves(self.time, self.repetitions.items, methods, self.mass_kg)
+
+
+def compare_trial(
+    recording: Recording, setup: Setup, *, static: Recording | None = None, progress: Progress | None = None
+) -> Trial:
+    """Run every preset and the reference methods.
+
+    "AT" is the paper's: classical angles, low-passed, on a chain of constant lengths with the table's inertia.
+    "classical" lets every joint follow its own landmarks, so that each segment stands for itself; the table's inertia
+    moves with it. The markers of both are carried rigidly from where they were while standing.
+
+    Raises:
+        LostError: no filter followed the person. DynakinError: as `Estimator.run`.
+    """
+    estimates, lost, initial = estimate_each(recording, setup, static=static, progress=progress)
+    trial = trial_of(estimates, initial, setup.definition, setup.cutoff_hz)
+    return with_lost(trial, lost)
+
+
+def with_lost(trial: Trial, lost: Mapping[str, str]) -> Trial:
+    """The trial with the filters that lost the person, which are left out, in its notes."""
+    notes = [f"Warning: EKF ({preset}) is left out: {reason}." for preset, reason in lost.items()]
+    return replace(trial, notes=(*trial.notes, *notes), lost=dict(lost))
+
+
+def estimate_each(
+    recording: Recording, setup: Setup, *, static: Recording | None = None, progress: Progress | None = None
+) -> tuple[dict[str, Estimate], dict[str, str], InitialModel]:
+    """Run every preset: the estimates, why others lost the person, and what they started from.
+
+    Raises:
+        LostError: no filter followed the person. DynakinError: as `Estimator.run`.
+    """
+    estimates: dict[str, Estimate] = {}
+    lost: dict[str, str] = {}
+    for preset in setup.noise:
+        estimator = setup.estimator(preset)
+        estimate = estimator.run(recording, static=static, smooth=setup.smooth, progress=progress)
+        reason = estimate.why_lost
+        if reason is None:
+            estimates[preset] = asked_angles(estimator, estimate, static, setup.zero, setup.signs)
+        else:
+            lost[preset] = reason
+    assert estimator.initial is not None
+    if not estimates:
+        where = recording.path or recording.name
+        raise LostError(f"{where}: {'; '.join(f'EKF ({preset}): {reason}' for preset, reason in lost.items())}")
+    return estimates, lost, estimator.initial
+
+
+def trial_of(
+    estimates: Mapping[str, Estimate],
+    initial: InitialModel,
+    definition: Definition,
+    cutoff_hz: float = CUTOFF_HZ,
+    *,
+    whatever: bool = False,
+) -> Trial:
+    """Estimates of one recording beside the reference methods on it; nothing is filtered again.
+
+    Args:
+        estimates: by the name of their preset, at least one. initial, definition: what they started from
+            (`Estimator.initial`, `Estimator.model`).
+        whatever: let no reference method that fails stop anything: the notes say why it is left out. Else only a model
+            that is no hinge chain in the plane is a note.
+
+    Raises:
+        RecordingError: uneven time steps, or a cut-off that is not below half the rate; not with ``whatever``.
+    """
+    methods = [_filtered(preset, estimate) for preset, estimate in estimates.items()]
+    first = facing(next(iter(estimates.values())))
+    notes = how_estimated(estimates)
+    options: tuple[tuple[str, Lengths], ...] = ((AT, "constant"), (CLASSICAL, "frame"))
+    try:
+        for kind, lengths in options:
+            reference = reference_methods(first.recording, initial, definition, cutoff_hz, lengths=lengths)
+            methods.append(_referred(kind, reference, initial))
+            notes += [f"{kind}: {note}" for note in reference.notes]
+    except DynakinError as error:
+        if not (whatever or isinstance(error, ModelError)):
+            raise
+        notes.append(f"AT and the classical method are left out: {error.message}")
+    data = first.data
+    return Trial(
+        name=first.recording.name,
+        time=first.time,
+        window=evaluation_window(first.time),
+        marker_names=tuple(first.marker_names),
+        coordinate_names=tuple(first.coordinate_names),
+        measured_markers=data["markers_measured"].transpose("time", "marker", "axis").values,
+        measured_wrench=data["wrench_measured"].transpose("time", "component").values,
+        axes=first.modelled_axes(),
+        rotation=first.is_rotation(),
+        repetitions=repetitions_of(first),
+        mass_kg=initial.mass_kg,
+        methods=tuple(methods),
+        notes=tuple(notes),
+        estimates=dict(estimates),
+    )
+
+
+def how_estimated(estimates: Mapping[str, Estimate]) -> list[str]:
+    """Which filters are smoothed and which are as live, where they stand beside each other and differ."""
+    if len({estimate.smoothed for estimate in estimates.values()}) < 2:
+        return []
+    return [
+        f"EKF ({preset}): " + ("each frame from all frames." if e.smoothed else "each frame as it would be live.")
+        for preset, e in estimates.items()
+    ]
+
+
+def _filtered(preset: str, estimate: Estimate) -> Method:
+    data = facing(estimate).data
+    return Method(
+        f"EKF ({preset})",
+        "EKF",
+        data["coordinates"].transpose("time", "coordinate").values,
+        data["moments"].transpose("time", "coordinate").values,
+        data["markers_estimated"].transpose("time", "marker", "axis").values,
+        data["wrench_estimated"].transpose("time", "component").values,
+        data,
+    )
+
+
+def _referred(kind: str, reference: Reference, initial: InitialModel) -> Method:
+    data = reference.data
+    cutoff = "" if reference.cutoff_hz is None else f" ({reference.cutoff_hz:g} Hz)"
+    segments = reference.chain.moving(reference.kinematics).segments
+    markers = np.stack([segments[site.segment].point(site.position) for site in initial.measured_plan().sites], axis=1)
+    return Method(
+        kind + cutoff,
+        kind,
+        data["coordinates"].transpose("time", "coordinate").values,
+        data["moments"].transpose("time", "coordinate").values,
+        markers,
+        data["wrench_estimated"].transpose("time", "component").sel(component=list(COMPONENTS)).values,
+        data,
+    )

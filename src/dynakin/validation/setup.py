@@ -1,0 +1,70 @@
+"""What a comparison is made with: the model, the noise presets beside each other, and the reference's cut-off."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from dynakin.errors import ConfigError
+from dynakin.filter import presets
+from dynakin.filter.augment import QUANTITIES, Quantity
+from dynakin.filter.estimator import Estimator
+from dynakin.filter.noise import Noise
+from dynakin.filter.zero import Zero
+from dynakin.model.calibration.loads import CarriedLoad
+from dynakin.model.definition import Definition
+from dynakin.model.identified import IdentifiedSubject
+from dynakin.model.priors import Bounds, Priors
+from dynakin.recordings.smoothing import CUTOFF_HZ
+from dynakin.results.measures.angles import Signs
+
+
+@dataclass(frozen=True, eq=False)
+class Setup:
+    """How every trial of a comparison is worked on.
+
+    Attributes:
+        definition: what `load_model` returns.
+        noise: settings of each filter that is compared, by the name of its preset.
+        cutoff_hz: of the reference methods' zero-lag low-pass, Hz.
+        priors, bounds, side, vertical, forward, estimate, plates, loads, parameters: as `Estimator` takes them.
+        smooth: as `Estimator.run`. zero, signs: of the joint angles, as in a run's configuration.
+    """
+
+    definition: Definition
+    noise: Mapping[str, Noise] = field(default_factory=lambda: {"default": presets.default()})
+    cutoff_hz: float = CUTOFF_HZ
+    priors: Priors | None = None
+    bounds: Bounds | None = None
+    side: str = "auto"
+    vertical: str = "auto"
+    forward: str | tuple[float, float, float] = "auto"
+    estimate: tuple[Quantity, ...] = QUANTITIES
+    plates: Mapping[str, str] | None = None
+    loads: tuple[CarriedLoad, ...] = ()
+    parameters: IdentifiedSubject | None = None
+    smooth: bool | None = None
+    zero: Zero = "model"
+    signs: Signs = "opensim"
+
+    def __post_init__(self) -> None:
+        if not self.noise:
+            raise ConfigError("comparison: no preset was given, expected at least one")
+        if not self.cutoff_hz > 0.0:
+            raise ConfigError(f"comparison: the cut-off is {self.cutoff_hz:g} Hz, expected a positive number")
+
+    def estimator(self, preset: str) -> Estimator:
+        """A filter with the noise of one of the presets, not started yet."""
+        return Estimator(
+            self.definition,
+            self.noise[preset],
+            priors=self.priors,
+            bounds=self.bounds,
+            side=self.side,
+            vertical=self.vertical,
+            forward=self.forward,
+            estimate=self.estimate,
+            plates=self.plates,
+            loads=self.loads,
+            parameters=self.parameters,
+        )

@@ -1,0 +1,104 @@
+"""Methods by their error, where a simulation tells the truth."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from dynakin.results.measures.adaptation import constant_groups
+from dynakin.results.records import Parameter
+
+Array = npt.NDArray[np.float64]
+
+LEG = ("ankle", "knee", "hip")
+"""Joints of a leg in the built-in planar models."""
+
+# (title, unit) of the figures of `truth_errors`, in their order.
+FIGURES = (
+    ("angles", "deg"),
+    ("about their mean", "deg"),
+    ("speeds", "rad/s"),
+    ("accelerations", "rad/s2"),
+    ("moments", "N m"),
+    ("FX", "N"),
+    ("FY", "N"),
+    ("MZ", "N m"),
+)
+
+
+@dataclass(frozen=True)
+class TruthErrors:
+    """RMS errors of one method in the order of `FIGURES`; NaN where it does not give the quantity.
+
+    Angles as they are, and after removing each coordinate's mean offset; these, speeds and accelerations are averaged
+    over all coordinates, moments over those that `truth_errors` was asked for.
+    """
+
+    method: str
+    values: tuple[float, ...]
+
+
+def truth_errors(
+    method: str, data: xr.Dataset, truth: xr.Dataset, window: npt.NDArray[np.bool_], joints: Sequence[str]
+) -> TruthErrors:
+    """Errors of ``data`` (named as `Estimate.data`) against ``truth`` over the frames ``window`` (T,).
+
+    Args:
+        joints: coordinates whose moments count; a planar model's toe is the ground's.
+    """
+    names = [str(name) for name in truth["coordinate"].values]
+
+    def error(variable: str, coordinates: Sequence[str] = names) -> Array:
+        both = (data[variable].sel(coordinate=list(coordinates)), truth[variable].sel(coordinate=list(coordinates)))
+        given, true = (entry.transpose("time", "coordinate").values for entry in both)
+        return np.asarray(given - true)[window]
+
+    angle = np.degrees(error("coordinates"))
+    wrench = (data["wrench_estimated"] - truth["wrench"]).transpose("time", "component").values[window]
+    return TruthErrors(
+        method,
+        (
+            _mean_rms(angle),
+            _mean_rms(angle - np.nanmean(angle, axis=0)),
+            _mean_rms(error("speeds")),
+            _mean_rms(error("accelerations")),
+            _mean_rms(error("moments", joints)),
+            *(_mean_rms(wrench[:, [k]]) for k in (0, 1, 5)),
+        ),
+    )
+
+
+class ParameterError(NamedTuple):
+    """RMS error of one kind of constant, per cent of the true values: where the filter started, and where it ended."""
+
+    constants: int
+    start_percent: float
+    end_percent: float
+
+
+def parameter_errors(parameters: Sequence[Parameter], truth: Mapping[str, float]) -> dict[str, ParameterError]:
+    """Errors of the estimated lengths, masses and moments of inertia.
+
+    Args:
+        truth: by the names of the filter's state, as `dynakin.simulation.Truth.parameters`; constants that it does not
+            hold do not count.
+    """
+    found = {}
+    for title, group in constant_groups(parameters).items():
+        known = [p for p in group if truth.get(p.name)]
+        if known:
+            true = np.array([truth[p.name] for p in known])
+            errors = [np.array([getattr(p, key) for p in known]) / true - 1.0 for key in ("initial", "value")]
+            start, end = (100.0 * float(np.sqrt(np.mean(error**2))) for error in errors)
+            found[title] = ParameterError(len(known), start, end)
+    return found
+
+
+def _mean_rms(errors: Array) -> float:
+    """Mean over the columns of their RMS."""
+    return float(np.mean(np.sqrt(np.nanmean(errors**2, axis=0))))

@@ -1,0 +1,200 @@
+"""What the filter has not seen: plates withheld, one marker left out at a time, a moment ahead. A posterior residual
+proves little, since large gains follow anything; these cannot be had by following."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+import dynakin._core as _core
+from dynakin.errors import ConfigError, RecordingError
+from dynakin.filter.estimator import Estimator
+from dynakin.model.calibration.initial import InitialModel
+from dynakin.recordings.recording import Recording
+from dynakin.results.estimate import COMPONENTS
+from dynakin.results.measures.fit import marker_rms_mm, signal_fit
+from dynakin.results.measures.metrics import evaluation_window
+from dynakin.validation.extrapolation import extrapolated, held, line, persisted, span_frames
+from dynakin.validation.held_out import halves, identify_on, judge, predict_blind
+from dynakin.validation.setup import Setup
+from dynakin.validation.statistics import Spread, spread
+from dynakin.validation.table2 import MARKERS, unit_of
+
+Array = npt.NDArray[np.float64]
+Figures = dict[tuple[str, str, str], float | None]  # (yardstick, quantity, method) -> RMS in the quantity's unit
+Progress = Callable[[int, int], None]
+
+HORIZON_S = 0.1
+WITHHELD, LEFT_OUT = "plates withheld", "marker left out"
+PERSISTENCE, LINEAR = "persistence", "linear extrapolation"
+
+
+@dataclass(frozen=True)
+class UnseenRow:
+    """RMS error of one quantity by one method, by one yardstick; mean and standard deviation over trials.
+
+    yardstick: "plates withheld", "marker left out", "100 ms ahead". quantity: fx to mz, "markers" (mean over markers)
+    or a marker's name. unit: of ``rms``.
+    """
+
+    yardstick: str
+    quantity: str
+    unit: str
+    method: str
+    rms: Spread
+
+
+def unseen(trials: Sequence[Figures]) -> list[UnseenRow]:
+    """Rows over one or many trials, each of `unseen_figures`: by yardstick, then quantity, then method."""
+    keys = dict.fromkeys(key for figures in trials for key in figures)
+    yardsticks, quantities, methods = (list(dict.fromkeys(part)) for part in zip(*keys, strict=True))
+    first = [name for name in (MARKERS, *COMPONENTS) if name in quantities]
+    return [
+        UnseenRow(*key[:2], unit_of(key[1]), key[2], spread([figures.get(key) for figures in trials]))
+        for yardstick in yardsticks
+        for quantity in dict.fromkeys([*first, *quantities])
+        for method in methods
+        if (key := (yardstick, quantity, method)) in keys
+    ]
+
+
+def unseen_figures(
+    recording: Recording,
+    setup: Setup,
+    *,
+    static: Recording | None = None,
+    horizon_s: float = HORIZON_S,
+    progress: Progress | None = None,
+) -> Figures:
+    """All yardsticks on one trial, over its window.
+
+    - Plates withheld: lengths and inertia from the first half, frozen; the second half from markers alone.
+    - Marker left out: from the end of the adaptation on, one marker is not given to the filter; its error there.
+    - Ahead: from each frame's estimate the state is predicted ``horizon_s`` on, without an update.
+
+    Beside each: the last value held, and the last slope of the raw data carried on.
+
+    Raises:
+        ConfigError: the horizon is not within the trial. DynakinError: as `Estimator.run`.
+    """
+    figures = plates_withheld(recording, setup, static=static)
+    for preset in setup.noise:
+        estimator = setup.estimator(preset)
+        initial = estimator.start(recording, static=static)
+        markers, wrench, _ = estimator.measured(recording, initial)
+        trial = _Trial(recording, initial, markers, wrench)
+        figures |= _left_out(estimator, preset, trial, progress)
+        figures |= _ahead(estimator, preset, trial, horizon_s)
+    return figures
+
+
+def plates_withheld(recording: Recording, setup: Setup, *, static: Recording | None = None) -> Figures:
+    """Errors (N, N m) of the second half's wrench from markers alone, parameters frozen at the first half's end."""
+    first, second = halves(recording)
+    identified = identify_on(first, setup, static=static, same_recording=True)
+    blind = predict_blind(identified, second)
+    wanted = {f"EKF ({preset}), identified": f"EKF ({preset})" for preset in setup.noise}
+    last = len(first.time) - 1
+    time = np.concatenate([first.time, second.time])
+    shown = np.vstack([identified.wrench, np.full((len(second.time), 6), np.nan)])
+    chosen = {wanted[name]: wrench for name, wrench in blind.wrenches.items() if name in wanted}
+    chosen |= {PERSISTENCE: held(shown, last)[last + 1 :], LINEAR: line(time, shown, last)[last + 1 :]}
+    rows = judge(replace(blind, wrenches=chosen), second)
+    return {(WITHHELD, row.quantity, row.method): row.rms.mean for row in rows}
+
+
+@dataclass(frozen=True, eq=False)
+class _Trial:
+    recording: Recording
+    initial: InitialModel
+    markers: Array  # (T, M, 3) m, ground frame
+    wrench: Array  # (T, 6); NaN where the plates do not tell all of it: neither fed nor judged
+
+    def marker_errors(self, yardstick: str, method: str, estimated: Array, columns: Sequence[int]) -> Figures:
+        """RMS distance (mm) of some markers (T, M, 3), over the window."""
+        axes, window = np.array(self.initial.spec.markers[0].measured), evaluation_window(self.recording.time)
+        return {
+            (yardstick, self.initial.recorded_markers[k], method): marker_rms_mm(
+                self.markers[window, k], estimated[window, k], axes
+            )
+            for k in columns
+        }
+
+    def wrench_errors(self, yardstick: str, method: str, estimated: Array) -> Figures:
+        """RMS (N, N m) of each modelled component, over the window."""
+        window = evaluation_window(self.recording.time)
+        return {
+            (yardstick, COMPONENTS[k], method): signal_fit(self.wrench[window, k], estimated[window, k]).rms
+            for k in np.flatnonzero(self.initial.spec.wrench_measured)
+            if np.isfinite(self.wrench[window, k]).any()
+        }
+
+
+def _left_out(estimator: Estimator, preset: str, trial: _Trial, progress: Progress | None) -> Figures:
+    time = trial.recording.time
+    window = evaluation_window(time)
+    first = int(np.flatnonzero(window)[0])
+    if first == 0:
+        raise RecordingError(
+            f"{trial.recording.path or trial.recording.name}: {time[-1] - time[0]:.1f} s, too short to leave a marker "
+            "out after the adaptation; expected more than 4 s"
+        )
+    single: Figures = {}
+    count = trial.markers.shape[1]
+    for k in range(count):
+        hidden = trial.markers.copy()
+        hidden[first:, k] = np.nan
+        estimator.start_from(trial.initial)
+        arrays = estimator.run_arrays(time, hidden, trial.wrench)
+        single |= trial.marker_errors(LEFT_OUT, f"EKF ({preset})", arrays["markers_estimated"], [k])
+        if progress is not None:
+            progress(k + 1, count)
+    for method, guess in (
+        (PERSISTENCE, [held(trial.markers[:, k], first - 1) for k in range(count)]),
+        (LINEAR, [line(time, trial.markers[:, k], first - 1) for k in range(count)]),
+    ):
+        single |= trial.marker_errors(LEFT_OUT, method, np.stack(guess, axis=1), range(count))
+    return _with_mean(LEFT_OUT, single)
+
+
+def _ahead(estimator: Estimator, preset: str, trial: _Trial, horizon_s: float) -> Figures:
+    time, initial = trial.recording.time, trial.initial
+    if not 0.0 < horizon_s < 0.5 * float(time[-1] - time[0]):
+        raise ConfigError(f"the horizon is {horizon_s:g} s, expected more than 0 and less than half of the trial")
+    yardstick = f"{1000.0 * horizon_s:g} ms ahead"
+    frames = span_frames(time, horizon_s)
+    estimator.start_from(initial)
+    states = estimator.run_arrays(time, trial.markers, trial.wrench)["state"]
+    model = _core.Model(initial.spec)
+    covariance = np.diag(initial.sd0**2)  # the mean's prediction does not depend on it
+    probe = _core.Filter(model, estimator.filter_settings(initial), initial.x0, covariance)
+    markers, wrench = np.full_like(trial.markers, np.nan), np.full_like(trial.wrench, np.nan)
+    for k in range(len(time) - frames):
+        probe.reset(states[k], covariance)
+        probe.predict(float(time[k + frames] - time[k]))
+        markers[k + frames] = _core.marker_positions(model, probe.state)
+        wrench[k + frames] = _core.wrench(model, probe.state)
+    figures: Figures = {}
+    for method, places, forces in (
+        (f"EKF ({preset})", markers, wrench),
+        (PERSISTENCE, persisted(trial.markers, frames), persisted(trial.wrench, frames)),
+        (LINEAR, extrapolated(time, trial.markers, frames), extrapolated(time, trial.wrench, frames)),
+    ):
+        figures |= trial.marker_errors(yardstick, method, places, range(markers.shape[1]))
+        figures |= trial.wrench_errors(yardstick, method, forces)
+    return _with_mean(yardstick, figures)
+
+
+def _with_mean(yardstick: str, figures: Figures) -> Figures:
+    """The same, opened by the mean over markers of each method."""
+    methods = dict.fromkeys(method for _, _, method in figures)
+    means: Figures = {
+        (yardstick, MARKERS, method): spread(
+            [value for (_, q, m), value in figures.items() if m == method and q not in COMPONENTS]
+        ).mean
+        for method in methods
+    }
+    return means | figures
