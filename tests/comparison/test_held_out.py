@@ -10,7 +10,7 @@ import pytest
 from dynakin import _core
 from dynakin.errors import LostError, RecordingError
 from dynakin.recordings.recording import Plate, Recording
-from dynakin.simulation.trial import SimulatedTrial
+from dynakin.simulation.output import SimulatedTrial
 from dynakin.validation.freeze import final_values, freeze, initial_values
 from dynakin.validation.held_out import Identified, halves, identify_on, judge, predict_blind
 from dynakin.validation.setup import Setup

@@ -13,8 +13,9 @@ from dynakin.errors import ConfigError
 from dynakin.filter.samples import recording_arrays
 from dynakin.report.insights import insights
 from dynakin.results.estimate import Estimate
+from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
-from dynakin.simulation.trial import SimulatedTrial, simulate_squat
+from dynakin.simulation.trial import simulate_squat
 
 START_S = 3.0
 

@@ -9,7 +9,8 @@ import pytest
 import dynakin
 from dynakin.identification.subject import Identified, identify_subject
 from dynakin.identification.trials import Common, MeasuredTrial, measure_all
-from dynakin.simulation.trial import SimulatedTrial, simulate
+from dynakin.simulation.output import SimulatedTrial
+from dynakin.simulation.trial import simulate
 
 
 @dataclass(frozen=True, eq=False)

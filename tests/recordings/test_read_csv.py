@@ -9,7 +9,7 @@ import pytest
 from made_recordings import write
 
 from dynakin.errors import ConfigError, RecordingError
-from dynakin.recordings.plates.options import ReadOptions
+from dynakin.recordings.formats.options import ReadOptions
 from dynakin.recordings.read import READERS, read, register_reader
 from dynakin.recordings.recording import Recording
 

@@ -12,8 +12,9 @@ from dynakin.model.calibration.initial import InitialModel
 from dynakin.model.calibration.posture import Geometry
 from dynakin.model.definition import ModelDefinition
 from dynakin.model.plan import ModelPlan
+from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
-from dynakin.simulation.trial import SimulatedTrial, simulate_squat
+from dynakin.simulation.trial import simulate_squat
 from dynakin.validation.reference.chain import Kinematics, PlanarChain
 
 MASS_KG = 70.0

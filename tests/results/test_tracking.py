@@ -16,7 +16,8 @@ from dynakin.cli.app import main
 from dynakin.errors import LostError
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.tracking import refuse_lost, tracking_of, without_lost
-from dynakin.simulation.trial import SimulatedTrial, simulate_squat
+from dynakin.simulation.output import SimulatedTrial
+from dynakin.simulation.trial import simulate_squat
 from dynakin.validation.methods import compare_trial
 from dynakin.validation.setup import Setup
 

@@ -12,8 +12,9 @@ from dynakin.errors import ConfigError, RecordingError
 from dynakin.results.files.storage import write_storage
 from dynakin.simulation.mechanics import Motion, kinematics
 from dynakin.simulation.motions.registry import MOTIONS
+from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
-from dynakin.simulation.trial import SimulatedTrial, simulate
+from dynakin.simulation.trial import simulate
 
 PERFECT = SensorNoise.none()
 MODELS = ("sagittal7", "squat7")

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynakin.simulation.bodies.body import Contact, SimulatedBody
+from dynakin.simulation.bodies.markers import Site
 from dynakin.simulation.bodies.subject import (
     LUMBAR_DIRECTION,
     T12_ON_TORSO,
@@ -19,7 +20,6 @@ from dynakin.simulation.bodies.subject import (
     symmetric,
 )
 from dynakin.simulation.mechanics import Axis, Motion, Segment, kinematics
-from dynakin.simulation.sensors.markers import Site
 
 Array = NDArray[np.float64]
 UP = np.array([0.0, 1.0, 0.0])

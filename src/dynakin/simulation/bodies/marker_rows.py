@@ -1,8 +1,9 @@
-"""Markers of the whole body in space: the ``opencap`` and the Plug-in Gait set, both sides.
+"""Marker lists of the simulated persons: the ``opencap`` and the Plug-in Gait set, both sides.
 
-Rows are places in the segment's own frame over the body height, from the joint by which the segment hangs (the pelvis:
-from the middle of the ASIS); lateral is outward. Markers over a joint lie beside its centre by half a joint's width
-(Ross & Wilson 1974, as in the marker sets) and a marker's radius of 7 mm.
+OPENCAP and PLUG_IN_GAIT are for planar persons, SETS for the whole body in space. Rows of the latter are places in the
+segment's own frame over the body height, from the joint by which the segment hangs (the pelvis: from the middle of the
+ASIS); lateral is outward. Markers over a joint lie off its centre by half a joint's width (Ross & Wilson 1974, as in
+the marker sets) and a marker's radius of 7 mm.
 """
 
 from __future__ import annotations
@@ -11,10 +12,77 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from dynakin.simulation.bodies.markers import MarkerList, Row, Site
 from dynakin.simulation.bodies.subject import SimulatedSubject
-from dynakin.simulation.sensors.markers import MarkerList, Row, Site
-from dynakin.simulation.sensors.opencap_markers import OPENCAP
-from dynakin.simulation.sensors.plug_in_gait_markers import PLUG_IN_GAIT
+
+_LOWER = {"foot", "shank", "thigh"}  # the right side's names of these begin with r_, of the others with R_
+
+
+def _opencap_name(row: Row, side: str) -> str:
+    if row.stem.startswith("."):  # r.ASIS, L.ASIS
+        return f"{'r' if side == 'right' else 'L'}{row.stem}"
+    if side == "left":
+        return f"L_{row.stem}"
+    return f"{'r' if row.part in _LOWER else 'R'}_{row.stem}"
+
+
+# Stem of the name, part, region, x, y over the body height, distance from the midline over it, whether landmark.
+OPENCAP = MarkerList(
+    _opencap_name,
+    (
+        Row("toe", "foot", "toe", 0.000, 0.000, 0.120, True),
+        Row("5meta", "foot", "forefoot", -0.026, -0.014, 0.150),
+        Row("calc", "foot", "heel", -0.128, -0.006, 0.098, True),
+        Row("ankle", "shank", "ankle", 0.000, 0.000, 0.125, True),
+        Row("sh2", "shank", "shank", -0.020, 0.190, 0.128),
+        Row("sh3", "shank", "shank", -0.012, 0.110, 0.130),
+        Row("shank_antsup", "shank", "shank", 0.026, 0.200, 0.112),
+        Row("knee", "thigh", "knee", 0.000, 0.000, 0.108, True),
+        Row("thigh1", "thigh", "thigh", 0.045, 0.165, 0.106),
+        Row("thigh2", "thigh", "thigh", 0.042, 0.085, 0.104),
+        Row("thigh3", "thigh", "thigh", -0.025, 0.155, 0.125),
+        Row("thigh4", "thigh", "thigh", -0.020, 0.080, 0.116),
+        Row(".ASIS", "pelvis", "pelvis", 0.036, 0.053, 0.076, True),
+        Row(".PSIS", "pelvis", "pelvis", -0.086, 0.053, 0.028, True),
+        Row("Sternum", "trunk", "trunk", 0.055, 0.215, 0.014),
+        Row("Shoulder", "trunk", "shoulder", 0.000, 0.248, 0.095),
+        Row("humerus", "upper_arm", "arm", 0.012, -0.080, 0.125),
+        Row("elbow_lat", "upper_arm", "arm", 0.000, -0.186, 0.138, True),
+        Row("elbow_med", "upper_arm", "arm", 0.000, -0.186, 0.094, True),
+        Row("forearm", "forearm", "forearm", 0.014, -0.045, 0.128),
+        Row("wrist_radius", "forearm", "forearm", 0.017, -0.146, 0.112, True),
+        Row("wrist_ulna", "forearm", "forearm", -0.017, -0.146, 0.118, True),
+        Row("C7", "trunk", "trunk", -0.050, 0.262, 0.0),
+    ),
+)
+
+
+def _plug_in_gait_name(row: Row, side: str) -> str:
+    return f"{side[0].upper()}{row.stem}"
+
+
+PLUG_IN_GAIT = MarkerList(
+    _plug_in_gait_name,
+    (
+        Row("TOE", "foot", "toe", 0.000, 0.000, 0.120, True),
+        Row("MT5", "foot", "forefoot", -0.026, -0.014, 0.150),
+        Row("HEE", "foot", "heel", -0.128, -0.006, 0.098, True),
+        Row("ANK", "shank", "ankle", 0.000, 0.000, 0.125, True),
+        Row("TIB", "shank", "shank", -0.008, 0.130, 0.130),
+        Row("KNE", "thigh", "knee", 0.000, 0.000, 0.108, True),
+        Row("THI", "thigh", "thigh", 0.005, 0.115, 0.122),
+        Row("ASI", "pelvis", "pelvis", 0.036, 0.053, 0.076, True),
+        Row("PSI", "pelvis", "pelvis", -0.086, 0.053, 0.028, True),
+        Row("SHO", "trunk", "shoulder", 0.000, 0.248, 0.095),
+        Row("ELB", "upper_arm", "arm", 0.000, -0.186, 0.138, True),
+        Row("WRA", "forearm", "forearm", 0.017, -0.146, 0.112, True),
+        Row("WRB", "forearm", "forearm", -0.017, -0.146, 0.118, True),
+        Row("T10", "abdomen", "trunk", -0.055, 0.107, 0.0, True),
+        Row("STRN", "trunk", "trunk", 0.060, 0.170, 0.0),
+        Row("CLAV", "trunk", "trunk", 0.055, 0.232, 0.0),
+        Row("C7", "trunk", "trunk", -0.050, 0.262, 0.0),
+    ),
+)
 
 _PAIRED = ("thigh", "shank", "foot", "upper_arm", "forearm")
 _ON_KNEE, _ON_ANKLE, _ON_ELBOW = 0.0320, 0.0236, 0.0230  # beside the joint centre, over the height
@@ -93,7 +161,7 @@ SETS: Mapping[str, MarkerList] = {
 def draw_sites(
     rng: np.random.Generator, subject: SimulatedSubject, markers: MarkerList, scatter_m: float = 0.006
 ) -> tuple[Site, ...]:
-    """Marker sites of the subject, as `dynakin.simulation.sensors.markers.draw_sites`: each is put down ``scatter_m``
+    """Marker sites of the subject, as `dynakin.simulation.bodies.markers.draw_sites`: each is put down ``scatter_m``
     (standard deviation an axis) off its usual place, paired landmarks where they belong."""
     sites = []
     for row in markers.rows:
