@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import pytest
 
 import dynakin
-from dynakin.identification.subject import Identified, identify_subject
+from dynakin.identification.subject import Identification, identify_subject
 from dynakin.identification.trials import Common, MeasuredTrial, measure_all
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.trial import simulate
@@ -37,5 +37,5 @@ def case() -> Case:
 
 
 @pytest.fixture(scope="session")
-def identified(case: Case) -> Identified:
+def identified(case: Case) -> Identification:
     return identify_subject(estimator(), [sim.recording for sim in case.sims], static=case.common.static)
