@@ -30,8 +30,7 @@ from dynakin.simulation.trial import simulate_squat
 from dynakin.stream.sinks.record_format import packet_record, text_record
 from dynakin.stream.sinks.recorder import FILE, recorded
 from dynakin.stream.sources.packets import MarkerPacket, PlatePacket
-
-from .corpus import OSIM_3, OSIM_4, make
+from support.fuzz.corpus import OSIM_3, OSIM_4, make
 
 
 def refused(call: Callable[[], object], kind: type[DynakinError], expected: str) -> None:

@@ -12,7 +12,7 @@ from dynakin.errors import ModelError
 from dynakin.identification.bodies import Bodies, BodyPriors
 from dynakin.identification.unknowns import Unknowns
 from dynakin.simulation.trial import simulate
-from identification.conftest import Case
+from support.identification import Case
 
 _M, _C, _R = np.array([2.0, 30.0, 38.0]), np.array([[0.1, 0.0], [0.0, 0.2], [0.02, 0.3]]), np.array([0.05, 0.1, 0.2])
 BODIES = Bodies.in_plane(("foot", "leg", "body"), 70.0, _M, _C, _R, np.ones(3), BodyPriors())

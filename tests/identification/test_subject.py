@@ -17,7 +17,7 @@ from dynakin.identification.subject import Identification, identify_subject
 from dynakin.identification.trials import measure_all
 from dynakin.model.identified import read_identified, with_identified
 from dynakin.recordings.recording import Recording
-from identification.conftest import Case, estimator
+from support.identification import Case, estimator
 
 
 def test_a_subject_is_possible_weighs_the_same_and_survives_its_file(

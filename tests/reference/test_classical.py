@@ -15,7 +15,7 @@ from dynakin.simulation.trial import simulate_squat
 from dynakin.validation.reference.chain import PlanarChain
 from dynakin.validation.reference.classical import classical_angles
 from dynakin.validation.reference.landmark_paths import landmark_paths
-from reference.conftest import Perfect
+from support.perfect import Perfect
 
 
 @pytest.fixture(scope="module")

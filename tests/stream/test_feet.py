@@ -17,8 +17,7 @@ from dynakin.stream.feet import LiveFeet
 from dynakin.stream.session import Live
 from dynakin.stream.sinks.base import Callback, LiveFrame
 from dynakin.stream.sources.replay import Replay
-
-from .offline import offline_states
+from support.stream.offline import offline_states
 
 LAG = 5
 
