@@ -27,6 +27,7 @@ from figures_compare import Comparison
 ROOT = Path(__file__).resolve().parents[1]
 DATA = Path(os.environ.get("DYNAKIN_TEST_DATA", ROOT.parent / "shared" / "data")).absolute()
 LIMIT_S = 900.0
+TIMED_OUT = 124  # as the command timeout says it
 
 
 def _cases() -> dict[str, dict[str, Any]]:
@@ -75,8 +76,12 @@ def _work(case: dict[str, Any], folder: Path, program: Path) -> str:
         for k, command in enumerate(case["commands"]):
             print(f"\n$ dynakin {command}", file=log, flush=True)
             call = [str(program), *command.split()]
-            done = subprocess.run(call, cwd=folder, env=os.environ | one, stdout=log, stderr=log, timeout=LIMIT_S)
-            codes[f"{k} {command.split()[0]}"] = done.returncode
+            try:
+                done = subprocess.run(call, cwd=folder, env=os.environ | one, stdout=log, stderr=log, timeout=LIMIT_S)
+                code = done.returncode
+            except subprocess.TimeoutExpired:
+                code = TIMED_OUT
+            codes[f"{k} {command.split()[0]}"] = code
     exits.write_text(json.dumps(codes, indent=1))
     bad = "".join(f", {name} ended with {code}" for name, code in codes.items() if code)
     return f"{time.monotonic() - started:.0f} s{bad}"

@@ -111,7 +111,7 @@ def _digit(cell: Any) -> float:
 
 def _whole(key: str) -> str:
     """The variable of a column that has no name of its own."""
-    return re.sub(r"\[\d+\]$", "", key)
+    return re.sub(r"(?:\[\d+\])+$", "", key)
 
 
 def _word(cell: Any) -> str:
