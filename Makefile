@@ -9,8 +9,11 @@ CORE := $(shell find cpp/include cpp/src src/dynakin/bindings -type f) CMakeList
 CPP_TESTS := $(shell find cpp/tests -type f)
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
+unexport PYTHONDONTWRITEBYTECODE  # tests start many processes; each would compile all modules again
+# A file's tests stay in one process, so that what they share is made once.
+PYTEST := $(BIN)/python -m pytest -n logical --maxprocesses 8 --dist loadfile
 
-.PHONY: all demo live test test-python test-cpp lint stubs bench peers nightly clean prerequisites
+.PHONY: all demo live check test test-python test-cpp test-cpp-sanitize lint stubs bench peers nightly clean prerequisites
 all: $(VENV)/.built
 
 prerequisites:
@@ -48,20 +51,31 @@ live: $(VENV)/.live
 demo: $(VENV)/.built
 	$(BIN)/dynakin demo -o $(OUT)
 
-test: lint test-cpp test-python
+# Three tiers (CONTRIBUTING): after each change, before each merge, each night.
+check: $(VENV)/.dev
+	+@$(MAKE) --no-print-directory -j2 --output-sync=target lint test-cpp
+	$(PYTEST) tests/core tests/oracle tests/recordings
+
+test: $(VENV)/.dev
+	+@$(MAKE) --no-print-directory -j2 --output-sync=target lint test-cpp
+	+@$(MAKE) --no-print-directory test-python
 
 test-python: $(VENV)/.dev
-	$(BIN)/python -m pytest
+	$(PYTEST)
 
-# The core's own tests: once as shipped (nothing may be allocated in a step), once under the sanitizers.
-test-cpp: $(VENV)/.dev
-	@for kind in release sanitize; do \
-	  $(BIN)/cmake -S . -B build/cpp-$$kind -G Ninja -DDYNAKIN_PYTHON=OFF -DDYNAKIN_TESTS=ON \
-	    -DDYNAKIN_SANITIZE=$$([ $$kind = sanitize ] && echo ON || echo OFF) \
-	    -DCMAKE_PREFIX_PATH="$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" >/dev/null && \
-	  $(BIN)/cmake --build build/cpp-$$kind >build/cpp-$$kind/build.log || { cat build/cpp-$$kind/build.log; exit 1; }; \
-	  $(BIN)/ctest --test-dir build/cpp-$$kind --output-on-failure || exit 1; \
-	done
+# What is long: sanitizers, real recordings at full length, processes killed, other software, some 25,000 damaged files.
+nightly: test-cpp-sanitize
+	$(PYTEST) -m nightly --dist load
+	+@$(MAKE) --no-print-directory peers
+
+# The core's own tests: as shipped (nothing may be allocated in a step), and under the sanitizers.
+test-cpp test-cpp-sanitize: BUILD = build/cpp-$(if $(findstring sanitize,$@),sanitize,release)
+test-cpp test-cpp-sanitize: $(VENV)/.dev
+	@$(BIN)/cmake -S . -B $(BUILD) -G Ninja -DDYNAKIN_PYTHON=OFF -DDYNAKIN_TESTS=ON \
+	  -DDYNAKIN_SANITIZE=$(if $(findstring sanitize,$@),ON,OFF) \
+	  -DCMAKE_PREFIX_PATH="$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" >/dev/null
+	@$(BIN)/cmake --build $(BUILD) >$(BUILD)/build.log || { cat $(BUILD)/build.log; exit 1; }
+	@$(BIN)/ctest --test-dir $(BUILD) --output-on-failure
 
 # What editors and mypy know of the compiled module; committed, so lint checks that it is up to date.
 stubs: $(VENV)/.dev
@@ -75,6 +89,7 @@ lint: $(VENV)/.dev
 	$(BIN)/ruff check src tests benchmarks examples
 	$(BIN)/ruff format --check src tests benchmarks examples
 	$(BIN)/mypy
+	$(BIN)/lint-imports --no-logo
 	$(BIN)/clang-format --dry-run --Werror $$(find cpp src/dynakin/bindings -name '*.cpp' -o -name '*.hpp')
 
 bench: $(VENV)/.dev
@@ -87,10 +102,6 @@ peers: $(VENV)/.dev
 	$(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[dev,peers]"
 	$(BIN)/python -m pytest -m peers
 	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/peers.py
-
-# Thousands of mutated inputs (tests/fuzz), a quarter of an hour.
-nightly: $(VENV)/.dev
-	$(BIN)/python -m pytest -m nightly -s
 
 clean:
 	rm -rf build out $(VENV)

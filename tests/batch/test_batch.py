@@ -15,7 +15,7 @@ from dynakin.errors import ConfigError
 from dynakin.simulation.trial import simulate
 from dynakin.studies.batch.dataset import read_dataset
 
-SUBJECTS, TRIALS, SECONDS, RATE_HZ = 8, 3, 5.0, 50.0
+SUBJECTS, TRIALS, SECONDS, RATE_HZ = 6, 2, 5.0, 50.0
 CORRUPT, SWAPPED = "S3/squat_2", "S6/squat_1"
 
 

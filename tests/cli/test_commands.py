@@ -117,6 +117,7 @@ def test_check_says_what_run_would_refuse(data_dir: Path, capsys: Said) -> None:
     assert "RTOE moves" in told
 
 
+@pytest.mark.nightly
 def test_run_on_real_data_and_again_from_its_own_configuration(data_dir: Path, tmp_path: Path, capsys: Said) -> None:
     folder = data_dir / "opencap_subject4"
     options = ["--model", "sagittal7", "--markers", "opencap", "--mass", "60.05", "--preset", "paper"]

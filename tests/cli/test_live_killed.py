@@ -54,6 +54,7 @@ class Session:
         self._reader.join(5.0)
 
 
+@pytest.mark.nightly
 def test_all_but_the_last_second_is_there(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pytest.importorskip("viser")
     folder, output = tmp_path / "recording", tmp_path / "results"

@@ -60,7 +60,10 @@ def run(study: Path, trial: str, output: Path) -> int:
     return main(["run", str(study / trial), *paths, "--mass", "70", "-o", str(output)])
 
 
-@pytest.mark.parametrize("name", ["squat", "..squat", "a b\nc=d;'\"<script>", "x" * 240, "[a]*?"])
+OTHERS = [pytest.param(name, marks=pytest.mark.nightly) for name in ("squat", "..squat", "[a]*?")]
+
+
+@pytest.mark.parametrize("name", ["a b\nc=d;'\"<script>", "x" * 240, *OTHERS])
 def test_a_run_keeps_its_results(study: Path, tmp_path: Path, name: str, capsys: Said) -> None:
     trial = study / f"{name}.trc"
     if not trial.exists():
@@ -98,6 +101,7 @@ def test_an_output_that_no_folder_can_be_called_is_refused_before_the_run(
     assert "cannot write results there" in " ".join(capsys.readouterr().err.split())
 
 
+@pytest.mark.nightly
 def test_an_output_of_as_long_a_name_as_there_can_be(study: Path, tmp_path: Path) -> None:
     output = tmp_path / ("o" * 255)
     assert run(study, "squat.trc", output) == 0

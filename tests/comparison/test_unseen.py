@@ -14,7 +14,7 @@ from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.trial import simulate_squat
 from dynakin.validation.extrapolation import extrapolated, held, line, persisted
 from dynakin.validation.setup import Setup
-from dynakin.validation.unseen import unseen, unseen_figures
+from dynakin.validation.unseen import Figures, unseen, unseen_figures
 
 
 def test_a_straight_line_is_extrapolated_exactly_and_persistence_lags_by_the_span() -> None:
@@ -33,8 +33,13 @@ def test_what_is_held_is_the_last_value_that_was_seen() -> None:
     assert np.array_equal(held(signal, 3), np.full((5, 1), 2.0))
 
 
-def test_rows_hold_every_yardstick_beside_what_raw_data_foretell(simulated: SimulatedTrial, setup: Setup) -> None:
-    rows = unseen([unseen_figures(simulated.recording, setup)])
+@pytest.fixture(scope="module")
+def figures(simulated: SimulatedTrial, setup: Setup) -> Figures:
+    return unseen_figures(simulated.recording, setup)
+
+
+def test_rows_hold_every_yardstick_beside_what_raw_data_foretell(figures: Figures) -> None:
+    rows = unseen([figures])
     methods = {"EKF (default)", "persistence", "linear extrapolation"}
     for yardstick in ("plates withheld", "marker left out", "100 ms ahead"):
         assert {row.method for row in rows if row.yardstick == yardstick} == methods
@@ -45,14 +50,16 @@ def test_rows_hold_every_yardstick_beside_what_raw_data_foretell(simulated: Simu
     assert left_out[0].rms.mean == pytest.approx(np.mean([row.rms.mean for row in left_out[1:]]))
 
 
-def test_a_marker_left_out_is_predicted_by_the_others_alone(simulated: SimulatedTrial, setup: Setup) -> None:
+def test_a_marker_left_out_is_predicted_by_the_others_alone(
+    simulated: SimulatedTrial, setup: Setup, figures: Figures
+) -> None:
     recording = simulated.recording
     name = "r_thigh2"
     column = recording.marker_names.index(name)
     moved = recording.markers.copy()
     moved[recording.time > 3.0, column] += 0.5  # m; nobody can foretell it, so it must all be error
-    both = [unseen_figures(r, setup) for r in (recording, replace(recording, markers=moved))]
-    honest, shifted = (figures["marker left out", name, "EKF (default)"] for figures in both)
+    both = [figures, unseen_figures(replace(recording, markers=moved), setup)]
+    honest, shifted = (each["marker left out", name, "EKF (default)"] for each in both)
     assert honest is not None and honest < 60.0
     assert shifted is not None and shifted > 400.0
 

@@ -27,6 +27,7 @@ def cluster():
         yield made
 
 
+@pytest.mark.nightly
 def test_a_worker_that_is_killed_on_the_way_changes_nothing(cluster):
     address = cluster.scheduler_address
     assert address.startswith("tcp://127.0.0.1:")

@@ -46,6 +46,7 @@ def test_a_process_that_dies_once_costs_nothing(tmp_path: Path):
     assert [o.row for o in outcomes] == [{"value": k} for k in range(6)]
 
 
+@pytest.mark.nightly
 def test_a_task_that_kills_each_of_its_workers_is_named_and_the_others_are_done():
     with open_pool("processes", 2) as pool:
         outcomes = work(pool, functions.deadly, None, [Task(str(k), k) for k in range(6)])

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+import pytest
 
 from dynakin import _core, read
 from dynakin.filter.estimator import Estimator
@@ -75,6 +76,7 @@ def from_opensim(folder: Path, name: str, recording: Recording, estimate: Estima
     return found
 
 
+@pytest.mark.nightly
 def test_squats(data_dir: Path) -> None:
     recording, estimator, estimate = run(data_dir, SQUATS)
     plausible(estimator, estimate, np.ones(recording.n_frames, dtype=bool))
@@ -103,6 +105,7 @@ def test_gait_with_plug_in_gait(data_dir: Path) -> None:
     assert events and all(event.kind == "missing" for event in events)
 
 
+@pytest.mark.nightly
 def test_a_standing_trial_may_wear_more_markers(data_dir: Path) -> None:
     """Medial knee and ankle markers come off before people walk."""
     name, forces, mass, height = WALK

@@ -20,8 +20,11 @@ LENGTH_S = STOP_S + LATER_S + AFTER_S
 FIT_M = 0.03  # what the core calls a fit
 
 
-@pytest.mark.parametrize("kind", ["sagittal7", "fullbody"])
-@pytest.mark.parametrize("gap_s", GAPS_S)
+CASES = [("sagittal7", gap_s) for gap_s in GAPS_S] + [("fullbody", gap_s) for gap_s in (0.5, 10.0, 300.0)]
+EACH_NIGHT = [pytest.param("fullbody", gap_s, marks=pytest.mark.nightly) for gap_s in (1.0, 2.0, 5.0, 60.0)]
+
+
+@pytest.mark.parametrize(("kind", "gap_s"), [*CASES, *EACH_NIGHT])
 def test_soon_after_a_gap_all_is_as_it_was_and_no_frame_claims_too_much(kind: str, gap_s: float) -> None:
     """0.1 has 1 to 600,000 m of error after 2 to 300 s, and says "following" 5 cm off for hundreds of frames."""
     found = figures(kind, gap_s, STOP_S, AFTER_S)
@@ -68,7 +71,7 @@ def test_a_jump_of_the_posture_within_the_carried_time_leaves_no_segment_behind(
     assert following.max() < FIT_M and run.off[-150:].max() < 0.002
 
 
-@pytest.mark.parametrize("turn_deg", [90.0, 180.0])
+@pytest.mark.parametrize("turn_deg", [pytest.param(90.0, marks=pytest.mark.nightly), 180.0])
 def test_a_person_who_comes_back_facing_elsewhere_is_found(turn_deg: float) -> None:
     recording, _ = with_gap(person("fullbody", LENGTH_S), STOP_S, 10.0)
     up = estimator("fullbody").start(recording.window(0.0, 2.0)).ground.rotation[1]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -18,10 +19,13 @@ from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.results.measures.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
 from dynakin.results.measures.sources import ABSENT, DERIVED
-from dynakin.simulation.trial import simulate
+from dynakin.simulation.trial import simulate as simulate_anew
 from dynakin.units import GRAVITY_M_S2
 
 WEIGHT = 70.0 * GRAVITY_M_S2
+
+
+simulate = cache(simulate_anew)  # several tests start from the same walk or squat
 
 
 def person(model: str) -> Estimator:
@@ -77,7 +81,7 @@ def test_a_seat_that_nothing_measures_is_noticed_and_leaves_no_moments(seed: int
 
 def test_without_plates_a_leg_that_may_stand_has_no_moments_and_one_that_swings_has() -> None:
     walk = simulate("fullbody", "gait", 3, 4.0, 50.0).recording
-    blind = person("fullbody").run(walk.with_plates(()))
+    blind = person("fullbody").run(walk.with_plates(()), smooth=False)
     contact = blind.data["foot_contact"].transpose("time", "foot").values
     assert set(np.unique(contact)) == {IN_THE_AIR, NOT_MEASURED}
     for k, side in enumerate("rl"):
@@ -95,7 +99,7 @@ def test_a_box_that_nothing_measures_is_no_flight() -> None:
     """Someone who stands while the plates read nothing stands on something."""
     recording = simulate("fullbody", "squat", 4, 6.0, 50.0).recording
     off = recording.time < 2.0
-    found = person("fullbody").run(with_loads(recording, np.where(off, 0.0, 1.0)))
+    found = person("fullbody").run(with_loads(recording, np.where(off, 0.0, 1.0)), smooth=False)
     contact = found.data["foot_contact"].transpose("time", "foot").values
     early, late = recording.time < 1.9, recording.time > 2.4
     assert (contact[early] == NOT_MEASURED).all() and (contact[late] == MEASURED).all()
@@ -153,7 +157,7 @@ class TestRealRecordings:
         folder = data_dir / "opencap_subject4"
         recording = dynakin.read(folder / "STS1.trc", folder / "STS1_grf.mot").window(0.0, 5.2)
         model = load_model("fullbody", Subject(mass_kg=60.05, height_m=1.7), markers="opencap")
-        found = Estimator(model).run(recording)
+        found = Estimator(model).run(recording, smooth=False)
         time = found.time
         seated = (time < 0.8) | ((time > 2.6) & (time < 3.5))
         alone = ((time > 1.07) & (time < 2.26)) | ((time > 3.74) & (time < 4.89))
@@ -175,6 +179,7 @@ class TestRealRecordings:
         assert np.isnan(ground.loads.wrench[on_the_box]).all()
         assert not ground.undeclared[flight].any() and (ground.loads.reason[flight] == 0).all()
 
+    @pytest.mark.nightly
     def test_a_run_on_a_treadmill_finds_its_plates_and_keeps_its_clock(self, data_dir: Path) -> None:
         """A delay of the plates grew to 958 ms; ankles 4676 N m."""
         folder = data_dir / "rajagopal"

@@ -38,10 +38,17 @@ def foretold(case: Case, recordings: list[Recording]) -> tuple[list[MeasuredTria
     ]
 
 
+@pytest.fixture(scope="module")
+def whole(case: Case) -> tuple[list[MeasuredTrial], list[np.ndarray]]:
+    return foretold(case, [sim.recording for sim in case.sims])
+
+
 @pytest.mark.parametrize("judging", [0, 1, 2, 3])
-def test_a_half_is_foretold_without_its_plates(case: Case, judging: int) -> None:
+def test_a_half_is_foretold_without_its_plates(
+    case: Case, whole: tuple[list[MeasuredTrial], list[np.ndarray]], judging: int
+) -> None:
     recordings = [sim.recording for sim in case.sims]
-    parts, before = foretold(case, recordings)
+    parts, before = whole
     start = parts[judging].movement.time[0]
     end = parts[judging].movement.time[-1]
     trial = judging // 2

@@ -92,7 +92,13 @@ FUNCTIONS = {
 
 
 @pytest.mark.parametrize("block", FUNCTIONS)
-@pytest.mark.parametrize("make", [make_walker, partial(make_estimate, 1.0)], ids=["space", "plane"])
+@pytest.mark.parametrize(
+    "make",
+    [
+        pytest.param(make_walker, id="space"),
+        pytest.param(partial(make_estimate, 1.0), id="plane", marks=pytest.mark.nightly),
+    ],
+)
 def test_page_and_console_bear_any_block_that_failed(
     block: str, make: Callable[..., Estimate], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

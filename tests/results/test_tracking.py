@@ -131,6 +131,7 @@ def test_known_truth_what_is_flagged_is_what_is_wrong(squat: SimulatedTrial, smo
         compare_trial(mislabelled, Setup(model, smooth=smooth))
 
 
+@pytest.mark.nightly
 def test_a_drop_jump_that_is_not_followed_is_no_result(
     data_dir: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -42,6 +42,7 @@ def test_processes_give_the_same_table_to_the_last_digit(paper: Shared, expected
     assert table(paper, "processes") == expected
 
 
+@pytest.mark.nightly
 def test_a_cluster_that_loses_a_worker_on_the_way_gives_the_same_table(paper: Shared, expected: tuple) -> None:
     distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed")
     options = {"n_workers": 2, "threads_per_worker": 1, "processes": True, "host": "127.0.0.1"}
@@ -98,6 +99,7 @@ def arguments(files: Path, output: Path) -> list[str]:
     return ["tune", "grid", *trial, "--mass", "70", "--preset", "paper", *varied, "-o", str(output)]
 
 
+@pytest.mark.nightly
 def test_a_command_that_is_killed_and_started_again_gives_the_same_files(files: Path, tmp_path: Path) -> None:
     whole, killed = tmp_path / "whole", tmp_path / "killed"
     assert main([*arguments(files, whole), "--backend", "threads"]) == 0

@@ -38,10 +38,12 @@ def test_held_as_the_file_has_it_the_fit_is_that_of_least_squares(data_dir: Path
     assert marker_rms_mm(data_dir / "opencap_subject4", ()) == pytest.approx(OPENSIM_MM, rel=0.05)
 
 
+@pytest.mark.nightly
 def test_calibrated_on_the_trial_it_is_closer(data_dir: Path) -> None:
     assert marker_rms_mm(data_dir / "opencap_subject4", ("lengths", "markers")) < 0.7 * OPENSIM_MM
 
 
+@pytest.mark.nightly
 def test_nothing_is_left_at_the_pelvis(data_dir: Path) -> None:
     folder = data_dir / "opencap_subject4"
     recording = dynakin.read(folder / "squats1.trc", folder / "squats1_grf.mot")
