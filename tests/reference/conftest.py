@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 import dynakin
-from dynakin.model.calibration.initial import InitialModel
-from dynakin.model.calibration.posture import Geometry
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import ModelDefinition
-from dynakin.model.plan import ModelPlan
+from dynakin.model.plan import Geometry, ModelPlan
 from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.trial import SimulatedTrial, simulate_squat
 from dynakin.validation.reference.chain import Kinematics, PlanarChain
@@ -25,7 +24,7 @@ class Perfect:
 
     trial: SimulatedTrial
     definition: ModelDefinition
-    initial: InitialModel
+    initial: CalibratedModel
     chain: PlanarChain
     plan: ModelPlan
     landmarks: dict[str, np.ndarray]
@@ -57,7 +56,7 @@ def perfect() -> Perfect:
     trial = simulate_squat(seed=2, duration_s=10.0, mass_kg=MASS_KG, noise=SensorNoise.none())
     subject = dynakin.Subject(mass_kg=MASS_KG, height_m=1.75, sex="male")
     definition = dynakin.load_model("sagittal7", subject=subject, markers="opencap")
-    initial = dynakin.initialise(definition, trial.recording)
+    initial = definition.calibrate(trial.recording)
     place = {segment.name: segment.placement for segment in trial.truth.tree}
     measured = {"shank": "foot", "trunk": "pelvis"}  # placements with a direction of their own, and their lengths
     directions = dict(initial.plan.geometry.directions)

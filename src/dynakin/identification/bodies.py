@@ -10,7 +10,7 @@ import numpy.typing as npt
 from dynakin.errors import ModelError
 from dynakin.identification.body_priors import BodyPriors, masses_of
 from dynakin.identification.spatial_bodies import SpatialBodies
-from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.inertia import INERTIA_NAMES, PLANAR_INERTIA
 
 Array = npt.NDArray[np.float64]
@@ -38,7 +38,7 @@ class PlanarBodies:
     sd: Array
 
     @classmethod
-    def of(cls, initial: InitialModel, priors: BodyPriors | None = None) -> PlanarBodies:
+    def of(cls, initial: CalibratedModel, priors: BodyPriors | None = None) -> PlanarBodies:
         """The bodies that a measured planar model estimates; those that are held keep their mass."""
         priors = priors or BodyPriors()
         chosen = [segment for segment in initial.spec.segments if any(segment.inertia_estimated)]
@@ -104,7 +104,7 @@ class PlanarBodies:
 Bodies = PlanarBodies | SpatialBodies
 
 
-def bodies_of(initial: InitialModel, priors: BodyPriors | None = None) -> Bodies:
+def bodies_of(initial: CalibratedModel, priors: BodyPriors | None = None) -> Bodies:
     """The bodies of a measured model, in the plane or in space, by the numbers of each that it estimates.
 
     Raises:

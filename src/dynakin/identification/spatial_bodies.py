@@ -21,7 +21,7 @@ import numpy.typing as npt
 
 from dynakin.errors import ModelError
 from dynakin.identification.body_priors import BodyPriors, masses_of, paired_with
-from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.inertia import INERTIA_NAMES, RigidBody
 
 Array = npt.NDArray[np.float64]
@@ -54,7 +54,7 @@ class SpatialBodies:
     unknowns: tuple[str, ...]
 
     @classmethod
-    def of(cls, initial: InitialModel, priors: BodyPriors | None = None) -> SpatialBodies:
+    def of(cls, initial: CalibratedModel, priors: BodyPriors | None = None) -> SpatialBodies:
         """The bodies that a measured model estimates with all ten numbers; those that are held keep their mass.
 
         Raises:
