@@ -20,7 +20,7 @@ import dynakin
 from dynakin.filter import presets
 from dynakin.filter.noise import Noise
 from dynakin.filter.samples import recording_arrays
-from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.trial import simulate
 from dynakin.validation.reference.methods import reference_methods
@@ -51,7 +51,7 @@ class Figures:
     inside: dict[str, Array]
 
 
-def off_by(initial: InitialModel, seed: int) -> InitialModel:
+def off_by(initial: CalibratedModel, seed: int) -> CalibratedModel:
     """Lengths too long or too short by 3 %, each as a coin falls."""
 
     signs = np.random.default_rng(seed).choice([-1.0, 1.0], len(initial.names))
@@ -84,7 +84,7 @@ def figures(method: str, given: dict[str, Array], trial: SimulatedTrial, names: 
     )  # fmt: skip
 
 
-def blocks(arrays: dict[str, Array], initial: InitialModel) -> dict[str, Array]:
+def blocks(arrays: dict[str, Array], initial: CalibratedModel) -> dict[str, Array]:
     """The core's arrays by the names of the outputs."""
     n = sum(not c.locked for c in initial.spec.coordinates)
     found = {"moments": arrays["moments"], "moments_sd": arrays["moments_sd"]}

@@ -15,7 +15,7 @@ from dynakin.filter import presets
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.noise import Noise
 from dynakin.filter.samples import Sample
-from dynakin.model.calibration.initialise import initialise
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import ModelDefinition, load_model
 from dynakin.model.opensim.definition import load_opensim
 from dynakin.model.priors import Bounds, Priors
@@ -29,6 +29,7 @@ __version__ = metadata.version("dynakin")
 
 __all__ = [
     "Bounds",
+    "CalibratedModel",
     "DynakinError",
     "Estimate",
     "Estimator",
@@ -39,7 +40,6 @@ __all__ = [
     "Recording",
     "Sample",
     "Subject",
-    "initialise",
     "load_model",
     "load_opensim",
     "presets",

@@ -7,7 +7,7 @@ import pytest
 
 import dynakin
 from dynakin.filter.estimator import Estimator
-from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.loads import foot_loads
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import COMPONENTS
@@ -33,12 +33,12 @@ def estimator() -> Estimator:
 
 
 @pytest.fixture(scope="module")
-def initial(walk: Recording, estimator: Estimator) -> InitialModel:
+def initial(walk: Recording, estimator: Estimator) -> CalibratedModel:
     return estimator.start(walk)
 
 
 @pytest.fixture(scope="module")
-def known(walk: Recording, initial: InitialModel) -> np.ndarray:
+def known(walk: Recording, initial: CalibratedModel) -> np.ndarray:
     found = foot_loads(walk, initial.ground).total_known
     judged = found[evaluation_window(walk.time)]
     assert judged.any() and not judged.all()
@@ -46,14 +46,14 @@ def known(walk: Recording, initial: InitialModel) -> np.ndarray:
 
 
 def test_one_mask_feeds_and_judges(
-    walk: Recording, estimator: Estimator, initial: InitialModel, known: np.ndarray
+    walk: Recording, estimator: Estimator, initial: CalibratedModel, known: np.ndarray
 ) -> None:
     _, fed, _ = estimator.measured(walk, initial)
     for wrench in (fed, measured_wrench(walk, initial), prepare(walk, estimator).wrench):
         assert np.array_equal(np.isfinite(wrench).all(axis=1), known)
 
 
-def test_frames_beside_the_plates_are_not_judged(walk: Recording, initial: InitialModel, known: np.ndarray) -> None:
+def test_frames_beside_the_plates_are_not_judged(walk: Recording, initial: CalibratedModel, known: np.ndarray) -> None:
     """A prediction that is right where the total is known, and absurd elsewhere, has no error."""
     told = initial.ground.wrench_to_ground(walk.total_wrench())
     told[~known] = WRONG

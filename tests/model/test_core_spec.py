@@ -7,7 +7,6 @@ import pickle
 import numpy as np
 import pytest
 
-from dynakin.model.calibration.initialise import initialise
 from dynakin.model.definition import load_model
 from dynakin.model.subject import Subject
 from dynakin.recordings.recording import Recording
@@ -18,7 +17,7 @@ PERSON = Subject(mass_kg=70.0, height_m=1.75, sex="male")
 
 
 def test_sagittal7_has_89_states_that_are_all_set(standing_person: Recording) -> None:
-    initial = initialise(load_model("sagittal7", PERSON), standing_person)
+    initial = load_model("sagittal7", PERSON).calibrate(standing_person)
     n = 7 * 3 + 6 + 17 * 2 + 7 * 4
     assert n == 89
     for vector in (initial.x0, initial.sd0, initial.lower, initial.upper, initial.table):
@@ -44,7 +43,7 @@ def test_sagittal7_has_89_states_that_are_all_set(standing_person: Recording) ->
 
 @pytest.mark.parametrize("name", ["sagittal7", "squat7"])
 def test_the_core_puts_the_markers_where_they_were_measured(name: str, standing_person: Recording) -> None:
-    initial = initialise(load_model(name, PERSON), standing_person, side="right")
+    initial = load_model(name, PERSON).calibrate(standing_person, side="right")
     model = _core.Model(initial.spec)
     places = np.asarray(_core.marker_positions(model, initial.x0))
     measured = np.array([standing_person.marker(marker)[0] for marker in initial.recorded_markers])
@@ -54,14 +53,14 @@ def test_the_core_puts_the_markers_where_they_were_measured(name: str, standing_
 
 def test_a_squat_start_is_met_too() -> None:
     deep = make([stand(ankle=25.0, knee=80.0, hip=70.0)] * 20)
-    initial = initialise(load_model("sagittal7", PERSON), deep, static=make([stand()] * 100, "static"))
+    initial = load_model("sagittal7", PERSON).calibrate(deep, static=make([stand()] * 100, "static"))
     places = np.asarray(_core.marker_positions(_core.Model(initial.spec), initial.x0))
     measured = np.array([deep.marker(marker)[0] for marker in initial.recorded_markers])
     np.testing.assert_allclose(places[:, :2], initial.ground.points_to_ground(measured)[:, :2], atol=1e-8)
 
 
 def test_the_weight_is_the_persons_and_acts_at_the_centre_of_mass(standing_person: Recording) -> None:
-    initial = initialise(load_model("sagittal7", PERSON), standing_person)
+    initial = load_model("sagittal7", PERSON).calibrate(standing_person)
     wrench = np.asarray(_core.wrench(_core.Model(initial.spec), initial.x0))
     assert wrench[1] == pytest.approx(70.0 * 9.80665, rel=1e-12)
     np.testing.assert_allclose(wrench[[0, 2]], 0.0, atol=1e-9)
@@ -75,7 +74,7 @@ def test_a_locked_arm_is_not_in_the_state(standing_person: Recording) -> None:
         "noarm", None, standing_person.time, tuple(standing_person.marker_names[k] for k in keep),
         standing_person.markers[:, keep],
     )  # fmt: skip
-    initial = initialise(load_model("sagittal7", PERSON, "opencap"), lacking)
+    initial = load_model("sagittal7", PERSON, "opencap").calibrate(lacking)
     assert "shoulder" not in initial.names
     assert "length/upper_arm" not in initial.names
     assert "inertia/forearm/mass" in initial.names
@@ -83,13 +82,13 @@ def test_a_locked_arm_is_not_in_the_state(standing_person: Recording) -> None:
 
 def test_a_start_beyond_a_joint_limit_is_put_on_it_and_said() -> None:
     recording = make([stand(ankle=60.0, knee=60.0, hip=40.0)] * 20)
-    initial = initialise(load_model("sagittal7", PERSON), recording)
+    initial = load_model("sagittal7", PERSON).calibrate(recording)
     k = initial.names.index("ankle")
     assert initial.x0[k] == initial.upper[k] == pytest.approx(np.deg2rad(50.0))
     assert any("Start of ankle" in message and "put on the bound" in message for message in initial.messages)
 
 
 def test_the_specification_can_be_pickled(standing_person: Recording) -> None:
-    initial = initialise(load_model("sagittal7", PERSON), standing_person)
+    initial = load_model("sagittal7", PERSON).calibrate(standing_person)
     again = pickle.loads(pickle.dumps(initial.spec))
     np.testing.assert_array_equal(_core.Model(again).initial_state(), _core.Model(initial.spec).initial_state())

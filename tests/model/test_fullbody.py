@@ -8,7 +8,6 @@ import pytest
 from dynakin import _core
 from dynakin.errors import ModelError
 from dynakin.filter.estimator import Estimator
-from dynakin.model.calibration.initialise import initialise
 from dynakin.model.definition import load_model
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Recording
@@ -94,7 +93,7 @@ def test_starts_at_any_heading_in_any_pose(seed: int) -> None:
     }
     x = states(initial, pose, rng.uniform(-np.pi, np.pi), rng.uniform(-3, 3, 3), time)
     trial = recording_of(initial, x, time, plates=False, noise_m=0.001)
-    found = initialise(definition(), trial, LABORATORY, static=standing())
+    found = definition().calibrate(trial, ground=LABORATORY, static=standing())
     n = len([c for c in found.spec.coordinates if not c.locked])
     names = list(found.names)
     turned = [k for k in range(n) if not names[k].startswith("pelvis_t") or names[k] == "pelvis_tilt"]
@@ -161,7 +160,7 @@ def test_a_person_without_arms_or_head_markers_has_them_locked() -> None:
         k for k, name in enumerate(whole.marker_names) if name[1:] not in ("ELB", "UPA", "WRA", "WRB", "FHD", "BHD")
     ]
     names = tuple(whole.marker_names[k] for k in kept)
-    initial = initialise(definition(), Recording("legs", None, whole.time, names, whole.markers[:, kept]))
+    initial = definition().calibrate(Recording("legs", None, whole.time, names, whole.markers[:, kept]))
     locked = {c.name for c in initial.spec.coordinates if c.locked}
     assert {"arm_flex_r", "elbow_flex_l", "neck_extension"} <= locked
     assert sum(body.mass for body in initial.plan.bodies.values()) == pytest.approx(70.0)
@@ -182,4 +181,4 @@ def test_a_recording_in_which_sides_are_swapped_is_refused() -> None:
     names = tuple(other[n[0]] + n[1:] if n[0] in other else n for n in whole.marker_names)
     swapped = Recording("swapped", None, whole.time, names, whole.markers)
     with pytest.raises(ModelError, match="swapped"):
-        initialise(definition(), swapped, LABORATORY, static=whole)
+        definition().calibrate(swapped, ground=LABORATORY, static=whole)

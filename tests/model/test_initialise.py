@@ -11,7 +11,6 @@ import pytest
 from dynakin.errors import ModelError
 from dynakin.model.calibration.body import find_height
 from dynakin.model.calibration.frames import Trial
-from dynakin.model.calibration.measure import measure
 from dynakin.model.definition import load_model
 from dynakin.model.markers.marker_set import load_marker_set, match_markers
 from dynakin.model.priors import Bounds, Priors
@@ -36,7 +35,8 @@ def blank(recording: Recording, name: str, frames: slice) -> Recording:
 
 
 def test_lengths_angles_and_places_of_a_known_person(standing_person: Recording) -> None:
-    plan, found = measure(load_model("sagittal7", PERSON), standing_person)
+    found = load_model("sagittal7", PERSON).calibrate(standing_person)
+    plan = found.measured_plan()
     for name, length in LENGTHS.items():
         assert plan.geometry.lengths[name] == pytest.approx(length, abs=1e-9)
     np.testing.assert_allclose(plan.geometry.directions["shank"][0][:2], FOOT_DIRECTION, atol=1e-9)
@@ -61,7 +61,7 @@ def test_signs_are_opensims() -> None:
     positive."""
     standing, deep = stand(), stand(ankle=30.0, knee=100.0, hip=90.0, heel_rise=15.0)
     recording = make([deep] * 30)
-    plan, _ = measure(load_model("sagittal7", PERSON), recording, static=make([standing] * 100, "static"))
+    plan = load_model("sagittal7", PERSON).calibrate(recording, static=make([standing] * 100, "static")).measured_plan()
     degrees = {name: np.rad2deg(value) for name, value in plan.start.items()}
     assert degrees["toe"] == pytest.approx(15.0, abs=1e-6)
     assert degrees["ankle"] == pytest.approx(30.0, abs=1e-6)
@@ -76,8 +76,9 @@ def test_another_laboratory_frame_changes_nothing(standing_person: Recording) ->
     a = np.deg2rad(130.0)
     R_LG = np.array([[np.cos(a), 0.0, np.sin(a)], [np.sin(a), 0.0, -np.cos(a)], [0.0, 1.0, 0.0]])
     turned = replace(standing_person, markers=standing_person.markers @ R_LG.T + [3.0, -2.0, 0.5])
-    plan, _ = measure(load_model("sagittal7", PERSON), standing_person)
-    again, found = measure(load_model("sagittal7", PERSON), turned)
+    plan = load_model("sagittal7", PERSON).calibrate(standing_person).measured_plan()
+    found = load_model("sagittal7", PERSON).calibrate(turned)
+    again = found.measured_plan()
     assert found.ground.vertical == "+Z"
     assert again.start == pytest.approx(plan.start, abs=1e-9)
     for one, other in zip(plan.sites, again.sites, strict=True):
@@ -86,25 +87,27 @@ def test_another_laboratory_frame_changes_nothing(standing_person: Recording) ->
 
 def test_side_auto_takes_the_side_with_fewer_gaps(standing_person: Recording) -> None:
     definition = load_model("sagittal7", PERSON)
-    assert measure(definition, standing_person)[1].side == "right"
+    assert definition.calibrate(standing_person).side == "right"
     gap = blank(standing_person, "R_knee", slice(40, 60))
-    plan, found = measure(definition, gap)
+    found = definition.calibrate(gap)
+    plan = found.measured_plan()
     assert found.side == "left"
     assert plan.sites[0].recorded == "L_toe"
-    assert measure(definition, gap, side="right")[1].side == "right"
+    assert definition.calibrate(gap, side="right").side == "right"
     with pytest.raises(ModelError, match="side is 'middle', expected auto, right, left or both"):
-        measure(definition, gap, side="middle")
+        definition.calibrate(gap, side="middle")
 
 
 def test_both_sides_are_separate_sites(standing_person: Recording) -> None:
-    plan, _ = measure(load_model("sagittal7", PERSON), standing_person, side="both")
+    plan = load_model("sagittal7", PERSON).calibrate(standing_person, side="both").measured_plan()
     assert len(plan.sites) == 33  # 16 a side and C7
     assert np.rad2deg(plan.start["knee"]) == pytest.approx(8.0, abs=1e-6)
 
 
 def test_a_start_without_markers_is_later(standing_person: Recording) -> None:
     gap = blank(blank(standing_person, "R_knee", slice(0, 25)), "L_knee", slice(0, 30))
-    plan, found = measure(load_model("sagittal7", PERSON), gap)
+    found = load_model("sagittal7", PERSON).calibrate(gap)
+    plan = found.measured_plan()
     assert any("Start from frame 25 (0.25 s)" in message for message in found.messages)
     assert np.rad2deg(plan.start["knee"]) == pytest.approx(8.0, abs=1e-6)
 
@@ -114,7 +117,8 @@ def test_a_marker_seen_only_later_is_placed_there(standing_person: Recording) ->
     recording = make(moving)
     for side in "RL":
         recording = blank(recording, f"{side}_thigh2", slice(0, 40))
-    plan, found = measure(load_model("sagittal7", PERSON), recording)
+    found = load_model("sagittal7", PERSON).calibrate(recording)
+    plan = found.measured_plan()
     place = next(site.position for site in plan.sites if site.name == "r_thigh2")
     np.testing.assert_allclose(place[:2], [0.06, 0.17], atol=2e-3)
     assert any("R_thigh2 is not seen in the calibration frames: placed from 0.40 s" in m for m in found.messages)
@@ -128,20 +132,20 @@ def test_a_moving_toe_is_refused_with_the_distance() -> None:
             frame[name] = frame[name] + [0.01 * k, 0.0, 0.0]
         frames.append(frame)
     with pytest.raises(ModelError, match=r"marker R_toe moves 79\d mm .* toe fixed in the ground \(at most 40 mm\)"):
-        measure(load_model("sagittal7", PERSON), make(frames))
+        load_model("sagittal7", PERSON).calibrate(make(frames))
 
 
 def test_a_needed_marker_absent_everywhere(standing_person: Recording) -> None:
     lacking = without(standing_person, "R_ankle", "L_ankle")
     with pytest.raises(ModelError) as error:
-        measure(load_model("sagittal7", PERSON, "opencap"), lacking)
+        load_model("sagittal7", PERSON, "opencap").calibrate(lacking)
     for word in ("segment 'shank'", "'ankle'", "marker ANKLE", "r_ankle", "L_ankle", "R_toe"):
         assert word in error.value.message
 
 
 def test_without_a_virtual_hip_marker_the_regression_is_used(standing_person: Recording) -> None:
     lacking = without(standing_person, "R_HJC_reg", "L_HJC_reg")
-    plan, _ = measure(load_model("sagittal7", PERSON, "opencap"), lacking)
+    plan = load_model("sagittal7", PERSON, "opencap").calibrate(lacking).measured_plan()
     depth, width = 0.20, 0.24
     to_asis = np.array([0.24 * depth + 0.0099, 0.30 * width + 0.0109])
     place = next(site.position for site in plan.sites if site.name == "r.ASIS")
@@ -150,7 +154,8 @@ def test_without_a_virtual_hip_marker_the_regression_is_used(standing_person: Re
 
 def test_an_arm_without_markers_hangs_and_is_locked(standing_person: Recording) -> None:
     arms = [f"{side}_{name}" for side in "RL" for name in ("elbow_lat", "wrist_radius")]
-    plan, found = measure(load_model("sagittal7", PERSON, "opencap"), without(standing_person, *arms))
+    found = load_model("sagittal7", PERSON, "opencap").calibrate(without(standing_person, *arms))
+    plan = found.measured_plan()
     assert plan.geometry.locked == {"shoulder": 0.0, "elbow": 0.0}
     assert "upper_arm" in plan.fixed_lengths
     assert plan.geometry.lengths["upper_arm"] == pytest.approx(1.75 * 0.1618, rel=1e-3)
@@ -159,7 +164,8 @@ def test_an_arm_without_markers_hangs_and_is_locked(standing_person: Recording) 
 
 
 def test_an_abdomen_without_markers_is_locked_to_the_thorax(standing_person: Recording) -> None:
-    plan, found = measure(load_model("squat7", PERSON, "opencap"), standing_person)
+    found = load_model("squat7", PERSON, "opencap").calibrate(standing_person)
+    plan = found.measured_plan()
     assert list(plan.geometry.locked) == ["thoracic"]
     assert plan.geometry.locked["thoracic"] == pytest.approx(0.0, abs=1e-9)  # on one line by the proportion
     assert plan.fixed_lengths == {"abdomen"}
@@ -169,13 +175,13 @@ def test_an_abdomen_without_markers_is_locked_to_the_thorax(standing_person: Rec
 def test_a_segment_without_markers_and_without_a_rule_is_refused(standing_person: Recording) -> None:
     trunk = [name for name in standing_person.marker_names if any(w in name for w in ("Sternum", "C7", "Shoulder"))]
     with pytest.raises(ModelError, match=r"segment 'trunk' has no marker \(tried R_Sternum.*it has R_toe"):
-        measure(load_model("sagittal7", PERSON, "opencap"), without(standing_person, *trunk))
+        load_model("sagittal7", PERSON, "opencap").calibrate(without(standing_person, *trunk))
 
 
 def test_mass_is_needed_and_height_is_estimated(standing_person: Recording) -> None:
     with pytest.raises(ModelError, match=r"mass_kg is not given .*made has no force plates"):
-        measure(load_model("sagittal7"), standing_person)
-    _, found = measure(load_model("sagittal7", Subject(mass_kg=70.0)), standing_person)
+        load_model("sagittal7").calibrate(standing_person)
+    found = load_model("sagittal7", Subject(mass_kg=70.0)).calibrate(standing_person)
     places = stand()
     lowest = min(place[1] for place in places.values())
     assert found.height_m == pytest.approx((places["R_Shoulder"][1] - lowest) / 0.818, abs=1e-9)
@@ -206,16 +212,20 @@ def test_a_height_is_taken_from_one_frame_with_a_foot_on_the_ground() -> None:
 def test_a_height_that_is_none_of_that_mass_is_refused(standing_person: Recording) -> None:
     crouched = replace(standing_person, markers=standing_person.markers * 0.5)
     with pytest.raises(ModelError, match=r"height_m is not given, and 0\.8\d m .*of 70\.0 kg .*10 to 60\).*--height"):
-        measure(load_model("sagittal7", Subject(mass_kg=70.0)), crouched)
+        load_model("sagittal7", Subject(mass_kg=70.0)).calibrate(crouched)
 
 
 def test_one_frame_is_enough() -> None:
-    plan, _ = measure(load_model("sagittal7", PERSON, "opencap"), make([stand()]), forward="+X", vertical="+Y")
+    plan = (
+        load_model("sagittal7", PERSON, "opencap")
+        .calibrate(make([stand()]), forward="+X", vertical="+Y")
+        .measured_plan()
+    )
     assert np.rad2deg(plan.start["ankle"]) == pytest.approx(5.0, abs=1e-6)
 
 
 def test_priors_are_finite_and_bounds_hold_the_start(standing_person: Recording) -> None:
-    plan, _ = measure(load_model("sagittal7", PERSON), standing_person)
+    plan = load_model("sagittal7", PERSON).calibrate(standing_person).measured_plan()
     sd = plan.prior(Priors())
     assert all(np.isfinite(value) and value > 0.0 for value in sd.values())
     assert sd["length/thigh"] == pytest.approx(0.05 * 0.40)
@@ -297,7 +307,8 @@ def test_a_users_own_spatial_tree(tmp_path: Path, standing_person: Recording) ->
     (tmp_path / "set.toml").write_text(text, encoding="utf-8")
     definition = load_model(tmp_path / "leg.toml", PERSON, tmp_path / "set.toml")
     for side, sign in (("right", 1.0), ("left", -1.0)):
-        plan, found = measure(definition, standing_person, side=side)
+        found = definition.calibrate(standing_person, side=side)
+        plan = found.measured_plan()
         letter = side[0].upper()
         hip, knee, ankle = (
             found.ground.points_to_ground(standing_person.marker(f"{letter}_{name}")[0])

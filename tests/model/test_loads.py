@@ -13,8 +13,7 @@ from dynakin import _core
 from dynakin.cli.run import configure
 from dynakin.config import make_config
 from dynakin.errors import ConfigError, ModelError, RecordingError
-from dynakin.model.calibration.initial import InitialModel
-from dynakin.model.calibration.initialise import initialise
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.loads import CarriedLoad, with_loads
 from dynakin.recordings.plates.loads import PlateLoad, without_plate_loads
 from dynakin.simulation.output import SimulatedTrial
@@ -37,11 +36,11 @@ def definition() -> dynakin.model.ModelDefinition:
 
 
 @pytest.fixture(scope="module")
-def initial(trial: SimulatedTrial, definition: dynakin.model.ModelDefinition) -> InitialModel:
-    return initialise(definition, trial.recording)
+def initial(trial: SimulatedTrial, definition: dynakin.model.ModelDefinition) -> CalibratedModel:
+    return definition.calibrate(trial.recording)
 
 
-def test_a_load_adds_its_own_wrench_and_nothing_else(initial: InitialModel) -> None:
+def test_a_load_adds_its_own_wrench_and_nothing_else(initial: CalibratedModel) -> None:
     """Newton and Euler of a body that turns about Z, by differences of its segment's pose."""
     loaded = with_loads(initial, [BARBELL])
     bare, model = _core.Model(initial.spec), _core.Model(loaded.spec)
@@ -88,7 +87,7 @@ def test_the_filter_finds_the_person_beside_the_load(
     assert unknown.mass_kg == 63.0 and any("plates carry" in m or "plates read" in m for m in unknown.messages)
 
 
-def test_loads_that_do_not_fit_are_told(initial: InitialModel, definition: dynakin.model.ModelDefinition) -> None:
+def test_loads_that_do_not_fit_are_told(initial: CalibratedModel, definition: dynakin.model.ModelDefinition) -> None:
     with pytest.raises(ModelError, match=r"load 'bar': segment 'trunck' is not .* \(did you mean 'trunk'\?\)"):
         with_loads(initial, [BARBELL.model_copy(update={"segment": "trunck"})])
     with pytest.raises(ModelError, match="load 'trunk': the name is taken"):

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from dynakin.errors import ModelError
-from dynakin.model.calibration.measure import measure
 from dynakin.model.definition import load_model
 from dynakin.model.subject import Subject
 from dynakin.recordings.formats.mot import read_table
@@ -25,7 +24,8 @@ def opencap(data_dir: Path, name: str) -> Recording:
 
 def test_squats1(data_dir: Path) -> None:
     recording = opencap(data_dir, "squats1")
-    plan, found = measure(load_model("sagittal7", Subject(mass_kg=60.05), "opencap"), recording)
+    found = load_model("sagittal7", Subject(mass_kg=60.05), "opencap").calibrate(recording)
+    plan = found.measured_plan()
     assert found.side == "right"
     assert len(plan.sites) == 17
     expected = {
@@ -52,19 +52,20 @@ def test_squats1(data_dir: Path) -> None:
 @pytest.mark.parametrize("name", ["DJ1", "STS1", "squats1", "walking1"])
 def test_height_is_that_of_the_standing_trial(data_dir: Path, name: str) -> None:
     """1.70 m. DJ1, a jump from a box, had 2.15 m: the highest shoulder of the trial over its lowest marker."""
-    _, found = measure(load_model("fullbody", Subject(mass_kg=60.05), "opencap"), opencap(data_dir, name))
+    found = load_model("fullbody", Subject(mass_kg=60.05), "opencap").calibrate(opencap(data_dir, name))
     assert found.height_m == pytest.approx(1.703, abs=0.03)
 
 
 def test_static1_as_the_trial_and_as_the_static(data_dir: Path) -> None:
     static = opencap(data_dir, "static1")
-    _, found = measure(load_model("sagittal7", markers="opencap"), static)
+    found = load_model("sagittal7", markers="opencap").calibrate(static)
     assert found.mass_kg == pytest.approx(60.05, abs=0.05)
     assert any("from the plates of static1" in message for message in found.messages)
     squats = opencap(data_dir, "squats1")
     definition = load_model("sagittal7", markers="opencap")
-    own, _ = measure(load_model("sagittal7", Subject(mass_kg=60.05), "opencap"), squats)
-    plan, found = measure(definition, squats, static=static)
+    own = load_model("sagittal7", Subject(mass_kg=60.05), "opencap").calibrate(squats).measured_plan()
+    found = definition.calibrate(squats, static=static)
+    plan = found.measured_plan()
     assert found.mass_kg == pytest.approx(60.05, abs=0.05)
     assert any("of static1 (517 frames)" in message for message in found.messages)
     for name, value in own.geometry.lengths.items():
@@ -76,7 +77,8 @@ def test_static1_as_the_trial_and_as_the_static(data_dir: Path) -> None:
 def test_s1_squat_without_t10_and_arms(data_dir: Path, side: str) -> None:
     recording = read(data_dir / PIG / "S1_FlywheelSquat.c3d")
     subject = Subject(mass_kg=78.6, height_m=1.74, sex="male")
-    plan, found = measure(load_model("squat7", subject), recording, side=side)
+    found = load_model("squat7", subject).calibrate(recording, side=side)
+    plan = found.measured_plan()
     assert found.side == ("left" if side == "auto" else side)  # RSHO is missing for 68 frames
     assert set(plan.geometry.locked) == {"thoracic", "shoulder"}
     text = " ".join(found.messages)
@@ -94,8 +96,8 @@ def test_s1_squat_without_t10_and_arms(data_dir: Path, side: str) -> None:
 def test_s1_squat_weighs_nobody_but_its_standing_trial_does(data_dir: Path) -> None:
     recording = read(data_dir / PIG / "S1_FlywheelSquat.c3d")
     with pytest.raises(ModelError, match="nobody stands still on the plates of S1_FlywheelSquat"):
-        measure(load_model("squat7"), recording)  # 129 kg on average: the flywheel's cable pulls too
-    _, found = measure(load_model("squat7"), recording, static=read(data_dir / PIG / "S1_StandingRef.c3d"))
+        load_model("squat7").calibrate(recording)  # 129 kg on average: the flywheel's cable pulls too
+    found = load_model("squat7").calibrate(recording, static=read(data_dir / PIG / "S1_StandingRef.c3d"))
     assert found.mass_kg == pytest.approx(81.3, abs=0.1)
 
 
@@ -103,12 +105,12 @@ def test_s1_squat_weighs_nobody_but_its_standing_trial_does(data_dir: Path) -> N
 def test_walking_is_refused_because_the_toe_moves(data_dir: Path, model: str) -> None:
     recording = read(data_dir / PIG / "GaitNormal_1.c3d")
     with pytest.raises(ModelError, match=r"GaitNormal_1\.c3d: marker [RL]TOE moves 1\d\d\d mm .*at most 40 mm"):
-        measure(load_model(model, Subject(mass_kg=66.0)), recording)
+        load_model(model, Subject(mass_kg=66.0)).calibrate(recording)
 
 
 def test_sagittal7_takes_plug_in_gait_without_arms(data_dir: Path) -> None:
     recording = read(data_dir / PIG / "S1_FlywheelSquat.c3d")
-    plan, _ = measure(load_model("sagittal7", Subject(mass_kg=78.6)), recording)
+    plan = load_model("sagittal7", Subject(mass_kg=78.6)).calibrate(recording).measured_plan()
     assert set(plan.geometry.locked) == {"shoulder", "elbow"}
     assert "upper_arm" in plan.fixed_lengths
 
@@ -117,12 +119,12 @@ def test_sagittal7_takes_plug_in_gait_without_arms(data_dir: Path) -> None:
 @pytest.mark.parametrize("markers", ["opencap", "opencap-all"])
 def test_squat7_takes_opencap(data_dir: Path, table: str, markers: str) -> None:
     subject = Subject(mass_kg=60.05)
-    plan, _ = measure(load_model("squat7", subject, markers, table), opencap(data_dir, "squats1"))
+    plan = load_model("squat7", subject, markers, table).calibrate(opencap(data_dir, "squats1")).measured_plan()
     assert list(plan.geometry.locked) == ["thoracic"]
     assert sum(body.mass for body in plan.bodies.values()) == pytest.approx(60.05, rel=1e-12)
 
 
 def test_a_wrong_marker_set_names_what_there_is(data_dir: Path) -> None:
     with pytest.raises(ModelError, match=r"squats1\.trc.*it has C7, L\.ASIS") as error:
-        measure(load_model("squat7", Subject(mass_kg=60.0), "plug-in-gait"), opencap(data_dir, "squats1"))
+        load_model("squat7", Subject(mass_kg=60.0), "plug-in-gait").calibrate(opencap(data_dir, "squats1"))
     assert "tried" in error.value.message or "has no marker" in error.value.message

@@ -20,7 +20,7 @@ def perfect() -> Perfect:
     trial = simulate_squat(seed=2, duration_s=10.0, mass_kg=MASS_KG, noise=SensorNoise.none())
     subject = dynakin.Subject(mass_kg=MASS_KG, height_m=1.75, sex="male")
     definition = dynakin.load_model("sagittal7", subject=subject, markers="opencap")
-    initial = dynakin.initialise(definition, trial.recording)
+    initial = definition.calibrate(trial.recording)
     place = {segment.name: segment.placement for segment in trial.truth.tree}
     measured = {"shank": "foot", "trunk": "pelvis"}  # placements with a direction of their own, and their lengths
     directions = dict(initial.plan.geometry.directions)

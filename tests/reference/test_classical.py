@@ -42,7 +42,7 @@ def test_markers_on_the_joints_give_the_true_leg_angles(perfect: Perfect) -> Non
 def test_angles_are_those_that_the_models_own_posture_finds(noisy: SimulatedTrial, model: str, side: str) -> None:
     """`find_posture` solves each joint by iteration; the classical method must agree at every frame and side."""
     definition = dynakin.load_model(model, dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male"), markers="opencap")
-    initial = dynakin.initialise(definition, noisy.recording, side=side)
+    initial = definition.calibrate(noisy.recording, side=side)
     plan, chain = initial.plan, PlanarChain.of(initial.plan)
     paths = landmark_paths(noisy.recording, initial, definition)
     angles = classical_angles(chain, plan, paths)
@@ -61,7 +61,7 @@ def test_locked_coordinates_stay_at_their_lock(perfect: Perfect) -> None:
     without_arms = replace(
         recording, marker_names=tuple(recording.marker_names[k] for k in legs), markers=recording.markers[:, legs]
     )
-    initial = dynakin.initialise(perfect.definition, without_arms)
+    initial = perfect.definition.calibrate(without_arms)
     chain = PlanarChain.of(initial.plan)
     assert {"shoulder", "elbow"} <= set(chain.locked)
     angles = classical_angles(chain, initial.plan, landmark_paths(without_arms, initial, perfect.definition))
@@ -75,7 +75,7 @@ def test_a_lost_marker_leaves_its_angles_open_and_no_others(perfect: Perfect) ->
     markers = recording.markers.copy()
     markers[300:340, recording.marker_names.index("r_knee")] = np.nan
     lost = replace(recording, markers=markers)
-    initial = dynakin.initialise(perfect.definition, lost, side="right")
+    initial = perfect.definition.calibrate(lost, side="right")
     paths = landmark_paths(lost, initial, perfect.definition)
     angles = classical_angles(PlanarChain.of(initial.plan), initial.plan, paths)
     missing = np.isnan(angles)
@@ -89,7 +89,7 @@ def test_both_sides_leave_a_gap_where_one_side_is_lost(perfect: Perfect) -> None
     markers = recording.markers.copy()
     markers[300:340, recording.marker_names.index("L_ankle")] = np.nan
     lost = replace(recording, markers=markers)
-    initial = dynakin.initialise(perfect.definition, lost, side="both")
+    initial = perfect.definition.calibrate(lost, side="both")
     ankle = landmark_paths(lost, initial, perfect.definition)["ankle"]
     assert np.isnan(ankle[300:340]).all() and np.isfinite(ankle[340:]).all()
 

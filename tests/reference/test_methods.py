@@ -48,7 +48,7 @@ def test_soft_tissue_spoils_angles_and_the_wrench_shows_it(perfect: Perfect) -> 
     """The same subject and motion; the classical method has no defence against skin."""
     errors = {}
     for name, trial in (("bones", perfect.trial), ("skin", simulate_squat(seed=2, duration_s=10.0, mass_kg=MASS_KG))):
-        reference = reference_methods(trial.recording, dynakin.initialise(perfect.definition, trial.recording),
+        reference = reference_methods(trial.recording, perfect.definition.calibrate(trial.recording),
                                       perfect.definition)  # fmt: skip
         truth = trial.truth.data["coordinates"]
         errors[name] = [
@@ -75,7 +75,7 @@ def test_gaps_are_filled_or_left_and_both_said(perfect: Perfect) -> None:
     knee = recording.marker_names.index("r_knee")
     markers[300:305, knee] = markers[600:640, knee] = np.nan
     gappy = replace(recording, markers=markers)
-    initial = dynakin.initialise(perfect.definition, gappy, side="right")
+    initial = perfect.definition.calibrate(gappy, side="right")
     reference = reference_methods(gappy, initial, perfect.definition)
     missing = np.isnan(reference.data["wrench_estimated"].sel(component="fy").values)
     assert missing.nonzero()[0].tolist() == list(range(600, 640))

@@ -47,7 +47,7 @@ class Followed:
         return float(np.sqrt(np.mean(self.off**2)))
 
 
-def distance(initial: dynakin.model.InitialModel, estimated: np.ndarray, measured: dict[str, np.ndarray]) -> float:
+def distance(initial: dynakin.model.CalibratedModel, estimated: np.ndarray, measured: dict[str, np.ndarray]) -> float:
     """RMS over the markers, m, on the axes that the model measures."""
     places = initial.ground.points_to_ground(np.stack([measured[name] for name in initial.recorded_markers]))
     axes = np.array([marker.measured for marker in initial.spec.markers])

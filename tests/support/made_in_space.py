@@ -8,8 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin import _core
-from dynakin.model.calibration.initial import InitialModel
-from dynakin.model.calibration.initialise import initialise
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import ModelDefinition, load_model
 from dynakin.model.subject import Subject
 from dynakin.recordings.recording import Plate, Recording
@@ -59,12 +58,12 @@ def definition() -> ModelDefinition:
     return load_model("fullbody", WHO, markers="plug-in-gait")
 
 
-def measured() -> InitialModel:
+def measured() -> CalibratedModel:
     """fullbody measured on the standing person."""
-    return initialise(definition(), standing())
+    return definition().calibrate(standing())
 
 
-def states(initial: InitialModel, motion: Mapping[str, Array], turn_rad: float, place: Array, time: Array) -> Array:
+def states(initial: CalibratedModel, motion: Mapping[str, Array], turn_rad: float, place: Array, time: Array) -> Array:
     """States (T, n) in which coordinates (by name, rad, (T,)) are added to standing, at another heading and place."""
     core = _core.Model(initial.spec)
     names, T = list(core.layout.names), len(time)
@@ -81,7 +80,7 @@ def states(initial: InitialModel, motion: Mapping[str, Array], turn_rad: float, 
 
 
 def recording_of(
-    initial: InitialModel, x: Array, time: Array, *, plates: bool = True, noise_m: float = 0.0
+    initial: CalibratedModel, x: Array, time: Array, *, plates: bool = True, noise_m: float = 0.0
 ) -> Recording:
     """Markers and one large plate under both feet, of these states; the ground frame is the laboratory's."""
     core, rng = _core.Model(initial.spec), np.random.default_rng(1)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import ModelDefinition
 from dynakin.model.plan import ModelPlan
 from dynakin.simulation.output import SimulatedTrial
@@ -21,7 +21,7 @@ class Perfect:
 
     trial: SimulatedTrial
     definition: ModelDefinition
-    initial: InitialModel
+    initial: CalibratedModel
     chain: PlanarChain
     plan: ModelPlan
     landmarks: dict[str, np.ndarray]

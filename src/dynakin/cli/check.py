@@ -15,13 +15,9 @@ from rich.text import Text
 from dynakin.cli.console import out, table
 from dynakin.cli.options import Force, Forward, Height, Markers, Mass, Sex, Side, Static, Vertical, forward_direction
 from dynakin.errors import DynakinError
-from dynakin.model.calibration.initial import InitialModel
-from dynakin.model.calibration.initialise import initialise
-from dynakin.model.calibration.measure import Measured, measure
-from dynakin.model.definition import Definition, available_models, load_model
+from dynakin.model.definition import available_models, load_model
 from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
 from dynakin.model.markers.schema import MarkerSetFile
-from dynakin.model.opensim.definition import OpenSimDefinition
 from dynakin.model.subject import Subject
 from dynakin.recordings.frame import GroundFrame, find_ground_frame
 from dynakin.recordings.landmarks import plain_name
@@ -61,11 +57,16 @@ def check(
         definition = load_model(name, subject, markers=markers or "auto")
         console.print(f"What `run --model {name}` would do", style="bold")
         try:
-            planar = not isinstance(definition, OpenSimDefinition) and definition.model.planar
-            if planar and not recording.plates:
+            if definition.planar and not recording.plates:
                 raise DynakinError("no force plates, expected at least one (give --forces)")
-            found = _laid_on(definition, recording, still, side or "auto", vertical or "auto", direction)
-            plates = check_plates(recording, found.ground, found.mass_kg if planar else None)
+            found = definition.calibrate(
+                recording,
+                static=still,
+                side=side or "auto",
+                vertical=vertical or "auto",
+                forward=direction,  # type: ignore[arg-type]
+            )
+            plates = check_plates(recording, found.ground, found.mass_kg if definition.planar else None)
             if recording.plates and plates.refusal:
                 raise DynakinError(plates.refusal)
         except DynakinError as error:
@@ -74,34 +75,6 @@ def check(
             # how the ground frame was found is said above
             _sentences(console, [text for text in found.messages if text not in found.ground.how])
         console.print()
-
-
-def _laid_on(
-    definition: Definition,
-    recording: Recording,
-    static: Recording | None,
-    side: str,
-    vertical: str,
-    forward: str | tuple[float, ...],
-) -> Measured | InitialModel:
-    """What the model is when measured on the recording, as far as the messages go."""
-    if isinstance(definition, OpenSimDefinition):
-        return initialise(
-            definition,
-            recording,
-            static=static,
-            vertical=vertical,
-            forward=forward,  # type: ignore[arg-type]
-        )
-    _, found = measure(
-        definition,
-        recording,
-        static=static,
-        side=side,
-        vertical=vertical,
-        forward=forward,  # type: ignore[arg-type]
-    )
-    return found
 
 
 def _print_recording(console: Console, recording: Recording) -> None:

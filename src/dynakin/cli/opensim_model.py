@@ -11,7 +11,6 @@ from rich.table import Table
 from rich.tree import Tree
 
 from dynakin.cli.console import table
-from dynakin.model.calibration.initialise import initialise
 from dynakin.model.definition import Definition
 from dynakin.model.opensim.definition import OpenSimDefinition
 from dynakin.model.opensim.export import mass_of_run, of_definition, of_initial, read_values
@@ -59,7 +58,7 @@ def export_model(
         return
     if trial is None:
         raise typer.BadParameter("--export of a model that is no .osim file: expected --trial to measure it on")
-    write_osim(of_initial(initialise(definition, read(trial, forces)), values), path)
+    write_osim(of_initial(definition.calibrate(read(trial, forces)), values), path)
 
 
 def _tree(definition: OpenSimDefinition) -> Tree:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.calibrated import CalibratedModel
 
 Array = npt.NDArray[np.float64]
 
@@ -16,7 +16,7 @@ PASSES = 3
 """The state extrapolates motion back over the delay and tells a long one a sixth too long; further passes mend that."""
 
 
-def delay_of(initial: InitialModel, state: Array, sd: Array) -> tuple[float, float] | None:
+def delay_of(initial: CalibratedModel, state: Array, sd: Array) -> tuple[float, float] | None:
     """Delay and its standard deviation, s, after the last frame (state, sd: (n,)); None where none is estimated."""
     if "plates/delay" not in initial.names:
         return None

@@ -16,7 +16,7 @@ from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.filter.parameters import parameters_of
 from dynakin.filter.sources import with_sources
 from dynakin.filter.total_wrench import ELSEWHERE
-from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import AXES, COMPONENTS, Estimate
 from dynakin.results.measures.facing import nearly_singular
@@ -29,7 +29,7 @@ Array = npt.NDArray[np.float64]
 def assemble(
     arrays: Mapping[str, Array],
     model: _core.Model,
-    initial: InitialModel,
+    initial: CalibratedModel,
     recording: Recording,
     measured: tuple[Array, Array],
     config: dict[str, Any],
@@ -100,7 +100,7 @@ def _without_infinities(data: xr.Dataset) -> list[str]:
 def _dataset(
     arrays: Mapping[str, Array],
     model: _core.Model,
-    initial: InitialModel,
+    initial: CalibratedModel,
     recording: Recording,
     measured: tuple[Array, Array],
     feet: FootWrenches | None,

@@ -12,7 +12,7 @@ import numpy.typing as npt
 
 import dynakin._core as _core
 from dynakin.filter.noise import Noise
-from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.calibrated import CalibratedModel
 
 Array = npt.NDArray[np.float64]
 Quantity = Literal["lengths", "markers", "soft_tissue", "inertia"]
@@ -20,7 +20,7 @@ QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
 """Parameters that can be estimated: segment lengths, marker places, displacements of skin and flesh, inertia."""
 
 
-def extended(initial: InitialModel, noise: Noise, estimate: Collection[Quantity] = QUANTITIES) -> InitialModel:
+def extended(initial: CalibratedModel, noise: Noise, estimate: Collection[Quantity] = QUANTITIES) -> CalibratedModel:
     """The same model with the states that these noise settings ask for; places, bounds and priors follow their names.
 
     Displacements of soft tissue and errors of the plates start at 0 with the standard deviations declared. Of places
@@ -63,7 +63,7 @@ def extended(initial: InitialModel, noise: Noise, estimate: Collection[Quantity]
     )
 
 
-def _place_sd(initial: InitialModel, first: dict[str, int]) -> Array:
+def _place_sd(initial: CalibratedModel, first: dict[str, int]) -> Array:
     """Prior standard deviation (M,) m of each marker's place, the mean over its axes; 0 where it is no state."""
     found = np.zeros(len(initial.spec.markers))
     for k, marker in enumerate(initial.spec.markers):
@@ -99,14 +99,14 @@ def _added_sd(spec: _core.ModelSpec, noise: Noise, soft_tissue: Array) -> dict[s
     return sd | {"plates/delay": noise.plate_delay_s}
 
 
-def initial_covariance(initial: InitialModel, noise: Noise) -> Array:
+def initial_covariance(initial: CalibratedModel, noise: Noise) -> Array:
     """P0 (n, n): the priors, and with `total_mass_use` "prior" the total mass as one piece of information on it."""
     covariance = np.diag(initial.sd0**2)
-    if initial.together is not None:
+    if initial.joint_prior is not None:
         place = {name: k for k, name in enumerate(initial.names)}
-        known = [k for k, name in enumerate(initial.together.names) if name in place]
-        at = [place[initial.together.names[k]] for k in known]
-        covariance[np.ix_(at, at)] = initial.together.covariance[np.ix_(known, known)]
+        known = [k for k, name in enumerate(initial.joint_prior.names) if name in place]
+        at = [place[initial.joint_prior.names[k]] for k in known]
+        covariance[np.ix_(at, at)] = initial.joint_prior.covariance[np.ix_(known, known)]
     if noise.total_mass_use == "frame":
         return covariance
     masses = np.array([float(name.startswith("inertia/") and name.endswith("/mass")) for name in initial.names])
@@ -117,7 +117,7 @@ def initial_covariance(initial: InitialModel, noise: Noise) -> Array:
     return covariance
 
 
-def continuous_noise(initial: InitialModel, noise: Noise, layout: _core.StateLayout) -> tuple[Array, Array]:
+def continuous_noise(initial: CalibratedModel, noise: Noise, layout: _core.StateLayout) -> tuple[Array, Array]:
     """Density (n,) of the white noise that drives each element, and the rate (n,) 1/s at which it decays."""
     density, decay = np.zeros(layout.size), np.zeros(layout.size)
     kinds = {axis.coordinate: axis.kind for segment in initial.spec.segments for axis in segment.axes}

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from scipy import ndimage
 
 from dynakin.filter.mass_centre import mass_centre
-from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.contact import runs
 from dynakin.recordings.recording import rate_of
 from dynakin.units import GRAVITY_M_S2
@@ -63,7 +63,7 @@ class Closure:
         return np.asarray(np.array([push @ about[:, 1], -(push @ about[:, 0])]) / max(float(push @ push), 1e-9))
 
 
-def closure(initial: InitialModel, time: Array, markers: Array, wrench: Array, claimed: Flags) -> Closure | None:
+def closure(initial: CalibratedModel, time: Array, markers: Array, wrench: Array, claimed: Flags) -> Closure | None:
     """Compare the plates' sum with the motion of the centre of mass.
 
     Args:
@@ -97,7 +97,7 @@ def closure(initial: InitialModel, time: Array, markers: Array, wrench: Array, c
     return Closure(excess, _smooth(about, judged, rate), undeclared, int(np.sum(claimed & ~judged)), ratio)
 
 
-def plates_misfit(initial: InitialModel, time: Array, markers: Array, wrench: Array) -> float | None:
+def plates_misfit(initial: CalibratedModel, time: Array, markers: Array, wrench: Array) -> float | None:
     """RMS of the excess, N, over all frames in which the wrench (T, 6) is known; None where nothing can be judged."""
     found = closure(initial, time, markers, wrench, np.ones(len(time), dtype=bool))
     if found is None:

@@ -11,14 +11,14 @@ import dynakin._core as _core
 from dynakin.errors import ConfigError
 from dynakin.filter.augment import QUANTITIES, Quantity, continuous_noise, extended, initial_covariance
 from dynakin.filter.noise import Noise, gate_limits
-from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.calibrated import CalibratedModel
 
 Array = npt.NDArray[np.float64]
 
 
 def core_filter(
-    initial: InitialModel, noise: Noise, estimate: Collection[Quantity] = QUANTITIES
-) -> tuple[InitialModel, _core.Model, _core.Filter]:
+    initial: CalibratedModel, noise: Noise, estimate: Collection[Quantity] = QUANTITIES
+) -> tuple[CalibratedModel, _core.Model, _core.Filter]:
     """The model with the states that these settings ask for, compiled, and a filter that starts from it.
 
     Args:
@@ -34,7 +34,7 @@ def core_filter(
 
 
 def filter_settings(
-    initial: InitialModel, noise: Noise, layout: _core.StateLayout, estimate: Collection[Quantity] = QUANTITIES
+    initial: CalibratedModel, noise: Noise, layout: _core.StateLayout, estimate: Collection[Quantity] = QUANTITIES
 ) -> _core.FilterSettings:
     """The core's settings for a measured model: this noise, the marker set's variances, the bounds of (9).
 
@@ -71,7 +71,7 @@ def filter_settings(
     )
 
 
-def marker_variance(initial: InitialModel, noise: Noise, estimate: Collection[Quantity] = QUANTITIES) -> Array:
+def marker_variance(initial: CalibratedModel, noise: Noise, estimate: Collection[Quantity] = QUANTITIES) -> Array:
     """R (M,) m^2 of the markers of a model that has the states these settings ask for."""
     return noise.marker_variance(
         initial.recorded_markers,

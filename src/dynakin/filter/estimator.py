@@ -22,8 +22,7 @@ from dynakin.filter.noise import Noise
 from dynakin.filter.samples import Sample, recording_arrays, sample_arrays
 from dynakin.filter.smoothing import check_can_smooth, smoothed, whether_to_smooth
 from dynakin.filter.total_wrench import Ground, doubtful_mass, foot_wrenches, known_ground
-from dynakin.model.calibration.initial import InitialModel
-from dynakin.model.calibration.initialise import initialise
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.loads import CarriedLoad, with_loads
 from dynakin.model.definition import Definition
 from dynakin.model.identified import IdentifiedSubject, with_identified
@@ -36,7 +35,7 @@ from dynakin.results.measures.tracking import without_lost
 
 Array = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]
-Feet = Callable[[InitialModel], FootWrenches | None]
+Feet = Callable[[CalibratedModel], FootWrenches | None]
 
 LARGEST_LAG = 1000
 """Frames. Each step goes back over all of them and each keeps its covariance: a whole body's take half a gigabyte, and
@@ -98,7 +97,7 @@ class Estimator:
         self.estimate = tuple(kind for kind in QUANTITIES if kind in estimate)
         self.plates = dict(plates or {})
         self.lag = lag
-        self.initial: InitialModel | None = None
+        self.initial: CalibratedModel | None = None
         self._filter: _core.Filter | None = None
         self._lag: _core.FixedLag | None = None
         self._core_model: _core.Model | None = None
@@ -170,12 +169,12 @@ class Estimator:
             )
         )
 
-    def _measured(self, recording: Recording, initial: InitialModel) -> tuple[Array, Array, Ground]:
+    def _measured(self, recording: Recording, initial: CalibratedModel) -> tuple[Array, Array, Ground]:
         markers, wrench = recording_arrays(recording, initial, gaps=self.noise.recover)
         tolerance = self.noise.plate_load_tolerance
         return markers, wrench, known_ground(recording, initial, markers, wrench, self.plates, tolerance)
 
-    def measured(self, recording: Recording, initial: InitialModel) -> tuple[Array, Array, list[str]]:
+    def measured(self, recording: Recording, initial: CalibratedModel) -> tuple[Array, Array, list[str]]:
         """What the filter takes of a recording: markers (T, M, 3) m, wrench (T, 6), NaN where it is not known (all of
         it where the plates carry something that the model does not have), and what there is to say of the plates.
 
@@ -187,7 +186,7 @@ class Estimator:
 
     def run_in_step(
         self,
-        initial: InitialModel,
+        initial: CalibratedModel,
         time: Array,
         markers: Array,
         wrench: Array,
@@ -217,7 +216,7 @@ class Estimator:
             arrays = self.run_arrays(time, markers, taken, progress, feet and feet.in_step(time, shift))
         return arrays, shift, in_words(shift, self._delay(arrays))
 
-    def start(self, recording: Recording, *, static: Recording | None = None) -> InitialModel:
+    def start(self, recording: Recording, *, static: Recording | None = None) -> CalibratedModel:
         """Measure the model on a recording (or the first seconds of a live one) and make the filter ready to step.
 
         Raises:
@@ -225,14 +224,13 @@ class Estimator:
         """
         return self.start_from(self.measure(recording, static=static))
 
-    def measure(self, recording: Recording, *, static: Recording | None = None) -> InitialModel:
+    def measure(self, recording: Recording, *, static: Recording | None = None) -> CalibratedModel:
         """The model as measured on a recording, before any states are added that the noise asks for.
 
         Raises:
             ModelError, RecordingError: as in `run`.
         """
-        initial = initialise(
-            self.model,
+        initial = self.model.calibrate(
             recording,
             static=static,
             side=self.side,
@@ -261,7 +259,7 @@ class Estimator:
             parameters=self.parameters,
         )
 
-    def start_from(self, initial: InitialModel) -> InitialModel:
+    def start_from(self, initial: CalibratedModel) -> CalibratedModel:
         """Make the filter ready to step from a model that was measured before, or changed since."""
         initial, self._core_model, self._filter = core_filter(initial, self.noise, self.estimate)
         if self.lag:
@@ -438,7 +436,7 @@ class Estimator:
             "bounds": self.bounds.model_dump(mode="json"),
         }
 
-    def filter_settings(self, initial: InitialModel) -> _core.FilterSettings:
+    def filter_settings(self, initial: CalibratedModel) -> _core.FilterSettings:
         """The core's settings for a measured model: this noise, the marker set's variances, the bounds of (9)."""
         assert self._core_model is not None
         return filter_settings(initial, self.noise, self._core_model.layout, self.estimate)

@@ -6,13 +6,13 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.contact import runs
 from dynakin.results.records import REFUSED, TRACKING, Event, EventKind, Parameter
 
 
 def events_of(
-    data: xr.Dataset, parameters: list[Parameter], initial: InitialModel, unseen_sd: float | None = None
+    data: xr.Dataset, parameters: list[Parameter], initial: CalibratedModel, unseen_sd: float | None = None
 ) -> list[Event]:
     """Events in the order of their times; one a stretch, not one a frame."""
     time = data["time"].values
@@ -95,7 +95,7 @@ def _held(data: xr.Dataset, unseen_sd: float | None) -> list[Event]:
     ]
 
 
-def _coordinates_at_bounds(data: xr.Dataset, initial: InitialModel) -> list[Event]:
+def _coordinates_at_bounds(data: xr.Dataset, initial: CalibratedModel) -> list[Event]:
     state = data["state"].values
     free = [coordinate.name for coordinate in initial.spec.coordinates if not coordinate.locked]
     events = []

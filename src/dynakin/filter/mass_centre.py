@@ -10,7 +10,7 @@ import numpy.typing as npt
 from scipy import signal
 
 import dynakin._core as _core
-from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.contact import runs
 from dynakin.recordings.recording import rate_of
 
@@ -40,7 +40,7 @@ class MassCentre:
     known: Flags
 
 
-def mass_centre(initial: InitialModel, time: Array, markers: Array) -> MassCentre | None:
+def mass_centre(initial: CalibratedModel, time: Array, markers: Array) -> MassCentre | None:
     """The centre of mass as a fixed mean of the markers, over each stretch that shows the same ones.
 
     Args:
@@ -115,7 +115,7 @@ class _Weights:
     With all markers of our models it is within 2 to 3 mm where every angle turns by 23 deg.
     """
 
-    def __init__(self, initial: InitialModel) -> None:
+    def __init__(self, initial: CalibratedModel) -> None:
         model = _core.Model(initial.spec)
         offset, size = model.layout.blocks["coordinates"]
         states = np.tile(initial.x0, (_POSTURES, 1))

@@ -161,7 +161,7 @@ class Noise(BaseModel):
 
         Args:
             of_set: (M,) m^2, as the marker set has it. declared_m: (M,) m, size of the soft tissue's displacement.
-            unmodelled_m: (M,) m, of ``InitialModel``; the marker set's R holds it already.
+            unmodelled_m: (M,) m, of ``CalibratedModel``; the marker set's R holds it already.
             soft_tissue_estimated: False: all of the displacement is noise.
         """
         variance = self.marker_scale * of_set

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.elements import element
-from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.results.records import Parameter, ParameterKind
 
 Array = npt.NDArray[np.float64]
@@ -17,7 +17,7 @@ _PLATE_UNITS = {"delay": "s", "fx": "N", "fy": "N", "fz": "N"}
 
 
 def parameters_of(
-    initial: InitialModel, state: Array, sd: Array, prior_sd: Array, length_skin: float = 0.0
+    initial: CalibratedModel, state: Array, sd: Array, prior_sd: Array, length_skin: float = 0.0
 ) -> list[Parameter]:
     """Every length, marker place and inertial parameter in the state, and the lengths that were held fixed.
 
@@ -63,7 +63,7 @@ def parameters_of(
     return found
 
 
-def length_skin_sd(initial: InitialModel, share: float) -> dict[str, float]:
+def length_skin_sd(initial: CalibratedModel, share: float) -> dict[str, float]:
     """Standard deviation (m) of each estimated length that comes from skin that follows joint angles.
 
     Such a displacement repeats with the movement, so no length of trial averages it out, and to the filter it is a

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import RecordingError
-from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.limits import FARTHEST_M, LARGEST_MOMENT_NM
 from dynakin.recordings.recording import Recording
 
@@ -32,7 +32,7 @@ class Sample:
     plates: Mapping[str, npt.ArrayLike] = field(default_factory=dict)
 
 
-def recording_arrays(recording: Recording, initial: InitialModel, *, gaps: bool = False) -> tuple[Array, Array]:
+def recording_arrays(recording: Recording, initial: CalibratedModel, *, gaps: bool = False) -> tuple[Array, Array]:
     """Markers (T, M, 3) m and total wrench (T, 6) about the model's ground origin, ground frame, NaN missing.
 
     Args:
@@ -74,7 +74,7 @@ def recording_arrays(recording: Recording, initial: InitialModel, *, gaps: bool 
     return np.ascontiguousarray(markers), np.ascontiguousarray(wrench)
 
 
-def sample_arrays(sample: Sample, initial: InitialModel) -> tuple[Array, Array]:
+def sample_arrays(sample: Sample, initial: CalibratedModel) -> tuple[Array, Array]:
     """Markers (M, 3) and total wrench (6,) of one live sample; what it lacks is NaN.
 
     Raises:

@@ -12,7 +12,7 @@ from dynakin.errors import RecordingError
 from dynakin.filter.closure import EXCESS, Closure, closure
 from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.filter.noise import Noise
-from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet import loads as on_plates
 from dynakin.recordings.feet.contact import runs
 from dynakin.recordings.feet.distance import distance_to_hull
@@ -51,7 +51,7 @@ _SHARED_REACH_M = 0.1
 """How far, as an arm of that force, its point may err."""
 
 
-def foot_wrenches(loads: FootLoads, initial: InitialModel, noise: Noise) -> FootWrenches:
+def foot_wrenches(loads: FootLoads, initial: CalibratedModel, noise: Noise) -> FootWrenches:
     """Each foot's wrench with its uncertainty: the plates' noise at the foot's centre of pressure. Last comes the
     contact `ELSEWHERE`, not measured in the frames in which something else may bear the person.
 
@@ -92,7 +92,7 @@ class Ground:
     reasons: tuple[str, ...]
 
 
-def foot_markers(initial: InitialModel) -> dict[str, list[str]]:
+def foot_markers(initial: CalibratedModel) -> dict[str, list[str]]:
     """Foot -> the recording's names of the markers on its segment, and on those that hang on that (toes)."""
     parents = {segment.name: segment.parent for segment in initial.spec.segments}
 
@@ -105,7 +105,7 @@ def foot_markers(initial: InitialModel) -> dict[str, list[str]]:
 
 def known_ground(
     recording: Recording,
-    initial: InitialModel,
+    initial: CalibratedModel,
     markers: Array,
     wrench: Array,
     assigned: Mapping[str, str] | None = None,
@@ -185,7 +185,7 @@ def _nearly_all(found: Closure) -> bool:
 
 
 def _undeclared_in_words(
-    found: Closure, recording: Recording, initial: InitialModel, markers: Array, wrench: Array
+    found: Closure, recording: Recording, initial: CalibratedModel, markers: Array, wrench: Array
 ) -> tuple[str, Flags]:
     """A sentence on what the plates lack, with times, and the feet (T, F) under whose plates it acts."""
     time, feet = recording.time, foot_markers(initial)
@@ -245,7 +245,7 @@ def doubtful_mass(wrench: Array, mass_kg: float, load_ratio: float | None) -> st
 
 
 def _foreign_load(
-    check: PlateCheck, wrench: Array, claimed: Flags, initial: InitialModel, tolerance: float | None
+    check: PlateCheck, wrench: Array, claimed: Flags, initial: CalibratedModel, tolerance: float | None
 ) -> str | None:
     """A sentence where the plates' mean load is not the person's weight, for recordings that `closure` cannot judge.
 

@@ -10,8 +10,7 @@ import numpy as np
 from dynakin.errors import RecordingError
 from dynakin.filter.samples import recording_arrays
 from dynakin.filter.smoothing import can_smooth
-from dynakin.model.calibration.initial import InitialModel
-from dynakin.model.calibration.initialise import initialise
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.loads import with_loads
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.standing import standing_window
@@ -83,9 +82,8 @@ def _estimated_anew(estimator: Estimator, estimate: Estimate, standing: Recordin
     return locked | mean_angles(free, turning, state[:, : len(free)])
 
 
-def _standing_model(estimator: Estimator, static: Recording) -> InitialModel:
-    return initialise(
-        estimator.model,
+def _standing_model(estimator: Estimator, static: Recording) -> CalibratedModel:
+    return estimator.model.calibrate(
         static,
         static=static,
         side=estimator.side,
@@ -96,7 +94,7 @@ def _standing_model(estimator: Estimator, static: Recording) -> InitialModel:
     )
 
 
-def _as_identified(start: InitialModel, estimate: Estimate) -> InitialModel:
+def _as_identified(start: CalibratedModel, estimate: Estimate) -> CalibratedModel:
     """With the constants that a trial ended with; markers that it did not see keep their own."""
     known = {p.name: p for p in estimate.parameters if p.estimated and p.name.startswith(_CONSTANT)}
     x0, sd0 = start.x0.copy(), start.sd0.copy()

@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ModelError
-from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.inertia import INERTIA_NAMES, PLANAR_INERTIA, RigidBody
 
 Array = npt.NDArray[np.float64]
@@ -73,7 +73,7 @@ class Bodies:
     inertia: tuple[str, ...] = INERTIA_NAMES
 
     @classmethod
-    def of(cls, initial: InitialModel, priors: BodyPriors | None = None) -> Bodies:
+    def of(cls, initial: CalibratedModel, priors: BodyPriors | None = None) -> Bodies:
         """The bodies of a calibrated model, in the plane or in space, by the numbers of each that it estimates; those
         that are held keep their mass.
 

@@ -11,8 +11,7 @@ import numpy.typing as npt
 import dynakin._core as _core
 from dynakin.errors import LostError, ModelError, RecordingError
 from dynakin.filter.estimator import Estimator
-from dynakin.model.calibration.initial import InitialModel
-from dynakin.model.opensim.definition import OpenSimDefinition
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.loads import LOADED_N
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Recording
@@ -44,7 +43,7 @@ class Movement:
     recording: Recording
     time: Array
     states: Array
-    start: InitialModel
+    start: CalibratedModel
     lost: npt.NDArray[np.bool_]
 
 
@@ -83,7 +82,7 @@ class Common:
     """
 
     estimator: Estimator
-    initial: InitialModel
+    initial: CalibratedModel
     static: Recording
     core: _core.Model
 
@@ -98,7 +97,7 @@ class Common:
             ModelError, RecordingError: as `Estimator.start`.
         """
         weighed = static is not None and bool(static.plates)
-        if estimator.model.subject.mass_kg is None and not weighed and not _brings_mass(estimator):
+        if not estimator.model.has_mass and not weighed:
             raise ModelError(
                 "identification: the body mass is not known; expected it (--mass), or a standing trial with plates "
                 "(--static): the plates of a trial that is left out and foretold must not tell it"
@@ -195,7 +194,7 @@ class Common:
         """A trial to identify on."""
         return self.with_plates(self.see(recording, progress=progress), recording)
 
-    def _start(self, recording: Recording, ground: GroundFrame | None) -> InitialModel:
+    def _start(self, recording: Recording, ground: GroundFrame | None) -> CalibratedModel:
         estimator = self.estimator
         return start_as(
             self.initial,
@@ -233,10 +232,6 @@ def _low_passed(time: Array, wrench: Array, middle: int) -> Array:
     unknown."""
     halves = [smooth(time[part], wrench[part], CUTOFF_HZ).values for part in (slice(middle), slice(middle, None))]
     return np.where(np.isfinite(wrench), np.concatenate(halves), np.nan)
-
-
-def _brings_mass(estimator: Estimator) -> bool:
-    return isinstance(estimator.model, OpenSimDefinition)
 
 
 def measure_all(

@@ -1,20 +1,32 @@
-"""A model that is chosen but not yet measured: its file, the subject, the marker set and the table."""
+"""A model that is chosen: what all have in common, and those of TOML files with subject, marker set and table."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from importlib import resources
 from pathlib import Path
+from typing import Protocol
 
+import numpy as np
+
+import dynakin._core as _core
 from dynakin.errors import ModelError
-from dynakin.model.markers.marker_set import load_marker_set
+from dynakin.model.calibration.calibrated import CalibratedModel, first_centre_of_pressure
+from dynakin.model.calibration.in_space import started
+from dynakin.model.calibration.measure import measure
+from dynakin.model.markers.marker_set import choose_marker_set, load_marker_set, match_markers
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.model.opensim.definition import OpenSimDefinition, OpenSimOptions, load_opensim
+from dynakin.model.priors import Bounds, Priors
 from dynakin.model.schema import ModelFile
+from dynakin.model.spec import in_layout, to_core
 from dynakin.model.subject import Subject
 from dynakin.model.table import BodyTable, load_table
 from dynakin.model.validation import nearest, read_toml, validate
 from dynakin.recordings.formats.textfile import is_file
+from dynakin.recordings.frame import GroundFrame
+from dynakin.recordings.recording import Recording
 
 _FOLDER = resources.files("dynakin.model") / "builtin"
 
@@ -24,14 +36,79 @@ def available_models() -> list[str]:
     return sorted(entry.name.removesuffix(".toml") for entry in _FOLDER.iterdir() if entry.name.endswith(".toml"))
 
 
+class Definition(Protocol):
+    """A model that is chosen but not yet calibrated on a person: built in, of a TOML file, or OpenSim's."""
+
+    @property
+    def name(self) -> str:
+        """The model's name."""
+
+    @property
+    def path(self) -> Path:
+        """Its file."""
+
+    @property
+    def subject(self) -> Subject:
+        """Mass, height, sex, as far as they are given."""
+
+    @property
+    def planar(self) -> bool:
+        """Whether it moves in the sagittal plane only."""
+
+    @property
+    def has_mass(self) -> bool:
+        """Whether a mass is known without a recording: given, or the model's own."""
+
+    def with_subject(self, subject: Subject) -> Definition:
+        """The same model of somebody else."""
+
+    def markers_among(self, came: Sequence[str], seen: Iterable[bool], where: str) -> tuple[str, list[str], list[str]]:
+        """Whose markers they are (the marker set's or the model's name), those expected, and those among ``came``.
+
+        Args:
+            came: names of markers. seen: whether each was seen at all. where: they came from.
+
+        Raises:
+            ModelError: the names fit no marker set.
+        """
+
+    def calibrate(
+        self,
+        recording: Recording,
+        *,
+        static: Recording | None = None,
+        side: str = "auto",
+        vertical: str = "auto",
+        forward: str | tuple[float, float, float] = "auto",
+        priors: Priors | None = None,
+        bounds: Bounds | None = None,
+        ground: GroundFrame | None = None,
+    ) -> CalibratedModel:
+        """The model of one person, calibrated on a recording; an OpenSim model brings its own lengths and places.
+
+        Args:
+            static: a recording of the same person and markers, standing; lengths and marker places come from it.
+            side: limb markers of a lumped model: "right", "left", "both" (separate sites), "auto" (fewest gaps, right
+                on a tie).
+            vertical, forward: directions of the laboratory, found in the recording where "auto".
+            priors, bounds: other numbers than the defaults of ``dynakin.model.priors``.
+            ground: directions of the ground frame, where they are known already. Its origin is replaced by the model's
+                ground landmark.
+
+        Raises:
+            ModelError, RecordingError: the model, the markers and the recording do not fit; one line says what was
+                found and expected.
+        """
+
+
 @dataclass(frozen=True, eq=False)
 class ModelDefinition:
-    """What ``load_model`` returns; ``initialise`` measures it on a recording.
+    """What ``load_model`` returns; ``calibrate`` measures it on a recording.
 
     Attributes:
         model: the model file.
         path: where it came from.
-        subject: mass, height, sex, as far as they are told.
+        subject: mass, height, sex, as far as they are given.
         marker_set: None: chosen by the recording's markers.
         table: inertial parameters for the subject's sex.
     """
@@ -47,8 +124,92 @@ class ModelDefinition:
         """The model's name."""
         return self.model.name
 
+    @property
+    def planar(self) -> bool:
+        """Whether it moves in the sagittal plane only."""
+        return self.model.planar
 
-Definition = ModelDefinition | OpenSimDefinition
+    @property
+    def has_mass(self) -> bool:
+        """Whether a mass is known without a recording."""
+        return self.subject.mass_kg is not None
+
+    def with_subject(self, subject: Subject) -> ModelDefinition:
+        """The same model of somebody else."""
+        return replace(self, subject=subject)
+
+    def markers_among(self, came: Sequence[str], seen: Iterable[bool], where: str) -> tuple[str, list[str], list[str]]:
+        """The marker set's name, its usual markers, and those of them that are among names."""
+        try:
+            chosen = self.marker_set or choose_marker_set(came)
+        except ModelError as error:
+            raise ModelError(f"{error.message}; what came: {', '.join(came)}") from None
+        sides = ("right", "left", "centre")
+        expected = [marker.aliases(side)[0] for marker in chosen.usual for side in sides if marker.aliases(side)]
+        usual = {marker.name for marker in chosen.usual}
+        matched = match_markers(chosen, came, seen, where).names
+        return chosen.name, expected, [name for (marker, _), name in matched.items() if marker in usual]
+
+    def calibrate(
+        self,
+        recording: Recording,
+        *,
+        static: Recording | None = None,
+        side: str = "auto",
+        vertical: str = "auto",
+        forward: str | tuple[float, float, float] = "auto",
+        priors: Priors | None = None,
+        bounds: Bounds | None = None,
+        ground: GroundFrame | None = None,
+    ) -> CalibratedModel:
+        """As ``Definition.calibrate``: lengths and marker places from the first (or standing) frames, inertia from the
+        table, coordinates from landmarks and, in space, markers."""
+        plan, rest = measure(
+            self.model, self.subject, self.table, self.marker_set, recording, ground,
+            static=static, side=side, vertical=vertical, forward=forward,
+        )  # fmt: skip
+        messages, speeds = list(rest.messages), dict[str, float]()
+        if plan.model.sided:
+            begun = started(plan, rest.trial, rest.unplaced, rest.still)
+            plan, speeds = begun.plan, begun.speeds
+            messages += begun.messages
+        spec = to_core(plan)
+        core = _core.Model(spec)
+        names = list(core.layout.names)
+        limits = plan.bounds(bounds or Bounds())
+        x0 = np.array(core.initial_state(), dtype=float)
+        for at, name in enumerate(names):
+            if name.endswith("/speed"):
+                x0[at] = speeds.get(name.removesuffix("/speed"), x0[at])
+        lower = in_layout(names, {name: pair[0] for name, pair in limits.items()}, -np.inf)
+        upper = in_layout(names, {name: pair[1] for name, pair in limits.items()}, np.inf)
+        outside = (x0 < lower) | (x0 > upper)
+        for k in np.flatnonzero(outside):
+            messages.append(
+                f"Start of {names[k]} ({x0[k]:.3f}) lies beyond its bounds {lower[k]:.3f} to {upper[k]:.3f}: "
+                "put on the bound."
+            )
+        return CalibratedModel(
+            spec=spec,
+            names=tuple(names),
+            x0=np.clip(x0, lower, upper),
+            sd0=in_layout(names, plan.prior(priors or Priors()), np.nan),
+            lower=lower,
+            upper=upper,
+            table=in_layout(names, plan.table_values(), np.nan),
+            marker_variance=np.array([site.variance for site in plan.sites]),
+            soft_tissue_m=np.array([site.soft_tissue_m for site in plan.sites]),
+            ground=rest.ground,
+            plate_centre=first_centre_of_pressure(recording, rest.ground),
+            recorded_markers=tuple(site.recorded for site in plan.sites),
+            side=rest.side,
+            mass_kg=rest.mass_kg,
+            height_m=rest.height_m,
+            parts=rest.parts,
+            messages=tuple(messages),
+            plan=plan,
+            feet={s.side: s.name for s in plan.model.segments if s.side is not None and "foot" in s.parts},
+        )
 
 
 def load_model(
@@ -57,7 +218,7 @@ def load_model(
     markers: str | Path = "auto",
     table: str | Path = "dumas",
     opensim: OpenSimOptions | None = None,
-) -> Definition:
+) -> ModelDefinition | OpenSimDefinition:
     """A built-in model ("sagittal7", "squat7"), a TOML file, or an OpenSim model (.osim, versions 3 and 4).
 
     An OpenSim model brings its own markers and inertia.

@@ -13,7 +13,7 @@ from pydantic import Field, model_validator
 
 import dynakin._core as _core
 from dynakin.errors import ModelError
-from dynakin.model.calibration.initial import InitialModel, Together
+from dynakin.model.calibration.calibrated import CalibratedModel, JointPrior
 from dynakin.model.inertia import INERTIA_NAMES
 from dynakin.model.validation import Strict, read_toml, validate
 
@@ -91,7 +91,7 @@ def read_identified(path: Path) -> IdentifiedSubject:
     return validate(IdentifiedSubject, read_toml(path), str(path))
 
 
-def with_identified(initial: InitialModel, subject: IdentifiedSubject) -> InitialModel:
+def with_identified(initial: CalibratedModel, subject: IdentifiedSubject) -> CalibratedModel:
     """The same model with the subject's inertia, and its covariance, where the filter starts; bounds are moved where
     they would cut it off. A subject whose table is kept changes nothing.
 
@@ -143,6 +143,6 @@ def with_identified(initial: InitialModel, subject: IdentifiedSubject) -> Initia
         sd0=sd0,
         lower=lower,
         upper=upper,
-        together=Together(subject.batch.names, covariance),
+        joint_prior=JointPrior(subject.batch.names, covariance),
         messages=(*initial.messages, message),
     )

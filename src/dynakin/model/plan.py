@@ -7,13 +7,29 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.model.calibration.posture import Geometry
 from dynakin.model.inertia import INERTIA_NAMES, PLANAR_INERTIA, RigidBody
 from dynakin.model.priors import Bounds, Interval, Priors
-from dynakin.model.schema import ModelFile
+from dynakin.model.schema import ModelFile, Segment
 from dynakin.model.state_priors import state_bounds, state_prior
 
 Array = npt.NDArray[np.float64]
+
+
+@dataclass
+class Geometry:
+    """Lengths (m), the directions of all joint placements, and the coordinates that are locked, with their
+    values."""
+
+    lengths: dict[str, float]
+    directions: dict[str, list[Array]]  # per segment, one for each term of its placement
+    locked: dict[str, float]
+
+    def placement(self, segment: Segment) -> Array:
+        """Joint origin (3,) m in the parent's frame."""
+        terms = [
+            self.lengths[t.length] * d for t, d in zip(segment.placement, self.directions[segment.name], strict=True)
+        ]
+        return np.asarray(np.array(segment.translation) + sum(terms, np.zeros(3)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ import dynakin._core as _core
 from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.filter.noise import Noise
 from dynakin.filter.total_wrench import foot_wrenches
-from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.contact import AFTER_S, ALOFT_M, NEAR_FLOOR_M, SLOW_M_S
 from dynakin.recordings.feet.distance import distance_to_hull
 from dynakin.recordings.feet.loads import (
@@ -45,7 +45,7 @@ class LiveFeet:
     """
 
     def __init__(
-        self, initial: InitialModel, noise: Noise, plates: tuple[str, ...], assigned: Mapping[str, str]
+        self, initial: CalibratedModel, noise: Noise, plates: tuple[str, ...], assigned: Mapping[str, str]
     ) -> None:
         self.initial, self.noise, self.plates = initial, noise, plates
         self.feet = tuple(initial.feet)

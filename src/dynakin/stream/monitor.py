@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.live import StepEstimate
-from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.stream.fusion import Fused, Fusion
 from dynakin.stream.sinks.base import Status
 
@@ -30,7 +30,7 @@ class Monitor:
             that it does not see, instead of carrying it on.
     """
 
-    def __init__(self, initial: InitialModel, rate_hz: float, plates: bool, used: bool, holds: bool = True) -> None:
+    def __init__(self, initial: CalibratedModel, rate_hz: float, plates: bool, used: bool, holds: bool = True) -> None:
         self.initial, self.rate_hz = initial, rate_hz
         self.last = Status(phase="running")
         self._plates, self._used, self._holds = plates, used, holds

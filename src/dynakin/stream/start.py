@@ -12,9 +12,8 @@ import numpy as np
 from dynakin.errors import ModelError, RecordingError
 from dynakin.filter.estimator import Estimator
 from dynakin.model.calibration.body import steady_load
-from dynakin.model.calibration.initial import InitialModel
-from dynakin.model.definition import Definition, ModelDefinition
-from dynakin.model.markers.marker_set import choose_marker_set, match_markers
+from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.model.definition import Definition
 from dynakin.recordings.formats.textfile import LARGEST_TEXT, read_bytes
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.landmarks import DEFAULT_PAIRS
@@ -38,22 +37,7 @@ def check_labels(model: Definition, came: Sequence[str], seen: Iterable[bool]) -
     Raises:
         ModelError: less than half of them; the message lists what came and what was expected.
     """
-    if not isinstance(model, ModelDefinition):
-        source = model.source
-        expected = [marker.name for marker in source.markers]
-        found = [name for name in expected if name in came]
-        name = source.name
-    else:
-        try:
-            chosen = model.marker_set or choose_marker_set(came)
-        except ModelError as error:
-            raise ModelError(f"{error.message}; what came: {', '.join(came)}") from None
-        sides = ("right", "left", "centre")
-        expected = [marker.aliases(side)[0] for marker in chosen.usual for side in sides if marker.aliases(side)]
-        usual = {marker.name for marker in chosen.usual}
-        matched = match_markers(chosen, came, seen, "the stream").names
-        found = [name for (marker, _), name in matched.items() if marker in usual]
-        name = chosen.name
+    name, expected, found = model.markers_among(came, seen, "the stream")
     if 2 * len(found) < len(expected):
         raise ModelError(
             f"the stream's markers do not fit the model: {len(found)} of {len(expected)} found; came: "
@@ -107,7 +91,7 @@ def _plate(name: str, wrench: np.ndarray, up: np.ndarray) -> Plate:
 
 def unknown_mass(model: Definition, told: Mapping[str, float], plates: bool) -> bool:
     """Whether nobody tells the person's mass and nothing can weigh them."""
-    return isinstance(model, ModelDefinition) and model.subject.mass_kg is None and "mass_kg" not in told and not plates
+    return not model.has_mass and "mass_kg" not in told and not plates
 
 
 def stands(recording: Recording) -> bool:
@@ -150,7 +134,7 @@ def begin(
     *,
     static: Recording | None = None,
     known: Mapping[str, tuple[float, float]] | None = None,
-) -> tuple[InitialModel, list[str], bool]:
+) -> tuple[CalibratedModel, list[str], bool]:
     """Measure the model on the standing person and make the estimator ready.
 
     Args:
@@ -191,7 +175,7 @@ def begin(
     return initial, said, usable
 
 
-def _continued(initial: InitialModel, known: Mapping[str, tuple[float, float]]) -> InitialModel:
+def _continued(initial: CalibratedModel, known: Mapping[str, tuple[float, float]]) -> CalibratedModel:
     """The same model with constants as they were found before, as sure as they were."""
     x0, sd0 = initial.x0.copy(), initial.sd0.copy()
     found = 0

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 import dynakin._core as _core
-from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.inertia import INERTIA_NAMES
 from dynakin.results.estimate import Estimate
 
@@ -18,13 +18,13 @@ def final_values(estimate: Estimate) -> dict[str, float]:
     return {p.name: p.value for p in estimate.parameters if p.estimated}
 
 
-def initial_values(initial: InitialModel) -> dict[str, float]:
+def initial_values(initial: CalibratedModel) -> dict[str, float]:
     """The same where a filter starts: lengths and places as measured while standing, inertia by the table."""
     kinds = ("length/", "marker/", "inertia/")
     return {name: float(x) for name, x in zip(initial.names, initial.x0, strict=True) if name.startswith(kinds)}
 
 
-def freeze(initial: InitialModel, values: Mapping[str, float], start: Mapping[str, float]) -> InitialModel:
+def freeze(initial: CalibratedModel, values: Mapping[str, float], start: Mapping[str, float]) -> CalibratedModel:
     """The same model with lengths and inertia fixed.
 
     Marker places begin at ``values`` and stay in the state: their process noise is how the filter follows the skin,

@@ -13,8 +13,7 @@ from dynakin.filter.assemble import assemble
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.smoothing import can_smooth
 from dynakin.filter.total_wrench import known_ground
-from dynakin.model.calibration.initial import InitialModel
-from dynakin.model.calibration.initialise import initialise
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition
 from dynakin.model.priors import Bounds, Priors
 from dynakin.recordings.frame import GroundFrame
@@ -45,7 +44,7 @@ class IdentifyingTrial:
     recording: Recording
     static: Recording | None
     setup: Setup
-    initial: InitialModel
+    initial: CalibratedModel
     estimates: dict[str, Estimate]
     wrench: Array
     ground: GroundFrame | None = None
@@ -60,7 +59,7 @@ class Blind:
     """
 
     recording: Recording
-    start: InitialModel
+    start: CalibratedModel
     wrenches: dict[str, Array]
     notes: tuple[str, ...]
     plates: Mapping[str, str] | None = None
@@ -164,7 +163,7 @@ def judge(blind: Blind, recording: Recording) -> list[Row]:
     return rows
 
 
-def measured_wrench(recording: Recording, initial: InitialModel, plates: Mapping[str, str] | None = None) -> Array:
+def measured_wrench(recording: Recording, initial: CalibratedModel, plates: Mapping[str, str] | None = None) -> Array:
     """The plates' total wrench (T, 6) N and N m about the ground origin; NaN where they do not tell all of it.
 
     Args:
@@ -187,7 +186,7 @@ def measured_wrench(recording: Recording, initial: InitialModel, plates: Mapping
     return wrench
 
 
-def marker_paths(recording: Recording, initial: InitialModel, ground: GroundFrame) -> Array:
+def marker_paths(recording: Recording, initial: CalibratedModel, ground: GroundFrame) -> Array:
     """Paths (T, M, 3) m of the model's markers in the ground frame; one that the recording lacks is NaN."""
     missing = np.full((recording.n_frames, 3), np.nan)
     paths = [recording.marker(name) if name in recording.marker_names else missing for name in initial.recorded_markers]
@@ -214,7 +213,7 @@ def _refuse_lost(estimate: Estimate, method: str) -> None:
 
 
 def start_as(
-    measured: InitialModel,
+    measured: CalibratedModel,
     definition: Definition,
     recording: Recording,
     ground: GroundFrame | None,
@@ -223,28 +222,27 @@ def start_as(
     forward: str | tuple[float, float, float],
     priors: Priors | None,
     bounds: Bounds | None,
-) -> InitialModel:
+) -> CalibratedModel:
     """Where a trial begins on a model that was ``measured`` on another one: lengths, places and body as there.
 
     Args:
         definition: that was measured. ground: of the same laboratory, None: found. static: lengths come from it.
-        forward, priors, bounds: as for `initialise`.
+        forward, priors, bounds: as for `Definition.calibrate`.
     """
     known = {"mass_kg": measured.mass_kg, "height_m": measured.height_m}
-    return initialise(
-        replace(definition, subject=definition.subject.model_copy(update=known)),
+    return definition.with_subject(definition.subject.model_copy(update=known)).calibrate(
         recording,
-        ground,
         static=static,
         side=measured.side,
         vertical=measured.ground.vertical,
         forward=forward,
         priors=priors,
         bounds=bounds,
+        ground=ground,
     )
 
 
-def _start(identified: IdentifyingTrial, recording: Recording) -> InitialModel:
+def _start(identified: IdentifyingTrial, recording: Recording) -> CalibratedModel:
     """Where the judging trial begins; lengths, places and body as measured for the identifying one."""
     setup = identified.setup
     return start_as(
@@ -259,7 +257,7 @@ def _start(identified: IdentifyingTrial, recording: Recording) -> InitialModel:
     )
 
 
-def _referred(identified: IdentifyingTrial, recording: Recording, start: InitialModel) -> dict[str, Array]:
+def _referred(identified: IdentifyingTrial, recording: Recording, start: CalibratedModel) -> dict[str, Array]:
     setup, measured = identified.setup, identified.initial
     hertz = f"({setup.cutoff_hz:g} Hz)"
     at = reference_methods(recording, start, setup.definition, setup.cutoff_hz)

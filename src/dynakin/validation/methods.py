@@ -11,7 +11,7 @@ import xarray as xr
 
 from dynakin.errors import DynakinError, LostError, ModelError
 from dynakin.filter.zero import asked_angles
-from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.smoothing import CUTOFF_HZ
@@ -127,7 +127,7 @@ def with_lost(trial: Trial, lost: Mapping[str, str]) -> Trial:
 
 def estimate_each(
     recording: Recording, setup: Setup, *, static: Recording | None = None, progress: Progress | None = None
-) -> tuple[dict[str, Estimate], dict[str, str], InitialModel]:
+) -> tuple[dict[str, Estimate], dict[str, str], CalibratedModel]:
     """Run every preset: the estimates, why others lost the person, and what they started from.
 
     Raises:
@@ -152,7 +152,7 @@ def estimate_each(
 
 def trial_of(
     estimates: Mapping[str, Estimate],
-    initial: InitialModel,
+    initial: CalibratedModel,
     definition: Definition,
     cutoff_hz: float = CUTOFF_HZ,
     *,
@@ -224,7 +224,7 @@ def _filtered(preset: str, estimate: Estimate) -> Method:
     )
 
 
-def _referred(kind: str, reference: Reference, initial: InitialModel) -> Method:
+def _referred(kind: str, reference: Reference, initial: CalibratedModel) -> Method:
     data = reference.data
     cutoff = "" if reference.cutoff_hz is None else f" ({reference.cutoff_hz:g} Hz)"
     segments = reference.chain.moving(reference.kinematics).segments

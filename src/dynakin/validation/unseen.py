@@ -12,7 +12,7 @@ import numpy.typing as npt
 import dynakin._core as _core
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.filter.estimator import Estimator
-from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import COMPONENTS
 from dynakin.results.measures.fit import marker_rms_mm, signal_fit
@@ -109,7 +109,7 @@ def plates_withheld(recording: Recording, setup: Setup, *, static: Recording | N
 @dataclass(frozen=True, eq=False)
 class _Trial:
     recording: Recording
-    initial: InitialModel
+    initial: CalibratedModel
     markers: Array  # (T, M, 3) m, ground frame
     wrench: Array  # (T, 6); NaN where the plates do not tell all of it: neither fed nor judged
 

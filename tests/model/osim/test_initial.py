@@ -12,11 +12,10 @@ import dynakin
 from dynakin import _core
 from dynakin.errors import ModelError
 from dynakin.filter import presets
-from dynakin.model.calibration.initial import InitialModel
-from dynakin.model.calibration.initialise import initialise
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import load_model
+from dynakin.model.opensim.calibrate import feet_of, limits_of
 from dynakin.model.opensim.definition import load_opensim
-from dynakin.model.opensim.initial import feet_of, limits_of
 from dynakin.model.opensim.read import read_osim
 from dynakin.model.opensim.skin import skin_of
 from dynakin.model.subject import Subject
@@ -38,7 +37,7 @@ def squats(folder: Path) -> Recording:
 
 def test_everything_from_the_file_but_mass_and_posture(folder: Path, squats: Recording) -> None:
     definition = load_model(folder / FILE, Subject(mass_kg=60.05))
-    found = initialise(definition, squats)
+    found = definition.calibrate(squats)
     source = read_osim(folder / FILE)
     assert len(found.spec.markers) == 45
     assert found.mass_kg == pytest.approx(60.05)
@@ -59,7 +58,7 @@ def test_everything_from_the_file_but_mass_and_posture(folder: Path, squats: Rec
 def test_what_is_estimated_is_a_choice(folder: Path, squats: Recording) -> None:
     path = folder / FILE
 
-    def started(estimate: tuple[str, ...], **options: object) -> InitialModel:
+    def started(estimate: tuple[str, ...], **options: object) -> CalibratedModel:
         noise = presets.default().model_copy(update={"plate_force": 0.0, "plate_moment": 0.0, "plate_delay_s": 0.0})
         return dynakin.Estimator(load_opensim(path, **options), noise, estimate=estimate).start(squats)
 
@@ -83,9 +82,9 @@ def test_what_is_estimated_is_a_choice(folder: Path, squats: Recording) -> None:
 
 def test_file_mass_where_nothing_tells(folder: Path) -> None:
     recording = dynakin.read(folder / "squats1.trc")
-    assert initialise(load_model(folder / FILE), recording).mass_kg == pytest.approx(62.6)
+    assert load_model(folder / FILE).calibrate(recording).mass_kg == pytest.approx(62.6)
     unscaled = load_opensim(folder / FILE, Subject(mass_kg=70.0), scale_masses=False)
-    assert initialise(unscaled, recording).mass_kg == pytest.approx(62.6)
+    assert unscaled.calibrate(recording).mass_kg == pytest.approx(62.6)
 
 
 def test_the_filter_runs_on_it(folder: Path, squats: Recording) -> None:
@@ -103,9 +102,9 @@ def test_the_filter_runs_on_it(folder: Path, squats: Recording) -> None:
 
 def test_wrong_requests_are_refused(folder: Path, squats: Recording, tmp_path: Path) -> None:
     with pytest.raises(ModelError, match="0 of the 1 markers"):
-        initialise(load_opensim(small_model(tmp_path, "PinJoint", 4)), squats)
+        load_opensim(small_model(tmp_path, "PinJoint", 4)).calibrate(squats)
     with pytest.raises(ModelError, match=r"no marker 'R_HJ'.*did you mean 'R_HJC'"):
-        initialise(load_opensim(folder / FILE, leave_out=("R_HJ",)), squats)
+        load_opensim(folder / FILE, leave_out=("R_HJ",)).calibrate(squats)
     with pytest.raises(ModelError, match="lightest_share"):
         load_opensim(folder / FILE, lightest_share=1.0)
     with pytest.raises(ModelError, match="unknown key 'scal'"):
@@ -115,7 +114,7 @@ def test_wrong_requests_are_refused(folder: Path, squats: Recording, tmp_path: P
     sideways = tmp_path / "sideways.osim"
     sideways.write_text(version_4("PinJoint", ("q",)).replace("0 -9.80665 0", "0 0 -9.80665"))
     with pytest.raises(ModelError, match=r"gravity is 0 0 -9\.80665"):
-        initialise(load_opensim(sideways), squats)
+        load_opensim(sideways).calibrate(squats)
 
 
 def test_a_whole_turn_is_no_limit(tmp_path: Path) -> None:
@@ -137,4 +136,4 @@ def test_too_few_markers_for_a_posture_are_refused(folder: Path, squats: Recordi
     few = [squats.marker_names.index(name) for name in ("C7", "r_toe", "L_toe")]
     poor = replace(squats, marker_names=tuple(squats.marker_names[k] for k in few), markers=squats.markers[:, few])
     with pytest.raises(ModelError, match=r"squats1.*3 of the 49 markers .*C7.*expected at least \d+ for its \d+ free"):
-        initialise(load_model(folder / FILE, Subject(mass_kg=60.05)), poor, forward=(1.0, 0.0, 0.0))
+        load_model(folder / FILE, Subject(mass_kg=60.05)).calibrate(poor, forward=(1.0, 0.0, 0.0))

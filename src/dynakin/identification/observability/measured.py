@@ -12,7 +12,7 @@ from dynakin.errors import ConfigError
 from dynakin.filter.augment import initial_covariance
 from dynakin.filter.core_filter import marker_variance
 from dynakin.filter.estimator import Estimator
-from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.calibrated import CalibratedModel
 
 Array = npt.NDArray[np.float64]
 
@@ -33,7 +33,7 @@ class MeasuredModel:
     """
 
     core: _core.Model
-    initial: InitialModel
+    initial: CalibratedModel
     prior: Array
     marker_sd: Array
     wrench_sd: Array

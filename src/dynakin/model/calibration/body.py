@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -32,19 +31,7 @@ _STANDS_M_S = 0.1
 """Speed of the lowest marker below which a foot stands: in the air it points down, which adds 0.2 m to a height."""
 
 
-class OnPlates(Protocol):
-    """A recording and its ground frame: a ``Trial``, say."""
-
-    @property
-    def recording(self) -> Recording:
-        """What was measured."""
-
-    @property
-    def ground(self) -> GroundFrame:
-        """The frame that it is taken to."""
-
-
-def find_mass(subject: Subject, trials: Sequence[OnPlates]) -> tuple[float, str]:
+def find_mass(subject: Subject, trials: Sequence[tuple[Recording, GroundFrame]]) -> tuple[float, str]:
     """Mass (kg) and where it comes from: given, from the plates while standing still, from the file, or, with a
     warning, from the plates' mean over a movement that is long and steady enough.
 
@@ -54,26 +41,25 @@ def find_mass(subject: Subject, trials: Sequence[OnPlates]) -> tuple[float, str]
     if subject.mass_kg is not None:
         return subject.mass_kg, f"Mass {subject.mass_kg:.2f} kg: given."
     reasons, means = [], []
-    for trial in trials:
-        recording = trial.recording
+    for recording, ground in trials:
         if not recording.plates:
             reasons.append(f"{recording.name} has no force plates")
             continue
-        check = check_plates(recording, trial.ground)
+        check = check_plates(recording, ground)
         if check.refusal is not None:
             reasons.append(f"{recording.name}: {check.refusal}")
         elif check.mass_kg_from_plates is None:
-            mean, why = steady_load(recording, trial.ground)
+            mean, why = steady_load(recording, ground)
             reasons.append(f"nobody stands still on the plates of {recording.name}, and {why}")
             if mean is not None:
                 means.append((mean, recording.name))
         else:
             mass = float(check.mass_kg_from_plates)
             return mass, f"Mass {mass:.2f} kg: from the plates of {recording.name} while standing still."
-    for trial in trials:
-        told = trial.recording.subject.get("mass_kg")
+    for recording, _ in trials:
+        told = recording.subject.get("mass_kg")
         if told:
-            return told, f"Mass {told:.2f} kg: from the file {trial.recording.name}."
+            return told, f"Mass {told:.2f} kg: from the file {recording.name}."
     for mass, name in means:
         return mass, (
             f"Warning: mass {mass:.2f} kg from the mean vertical force of {name}, in which nobody stands still; wrong "

@@ -7,10 +7,9 @@ import numpy as np
 from dynakin.errors import ModelError
 from dynakin.model.calibration.frames import Trial
 from dynakin.model.calibration.landmarks import LandmarkFinder
-from dynakin.model.calibration.posture import Geometry
+from dynakin.model.calibration.lumping import PlacedPart
 from dynakin.model.inertia import RigidBody
-from dynakin.model.lumping import PlacedPart
-from dynakin.model.plan import ModelPlan
+from dynakin.model.plan import Geometry, ModelPlan
 from dynakin.model.schema import ModelFile
 
 

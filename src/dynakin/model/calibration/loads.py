@@ -9,8 +9,9 @@ from typing import Annotated
 import numpy as np
 from pydantic import Field
 
+import dynakin._core as _core
 from dynakin.errors import ModelError
-from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.validation import Name, Strict, nearest
 
 Positive = Annotated[float, Field(gt=0.0)]
@@ -32,7 +33,7 @@ class CarriedLoad(Strict):
     """Its own name among the segments."""
 
 
-def with_loads(initial: InitialModel, loads: Sequence[CarriedLoad]) -> InitialModel:
+def with_loads(initial: CalibratedModel, loads: Sequence[CarriedLoad]) -> CalibratedModel:
     """The same model with these bodies welded to it, each a segment without joint and with fixed inertia.
 
     Nothing of the state changes: the person's own numbers, their bounds and priors stay the person's.
@@ -42,8 +43,6 @@ def with_loads(initial: InitialModel, loads: Sequence[CarriedLoad]) -> InitialMo
     """
     if not loads:
         return initial
-    import dynakin._core as _core
-
     spec = _core.Model(initial.spec).spec  # a copy
     segments = list(spec.segments)
     own = [segment.name for segment in segments]

@@ -1,5 +1,4 @@
-"""Measures a model on a recording without the compiled core: lengths, marker places, inertia, first
-posture."""
+"""A model file measured on a recording: lengths, marker places, inertia, first posture."""
 
 from __future__ import annotations
 
@@ -13,13 +12,15 @@ from dynakin.model.calibration.body import check_body_mass, find_height, find_ma
 from dynakin.model.calibration.checks import check_masses, fixed_lengths, reach, refuse_moving_origin, report
 from dynakin.model.calibration.frames import Trial, choose_side
 from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder, slope
-from dynakin.model.calibration.posture import Geometry, Posture, find_geometry, find_posture, frame_landmarks
+from dynakin.model.calibration.lumping import PlacedPart, segment_bodies
+from dynakin.model.calibration.posture import Posture, find_geometry, find_posture, frame_landmarks
 from dynakin.model.calibration.sites import Candidate, candidates, find_locks, place_sites
-from dynakin.model.definition import ModelDefinition
-from dynakin.model.lumping import PlacedPart, segment_bodies
 from dynakin.model.markers.marker_set import MarkerKey, MarkerMatch, choose_marker_set, match_markers
-from dynakin.model.plan import ModelPlan
+from dynakin.model.markers.schema import MarkerSetFile
+from dynakin.model.plan import Geometry, ModelPlan
 from dynakin.model.schema import ModelFile
+from dynakin.model.subject import Subject
+from dynakin.model.table import BodyTable
 from dynakin.recordings.feet.contact import foot_contact
 from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_laboratory_frame
 from dynakin.recordings.recording import Recording
@@ -30,7 +31,7 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Measured:
-    """What ``measure`` found beside the plan itself; attributes as in ``InitialModel``."""
+    """What ``measure`` found apart from the plan itself; attributes as in ``CalibratedModel``."""
 
     ground: GroundFrame
     side: str
@@ -44,19 +45,22 @@ class Measured:
 
 
 def measure(
-    definition: ModelDefinition,
+    model: ModelFile,
+    subject: Subject,
+    table: BodyTable,
+    asked_markers: MarkerSetFile | None,
     recording: Recording,
-    ground: GroundFrame | None = None,
+    ground: GroundFrame | None,
     *,
-    static: Recording | None = None,
-    side: str = "auto",
-    vertical: str = "auto",
-    forward: str | tuple[float, float, float] = "auto",
+    static: Recording | None,
+    side: str,
+    vertical: str,
+    forward: str | tuple[float, float, float],
 ) -> tuple[ModelPlan, Measured]:
-    """All of ``initialise`` that needs no compiled core; arguments and errors as there."""
-    model, subject, messages = definition.model, definition.subject, []
-    marker_set = definition.marker_set or choose_marker_set(recording.marker_names)
-    if definition.marker_set is None:
+    """The model filled with what the recording shows; arguments and errors as of ``Definition.calibrate``."""
+    messages: list[str] = []
+    marker_set = asked_markers or choose_marker_set(recording.marker_names)
+    if asked_markers is None:
         messages.append(f"Marker set {marker_set.name}: chosen by the recording's marker names.")
 
     def matched(entry: Recording, frame: GroundFrame | None) -> Trial:
@@ -90,7 +94,7 @@ def measure(
         finder.sole = flat_slopes(source)
     needed = needed_markers(model, finder, locks)
     refuse_moving_origin(model, trial, finder)
-    wished = needed | table_markers(definition, finder)
+    wished = needed | table_markers(model, table, finder)
     if static is None or not model.sided:  # else the trial may lack markers that only the standing person wears
         frames, which = trial.calibration_frames(needed, wished)
         trial = _at_origin(model, trial, finder, frames)
@@ -101,7 +105,9 @@ def measure(
     standing = source.median(frames)
     landmarks = finder.find_in_space(standing) if model.sided else finder.find(standing)
 
-    mass_kg, how = find_mass(subject, [source, trial] if static is not None else [trial])
+    mass_kg, how = find_mass(
+        subject, [(t.recording, t.ground) for t in ([source, trial] if static is not None else [trial])]
+    )
     messages.append(how)
     height_m, how = find_height(subject, [r for r in (static, recording) if r is not None], source)
     messages.append(how)
@@ -111,12 +117,12 @@ def measure(
             "Sex not given: regressions and table are the mean of both sexes (masses, centres, signed tensors)."
         )
 
-    unmeasured = _unmeasured_lengths(definition, landmarks, height_m, messages)
+    unmeasured = _unmeasured_lengths(model, table, landmarks, height_m, messages)
     geometry, posture = find_geometry(model, landmarks, locks, unmeasured)
     sites, placed = place_sites(chosen, (source, posture, frames), trial, finder, geometry, model, needed)
     messages += placed
     bodies, parts = segment_bodies(
-        model, definition.table, landmarks, posture, mass_kg, height_m if height_m is not None else np.nan
+        model, table, landmarks, posture, mass_kg, height_m if height_m is not None else np.nan
     )
     check_masses(model, bodies, parts, mass_kg, height_m, messages)
     start = posture if model.sided else _first_posture(model, geometry, finder, trial, needed, posture, messages)
@@ -179,11 +185,11 @@ def flat_slopes(trial: Trial) -> dict[str, float]:
     return found
 
 
-def table_markers(definition: ModelDefinition, finder: LandmarkFinder) -> set[MarkerKey]:
+def table_markers(model: ModelFile, table: BodyTable, finder: LandmarkFinder) -> set[MarkerKey]:
     """Markers of the landmarks at which the inertia table's parts lie, as far as the recording has them."""
     names: set[str] = set()
-    for segment in definition.model.segments:
-        for part in (definition.table.part(name) for name in segment.parts):
+    for segment in model.segments:
+        for part in (table.part(name) for name in segment.parts):
             for point in (part.axis_from, part.axis_to, part.origin, part.length_from, part.length_to):
                 names |= {point.start, point.end}
     keys: set[MarkerKey] = set()
@@ -205,23 +211,21 @@ def _at_origin(model: ModelFile, trial: Trial, finder: LandmarkFinder, frames: n
 
 
 def _unmeasured_lengths(
-    definition: ModelDefinition, landmarks: dict[str, Array], height_m: float | None, messages: list[str]
+    model: ModelFile, table: BodyTable, landmarks: dict[str, Array], height_m: float | None, messages: list[str]
 ) -> dict[str, float]:
     found: dict[str, float] = {}
-    for length in definition.model.lengths:
+    for length in model.lengths:
         if length.between is None or all(name in landmarks for pair in length.pairs() for name in pair):
             continue
-        part = definition.table.parts.get(length.name)
+        part = table.parts.get(length.name)
         if part is None or part.length_per_height is None or height_m is None:
             raise ModelError(
                 f"length {length.name!r}: its landmarks {' and '.join(length.between)} are not measured, "
-                "and neither the table "
-                f"{definition.table.name} nor the subject's height gives it"
+                f"and neither the table {table.name} nor the subject's height gives it"
             )
         found[length.name] = part.length_per_height * height_m
         messages.append(
-            f"Length {length.name}: {1000 * found[length.name]:.0f} mm from the height "
-            f"({definition.table.name}), no markers."
+            f"Length {length.name}: {1000 * found[length.name]:.0f} mm from the height ({table.name}), no markers."
         )
     return found
 

@@ -12,6 +12,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from dynakin.errors import ModelError
+from dynakin.model.plan import Geometry
 from dynakin.model.schema import Axis, Frame, ModelFile, Segment
 
 Array = npt.NDArray[np.float64]
@@ -104,23 +105,6 @@ class Posture:
     def to_local(self, segment: str, point: Array) -> Array:
         """A point (3,) m of the ground frame in a segment's frame."""
         return np.asarray(self.rotations[segment].T @ (point - self.origins[segment]))
-
-
-@dataclass
-class Geometry:
-    """Lengths (m), the directions of all joint placements, and the coordinates that are locked, with their
-    values."""
-
-    lengths: dict[str, float]
-    directions: dict[str, list[Array]]  # per segment, one for each term of its placement
-    locked: dict[str, float]
-
-    def placement(self, segment: Segment) -> Array:
-        """Joint origin (3,) m in the parent's frame."""
-        terms = [
-            self.lengths[t.length] * d for t, d in zip(segment.placement, self.directions[segment.name], strict=True)
-        ]
-        return np.asarray(np.array(segment.translation) + sum(terms, np.zeros(3)))
 
 
 def find_posture(

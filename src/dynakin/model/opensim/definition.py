@@ -1,18 +1,49 @@
-"""An OpenSim model that is chosen but not yet laid on a recording, and what to make of it."""
+"""An OpenSim model that is chosen, what of it can be estimated, and its calibration on a recording: marker places,
+joints and inertia come from the file, mass and posture are measured."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
 from pydantic import Field
 
+import dynakin._core as _core
+from dynakin.model.calibration.calibrated import CalibratedModel, first_centre_of_pressure
+from dynakin.model.calibration.pose_start import start_posture
+from dynakin.model.inertia import INERTIA_NAMES
+from dynakin.model.opensim.calibrate import (
+    beyond_range,
+    estimated_bodies,
+    facing_pairs,
+    feet_of,
+    first_frame,
+    limits_of,
+    of_subject,
+    reach_of,
+    refuse_other_gravity,
+    refuse_too_few,
+)
 from dynakin.model.opensim.description import OpenSimModel
 from dynakin.model.opensim.read import read_osim
 from dynakin.model.opensim.scales import scale_names
+from dynakin.model.opensim.sites import sites
+from dynakin.model.opensim.skin import skin_of
+from dynakin.model.opensim.spec import to_spec, unseen
+from dynakin.model.priors import Bounds, Priors
+from dynakin.model.spec import in_layout
+from dynakin.model.state_priors import state_bounds, state_prior
 from dynakin.model.subject import Subject
 from dynakin.model.validation import Strict, validate
+from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_laboratory_frame
+from dynakin.recordings.recording import Recording
+
+_MODEL_M = 0.003
+"""Standard deviation of a marker for what a generic skeleton, scaled, gets wrong of a person's joints: on `squats1` the
+normalised innovations are consistent with it (1.1), and far too large with the cameras' noise alone (1.9 to 18)."""
 
 
 class OpenSimOptions(Strict):
@@ -34,11 +65,11 @@ class OpenSimOptions(Strict):
 
 @dataclass(frozen=True, eq=False)
 class OpenSimDefinition:
-    """What ``load_model`` returns for an .osim file; ``initialise`` lays it on a recording.
+    """What ``load_model`` returns for an .osim file; ``calibrate`` lays it on a recording.
 
     Attributes:
         source: the file's content.
-        subject: mass, height, sex, as far as they are told.
+        subject: mass, height, sex, as far as they are given.
         options: what can be estimated.
         scales: scale parameter of each body that has one.
     """
@@ -57,6 +88,124 @@ class OpenSimDefinition:
     def path(self) -> Path:
         """Where it came from."""
         return self.source.path
+
+    @property
+    def planar(self) -> bool:
+        """Whether it moves in the sagittal plane only: no OpenSim model is held there."""
+        return False
+
+    @property
+    def has_mass(self) -> bool:
+        """Whether a mass is known without a recording: the file has one."""
+        return True
+
+    def with_subject(self, subject: Subject) -> OpenSimDefinition:
+        """The same model of somebody else."""
+        return replace(self, subject=subject)
+
+    def markers_among(self, came: Sequence[str], seen: Iterable[bool], where: str) -> tuple[str, list[str], list[str]]:
+        """The model's name, its markers, and those of them that are among names."""
+        expected = [marker.name for marker in self.source.markers]
+        return self.name, expected, [name for name in expected if name in came]
+
+    def calibrate(
+        self,
+        recording: Recording,
+        *,
+        static: Recording | None = None,
+        side: str = "auto",
+        vertical: str = "auto",
+        forward: str | tuple[float, float, float] = "auto",
+        priors: Priors | None = None,
+        bounds: Bounds | None = None,
+        ground: GroundFrame | None = None,
+    ) -> CalibratedModel:
+        """As ``Definition.calibrate``; ``side`` does not matter, for the file says where its markers are. The ground is
+        the laboratory, Y up; X is forward where it is asked for, or where the file holds the body so that it cannot
+        head anywhere."""
+        source, options, messages = self.source, self.options, list(self.source.left_out)
+        refuse_other_gravity(source)
+        find = find_laboratory_frame if source.floating else find_ground_frame
+        chosen, said = sites(source, options.leave_out, recording)
+        frame = ground or find(recording, vertical=vertical, forward=forward, pairs=facing_pairs(source, chosen))
+        messages += frame.how
+        if options.scale_masses:
+            source = of_subject(
+                source, self.subject, [r for r in (static, recording) if r is not None], frame, messages
+            )
+        else:
+            messages.append(f"Mass {source.mass:.2f} kg: the OpenSim file's.")
+        messages += said
+        if static is not None:
+            messages.append("The standing trial gives the mass only: marker places are those of the OpenSim file.")
+        lock = unseen(source, {marker.body for marker, _ in chosen}) if options.lock_unseen else []
+        if lock:
+            messages.append(f"Coordinates that move no measured marker, locked at the file's value: {', '.join(lock)}.")
+        carried = estimated_bodies(source, options.lightest_share, messages)
+
+        def spec_at(values: dict[str, float]) -> _core.ModelSpec:
+            return to_spec(
+                source,
+                self.scales,
+                markers=[marker for marker, _ in chosen],
+                estimate_inertia=carried,
+                values=values,
+                lock=lock,
+            )
+
+        limits = limits_of(source)
+        measured = frame.points_to_ground(np.stack([recording.marker(name) for _, name in chosen], axis=1))
+        first = first_frame(measured)
+        fit = start_posture(
+            _core.Model(spec_at({})), measured[first], limits=limits, where=str(recording.path or recording.name)
+        )
+        messages.append(
+            f"Start: frame {first + 1} ({recording.time[first]:.2f} s), where the model of {source.path.name} fits the "
+            f"markers to {1000.0 * fit.rms_m:.0f} mm (root mean square)."
+        )
+        messages += beyond_range(source, fit.coordinates)
+        spec = spec_at(fit.coordinates)
+        refuse_too_few(source, spec, [name for _, name in chosen], recording)
+        core = _core.Model(spec)
+        names = list(core.layout.names)
+        bodies = {body.name: body.rigid for body in source.bodies}
+        reach = reach_of(source)
+        lengths = {parameter.name: 1.0 for parameter in spec.parameters}
+        places = {marker.name: np.array(marker.location) for marker, _ in chosen}
+        kinds = {axis.coordinate: axis.kind for s in reversed(spec.segments) for axis in reversed(s.axes)}
+        intervals = state_bounds(limits, lengths, places, bodies, reach, bounds or Bounds())
+        lower = in_layout(names, {name: pair[0] for name, pair in intervals.items()}, -np.inf)
+        upper = in_layout(names, {name: pair[1] for name, pair in intervals.items()}, np.inf)
+        x0 = np.array(core.initial_state(), dtype=float)
+        table = {
+            f"inertia/{s.name}/{k}": v for s in spec.segments for k, v in zip(INERTIA_NAMES, s.inertia, strict=True)
+        }
+        skin = np.array([skin_of(marker.name, marker.body) for marker, _ in chosen])
+        known = priors or Priors()
+        known = known.model_copy(update={"marker_m": float(np.hypot(known.marker_m, fit.rms_m / np.sqrt(3.0)))})
+        return CalibratedModel(
+            spec=spec,
+            names=tuple(names),
+            x0=np.clip(x0, lower, upper),
+            sd0=in_layout(names, state_prior(kinds, lengths, places, bodies, reach, known), np.nan),
+            lower=lower,
+            upper=upper,
+            table=in_layout(names, table, np.nan),
+            marker_variance=skin[:, 0],
+            soft_tissue_m=skin[:, 1],
+            ground=frame,
+            plate_centre=first_centre_of_pressure(recording, frame),
+            recorded_markers=tuple(name for _, name in chosen),
+            side="both",
+            mass_kg=source.mass,
+            height_m=self.subject.height_m,
+            parts={},
+            messages=tuple(messages),
+            plan=None,
+            feet=feet_of(source),
+            unmodelled_m=np.full(len(skin), _MODEL_M),
+            dimensionless=frozenset(lengths),
+        )
 
 
 def load_opensim(

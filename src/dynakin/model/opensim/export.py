@@ -9,7 +9,7 @@ import numpy as np
 
 from dynakin.elements import element
 from dynakin.errors import ModelError
-from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.opensim.definition import OpenSimDefinition
 from dynakin.model.opensim.description import OpenSimModel
 from dynakin.model.opensim.from_core import from_core
@@ -69,7 +69,7 @@ def of_definition(definition: OpenSimDefinition, values: dict[str, float], mass_
     return identified(source, definition.scales, values)
 
 
-def of_initial(initial: InitialModel, values: dict[str, float]) -> OpenSimModel:
+def of_initial(initial: CalibratedModel, values: dict[str, float]) -> OpenSimModel:
     """A model that was measured on a recording."""
     bounds = zip(initial.names, initial.lower, initial.upper, strict=True)
     limits = {name: (float(low), float(high)) for name, low, high in bounds if "/" not in name}

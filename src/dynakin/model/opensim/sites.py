@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
 
 from dynakin.errors import ModelError
-from dynakin.model.opensim.definition import OpenSimDefinition
 from dynakin.model.opensim.description import GROUND, Marker, OpenSimModel
 from dynakin.model.validation import nearest
 from dynakin.recordings.landmarks import plain_name
@@ -16,15 +16,17 @@ from dynakin.recordings.recording import Recording
 _FEWEST = 3
 
 
-def sites(definition: OpenSimDefinition, recording: Recording) -> tuple[list[tuple[Marker, str]], list[str]]:
+def sites(
+    source: OpenSimModel, leave_out: Collection[str], recording: Recording
+) -> tuple[list[tuple[Marker, str]], list[str]]:
     """Markers on bodies that are seen, each with its name in the recording, and sentences on the others.
 
     Raises:
         ModelError: fewer than three, or two recorded names that fit one marker.
     """
-    source, where = definition.source, recording.path or recording.name
+    where = recording.path or recording.name
     there = {marker.name: marker for marker in source.markers if marker.body != GROUND}
-    for name in definition.options.leave_out:
+    for name in leave_out:
         if name not in there:
             raise ModelError(f"{source.path}: leave_out: no marker {name!r}{nearest(name, there)}")
     recorded: dict[str, list[str]] = {}
@@ -36,7 +38,7 @@ def sites(definition: OpenSimDefinition, recording: Recording) -> tuple[list[tup
         names = recorded.get(plain_name(marker.name), [])
         if len(names) > 1:
             raise ModelError(f"{where}: {' and '.join(names)} both fit marker {marker.name} of {source.path}")
-        if names and marker.name not in definition.options.leave_out:
+        if names and marker.name not in leave_out:
             found.append((marker, names[0]))
     if len(found) < _FEWEST:
         raise ModelError(

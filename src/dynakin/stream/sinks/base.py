@@ -9,7 +9,7 @@ import numpy as np
 
 import dynakin._core as _core
 from dynakin.filter.live import StepEstimate
-from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.stream.fusion import Fused
 from dynakin.stream.sources.packets import Packet, StreamInfo
 
@@ -75,7 +75,7 @@ class LiveFrame:
 class Started:
     """What sinks need to know of the model once it is measured."""
 
-    initial: InitialModel
+    initial: CalibratedModel
     model: _core.Model
     rate_hz: float
 

@@ -11,7 +11,7 @@ from dynakin.filter.alignment import in_step
 from dynakin.filter.augment import QUANTITIES, Quantity
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.noise import Noise
-from dynakin.model.calibration.initial import InitialModel
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.recording import Recording
 from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.records import FOLLOWING, REFUSED
@@ -36,7 +36,7 @@ class TuningTrial:
     """
 
     name: str
-    initial: InitialModel
+    initial: CalibratedModel
     time: Array
     markers: Array
     wrench: Array

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.frames import Trial
-from dynakin.model.calibration.initial import InitialModel
 from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder
 from dynakin.model.definition import ModelDefinition
 from dynakin.model.markers.marker_set import choose_marker_set, match_markers
@@ -15,7 +15,7 @@ from dynakin.recordings.recording import Recording
 Array = npt.NDArray[np.float64]
 
 
-def landmark_paths(recording: Recording, initial: InitialModel, definition: ModelDefinition) -> dict[str, Array]:
+def landmark_paths(recording: Recording, initial: CalibratedModel, definition: ModelDefinition) -> dict[str, Array]:
     """Every landmark (T, 3) m in the ground frame of ``initial`` (z = 0 in a planar model), NaN where one of its
     markers is missing.
 

@@ -10,9 +10,8 @@ import numpy.typing as npt
 import xarray as xr
 
 from dynakin.errors import ConfigError
-from dynakin.model.calibration.initial import InitialModel
-from dynakin.model.definition import Definition
-from dynakin.model.opensim.definition import OpenSimDefinition
+from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.model.definition import Definition, ModelDefinition
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.smoothing import CUTOFF_HZ, MAX_GAP_S, smooth
 from dynakin.results.estimate import COMPONENTS
@@ -48,7 +47,7 @@ class Reference:
 
 def reference_methods(
     recording: Recording,
-    initial: InitialModel,
+    initial: CalibratedModel,
     definition: Definition,
     cutoff_hz: float | None = CUTOFF_HZ,
     *,
@@ -74,7 +73,7 @@ def reference_methods(
     if lengths not in ("constant", "frame"):
         raise ConfigError(f"lengths is {lengths!r}, expected constant or frame")
     plan = initial.measured_plan()
-    assert not isinstance(definition, OpenSimDefinition)  # it would have no plan
+    assert isinstance(definition, ModelDefinition)  # else there is no plan
     chain = PlanarChain.of(plan)
     landmarks = landmark_paths(recording, initial, definition)
     angles = classical_angles(chain, plan, landmarks)
@@ -113,7 +112,7 @@ def reference_methods(
     return Reference(data, chain, kinematics, cutoff_hz, lengths, notes)
 
 
-def plane_wrench(recording: Recording, initial: InitialModel) -> Array:
+def plane_wrench(recording: Recording, initial: CalibratedModel) -> Array:
     """The plates' total wrench (T, 6) about the model's ground origin, ground frame, NaN out of the plane."""
     measured = initial.ground.wrench_to_ground(recording.total_wrench())
     wrench = np.full(measured.shape, np.nan)

@@ -1,26 +1,26 @@
-"""The outcome of an initialisation: what the filter starts from."""
+"""The outcome of a calibration: a model of one person, from which the filter starts."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
+import dynakin._core as _core
 from dynakin.errors import ModelError
-from dynakin.model.lumping import PlacedPart
+from dynakin.model.calibration.lumping import PlacedPart
 from dynakin.model.plan import ModelPlan
 from dynakin.recordings.frame import GroundFrame
-
-if TYPE_CHECKING:
-    import dynakin._core as _core
+from dynakin.recordings.recording import Recording
 
 Array = npt.NDArray[np.float64]
 
+_LOADED_N = 20.0  # a lesser load has no centre of pressure worth the name
+
 
 @dataclass(frozen=True, eq=False)
-class Together:
+class JointPrior:
     """Prior covariance (k, k) of elements of the state that are known together, by name."""
 
     names: tuple[str, ...]
@@ -28,9 +28,8 @@ class Together:
 
 
 @dataclass(frozen=True, eq=False)
-class InitialModel:
-    """A model measured on one person, and the state from which the filter starts; order of n: the core's
-    layout.
+class CalibratedModel:
+    """A model calibrated on one person, and the state from which the filter starts; order of n: the core's layout.
 
     Attributes:
         spec: the core's specification.
@@ -55,7 +54,7 @@ class InitialModel:
             added to the noise of the cameras.
         dimensionless: geometry parameters that are factors, not lengths.
         carried_kg: mass of the known loads (`model.calibration.loads`), not in ``mass_kg``.
-        together: prior covariance of elements that were identified before; the others are independent.
+        joint_prior: prior covariance of elements that were identified before; the others are independent.
     """
 
     spec: _core.ModelSpec
@@ -80,7 +79,7 @@ class InitialModel:
     unmodelled_m: Array | float = 0.0
     dimensionless: frozenset[str] = frozenset()
     carried_kg: float = 0.0
-    together: Together | None = None
+    joint_prior: JointPrior | None = None
 
     @property
     def weighed_kg(self) -> float:
@@ -98,3 +97,16 @@ class InitialModel:
                 f"model {self.spec.name} comes from an OpenSim file; expected a built-in model or a .toml file for this"
             )
         return self.plan
+
+
+def first_centre_of_pressure(recording: Recording, ground: GroundFrame) -> Array:
+    """Mean centre of pressure (3,) m of the first second, on the ground (y = 0), ground frame; 0 without plates."""
+    if not recording.plates:
+        return np.zeros(3)
+    wrench = ground.wrench_to_ground(recording.total_wrench())
+    wrench = wrench[recording.time < recording.time[0] + 1.0]
+    loaded = wrench[np.isfinite(wrench).all(axis=1) & (wrench[:, 1] > _LOADED_N)]
+    if not len(loaded):
+        return np.zeros(3)
+    force, moment = loaded[:, 1].mean(), loaded[:, 3:].mean(axis=0)
+    return np.array([moment[2] / force, 0.0, -moment[0] / force])

@@ -1,0 +1,162 @@
+"""What calibrating an OpenSim model on a recording takes: mass, first frame, limits, which way it faces, its feet."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+import dynakin._core as _core
+from dynakin.errors import ModelError
+from dynakin.model.calibration.body import find_mass
+from dynakin.model.opensim.description import Marker, OpenSimModel
+from dynakin.model.opensim.sites import with_mass
+from dynakin.model.opensim.spec import free_coordinates
+from dynakin.model.priors import Interval
+from dynakin.model.subject import Subject
+from dynakin.recordings.frame import GroundFrame
+from dynakin.recordings.landmarks import DEFAULT_PAIRS, FacingPairs
+from dynakin.recordings.recording import Recording
+
+Array = npt.NDArray[np.float64]
+
+_MOST = 0.9  # a first frame shows at least this part of the markers of the fullest one
+_A_TURN = 1e-3  # rad: files write pi with few digits
+_APART_M, _LEVEL_M = 0.08, 0.03  # of markers that show which way a body points; of markers that lie beside each other
+_FEET = ("calcn", "foot", "calc", "talus")  # bodies that stand on the ground, the first that a model has
+
+
+def limits_of(source: OpenSimModel) -> dict[str, Interval]:
+    """Limits (rad or m) of the free coordinates; a turn that is clamped to a whole one or more has none, nor has the
+    root of a body that is fixed nowhere: its ranges are those of the laboratory that the file was made in."""
+    turns = {axis.coordinate for joint in source.joints for axis in joint.axes if axis.kind == "rotation"}
+    found = {}
+    for c in free_coordinates(source):
+        low, high = (-np.inf, np.inf) if c.name in source.floating else c.limits
+        found[c.name] = (-np.inf, np.inf) if c.name in turns and high - low > 2.0 * np.pi - _A_TURN else (low, high)
+    return found
+
+
+def beyond_range(source: OpenSimModel, start: dict[str, float]) -> list[str]:
+    """Says where the root starts beyond what the file clamps it to: OpenSim would draw it at the end of that range."""
+    clamped = [c for c in free_coordinates(source) if c.name in source.floating]
+    names = [c.name for c in clamped if not c.limits[0] <= start[c.name] <= c.limits[1]]
+    if not names:
+        return []
+    return [
+        f"Warning: {', '.join(names)} begin beyond the range to which {source.path.name} clamps them; OpenSim may not "
+        "follow coordinates.mot there. Widen the range in the file, or give --forward: X is then the way the person "
+        "faces."
+    ]
+
+
+def refuse_other_gravity(source: OpenSimModel) -> None:
+    """
+    Raises:
+        ModelError: gravity is not along -Y.
+    """
+    x, y, z = source.gravity
+    if y >= 0.0 or abs(x) + abs(z) > 1e-9:
+        raise ModelError(
+            f"{source.path}: gravity is {x:g} {y:g} {z:g}, expected it along -Y (the ground frame of models)"
+        )
+
+
+def of_subject(
+    source: OpenSimModel, subject: Subject, recordings: list[Recording], ground: GroundFrame, messages: list[str]
+) -> OpenSimModel:
+    """The model with the subject's mass: as given, or as the plates say, or as it stands in the file."""
+    try:
+        mass, how = find_mass(subject, [(recording, ground) for recording in recordings])
+    except ModelError:
+        messages.append(f"Mass {source.mass:.2f} kg: the OpenSim file's, as neither told nor measured.")
+        return source
+    messages.append(how)
+    messages.append(f"Masses and inertias of the OpenSim file ({source.mass:.2f} kg) times {mass / source.mass:.3f}.")
+    return with_mass(source, mass)
+
+
+def estimated_bodies(source: OpenSimModel, lightest_share: float, messages: list[str]) -> list[str]:
+    """Bodies whose ten numbers are estimated, of this share of the mass at least; says which are not."""
+    heavy = [b for b in source.bodies if b.mass > 0.0 and b.mass >= lightest_share * source.mass]
+    impossible = [body.name for body in heavy if not body.rigid.possible()]
+    if impossible:
+        messages.append(f"Inertia of {', '.join(impossible)} belongs to no real body in the file: not estimated.")
+    chosen = [body.name for body in heavy if body.name not in impossible]
+    kept = [body.name for body in source.bodies if body.name not in (*chosen, *impossible)]
+    if kept:
+        messages.append(
+            f"Inertia of bodies below {100.0 * lightest_share:g} % of the mass is the file's: {', '.join(kept)}."
+        )
+    return chosen
+
+
+def refuse_too_few(source: OpenSimModel, spec: _core.ModelSpec, names: list[str], recording: Recording) -> None:
+    """Markers that measure less than the coordinates say nothing of a posture.
+
+    Raises:
+        ModelError: so few are they.
+    """
+    free = sum(not coordinate.locked for coordinate in spec.coordinates)
+    if 3 * len(names) < free:
+        raise ModelError(
+            f"{recording.path or recording.name}: {len(names)} of the {len(source.markers)} markers of "
+            f"{source.path.name} are there ({', '.join(names)}), expected at least {-(-free // 3)} for its {free} free "
+            "coordinates: name them alike"
+        )
+
+
+def first_frame(measured: Array) -> int:
+    """The first frame that shows nearly as many markers as the fullest."""
+    seen = np.isfinite(measured).all(axis=2).sum(axis=1)
+    return int(np.flatnonzero(seen >= _MOST * seen.max())[0])
+
+
+def reach_of(source: OpenSimModel) -> dict[str, float]:
+    """Length that a body's first moments are compared with: to the furthest joint on it, else twice to its centre."""
+    found = {body.name: 2.0 * float(np.linalg.norm(body.centre)) for body in source.bodies}
+    for name in found:
+        joints = [
+            float(np.linalg.norm(np.array(joint.parent_offset.translation)))
+            for joint in source.joints
+            if joint.parent == name
+        ]
+        found[name] = max([found[name], *joints])
+    return found
+
+
+def facing_pairs(source: OpenSimModel, chosen: Sequence[tuple[Marker, str]]) -> FacingPairs:
+    """Recorded markers that lie behind each other on feet and pelvis: bodies of OpenSim's models have X forward."""
+
+    def on(body: str) -> list[tuple[float, float, str]]:
+        return sorted((m.location[0], m.location[2], name) for m, name in chosen if m.body == body)
+
+    def ends(body: str) -> list[tuple[str, str]]:
+        """Backmost and foremost; of each side, where there are several."""
+        places = on(body)
+        if not places or places[-1][0] - places[0][0] < _APART_M:
+            return []
+        back = sorted((z, name) for x, z, name in places if x - places[0][0] < _LEVEL_M)
+        front = sorted((z, name) for x, z, name in places if places[-1][0] - x < _LEVEL_M)
+        return [(back[0][1], front[0][1]), (back[-1][1], front[-1][1])]
+
+    feet = [pair for body in feet_of(source).values() for pair in ends(body)]
+    pelvis = [pair for body in source.bodies if "pelvis" in body.name.casefold() for pair in ends(body.name)]
+    return FacingPairs((*feet, *DEFAULT_PAIRS.heel_toe), (*pelvis, *DEFAULT_PAIRS.pelvis))
+
+
+def feet_of(source: OpenSimModel) -> dict[str, str]:
+    """ "right" and "left" -> the body that stands on the ground, where the names tell."""
+    names = [body.name for body in source.bodies]
+    for word in _FEET:
+        pair = {
+            side: name
+            for side, ends in (("right", ("_r", "r_", "right")), ("left", ("_l", "l_", "left")))
+            for name in names
+            if word in name.casefold()
+            and any(name.casefold().endswith(e) or name.casefold().startswith(e) for e in ends)
+        }
+        if len(pair) == 2:
+            return pair
+    return {}
