@@ -13,9 +13,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy import ndimage
 
+from dynakin.arrays import runs
 from dynakin.filter.mass_centre import mass_centre
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.recordings.feet.contact import runs
 from dynakin.recordings.recording import rate_of
 from dynakin.units import GRAVITY_M_S2
 

@@ -6,8 +6,8 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from dynakin.arrays import runs
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.recordings.feet.contact import runs
 from dynakin.results.records import REFUSED, TRACKING, Event, EventKind, Parameter
 
 

@@ -10,8 +10,8 @@ import numpy.typing as npt
 from scipy import signal
 
 import dynakin._core as _core
+from dynakin.arrays import runs
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.recordings.feet.contact import runs
 from dynakin.recordings.recording import rate_of
 
 Array = npt.NDArray[np.float64]

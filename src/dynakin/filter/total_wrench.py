@@ -8,13 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import runs
 from dynakin.errors import RecordingError
 from dynakin.filter.closure import EXCESS, Closure, closure
 from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.filter.noise import Noise
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet import loads as on_plates
-from dynakin.recordings.feet.contact import runs
 from dynakin.recordings.feet.distance import distance_to_hull
 from dynakin.recordings.feet.loads import LOADED_N, NEAR_M, FootLoads, foot_loads
 from dynakin.recordings.plates.checks import PlateCheck, check_plates

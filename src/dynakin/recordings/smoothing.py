@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy import interpolate
 
+from dynakin.arrays import runs
 from dynakin.errors import RecordingError
 from dynakin.recordings.resampling import low_pass
 
@@ -70,7 +71,7 @@ def smooth(
             notes.append(f"{label}: {int(filled[:, k].sum())} frames in gaps of at most {max_gap_s:g} s interpolated.")
         if np.isnan(column).any():
             notes.append(f"{label}: {int(np.isnan(column).sum())} frames missing, in longer gaps or at the ends.")
-        for first, end in stretches(np.isfinite(column)):
+        for first, end in runs(np.isfinite(column)):
             if end - first < shortest:
                 notes.append(f"{label}: {end - first} frames from {time[first]:.2f} s on are too few, left out.")
                 continue
@@ -107,7 +108,7 @@ def fill_gaps(signal: Array, max_frames: int) -> tuple[Array, Mask]:
     """The signal (T,) with inner gaps of at most ``max_frames`` filled by a cubic spline, and where (T,) it was."""
     missing = ~np.isfinite(signal)
     filled = np.zeros(len(signal), dtype=bool)
-    for first, end in stretches(missing):
+    for first, end in runs(missing):
         if first > 0 and end < len(signal) and end - first <= max_frames:
             filled[first:end] = True
     known = np.flatnonzero(~missing)
@@ -118,9 +119,3 @@ def fill_gaps(signal: Array, max_frames: int) -> tuple[Array, Mask]:
     elif filled.any():
         filled[:] = False
     return found, filled
-
-
-def stretches(flags: Mask) -> list[tuple[int, int]]:
-    """(first, end) of each run of true values, end excluded."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from dynakin.arrays import runs
 from dynakin.recordings.recording import Array, Recording
 
 STILL_SPEED_M_S = 0.06
@@ -40,8 +41,7 @@ def standing_window(recording: Recording) -> slice | None:
     still = np.zeros(recording.n_frames, dtype=bool)
     seen = np.isfinite(speeds).any(axis=1)
     still[seen] = np.nanpercentile(speeds[seen], 90, axis=1) < STILL_SPEED_M_S
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
-    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+    for start, stop in runs(still):
         if recording.time[stop - 1] - recording.time[start] >= MIN_STILL_S - 1.5 / recording.rate:
-            return slice(int(start), int(stop))
+            return slice(start, stop)
     return None

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import runs
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.landmarks import find_marker
 from dynakin.recordings.recording import Array, Recording
@@ -76,12 +77,6 @@ def foot_contact(recording: Recording, ground: GroundFrame, names: list[str]) ->
     gap = max(1, round(GAP_S * recording.rate)) if recording.n_frames > 1 else 1
     stands = _closed(np.asarray(touching.any(axis=1)), gap)
     return FootContact(places[:, :, [0, 2]], touching, stands, tuple(runs(stands)), low, moves, aloft)
-
-
-def runs(flags: Flags) -> list[tuple[int, int]]:
-    """Frames [first, end) of each stretch of true."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def _closed(flags: Flags, gap: int) -> Flags:

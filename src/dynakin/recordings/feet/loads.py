@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import runs
 from dynakin.errors import ConfigError
-from dynakin.recordings.feet.contact import FootContact, foot_contact, runs
+from dynakin.recordings.feet.contact import FootContact, foot_contact
 from dynakin.recordings.feet.distance import DEFAULT_FOOT_MARKERS, distance_to_hull
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Array, Plate, Recording

@@ -11,12 +11,13 @@ import numpy as np
 import numpy.typing as npt
 from scipy.signal import find_peaks
 
+from dynakin.arrays import runs
 from dynakin.elements import element
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.landmarks import DEFAULT_PAIRS, find_marker
 from dynakin.recordings.recording import Recording
-from dynakin.recordings.smoothing import smooth, stretches
+from dynakin.recordings.smoothing import smooth
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.metrics import evaluation_window
 
@@ -202,7 +203,7 @@ def initial_contacts(time: Array, ahead: Array) -> list[list[int]]:
     """
     path = smooth(time, ahead[:, None], GAIT_CUTOFF_HZ).values[:, 0]
     found = []
-    for first, end in stretches(np.isfinite(path)):
+    for first, end in runs(np.isfinite(path)):
         low = [float(path[first:end].min())]  # beyond the ends counts as low: a swing that is cut has its contact too
         peaks, _ = find_peaks(np.concatenate([low, path[first:end], low]), prominence=LEAST_STEP_M)
         frames = [first + int(peak) - 1 for peak in peaks]

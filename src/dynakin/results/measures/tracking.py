@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import runs
 from dynakin.errors import LostError
-from dynakin.recordings.feet.contact import runs
 from dynakin.results.estimate import AXES, Estimate
 from dynakin.results.measures.soft_tissue import marker_sites, state_paths
 from dynakin.results.measures.sources import ABSENT
