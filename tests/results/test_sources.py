@@ -14,6 +14,7 @@ from rich.console import Console
 from walking_estimate import MASS_KG, STANCE_S, make_walker
 
 from dynakin.cli import summary
+from dynakin.pipeline.result import Result
 from dynakin.recordings.formats.mot import read_table
 from dynakin.report.insights import in_short, insights
 from dynakin.results.estimate import Estimate
@@ -169,7 +170,7 @@ def test_what_has_no_codes_is_measured_and_what_is_nan_is_absent(estimate: Estim
 @pytest.fixture(scope="module", params=[False, True], ids=["derived", "absent"])
 def saved(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[Estimate, Path]:
     walker = make_walker((2,), absent=request.param)
-    return walker, walker.save(tmp_path_factory.mktemp("walker") / "out")
+    return walker, Result(walker).save(tmp_path_factory.mktemp("walker") / "out")
 
 
 def test_every_table_has_its_flags(saved: tuple[Estimate, Path]) -> None:
