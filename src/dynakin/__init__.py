@@ -20,6 +20,8 @@ from dynakin.model.definition import ModelDefinition, load_model
 from dynakin.model.opensim.definition import load_opensim
 from dynakin.model.priors import Bounds, Priors
 from dynakin.model.subject import Subject
+from dynakin.pipeline.result import Result
+from dynakin.pipeline.stages import run
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
@@ -38,10 +40,12 @@ __all__ = [
     "Noise",
     "Priors",
     "Recording",
+    "Result",
     "Sample",
     "Subject",
     "load_model",
     "load_opensim",
     "presets",
     "read",
+    "run",
 ]

@@ -10,13 +10,13 @@ from typing import Any
 import pytest
 
 from dynakin.cli.app import main
-from dynakin.cli.run import configure
 from dynakin.config import RunConfig, make_config, read_config
 from dynakin.config_template import attribute_docs, config_template
 from dynakin.errors import ConfigError
 from dynakin.filter import presets
 from dynakin.filter.noise import Noise
 from dynakin.model.priors import Bounds, Priors
+from dynakin.pipeline.stages import configure
 
 REQUIRED = {"trial": "squat.c3d", "model": "squat7", "output": "out"}
 

@@ -11,6 +11,7 @@ import pytest
 
 from dynakin.cli import run as run_module
 from dynakin.cli.app import main
+from dynakin.pipeline import stages
 from dynakin.recordings.recording import Recording
 from dynakin.report.paper_figures import figures
 from dynakin.results.files.folder import OUTPUT_FILES
@@ -36,25 +37,25 @@ def test_what_fails_after_the_estimate_is_named_and_the_rest_saved(
     squat: SimulatedTrial, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: Said
 ) -> None:
     squat.save(tmp_path / "trial")
-    monkeypatch.setattr(run_module, "trial_of", broken)
-    monkeypatch.setattr(run_module, "identifiability", broken)
+    monkeypatch.setattr(stages, "trial_of", broken)
+    monkeypatch.setattr(stages, "identifiability", broken)
     monkeypatch.setattr(run_module, "print_summary", broken)
     monkeypatch.setitem(figures.FIGURES, "figure5_angles", broken)
     trial = [str(tmp_path / "trial" / "markers.trc"), "--forces", str(tmp_path / "trial" / "forces.mot")]
     out, drawn = tmp_path / "out", tmp_path / "figures"
     assert main(["run", *trial, *SUBJECT, "-o", str(out), "--figures", str(drawn)]) == 1
     said = capsys.readouterr().err.splitlines()
-    stages = [
+    failed = [
         "comparison with the reference methods",
         "what the recording tells of the constants",
         "summary",
         "figure figure5_angles",
     ]
-    assert said == [f"error: Failed: {stage}: ValueError: zero-size array." for stage in stages]
+    assert said == [f"error: Failed: {stage}: ValueError: zero-size array." for stage in failed]
     assert {file.name for file in out.iterdir()} >= {*OUTPUT_FILES, "failures.log"}
-    assert json.loads((out / "metrics.json").read_text())["failures"] == stages
+    assert json.loads((out / "metrics.json").read_text())["failures"] == failed
     page = (out / "report.html").read_text()
-    assert all(stage in page for stage in stages) and "Nothing in this run speaks against using it" not in page
+    assert all(stage in page for stage in failed) and "Nothing in this run speaks against using it" not in page
     assert (drawn / "figure4_markers.svg").exists() and not (drawn / "figure5_angles.svg").exists()
 
 
@@ -71,7 +72,7 @@ def test_figures_that_cannot_be_written_are_refused_before_or_named_after(
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(run_module, "identifiability", broken)
+    monkeypatch.setattr(stages, "identifiability", broken)
     monkeypatch.setitem(figures.FIGURES, "figure4_markers", full)
     assert main(["run", *trial, *SUBJECT, "-o", str(out), "--figures", str(tmp_path / "figures")]) == 1
     said = capsys.readouterr().err.splitlines()

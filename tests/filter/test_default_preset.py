@@ -10,8 +10,10 @@ import pytest
 import dynakin
 from dynakin.errors import ConfigError
 from dynakin.filter.samples import recording_arrays
+from dynakin.pipeline.result import Result
 from dynakin.report.insights import insights
 from dynakin.results.estimate import Estimate
+from dynakin.results.measures.metrics import compute_metrics
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.trial import simulate_squat
@@ -98,9 +100,9 @@ def test_a_recording_is_smoothed_unless_the_settings_have_no_smoother(
 def test_what_only_describes_live_estimates_is_no_headline_of_a_smoothed_one(
     plain: Estimate, smoothed: Estimate
 ) -> None:
-    live, after = ({i.title: i for i in insights(e, e.metrics())} for e in (plain, smoothed))
-    assert live["Adaptation"].text and plain.metrics()["adaptation"]["verdict"]
-    assert "Adaptation" not in after and smoothed.metrics()["adaptation"]["verdict"] == ""
+    live, after = ({i.title: i for i in insights(e, compute_metrics(e))} for e in (plain, smoothed))
+    assert live["Adaptation"].text and compute_metrics(plain)["adaptation"]["verdict"]
+    assert "Adaptation" not in after and compute_metrics(smoothed)["adaptation"]["verdict"] == ""
     assert "Speeds" not in after and after["One frame ahead"].level in ("good", "note")
     for found in (live, after):  # true of both: it is the filter's covariance
         assert found["Uncertainty"].text.startswith("The standard deviations are larger than needed")
@@ -227,7 +229,7 @@ def test_a_joint_that_nobody_sees_is_held_and_comes_back(trial: SimulatedTrial) 
 def test_every_output_has_a_deviation_in_the_files(smoothed: Estimate, tmp_path) -> None:
     from dynakin.recordings.formats.mot import read_table
 
-    smoothed.save(tmp_path / "out")
+    Result(smoothed).save(tmp_path / "out")
     table = read_table(tmp_path / "out" / "uncertainty.sto")
     for name in ("knee", "knee_speed", "knee_acceleration", "knee_moment", "fx", "fy", "mz"):
         values = table.column(name)

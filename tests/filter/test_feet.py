@@ -15,11 +15,14 @@ from dynakin.errors import ModelError
 from dynakin.filter.assemble import assemble
 from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.filter.smoothing import smoothed
+from dynakin.pipeline.result import Result
 from dynakin.recordings.formats.mot import read_table
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
+from dynakin.results.measures.metrics import compute_metrics
+from dynakin.results.measures.pressure import floor_height, foot_pressure
 from support.core.bridge import filter_of, to_core
 from support.core.random_models import FEET, ROOT, Trial, floating_model, prior_sd, settings, trial
 from support.oracle import measurement
@@ -132,7 +135,7 @@ def test_what_is_derived_and_what_is_not_known_is_marked(estimate: Estimate) -> 
 
 
 def test_figures_of_the_feet(estimate: Estimate) -> None:
-    figures = estimate.metrics()["feet"]
+    figures = compute_metrics(estimate)["feet"]
     assert figures["derived_frames"] == 10 and figures["unknown_frames"] == 5 and figures["flight_frames"] == 5
     both = np.r_[0:25, 35:40, 45:FRAMES]
     adjustment = values(estimate, "foot_adjustment")[:, 0, 1]
@@ -143,15 +146,15 @@ def test_figures_of_the_feet(estimate: Estimate) -> None:
 
 
 def test_centres_of_pressure_carry_the_whole_wrench(estimate: Estimate) -> None:
-    assert estimate.floor_height_m == pytest.approx(-0.05)
+    assert floor_height(estimate) == pytest.approx(-0.05)
     wrench = values(estimate, "foot_wrench")[:, 0]
-    point, free = estimate.centre_of_pressure("left")
+    point, free = foot_pressure(estimate, "left")
     loaded = np.nan_to_num(wrench[:, 1]) >= 20.0
     assert loaded.any() and not loaded.all()
     np.testing.assert_array_equal(np.isfinite(point).all(axis=1), loaded)
     moment = np.cross(point, wrench[:, :3]) + np.outer(free, [0.0, 1.0, 0.0])
     np.testing.assert_allclose(moment[loaded], wrench[loaded, 3:], atol=1e-9)
-    assert (point[loaded, 1] == estimate.floor_height_m).all()
+    assert (point[loaded, 1] == floor_height(estimate)).all()
 
 
 def test_joint_loads_along_the_axes_of_either_segment(estimate: Estimate) -> None:
@@ -171,17 +174,17 @@ def test_joint_loads_along_the_axes_of_either_segment(estimate: Estimate) -> Non
 def test_powers_and_work(estimate: Estimate) -> None:
     power = estimate.powers()
     np.testing.assert_array_equal(power, values(estimate, "moments") * values(estimate, "speeds"))
-    work = estimate.metrics()["work"]["arm_0"]
+    work = compute_metrics(estimate)["work"]["arm_0"]
     own = power[:, estimate.coordinate_names.index("arm_0")]
     assert work["positive_j"] + work["negative_j"] == pytest.approx(np.trapezoid(own, estimate.time))
     assert work["positive_j"] >= 0.0 >= work["negative_j"]
     assert work["positive_j_per_kg"] == pytest.approx(work["positive_j"] / 50.0)
-    assert not set(ROOT) & set(estimate.metrics()["work"])  # the root has no muscle
+    assert not set(ROOT) & set(compute_metrics(estimate)["work"])  # the root has no muscle
     np.testing.assert_allclose(estimate.moments_per_kg(), values(estimate, "moments") / 50.0)
 
 
 def test_both_sides_are_compared(estimate: Estimate) -> None:
-    found = estimate.metrics()["asymmetry"]
+    found = compute_metrics(estimate)["asymmetry"]
     angle = {side: estimate.data["coordinates"].sel(coordinate=f"leg0_0_{side}").values for side in "rl"}
     r, left = np.ptp(angle["r"]), np.ptp(angle["l"])
     assert found["coordinates"]["leg0_0"]["range"] == pytest.approx(100 * (r - left) / ((r + left) / 2))
@@ -194,7 +197,7 @@ def test_feet_are_compared_over_whole_measured_stances(data: Trial) -> None:
     codes[:5, 0] = codes[25:30, 0] = codes[:10, 1] = codes[30:35, 1] = IN_THE_AIR
     codes[45:50, 0] = NOT_MEASURED  # one contact: derived
     stepping = estimate_of(data, feet_of(data, codes))
-    found = stepping.metrics()["asymmetry"]
+    found = compute_metrics(stepping)["asymmetry"]
     assert found["stances"] == {"left": 1, "right": 1} and found["reason"] is None
     push = values(stepping, "foot_wrench")[:, :, 1]
     left, right = (np.abs(push[part, k]).max() for k, part in enumerate((slice(5, 25), slice(10, 30))))
@@ -202,7 +205,7 @@ def test_feet_are_compared_over_whole_measured_stances(data: Trial) -> None:
 
 
 def test_files(estimate: Estimate, tmp_path: Path) -> None:
-    folder = estimate.save(tmp_path / "out")
+    folder = Result(estimate).save(tmp_path / "out")
     feet = read_table(folder / "feet.sto")
     columns = dict(zip(feet.names, feet.values.T, strict=True))
     for side, foot in (("l", 0), ("r", 1)):
@@ -231,7 +234,7 @@ def test_the_feet_change_nothing_but_the_moments(data: Trial, feet: FootWrenches
     with_feet, without = estimate_of(data, feet), estimate_of(data, None)
     for name in ("coordinates", "wrench_estimated", "state_sd", "mass_centre", "joint_centres"):
         np.testing.assert_array_equal(values(with_feet, name), values(without, name))
-    assert without.foot_names == [] and without.metrics()["feet"] is None
+    assert without.foot_names == [] and compute_metrics(without)["feet"] is None
 
 
 def test_errors_about_a_reference_point_are_carried_to_the_origin() -> None:

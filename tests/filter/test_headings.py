@@ -15,11 +15,13 @@ from dynakin import read
 from dynakin.filter.estimator import Estimator
 from dynakin.model.definition import load_model
 from dynakin.model.subject import Subject
+from dynakin.pipeline.result import Result
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
 from dynakin.results.failures import Failures
 from dynakin.results.measures.angles import angle_columns, with_angles
 from dynakin.results.measures.facing import PELVIS, facing, nearly_singular
+from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.tracking import without_lost
 
 Array = npt.NDArray[np.float64]
@@ -61,7 +63,7 @@ def test_joints_and_figures_do_not_depend_on_the_laboratory(data_dir: Path, turn
     assert np.abs(pelvis[0] - pelvis[1]).max() < 0.3
     assert np.degrees(np.ptp(of(one, "coordinates", ["pelvis_tilt"]))) > 5.0  # a squat's lean, seen by all of them
     for name in ("fx", "fy", "fz"):
-        ours, theirs = (e.metrics()["wrench"]["rms"][name] for e in (one, other))
+        ours, theirs = (compute_metrics(e)["wrench"]["rms"][name] for e in (one, other))
         assert ours == pytest.approx(theirs, rel=0.1, abs=0.1)
     clinical = [angle_columns(with_angles(e, {}, "clinical")) for e in (one, other)]
     assert clinical[0][0][:3] == ["pelvic_tilt", "pelvic_obliquity", "pelvic_rotation"]
@@ -115,7 +117,7 @@ def test_lost_frames_of_who_faces_off_x_stay_lost_and_lose_nothing_else(data_dir
     estimate = Estimator(load_model("fullbody", Subject(mass_kg=60.05, height_m=1.70))).run(trial, smooth=False)
     assert estimate.lost[205:230].any() and not estimate.lost[:195].any()
     failures = Failures()
-    estimate.save(tmp_path / "gap", failures=failures)
+    Result(estimate, failures=failures).save(tmp_path / "gap")
     assert failures.messages() == []
     faced = of(facing(estimate), "coordinates", list(PELVIS))
     np.testing.assert_array_equal(np.isnan(faced).any(axis=1), estimate.lost)
@@ -124,6 +126,6 @@ def test_lost_frames_of_who_faces_off_x_stay_lost_and_lose_nothing_else(data_dir
     held = estimate.data.assign(tracking=("time", np.full(len(estimate.time), 2)))
     nothing = without_lost(replace(estimate, data=held, messages=[]))
     assert nothing.lost.all() and nearly_singular(nothing) == []
-    nothing.save(tmp_path / "lost", failures=failures, keep_lost=True)
+    Result(nothing, failures=failures).save(tmp_path / "lost", keep_lost=True)
     assert failures.messages() == []
     assert (tmp_path / "lost" / "report.html").exists()

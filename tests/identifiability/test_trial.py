@@ -9,6 +9,7 @@ import pytest
 import xarray as xr
 
 from dynakin.identification.observability.excitation import Bench
+from dynakin.pipeline.result import Result
 from dynakin.results.measures.posterior import judged, learned
 from support.identifiability import Told, estimated_squat
 
@@ -70,7 +71,7 @@ def test_covariances_are_kept_and_written(squat: Told, tmp_path: Path) -> None:
         if p.estimated:
             variance = estimate.data["initial_covariance"].sel(element=p.name, element_=p.name)
             assert p.prior_sd == pytest.approx(float(np.sqrt(variance)))
-    folder = estimate.save(tmp_path / "out", identifiability=squat.found)
+    folder = Result(estimate, observability=squat.found).save(tmp_path / "out")
     with xr.open_dataset(folder / "estimate.nc") as read:
         assert read["final_covariance"].dims == ("element", "element_")
         np.testing.assert_array_equal(read["final_covariance"], estimate.data["final_covariance"])

@@ -10,12 +10,13 @@ import pytest
 
 import dynakin
 from dynakin import _core
-from dynakin.cli.run import configure
 from dynakin.config import make_config
 from dynakin.errors import ConfigError, ModelError, RecordingError
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.loads import CarriedLoad, with_loads
+from dynakin.pipeline.stages import configure
 from dynakin.recordings.plates.loads import PlateLoad, without_plate_loads
+from dynakin.results.measures.metrics import compute_metrics
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.trial import simulate_squat
 
@@ -81,7 +82,7 @@ def test_the_filter_finds_the_person_beside_the_load(
     assert not any("plates are not used" in message for message in parts.messages)
     apart = np.abs(parts.data["coordinates"].values - whole.data["coordinates"].values)[200:]
     assert np.degrees(apart).max() < 2.0
-    fit = parts.metrics()["wrench"]["rms"]
+    fit = compute_metrics(parts)["wrench"]["rms"]
     assert fit["fy"] < 10.0
     unknown = dynakin.Estimator(lighter).run(trial.recording)
     assert unknown.mass_kg == 63.0 and any("plates carry" in m or "plates read" in m for m in unknown.messages)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dynakin.pipeline.result import Result
 from dynakin.results.estimate import Estimate
 from dynakin.results.files.markers import laboratory_markers
 from dynakin.results.files.motion import write_moments
@@ -19,7 +20,7 @@ pytestmark = pytest.mark.peers
 
 @pytest.fixture(scope="module")
 def folder(estimate: Estimate, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return estimate.save(tmp_path_factory.mktemp("opensim") / "out")
+    return Result(estimate).save(tmp_path_factory.mktemp("opensim") / "out")
 
 
 @pytest.mark.parametrize("name", ["coordinates.mot", "speeds.sto", "accelerations.sto"])

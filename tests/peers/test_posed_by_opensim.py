@@ -17,6 +17,7 @@ from dynakin.model.opensim.definition import OpenSimDefinition
 from dynakin.model.opensim.export import of_definition, of_initial
 from dynakin.model.opensim.write import write_osim
 from dynakin.model.subject import Subject
+from dynakin.pipeline.result import Result
 from dynakin.results.estimate import Estimate
 
 opensim: Any = pytest.importorskip("opensim", reason="OpenSim is not installed (pip install opensim)")
@@ -41,7 +42,7 @@ def estimated(folder: Path, name: str, model: str, mass: float, out: Path) -> tu
     noise = presets.default().model_copy(update={"length_drift": 0.0})
     estimator = Estimator(definition, noise, estimate=("lengths", "markers", "inertia"))
     estimate = estimator.run(recording, smooth=True)
-    estimate.save(out)
+    Result(estimate).save(out)
     return estimator, estimate
 
 

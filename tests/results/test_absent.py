@@ -10,6 +10,7 @@ import numpy as np
 import xarray as xr
 
 from dynakin.absent import finite, with_nulls
+from dynakin.pipeline.result import Result
 from dynakin.recordings.formats.mot import read_table
 from dynakin.results.estimate import Estimate
 from dynakin.results.files.storage import write_storage
@@ -36,7 +37,7 @@ def spoilt(estimate: Estimate) -> Estimate:
 
 
 def test_no_file_of_a_run_holds_an_infinite_number(estimate: Estimate, tmp_path: Path) -> None:
-    folder = spoilt(estimate).save(tmp_path / "out")
+    folder = Result(spoilt(estimate)).save(tmp_path / "out")
     for name in TABLES:
         rows = (folder / name).read_text(encoding="utf-8").split("endheader", 1)[1]
         assert "inf" not in rows.casefold(), name

@@ -11,10 +11,10 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-import dynakin.report
 from dynakin.cli import summary
 from dynakin.errors import OutputError
-from dynakin.pipeline import save
+from dynakin.pipeline import result
+from dynakin.pipeline.result import Result
 from dynakin.results.estimate import Estimate
 from dynakin.results.failures import Failures
 from dynakin.results.files.folder import OUTPUT_FILES, check_folder_writable, check_output_writable
@@ -33,9 +33,9 @@ def short() -> Estimate:
 
 
 def test_a_page_that_fails_loses_no_file(short: Estimate, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(dynakin.report, "write_report", broken)
-    failures = Failures()
-    out = short.save(tmp_path / "out", failures=failures)
+    monkeypatch.setattr(result, "write_report", broken)
+    made = Result(short)
+    out, failures = made.save(tmp_path / "out", check=False), made.failures
     assert {file.name for file in out.iterdir()} >= {*OUTPUT_FILES, "failures.log"} - {"report.html"}
     assert not (out / "report.html").exists()
     expected = "Failed: report.html: MemoryError: Unable to allocate 6.8 TiB."
@@ -45,9 +45,9 @@ def test_a_page_that_fails_loses_no_file(short: Estimate, tmp_path: Path, monkey
     assert "Traceback" in (out / "failures.log").read_text()
     check_output_writable(out)  # with its log it is still ours
     with pytest.raises(OutputError, match=r"the results are saved .*Failed: report\.html"):  # nobody takes the failures
-        short.save(out)
+        Result(short).save(out)
     monkeypatch.undo()
-    short.save(out)
+    Result(short).save(out)
     assert (out / "report.html").exists() and not (out / "failures.log").exists()
 
 
@@ -55,11 +55,10 @@ def test_a_figure_or_a_file_that_fails_is_left_out_and_named_on_the_page(
     short: Estimate, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(metrics, "asymmetry", broken)
-    monkeypatch.setattr(save, "write_markers", broken)
-    failures = Failures()
-    fresh = make_estimate(1.0)
-    out = fresh.save(tmp_path / "out", failures=failures)
-    assert [failure.stage for failure in failures.found] == ["asymmetry in metrics.json", "markers.trc"]
+    monkeypatch.setattr(result, "write_markers", broken)
+    fresh = Result(make_estimate(1.0))
+    out = fresh.save(tmp_path / "out", check=False)
+    assert [failure.stage for failure in fresh.failures.found] == ["asymmetry in metrics.json", "markers.trc"]
     written = json.loads((out / "metrics.json").read_text())
     assert written["asymmetry"] is None and written["markers"]["mean_rms_mm"] > 0.0
     assert not (out / "markers.trc").exists()
@@ -105,13 +104,13 @@ def test_page_and_console_bear_any_block_that_failed(
     estimate, text = make(), io.StringIO()
     monkeypatch.setattr(metrics, FUNCTIONS[block], broken)
     monkeypatch.setattr(summary, "out", lambda: Console(file=text, width=200))
-    failures = Failures()
-    folder = estimate.save(tmp_path / "out", failures=failures)
+    made = Result(estimate)
+    folder = made.save(tmp_path / "out", check=False)
     known = {"markers": {"markers in metrics.json", "prediction in metrics.json"}}
     known["wrench"] = {"wrench in metrics.json", "prediction in metrics.json"}
-    assert {failure.stage for failure in failures.found} == known.get(block, {f"{block} in metrics.json"})
+    assert {failure.stage for failure in made.failures.found} == known.get(block, {f"{block} in metrics.json"})
     assert "Not made" in (folder / "report.html").read_text()
-    summary.print_summary(estimate, folder)
+    summary.print_summary(made, folder)
     assert "Report" in text.getvalue()
 
     failures = Failures()

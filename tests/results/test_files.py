@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from dynakin.pipeline.result import Result
 from dynakin.recordings.formats.mot import read_table
 from dynakin.recordings.read import read
 from dynakin.results.estimate import Estimate
@@ -21,7 +22,7 @@ from support.estimates.synthetic import make_estimate
 
 @pytest.fixture(scope="module")
 def folder(estimate: Estimate, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return estimate.save(tmp_path_factory.mktemp("results") / "out")
+    return Result(estimate).save(tmp_path_factory.mktemp("results") / "out")
 
 
 def test_all_files_are_there_and_none_is_left_beside(folder: Path) -> None:
@@ -81,7 +82,7 @@ def test_figures_recomputed_from_the_files_equal_metrics_json(folder: Path, esti
 @pytest.mark.parametrize("unit", ["m", "mm"])
 def test_markers_are_written_in_the_unit_and_frame_of_the_recording(tmp_path: Path, unit: str) -> None:
     made = make_estimate(3.0, unit=unit, gaps=False)
-    back = read(made.save(tmp_path / "out") / "markers.trc")
+    back = read(Result(made).save(tmp_path / "out") / "markers.trc")
     assert back.length_unit == unit
     assert list(back.marker_names) == made.marker_names
     measured = made.recording.markers[:, : len(made.marker_names)]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from dynakin.pipeline.result import Result
 from dynakin.results.estimate import Estimate
-from dynakin.results.measures import consistency
-from dynakin.results.measures.consistency import lag_one
+from dynakin.results.measures.consistency import consistency, lag_one
 from dynakin.results.measures.fit import marker_rms_mm, wrench_fit
 from dynakin.results.measures.metrics import compute_metrics, evaluation_window
 from support.estimates.synthetic import make_estimate
@@ -89,7 +89,7 @@ def test_a_recording_is_judged_by_the_practical_band(estimate: Estimate) -> None
 def test_metrics_are_computed_once_and_given_as_copies(monkeypatch: pytest.MonkeyPatch) -> None:
     calls = []
     monkeypatch.setattr("dynakin.results.measures.metrics.adaptation", lambda _: calls.append(1) or {})
-    made = make_estimate(2.0)
+    made = Result(make_estimate(2.0))
     first = made.metrics()
     first["window"]["start_s"] = -1.0
     assert made.metrics()["window"]["start_s"] == 0.0 and len(calls) == 1

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from dynakin.errors import OutputError
-from dynakin.pipeline import save as save_module
+from dynakin.pipeline import result as result_module
+from dynakin.pipeline.result import Result
 from dynakin.results.estimate import Estimate
 from dynakin.results.files.folder import check_output_writable, replacing
 from support.estimates.synthetic import make_estimate
@@ -20,34 +21,34 @@ def small() -> Estimate:
 
 def test_an_earlier_output_is_replaced(small: Estimate, tmp_path: Path) -> None:
     out = tmp_path / "out"
-    small.save(out)
+    Result(small).save(out)
     (out / "metrics.json").write_text("{}")
-    small.save(out)
+    Result(small).save(out)
     assert len((out / "metrics.json").read_text()) > 100
     assert [entry.name for entry in tmp_path.iterdir()] == ["out"]
 
 
 def test_overwriting_can_be_forbidden(small: Estimate, tmp_path: Path) -> None:
-    small.save(tmp_path / "out")
+    Result(small).save(tmp_path / "out")
     with pytest.raises(OutputError, match="already holds results"):
-        small.save(tmp_path / "out", overwrite=False)
+        Result(small).save(tmp_path / "out", overwrite=False)
 
 
 def test_an_empty_folder_and_missing_parents_are_fine(small: Estimate, tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
-    assert (small.save(tmp_path / "empty") / "report.html").exists()
-    assert (small.save(tmp_path / "a" / "b" / "out") / "report.html").exists()
+    assert (Result(small).save(tmp_path / "empty") / "report.html").exists()
+    assert (Result(small).save(tmp_path / "a" / "b" / "out") / "report.html").exists()
 
 
 def test_a_folder_of_somebody_else_is_left_alone(small: Estimate, tmp_path: Path) -> None:
     (tmp_path / "thesis.docx").write_text("years of work")
     with pytest.raises(OutputError, match=r"thesis\.docx"):
-        small.save(tmp_path)
+        Result(small).save(tmp_path)
     assert (tmp_path / "thesis.docx").read_text() == "years of work"
 
 
 def test_a_foreign_file_in_our_own_output_stops_the_replacement(small: Estimate, tmp_path: Path) -> None:
-    out = small.save(tmp_path / "out")
+    out = Result(small).save(tmp_path / "out")
     (out / "notes.txt").write_text("mine")
     with pytest.raises(OutputError, match=r"notes\.txt"):
         check_output_writable(out)
@@ -77,15 +78,15 @@ def test_checking_leaves_nothing_behind(tmp_path: Path) -> None:
 def test_a_failure_half_way_leaves_what_was_there(
     small: Estimate, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    out = small.save(tmp_path / "out")
+    out = Result(small).save(tmp_path / "out")
     before = (out / "metrics.json").read_bytes()
 
     def full_disk(*_: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(save_module, "write_netcdf", full_disk)
+    monkeypatch.setattr(result_module, "write_netcdf", full_disk)
     with pytest.raises(OutputError, match="No space left on device"):
-        small.save(out)
+        Result(small).save(out)
     assert (out / "metrics.json").read_bytes() == before
     assert [entry.name for entry in tmp_path.iterdir()] == ["out"]
 

@@ -13,6 +13,7 @@ import xarray as xr
 from rich.console import Console
 
 from dynakin.cli import summary
+from dynakin.pipeline.result import Result
 from dynakin.recordings.formats.mot import read_table
 from dynakin.report.insights import in_short, insights
 from dynakin.results.estimate import Estimate
@@ -169,7 +170,7 @@ def test_what_has_no_codes_is_measured_and_what_is_nan_is_absent(estimate: Estim
 @pytest.fixture(scope="module", params=[False, True], ids=["derived", "absent"])
 def saved(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[Estimate, Path]:
     walker = make_walker((2,), absent=request.param)
-    return walker, walker.save(tmp_path_factory.mktemp("walker") / "out")
+    return walker, Result(walker).save(tmp_path_factory.mktemp("walker") / "out")
 
 
 def test_every_table_has_its_flags(saved: tuple[Estimate, Path]) -> None:
@@ -271,7 +272,7 @@ def test_nothing_left_at_the_root_is_said_by_the_numbers_only() -> None:
 def test_the_console_says_first_what_is_measured(monkeypatch: pytest.MonkeyPatch) -> None:
     text = io.StringIO()
     monkeypatch.setattr(summary, "out", lambda: Console(file=text, width=200))
-    summary.print_summary(make_walker((2,)), Path("out"))
+    summary.print_summary(Result(make_walker((2,))), Path("out"))
     first, second = text.getvalue().splitlines()[:2]
     assert first.startswith("Leg moments: right measured in 301 of 301 frames")
     assert "off the plates from 1.70 to 2.30 s" in second
@@ -285,13 +286,13 @@ def test_the_console_says_warnings_before_figures_and_the_mass_first(
     light = f"Warning: the plates carry 70.0 kg on average where the person weighs 40.0 kg: {doubt}."
     doubted = replace(walker, messages=["Warning: something else.", light, "A note."])
     monkeypatch.setattr(summary, "out", lambda: Console(file=text, width=200))
-    summary.print_summary(doubted, Path("out"))
+    summary.print_summary(Result(doubted), Path("out"))
     lines = text.getvalue().splitlines()
     assert lines[1:3] == [light, "Warning: something else."]
     data = walker.data.assign(moments=walker.data["moments"].where(walker.data["coordinate"] != "knee_angle_r"))
     text.seek(0)
     known = {"ground": {"reasons": [light]}}  # said first, as a reason, and not again
-    summary.print_summary(replace(doubted, data=data, config=doubted.config | known), Path("out"))
+    summary.print_summary(Result(replace(doubted, data=data, config=doubted.config | known)), Path("out"))
     assert text.getvalue()[: text.tell()].casefold().count("the plates carry") == 1
     assert lines[0].startswith("Leg moments:") and "Verdict:" not in "".join(lines[:5])
     (first, *others) = insights(doubted, compute_metrics(doubted))

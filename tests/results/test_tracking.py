@@ -13,8 +13,10 @@ import xarray as xr
 import dynakin
 from dynakin.cli.app import main
 from dynakin.errors import LostError
+from dynakin.pipeline.result import Result
 from dynakin.results.estimate import Estimate
-from dynakin.results.measures.tracking import refuse_lost, tracking_of, without_lost
+from dynakin.results.measures.metrics import compute_metrics
+from dynakin.results.measures.tracking import refuse_lost, tracking_of, why_lost, without_lost
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.trial import simulate_squat
 from dynakin.validation.methods import compare_trial
@@ -45,11 +47,11 @@ def test_lost_frames_are_empty_and_out_of_the_figures() -> None:
         values = estimate.data[name].transpose("time", ...).values
         assert np.isnan(values[500:520]).all(), name
     assert np.isfinite(estimate.data["markers_measured"].values[505, :, :2]).all()
-    assert estimate.why_lost is None  # 1.7 % of the frames
+    assert why_lost(estimate) is None  # 1.7 % of the frames
     (said,) = [message for message in estimate.messages if "lost" in message]
     assert said.startswith("Warning: the person was lost: 20 of 1201 frames") and "(5.00 to 5.19 s)" in said
-    metrics = estimate.metrics()
-    whole = make_estimate(gaps=False).metrics()
+    metrics = compute_metrics(estimate)
+    whole = compute_metrics(make_estimate(gaps=False))
     assert metrics["markers"]["rms_mm"] == pytest.approx(whole["markers"]["rms_mm"], rel=0.05)
     assert metrics["tracking"]["lost_frames"] == 20 and not metrics["tracking"]["trial_lost"]
     assert metrics["consistency"]["verdict"].startswith("Of the frames that are not lost")
@@ -81,11 +83,11 @@ def test_refused_markers_count_by_their_share_and_by_limb() -> None:
 
 def test_a_lost_trial_is_saved_only_where_asked(tmp_path: Path) -> None:
     estimate = without_lost(arm_off(slice(300, 500)))
-    assert estimate.why_lost is not None and "17 % of the frames with markers, expected 10 %" in estimate.why_lost
+    assert why_lost(estimate) is not None and "17 % of the frames with markers, expected 10 %" in why_lost(estimate)
     with pytest.raises(LostError, match=r"3\.00 to 4\.99 s.*nothing is saved \(keep_lost=True saves"):
-        estimate.save(tmp_path / "out")
+        Result(estimate).save(tmp_path / "out")
     assert not (tmp_path / "out").exists()
-    folder = estimate.save(tmp_path / "out", keep_lost=True)
+    folder = Result(estimate).save(tmp_path / "out", keep_lost=True)
     metrics = json.loads((folder / "metrics.json").read_text())
     assert metrics["tracking"]["trial_lost"] and metrics["consistency"]["judgement"] is None
     assert "The filter is consistent" not in (folder / "report.html").read_text()
@@ -123,7 +125,7 @@ def test_known_truth_what_is_flagged_is_what_is_wrong(squat: SimulatedTrial, smo
     markers[300:450, others] = np.roll(markers[300:450][:, others], 5, axis=1)
     mislabelled = replace(squat.recording, markers=markers)
     found = dynakin.Estimator(model).run(mislabelled, smooth=smooth)
-    assert found.lost[310:450].all() and found.why_lost is not None
+    assert found.lost[310:450].all() and why_lost(found) is not None
     truth = squat.truth.data["coordinates"].sel(coordinate=found.coordinate_names)
     error = np.abs(found.data["coordinates"] - truth.transpose("time", "coordinate").values).values
     assert np.nanmax(np.degrees(error)) < 25.0  # what is left is right
@@ -168,5 +170,5 @@ def test_sitting_down_in_the_plane_that_fits_is_not_lost(data_dir: Path) -> None
     trial = dynakin.read(folder / "STS1.trc", folder / "STS1_grf.mot").window(0.0, 6.0)
     model = dynakin.load_model("sagittal7", subject=dynakin.Subject(mass_kg=60.05, height_m=1.70), markers="opencap")
     estimate = dynakin.Estimator(model).run(trial)
-    assert estimate.metrics()["markers"]["mean_rms_mm"] < 5.0
+    assert compute_metrics(estimate)["markers"]["mean_rms_mm"] < 5.0
     assert not estimate.lost.any()

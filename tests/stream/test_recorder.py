@@ -72,7 +72,7 @@ def test_what_was_recorded_is_what_came(squat: Recording, tmp_path: Path) -> Non
 
 def test_a_recorded_session_becomes_the_usual_output(squat: Recording, tmp_path: Path) -> None:
     record(squat, tmp_path / "r")
-    estimate = finish(tmp_path / "r", tmp_path / "out")
+    estimate = finish(tmp_path / "r", tmp_path / "out").estimate
     assert len(estimate.time) == squat.n_frames
     assert {"coordinates.mot", "estimate.nc", "report.html"} <= {path.name for path in (tmp_path / "out").iterdir()}
 
@@ -97,7 +97,7 @@ def test_a_session_killed_while_recording_loses_nothing_but_the_last_moment(tmp_
         time.sleep(0.1)
         found = recorded(folder)
     assert found.time[-1] >= times[-1] - 0.1 and found.n_frames >= len(times) - 10
-    estimate = finish(folder, tmp_path / "out")
+    estimate = finish(folder, tmp_path / "out").estimate
     assert len(estimate.time) == found.n_frames and (tmp_path / "out" / "coordinates.mot").exists()
 
 

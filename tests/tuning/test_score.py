@@ -13,6 +13,7 @@ from dynakin.filter import presets
 from dynakin.filter.estimator import Estimator
 from dynakin.recordings.recording import Recording
 from dynakin.results.measures.fit import marker_rms_mm, signal_fit
+from dynakin.results.measures.metrics import compute_metrics
 from dynakin.studies.tuning.score import Shared, figures_of, score_task
 from dynakin.studies.tuning.settings import changed, check_setting, value_of
 from dynakin.studies.tuning.trial import prepare, undoubting
@@ -20,7 +21,7 @@ from dynakin.studies.tuning.trial import prepare, undoubting
 
 def test_the_papers_criterion_is_the_sum_of_what_run_reports(paper: Shared, definition, recording: Recording) -> None:
     found = score_task(paper, (0, {}))
-    metrics = Estimator(definition, presets.paper()).run(recording).metrics()
+    metrics = compute_metrics(Estimator(definition, presets.paper()).run(recording))
     markers = [rms / 1000.0 for rms in metrics["markers"]["rms_mm"].values() if rms is not None]
     assert found["paper"] == pytest.approx(sum(markers) + sum(metrics["wrench"]["rms"].values()), rel=1e-9)
     assert found["markers_mm"] == pytest.approx(metrics["markers"]["mean_rms_mm"], rel=1e-9)

@@ -12,12 +12,13 @@ import xarray as xr
 from rich.table import Table
 
 from dynakin.cli.console import busy, out, progress_bar, table
-from dynakin.cli.summary import print_summary
+from dynakin.cli.summary import end, print_summary
 from dynakin.filter import presets
 from dynakin.filter.estimator import Estimator
 from dynakin.identification.observability.trial import identifiability
 from dynakin.model.definition import load_model
 from dynakin.model.subject import Subject
+from dynakin.pipeline.result import Result
 from dynakin.results.estimate import Estimate
 from dynakin.results.files.folder import check_output_writable
 from dynakin.results.measures.fit import truth_error
@@ -54,7 +55,8 @@ def demo(
     comparison = trial_of({"default": estimate, "paper": paper}, estimator.initial, model)
     methods = {method.name: method.data for method in comparison.methods}
     with busy("writing results and report"):
-        folder = estimate.save(output, comparison=comparison, identifiability=identifiability(estimator, estimate))
+        result = Result(estimate, estimator.initial, comparison, identifiability(estimator, estimate))
+        folder = result.save(output, check=False)
     console = out()
     console.print(methods_by_error(methods, estimate, trial.truth))
     console.print(compared_with_truth(estimate, trial.truth))
@@ -69,7 +71,8 @@ def demo(
         style="dim",
     )
     console.print()
-    print_summary(estimate, folder)
+    print_summary(result, folder)
+    end(result)
 
 
 def methods_by_error(methods: dict[str, xr.Dataset], estimate: Estimate, truth: Truth) -> Table:

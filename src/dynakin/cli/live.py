@@ -24,7 +24,7 @@ from dynakin.cli.options import (
     forward_direction,
 )
 from dynakin.cli.run import estimated
-from dynakin.cli.summary import print_summary
+from dynakin.cli.summary import end, print_summary
 from dynakin.errors import ConfigError
 from dynakin.recordings.read import FORCE_READERS, read
 from dynakin.stream.fusion import DELAY_S
@@ -91,8 +91,9 @@ def live(
         if output is None:
             raise typer.BadParameter("--finish needs -o OUT, the folder for the results")
         with busy("estimating"):
-            found = finish(finish_folder, output)
-        print_summary(found, output)
+            result = finish(finish_folder, output)
+        print_summary(result, output)
+        end(result)
         return
     if source is None:
         raise typer.BadParameter(

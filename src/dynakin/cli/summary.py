@@ -1,27 +1,27 @@
-"""The table that `run` and `demo` end with."""
+"""The table that `run`, `demo` and `live --finish` end with, and their exit code."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Any
 
+import typer
 from rich.console import Console
 from rich.table import Table
 
-from dynakin.cli.console import out, table
+from dynakin.cli.console import out, print_error, table
+from dynakin.pipeline.result import Result
 from dynakin.results.estimate import Estimate
-from dynakin.results.failures import Failures
 from dynakin.results.measures.bounds import counts_in_words
-from dynakin.results.measures.metrics import known_metrics
 from dynakin.results.measures.sources import UNKNOWN
+from dynakin.results.measures.tracking import why_lost
 from dynakin.results.naming import sentence
 from dynakin.results.records import NOT_SMOOTHED, doubts_mass
 
 
-def print_summary(estimate: Estimate, folder: Path) -> None:
+def print_summary(result: Result, folder: Path) -> None:
     """Which moments there are, what to look at, the figures, the verdict, and where the files lie."""
-    console = out()
-    metrics = known_metrics(estimate, Failures())  # what failed was named when it was saved
+    console, estimate, metrics = out(), result.estimate, result.metrics()
     moments = metrics["moments"] or UNKNOWN
     _print_moments(console, moments)
     warnings = [
@@ -42,6 +42,19 @@ def print_summary(estimate: Estimate, folder: Path) -> None:
     console.print(f"Results  {folder}", soft_wrap=True)
     if (folder / "report.html").exists():
         console.print(f"Report   {folder / 'report.html'}", soft_wrap=True)
+
+
+def end(result: Result) -> None:
+    """Say what failed, and that a trial was lost.
+
+    Raises:
+        typer.Exit: there was something to say; code 1.
+    """
+    wrong = [*result.failures.messages(), *filter(None, [why_lost(result.estimate)])]
+    for message in wrong:
+        print_error(message)
+    if wrong:
+        raise typer.Exit(1)
 
 
 def _print_moments(console: Console, moments: dict[str, Any]) -> None:

@@ -16,6 +16,7 @@ from dynakin.recordings.feet.loads import LOADED_N
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.smoothing import CUTOFF_HZ, smooth
+from dynakin.results.measures.tracking import why_lost
 from dynakin.units import GRAVITY_M_S2
 from dynakin.validation.freeze import freeze, initial_values
 from dynakin.validation.held_out import as_estimate, marker_paths, measured_wrench, start_as
@@ -145,7 +146,7 @@ class Common:
             recording.time, markers, np.full((recording.n_frames, 6), np.nan), progress
         )  # fmt: skip
         judged = as_estimate(other, arrays, recording, markers)
-        if (reason := judged.why_lost) is not None:
+        if (reason := why_lost(judged)) is not None:
             raise LostError(f"{recording.path or recording.name}: {reason}")
         every = max(1, round(1.0 / (RATE_HZ * float(np.median(np.diff(recording.time))))))
         states = np.tile(self.initial.x0, (recording.n_frames, 1))

@@ -23,6 +23,7 @@ from dynakin.results.measures.bounds import counts_in_words
 from dynakin.results.measures.consistency import CONSISTENT
 from dynakin.results.measures.metrics import ADAPTATION_S, evaluation_window, speed_consistency, window_consistency
 from dynakin.results.measures.soft_tissue import excess_in_words
+from dynakin.results.measures.tracking import why_lost
 from dynakin.results.records import doubts_mass
 
 # Expected one frame ahead against seen: further apart than this, the estimate follows the measurements.
@@ -234,7 +235,7 @@ def _prediction(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
 
 @needs("consistency", otherwise=None)
 def _consistency(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
-    if estimate.why_lost is not None:
+    if why_lost(estimate) is not None:
         return None
     found = window_consistency(estimate, evaluation_window(estimate.time))
     ratio = metrics["consistency"]["mean_nis_per_dof"]

@@ -18,7 +18,7 @@ from dynakin.report.plot import MEASURED
 from dynakin.report.sides import Joint, joints_of
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.feet import foot_sources
-from dynakin.results.measures.pressure import centre_of_pressure
+from dynakin.results.measures.pressure import centre_of_pressure, floor_height
 from dynakin.results.measures.sources import DERIVED, moment_sources, wrench_sources
 from dynakin.units import GRAVITY_M_S2
 
@@ -118,7 +118,7 @@ def _view(estimate: Estimate, every: Array) -> tuple[dict[str, Any], Array]:
     about = centre if follow else np.broadcast_to(middle, centre.shape)
     away = np.linalg.norm(every[:, :, [0, 2]] - about[:, None], axis=2)
     heights = every[:, :, 1]
-    floor = 1000.0 * estimate.floor_height_m
+    floor = 1000.0 * floor_height(estimate)
     top = float(np.nanmax(heights)) if known.any() else floor + 1000.0
     low = min(float(np.nanmin(heights)), floor) if known.any() else floor
     return {
@@ -147,7 +147,7 @@ def _arrows(estimate: Estimate, arrays: dict[str, Array]) -> list[dict[str, Any]
         else:
             wrench = estimate.data[f"wrench_{kind}"].transpose("time", "component").values[:, None]
         point = np.stack(
-            [centre_of_pressure(wrench[:, k], estimate.floor_height_m)[0] for k in range(wrench.shape[1])], axis=1
+            [centre_of_pressure(wrench[:, k], floor_height(estimate))[0] for k in range(wrench.shape[1])], axis=1
         )
         force = np.where(np.isfinite(point).all(axis=2, keepdims=True), wrench[..., :3], np.nan)
         arrays[f"{kind}_points"] = 1000.0 * point.reshape(len(point), -1)

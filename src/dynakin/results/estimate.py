@@ -1,25 +1,16 @@
-"""The result of a run: labelled arrays with what is needed to judge them, and `save`."""
+"""What a run estimated: labelled arrays with what is needed to judge them. Data only; `dynakin.Result` saves it."""
 
 from __future__ import annotations
 
-from copy import deepcopy
 from dataclasses import dataclass, field
-from functools import cached_property
-from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import Any, Literal
 
 import numpy as np
 import xarray as xr
 
-from dynakin.results.records import Event, Parameter, Timing
-
-if TYPE_CHECKING:
-    from dynakin.identification.observability.trial import Identifiability
-    from dynakin.recordings.frame import GroundFrame
-    from dynakin.recordings.recording import Recording
-    from dynakin.results.failures import Failures
-    from dynakin.results.measures.tracking import Tracking
-    from dynakin.validation.methods import Trial
+from dynakin.recordings.frame import GroundFrame
+from dynakin.recordings.recording import Recording
+from dynakin.results.records import Event, Parameter, Timing, Tracking
 
 AXES = ("x", "y", "z")
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
@@ -27,7 +18,7 @@ COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
 
 @dataclass(frozen=True)
 class Estimate:
-    """What one run estimated. Do not change it: every file of `save` and the report are made from it.
+    """What one run estimated. Do not change it: every output file and the report are made from it.
 
     ``data`` holds, in the ground frame (Y up; the laboratory's own of a body that is fixed nowhere, with X forward of a
     planar model), SI units and radians:
@@ -125,13 +116,6 @@ class Estimate:
         return np.asarray(self.data["lost"].values, dtype=bool)
 
     @property
-    def why_lost(self) -> str | None:
-        """Why the trial as a whole is no estimate, with times; None where it is one. `Estimator.run` does not raise."""
-        from dynakin.results.measures.tracking import why_lost
-
-        return why_lost(self)
-
-    @property
     def mass_kg(self) -> float | None:
         """Body mass as used, kg."""
         mass = self.config.get("mass_kg")
@@ -166,76 +150,3 @@ class Estimate:
         known = np.isfinite(loads) | np.isnan(loads).all(axis=(0, 1))  # a number turned away from may not be known
         turned = np.where(known.all(axis=2, keepdims=True), vectors.reshape(loads.shape), np.nan)
         return np.where(np.isnan(loads).all(axis=(0, 1)), np.nan, turned)
-
-    @cached_property
-    def floor_height_m(self) -> float:
-        """Height of the plates' surface over the ground's origin, m."""
-        from dynakin.results.measures.pressure import floor_height
-
-        return floor_height(self.recording, self.ground)
-
-    def centre_of_pressure(self, foot: str | None = None) -> tuple[np.ndarray, np.ndarray]:
-        """Centre of pressure (T, 3) m, ground frame, and free moment (T,) N m, of a foot or of the estimated total
-        wrench; NaN below `dynakin.results.measures.pressure.LOADED_N` and where a model does not tell.
-
-        Raises:
-            KeyError: no such foot.
-        """
-        from dynakin.results.measures.pressure import centre_of_pressure
-
-        wrench = self.data["wrench_estimated"] if foot is None else self.data["foot_wrench"].sel(foot=foot)
-        return centre_of_pressure(wrench.transpose("time", "component").values, self.floor_height_m)
-
-    def metrics(self) -> dict[str, Any]:
-        """The content of ``metrics.json`` (see `dynakin.results.measures.metrics`); computed once, a copy is given."""
-        return deepcopy(self._metrics)
-
-    @cached_property
-    def _metrics(self) -> dict[str, Any]:
-        from dynakin.results.measures.metrics import compute_metrics
-
-        return compute_metrics(self)
-
-    def save(
-        self,
-        folder: str | Path,
-        *,
-        overwrite: bool = True,
-        comparison: Trial | None = None,
-        identifiability: Identifiability | None = None,
-        keep_lost: bool = False,
-        failures: Failures | None = None,
-    ) -> Path:
-        """Write every output file into ``folder`` and return it.
-
-        All files are first written into a temporary folder beside it, which then takes its place: a failure leaves
-        what was there. A folder that exists is replaced only if ``overwrite`` is true and it is empty or holds
-        nothing but an earlier output of dynakin.
-
-        Args:
-            comparison: this estimate beside the reference methods (`dynakin.validation.trial_of`), for the report and
-                for ``repetitions.csv``.
-            identifiability: what this trial observes of the constants (`dynakin.identification.observability`), for the
-                report and for ``metrics.json``.
-            keep_lost: write a trial that was lost too, its lost frames empty.
-            failures: takes the stages that fail (a figure, the page); all else is written, and `failures.log`.
-
-        Raises:
-            LostError: the person was lost for so long that the trial is no estimate, and ``keep_lost`` is false:
-                nothing is written.
-            OutputError: the folder cannot be written or holds something else; or some stage failed and ``failures`` is
-                not given: all else is saved then.
-        """
-        from dynakin.pipeline.save import save_estimate
-        from dynakin.results.measures.tracking import refuse_lost
-
-        if not keep_lost:
-            refuse_lost(self, "keep_lost=True")
-        return save_estimate(
-            self,
-            Path(folder),
-            overwrite=overwrite,
-            comparison=comparison,
-            identifiability=identifiability,
-            failures=failures,
-        )

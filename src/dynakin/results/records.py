@@ -1,10 +1,13 @@
-"""The small records that stand beside the arrays of an estimate: parameters, events and timing."""
+"""The small records that stand beside the arrays of an estimate: parameters, events, timing and tracking."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
 from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
 
 ParameterKind = Literal["length", "marker", "inertia", "plates"]
 REFUSED = 2
@@ -84,3 +87,19 @@ class Timing:
     median_us: float
     p99_us: float
     realtime_factor: float
+
+
+@dataclass(frozen=True, eq=False)
+class Tracking:
+    """How the filter followed the person, frame by frame.
+
+    Attributes:
+        lost: (T,) bool. measured: (T,) bool, some marker was seen.
+        distance_m: (T, M) of each measured marker from where the bone carries it: residual, displaced skin and place.
+        refused: (T, M) bool.
+    """
+
+    lost: npt.NDArray[np.bool_]
+    measured: npt.NDArray[np.bool_]
+    distance_m: npt.NDArray[np.float64]
+    refused: npt.NDArray[np.bool_]

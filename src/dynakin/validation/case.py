@@ -1,44 +1,62 @@
-"""A trial as a configuration names it, read and ready to be compared."""
+"""A trial as a configuration names it, read and ready to be estimated."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from dynakin.config import RunConfig
+from dynakin.errors import ConfigError
 from dynakin.filter import presets as known_presets
 from dynakin.recordings.plates.loads import without_plate_loads
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
+from dynakin.recordings.smoothing import CUTOFF_HZ
+from dynakin.results.estimate import Estimate
 from dynakin.validation.setup import Setup
 
 
 @dataclass(frozen=True, eq=False)
 class Case:
-    """A trial as read, with its subject's setup."""
+    """A trial as read, with its subject's setup. configs: of each preset, by its title as in ``setup.noise``."""
 
     recording: Recording
     static: Recording | None
     setup: Setup
     config: RunConfig
+    configs: dict[str, RunConfig]
+
+    def with_config(self, title: str, estimate: Estimate) -> Estimate:
+        """An estimate with one of the presets, with the configuration as used in it."""
+        used = self.configs[title].as_used()
+        if self.recording.path is None:  # was never a file
+            used["trial"] = self.recording.name
+        return replace(estimate, config=used | estimate.config)
 
 
-def case_of(config: RunConfig, presets: Sequence[str], cutoff_hz: float) -> Case:
+def case_of(
+    config: RunConfig,
+    presets: Sequence[str] = (),
+    cutoff_hz: float = CUTOFF_HZ,
+    *,
+    recording: Recording | None = None,
+    static: Recording | None = None,
+) -> Case:
     """Read what a configuration names.
 
     Args:
         presets: beside each other; none: the configuration's own. cutoff_hz: of the reference methods.
+        recording, static: that were read before.
 
     Raises:
         DynakinError: anything wrong with the input, in one line.
     """
-    noise = {
-        known_presets.title(name): config.model_copy(update={"preset": name}).noise_settings()
-        for name in (presets or [config.preset])
+    configs = {
+        known_presets.title(name): config.model_copy(update={"preset": name}) for name in (presets or [config.preset])
     }
     setup = Setup(
         config.definition(),
-        noise,
+        {title: one.noise_settings() for title, one in configs.items()},
         cutoff_hz,
         config.priors,
         config.bounds,
@@ -53,8 +71,18 @@ def case_of(config: RunConfig, presets: Sequence[str], cutoff_hz: float) -> Case
         config.zero,
         config.signs,
     )
-    recording = read(
-        config.trial, config.forces, plate_filter_hz=config.plate_filter_hz, force_threshold_n=config.force_threshold_n
-    )
+    if recording is None:
+        recording = read(
+            config.trial,
+            config.forces,
+            plate_filter_hz=config.plate_filter_hz,
+            force_threshold_n=config.force_threshold_n,
+        )
+    else:
+        for key in ("forces", "plate_filter_hz", "force_threshold_n"):
+            if getattr(config, key) is not None:
+                raise ConfigError(f"{recording.name}: {key} takes effect while a file is read, expected its path")
     recording = without_plate_loads(recording, config.plate_loads, config.vertical)
-    return Case(recording, None if config.static is None else read(config.static), setup, config)
+    if static is None and config.static is not None:
+        static = read(config.static)
+    return Case(recording, static, setup, config, configs)

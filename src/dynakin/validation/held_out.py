@@ -21,7 +21,7 @@ from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import COMPONENTS, Estimate
 from dynakin.results.measures.fit import signal_fit
 from dynakin.results.measures.metrics import evaluation_window
-from dynakin.results.measures.tracking import without_lost
+from dynakin.results.measures.tracking import why_lost, without_lost
 from dynakin.validation.freeze import final_values, freeze, initial_values
 from dynakin.validation.reference.least_squares import identify, predicted_wrench
 from dynakin.validation.reference.methods import reference_methods
@@ -207,7 +207,7 @@ def as_estimate(estimator: Estimator, arrays: Mapping[str, Array], recording: Re
 
 
 def _refuse_lost(estimate: Estimate, method: str) -> None:
-    if (reason := estimate.why_lost) is not None:
+    if (reason := why_lost(estimate)) is not None:
         where = estimate.recording.path or estimate.recording.name
         raise LostError(f"{where}: {method}: {reason}; nothing is judged by it")
 

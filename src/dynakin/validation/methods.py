@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -10,17 +11,20 @@ import numpy.typing as npt
 import xarray as xr
 
 from dynakin.errors import DynakinError, LostError, ModelError
+from dynakin.filter.estimator import Estimator
 from dynakin.filter.zero import asked_angles
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.smoothing import CUTOFF_HZ
 from dynakin.results.estimate import COMPONENTS, Estimate
+from dynakin.results.failures import Failures
 from dynakin.results.measures.facing import facing
 from dynakin.results.measures.mean_curves import MEASURED, MeanCurve, mean_curves, signals
 from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.measures.repetitions import Found, repetitions_of
 from dynakin.results.measures.sources import measured_only, moment_sources, wrench_sources
+from dynakin.results.measures.tracking import why_lost
 from dynakin.validation.reference.methods import Lengths, Reference, reference_methods
 from dynakin.validation.setup import Setup
 
@@ -114,7 +118,9 @@ def compare_trial(
     Raises:
         LostError: no filter followed the person. DynakinError: as `Estimator.run`.
     """
-    estimates, lost, initial = estimate_each(recording, setup, static=static, progress=progress)
+    estimates, lost, estimators = estimate_each(recording, setup, static=static, progress=progress)
+    initial = list(estimators.values())[-1].initial
+    assert initial is not None
     trial = trial_of(estimates, initial, setup.definition, setup.cutoff_hz)
     return with_lost(trial, lost)
 
@@ -126,28 +132,43 @@ def with_lost(trial: Trial, lost: Mapping[str, str]) -> Trial:
 
 
 def estimate_each(
-    recording: Recording, setup: Setup, *, static: Recording | None = None, progress: Progress | None = None
-) -> tuple[dict[str, Estimate], dict[str, str], CalibratedModel]:
-    """Run every preset: the estimates, why others lost the person, and what they started from.
+    recording: Recording,
+    setup: Setup,
+    *,
+    static: Recording | None = None,
+    progress: Progress | None = None,
+    keep_lost: bool = False,
+    failures: Failures | None = None,
+) -> tuple[dict[str, Estimate], dict[str, str], dict[str, Estimator]]:
+    """Run every preset.
+
+    Args:
+        keep_lost: those that lost the person are estimates like the others. failures: takes what fails once an
+            estimate is there (the angles that were asked for); not given: it is raised.
+
+    Returns:
+        By preset: the estimates, why others lost the person, and the estimators of all as they ran.
 
     Raises:
         LostError: no filter followed the person. DynakinError: as `Estimator.run`.
     """
     estimates: dict[str, Estimate] = {}
     lost: dict[str, str] = {}
+    estimators: dict[str, Estimator] = {}
     for preset in setup.noise:
-        estimator = setup.estimator(preset)
+        estimator = estimators[preset] = setup.estimator(preset)
         estimate = estimator.run(recording, static=static, smooth=setup.smooth, progress=progress)
-        reason = estimate.why_lost
-        if reason is None:
-            estimates[preset] = asked_angles(estimator, estimate, static, setup.zero, setup.signs)
-        else:
+        reason = None if keep_lost else why_lost(estimate)
+        if reason is not None:
             lost[preset] = reason
-    assert estimator.initial is not None
+            continue
+        with nullcontext() if failures is None else failures.stage("joint angles of angles.sto"):
+            estimate = asked_angles(estimator, estimate, static, setup.zero, setup.signs)
+        estimates[preset] = estimate
     if not estimates:
         where = recording.path or recording.name
         raise LostError(f"{where}: {'; '.join(f'EKF ({preset}): {reason}' for preset, reason in lost.items())}")
-    return estimates, lost, estimator.initial
+    return estimates, lost, estimators
 
 
 def trial_of(

@@ -23,7 +23,7 @@ from dynakin.results.measures.angles import convention_of
 from dynakin.results.measures.feet import ROUNDING, foot_sources
 from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.measures.power import root_coordinates
-from dynakin.results.measures.pressure import centre_of_pressure
+from dynakin.results.measures.pressure import centre_of_pressure, floor_height
 from dynakin.results.measures.sources import DERIVED, UNKNOWN, measured_only, moment_sources, wrench_sources
 from dynakin.results.measures.sources import MEASURED as MOMENT_MEASURED
 from dynakin.results.measures.stances import compared_stances
@@ -170,7 +170,7 @@ def _foot_part(estimate: Estimate, foot: str) -> Section:
         title, unit = COMPONENT_LABELS[component]
         note = _peak(estimate, foot, measured_only(wrenches["adjusted"][:, k], source), unit)
         add(title, unit, wrenches["measured"][:, k], wrenches["adjusted"][:, k], note)
-    pressed = {kind: centre_of_pressure(wrench, estimate.floor_height_m) for kind, wrench in wrenches.items()}
+    pressed = {kind: centre_of_pressure(wrench, floor_height(estimate)) for kind, wrench in wrenches.items()}
     for axis, k in (("forward", 0), ("to the right", 2)):
         each = {kind: 1000.0 * point[:, k] for kind, (point, _) in pressed.items()}
         add(f"Centre of pressure, {axis}", "mm", each["measured"], each["adjusted"], least=20.0)

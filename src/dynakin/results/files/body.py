@@ -11,7 +11,7 @@ from dynakin.results.files.motion import write_sources
 from dynakin.results.files.storage import write_storage
 from dynakin.results.measures.angles import angle_columns
 from dynakin.results.measures.feet import foot_sources
-from dynakin.results.measures.pressure import LOADED_N
+from dynakin.results.measures.pressure import LOADED_N, foot_pressure
 from dynakin.results.measures.sources import joint_sources
 
 _SIDES = {"right": "r", "left": "l"}
@@ -73,7 +73,7 @@ def write_centre_of_pressure(estimate: Estimate, path: Path) -> None:
     below the threshold. What a planar model does not tell has no column."""
     names, columns = [], []
     for foot in (None, *estimate.foot_names):
-        point, free = estimate.centre_of_pressure(foot)
+        point, free = foot_pressure(estimate, foot)
         for label, values in zip(("px", "py", "pz", "free_moment"), [*point.T, free], strict=True):
             if np.isfinite(values).any() or foot is not None:
                 names.append(f"{foot or 'total'}_{label}")
@@ -141,8 +141,8 @@ def write_feet(estimate: Estimate, path: Path) -> None:
     columns: list[np.ndarray] = []
     for foot in estimate.foot_names:
         wrench = estimate.data["foot_wrench"].sel(foot=foot).transpose("time", "component").values
-        point, free = estimate.centre_of_pressure(foot)
-        loaded = np.isfinite(point).all(axis=1)
+        point, free = foot_pressure(estimate, foot)
+        loaded = np.asarray(np.isfinite(point).all(axis=1))
         torque = wrench[:, 3:].copy()
         torque[loaded] = np.column_stack([0.0 * free[loaded], free[loaded], 0.0 * free[loaded]])
         side = _SIDES.get(foot, foot)

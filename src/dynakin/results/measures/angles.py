@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Literal, NamedTuple
+from typing import Literal, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
-if TYPE_CHECKING:
-    from dynakin.results.estimate import Estimate
+from dynakin.results.estimate import Estimate
 
 Array = npt.NDArray[np.float64]
 Signs = Literal["opensim", "clinical"]

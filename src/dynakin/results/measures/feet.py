@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from dynakin.results.estimate import COMPONENTS
+from dynakin.results.estimate import COMPONENTS, Estimate
 from dynakin.results.measures import sources
 from dynakin.results.naming import plural
 from dynakin.units import GRAVITY_M_S2
-
-if TYPE_CHECKING:
-    from dynakin.results.estimate import Estimate
 
 IN_THE_AIR, MEASURED, NOT_MEASURED = range(3)
 """Codes of ``foot_contact``: a foot's wrench is zero, is measured, or is not known."""

@@ -25,7 +25,7 @@ from dynakin.results.measures.soft_tissue import soft_tissue
 from dynakin.results.measures.sources import moment_figures
 from dynakin.results.measures.stances import counted
 from dynakin.results.measures.symmetry import asymmetry
-from dynakin.results.measures.tracking import lost_in_words, tracking_figures
+from dynakin.results.measures.tracking import lost_in_words, tracking_figures, why_lost
 
 SCHEMA_VERSION = 2
 """Version of ``metrics.json``, ``parameters.json`` and ``estimate.nc``; it grows when a key changes its meaning."""
@@ -84,16 +84,6 @@ def compute_metrics(estimate: Estimate, failures: Failures | None = None) -> dic
         with nullcontext() if failures is None else failures.stage(f"{name} in metrics.json"):
             metrics[name] = block()
     return metrics
-
-
-def known_metrics(estimate: Estimate, failures: Failures) -> dict[str, Any]:
-    """`Estimate.metrics`, or what of it can be had."""
-    try:
-        return estimate.metrics()
-    except OSError:
-        raise
-    except Exception:  # each block by its own name
-        return compute_metrics(estimate, failures)
 
 
 def _prediction(estimate: Estimate, window: np.ndarray) -> dict[str, Any]:
@@ -177,7 +167,7 @@ def speed_consistency(estimate: Estimate, window: np.ndarray) -> tuple[dict[str,
 def _consistency(estimate: Estimate, window: np.ndarray) -> dict[str, Any]:
     found = window_consistency(estimate, window)
     mismatch, speeds_verdict = speed_consistency(estimate, window)
-    if estimate.why_lost is not None:
+    if why_lost(estimate) is not None:
         found = replace(found, judgement=None, verdict="The person was lost, so nothing is said of consistency.")
         speeds_verdict = ""
     elif estimate.lost.any():

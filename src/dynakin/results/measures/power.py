@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.results.estimate import Estimate
 from dynakin.results.measures.stances import counted
-
-if TYPE_CHECKING:
-    from dynakin.results.estimate import Estimate
 
 Array = npt.NDArray[np.float64]
 

@@ -1,14 +1,13 @@
-"""Centres of pressure of wrenches that are given about the ground's origin."""
+"""Centres of pressure: of an estimate's feet, and of any wrench that is given about the ground's origin."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.plates.pressure import Surface
 from dynakin.recordings.plates.pressure import centre_of_pressure as recorded_pressure
-from dynakin.recordings.recording import Recording
+from dynakin.results.estimate import Estimate
 
 Array = npt.NDArray[np.float64]
 
@@ -37,12 +36,24 @@ def centre_of_pressure(wrench: Array, height_m: float, threshold_n: float = LOAD
     return np.where(told, point, np.nan), np.where(known.all(axis=-1) & pushed, free[..., 1], np.nan)
 
 
-def floor_height(recording: Recording, ground: GroundFrame) -> float:
+def foot_pressure(estimate: Estimate, foot: str | None = None) -> tuple[Array, Array]:
+    """Centre of pressure (T, 3) m, ground frame, and free moment (T,) N m, of a foot or of the estimated total wrench;
+    NaN below `LOADED_N` and where the model does not have the components.
+
+    Raises:
+        KeyError: no such foot.
+    """
+    wrench = estimate.data["wrench_estimated"] if foot is None else estimate.data["foot_wrench"].sel(foot=foot)
+    return centre_of_pressure(wrench.transpose("time", "component").values, floor_height(estimate))
+
+
+def floor_height(estimate: Estimate) -> float:
     """Height (m, ground frame) of the plates' surface: the median of their centres of pressure, else of their corners,
     else 0."""
-    points = [plate.cop for plate in recording.plates]
+    plates, ground = estimate.recording.plates, estimate.ground
+    points = [plate.cop for plate in plates]
     heights = ground.points_to_ground(np.concatenate(points))[:, 1] if points else np.array([])
     if not np.isfinite(heights).any():
-        corners = [plate.corners for plate in recording.plates if plate.corners is not None]
+        corners = [plate.corners for plate in plates if plate.corners is not None]
         heights = ground.points_to_ground(np.concatenate(corners))[:, 1] if corners else np.zeros(1)
     return float(np.nanmedian(heights))

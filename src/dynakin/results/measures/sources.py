@@ -6,16 +6,14 @@ but all others are, it follows from the motion and is *derived*; where that cann
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from dynakin.results.estimate import Estimate
 from dynakin.results.naming import listed, sentence, words
-
-if TYPE_CHECKING:
-    from dynakin.results.estimate import Estimate
 
 Array = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.uint8]

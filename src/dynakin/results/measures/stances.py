@@ -9,16 +9,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.results.estimate import Estimate
 from dynakin.results.measures import sources
 from dynakin.results.measures.feet import IN_THE_AIR, MEASURED
-
-if TYPE_CHECKING:
-    from dynakin.results.estimate import Estimate
 
 Flags = npt.NDArray[np.bool_]
 

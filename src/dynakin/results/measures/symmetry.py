@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.results.estimate import Estimate
 from dynakin.results.measures import sources
 from dynakin.results.measures.feet import foot_sources
 from dynakin.results.measures.power import work_of
 from dynakin.results.measures.stances import compared_stances
-
-if TYPE_CHECKING:
-    from dynakin.results.estimate import Estimate
 
 Array = npt.NDArray[np.float64]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -14,7 +14,7 @@ from dynakin.results.estimate import AXES, Estimate
 from dynakin.results.measures.soft_tissue import marker_sites, state_paths
 from dynakin.results.measures.sources import ABSENT
 from dynakin.results.naming import sentence
-from dynakin.results.records import REFUSED, TRACKING
+from dynakin.results.records import REFUSED, TRACKING, Tracking
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -42,22 +42,6 @@ _KEPT = ("_measured", "_covariance")
 _RECORD = {"state", "state_sd", "foot_contact", "verdict", "tracking", "constrained", "lost"}
 _RECORD |= {"constraints_met", "step_us"}
 _SOURCES = {"moment_source", "joint_source"}
-
-
-@dataclass(frozen=True, eq=False)
-class Tracking:
-    """How the filter followed the person, frame by frame.
-
-    Attributes:
-        lost: (T,) bool. measured: (T,) bool, some marker was seen.
-        distance_m: (T, M) of each measured marker from where the bone carries it: residual, displaced skin and place.
-        refused: (T, M) bool.
-    """
-
-    lost: Mask
-    measured: Mask
-    distance_m: Array
-    refused: Mask
 
 
 def tracking_of(estimate: Estimate) -> Tracking:

@@ -14,19 +14,20 @@ from typing import Any
 
 import numpy as np
 
+from dynakin.config import make_config
 from dynakin.errors import OutputError, RecordingError
+from dynakin.pipeline.result import Result
+from dynakin.pipeline.stages import run_case
 from dynakin.recordings.limits import FASTEST_HZ, SLOWEST_HZ
 from dynakin.recordings.recording import Recording
-from dynakin.results.estimate import Estimate
 from dynakin.results.files.folder import check_output_writable
-from dynakin.results.measures.tracking import refuse_lost
 from dynakin.stream.fusion import DELAY_S, Fused, Fusion
-from dynakin.stream.settings import estimator_of
 from dynakin.stream.sinks.append import SYSTEM_ERROR
 from dynakin.stream.sinks.base import Sink, Status
 from dynakin.stream.sinks.record_format import packet_record, read_records, text_record
 from dynakin.stream.sources.packets import MarkerPacket, Packet, PlatePacket, StreamInfo
 from dynakin.stream.start import recording_of
+from dynakin.validation.case import case_of
 
 FILE = "stream.dkr"
 _CLOSE_S = 10.0  # for the last half second to reach the disk
@@ -177,18 +178,19 @@ def recorded(folder: str | Path) -> Recording:
     return recording_of(found, markers.names, names, Path(folder).name, begun.get("subject"))
 
 
-def finish(folder: str | Path, output: str | Path) -> Estimate:
-    """Turn a recorded session into the usual output folder, by the same estimate offline.
+def finish(folder: str | Path, output: str | Path) -> Result:
+    """Turn a recorded session into the usual output folder, as `dynakin run` makes it of a recording; late stages that
+    failed are in its ``failures``.
 
     Raises:
         RecordingError: nothing was recorded there. Others: as `dynakin run`.
     """
     check_output_writable(Path(output))
     settings = read_recorded(folder)[3]["settings"]
-    estimate = estimator_of(settings).run(recorded(folder))
-    refuse_lost(estimate)  # live has no option to keep it
-    estimate.save(Path(output))
-    return estimate
+    config = make_config(settings | {"trial": Path(folder), "output": Path(output)}, "live")
+    result = run_case(case_of(config, recording=recorded(folder)), keep=None)  # live has no option to keep it
+    result.save(output, check=False)
+    return result
 
 
 def _fusion(record: Mapping[str, Any]) -> Fusion:

@@ -3,25 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from dynakin.config import make_config
 from dynakin.errors import DynakinError
-from dynakin.filter import presets
+from dynakin.pipeline.stages import judged
 from dynakin.recordings.smoothing import CUTOFF_HZ
 from dynakin.results.estimate import COMPONENTS
 from dynakin.results.failures import Failures
 from dynakin.results.files.versions import versions
 from dynakin.results.measures.fit import SignalFit
+from dynakin.results.measures.metrics import compute_metrics
 from dynakin.studies.batch.dataset import Dataset, Session
 from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import Pool
 from dynakin.studies.engine.tasks import Failure, Task
 from dynakin.studies.engine.work import Progress, work
 from dynakin.validation.case import case_of
-from dynakin.validation.methods import estimate_each, trial_of, with_lost
+from dynakin.validation.methods import estimate_each
 from dynakin.validation.table2 import MARKERS, Row, mean_fit, table2_of, trial_fits
 
 Fits = dict[tuple[str, str], SignalFit]
@@ -80,23 +81,19 @@ def work_on(options: Options, payload: Session) -> dict[str, Any]:
     """One trial: read, estimated, compared with the reference methods, and written where files are wanted."""
     config = make_config(payload.content, payload.name)
     case = case_of(config, options.presets, options.cutoff_hz)
-    estimates, lost, initial = estimate_each(case.recording, case.setup, static=case.static)
-    failures, trial = Failures(), None
-    with failures.stage("comparison with the reference methods"):
-        trial = with_lost(trial_of(estimates, initial, case.setup.definition, options.cutoff_hz), lost)
-    title, first = next(iter(estimates.items()))
+    failures = Failures()
+    estimates, lost, estimators = estimate_each(case.recording, case.setup, static=case.static, failures=failures)
+    result = judged(case, estimates, lost, estimators, failures, whatever=False, observability=False)
     if options.files:
-        Path(config.output).parent.mkdir(parents=True, exist_ok=True)
-        preset = next(name for name in (options.presets or [config.preset]) if presets.title(name) == title)
-        used = config.model_copy(update={"preset": preset}).as_used()
-        replace(first, config=used | first.config).save(config.output, comparison=trial, failures=failures)
+        result.save(config.output, check=False)
+    trial = result.comparison
     if trial is None or failures.found:
         saved = "the results are saved. " if options.files else ""
         raise DynakinError(f"{saved}{' '.join(failures.messages())}")
-    metrics = {name: estimate.metrics() for name, estimate in estimates.items()}
+    metrics = {name: compute_metrics(estimate) for name, estimate in estimates.items()}
     return {
         "fits": [[*key, *fit] for key, fit in trial_fits(trial).items()],
-        "notes": [*trial.notes, *first.messages],
+        "notes": [*trial.notes, *result.estimate.messages],
         "lost": lost,
         "nis_per_dof": {name: m["consistency"]["mean_nis_per_dof"] for name, m in metrics.items()},
         "events": {

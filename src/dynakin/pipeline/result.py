@@ -1,0 +1,204 @@
+"""What a run gives, and its output folder: written as one, so that all files are there or what was there before."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from copy import deepcopy
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from dynakin.config import RunConfig
+from dynakin.errors import OutputError
+from dynakin.identification.observability.trial import Identifiability
+from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.report.page import write_report
+from dynakin.report.paper_figures.figures import FORMATS, save_figures
+from dynakin.report.paper_figures.sensitivity import Sensitivity
+from dynakin.results.estimate import Estimate
+from dynakin.results.failures import LOG, Failures
+from dynakin.results.files import body as body_files
+from dynakin.results.files import motion as motion_files
+from dynakin.results.files.config import write_config
+from dynakin.results.files.folder import replacing
+from dynakin.results.files.json import write_metrics, write_parameters
+from dynakin.results.files.markers import write_markers
+from dynakin.results.files.netcdf import write_netcdf
+from dynakin.results.measures.mean_curves import curve_points, estimate_curves, write_curves
+from dynakin.results.measures.metrics import compute_metrics
+from dynakin.results.measures.tracking import refuse_lost
+from dynakin.results.records import Event
+from dynakin.validation.methods import Trial
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+
+@dataclass(frozen=True, eq=False)
+class Result:
+    """What `dynakin.run` found. ``Result(estimate)`` alone can be saved too.
+
+    Attributes:
+        model: as it was calibrated on the recording, where the filter started.
+        comparison: the estimate beside the reference methods; None where that stage failed or was not asked for.
+        observability: what the recording says of the constants, and what motion would say more; None as above, and
+            where it would take too long (a message of the estimate says so).
+        settings: that were asked for; ``estimate.config`` has them as used.
+        failures: late stages that failed (a figure, the page, observability): all else is there.
+    """
+
+    estimate: Estimate
+    model: CalibratedModel | None = None
+    comparison: Trial | None = None
+    observability: Identifiability | None = None
+    settings: RunConfig | None = None
+    failures: Failures = field(default_factory=Failures)
+
+    @property
+    def events(self) -> list[Event]:
+        """Markers that were missing or refused, bounds reached, resets."""
+        return self.estimate.events
+
+    def to_dataframe(self, quantity: str = "coordinates") -> pd.DataFrame:
+        """A quantity of ``estimate.data`` over time, a column a name: coordinates (rad, m), speeds, moments (N m, N),
+        each with ``_sd``, ``state``, ``wrench_estimated``, ...
+
+        Raises:
+            KeyError: no such quantity. ValueError: it has more dimensions than a table.
+        """
+        data = self.estimate.data[quantity]
+        if len(data.dims) != 2:
+            raise ValueError(
+                f"{quantity} has the dimensions {', '.join(map(str, data.dims))}, expected time and another"
+            )
+        return data.transpose("time", ...).to_pandas()
+
+    def metrics(self) -> dict[str, Any]:
+        """The figures of ``metrics.json`` (see `dynakin.results.measures.metrics`); computed once, a copy is given. A
+        figure that cannot be had is None, and stands in ``failures``."""
+        return deepcopy(self._metrics)
+
+    @cached_property
+    def _metrics(self) -> dict[str, Any]:
+        metrics = compute_metrics(self.estimate, self.failures)
+        if self.observability is not None:
+            with self.failures.stage("what the recording tells of the constants"):
+                metrics["identifiability"] = self.observability.as_dict()
+        return metrics
+
+    def save(
+        self,
+        folder: str | Path | None = None,
+        *,
+        overwrite: bool = True,
+        keep_lost: bool = False,
+        figures: str | Path | None = None,
+        check: bool = True,
+    ) -> Path:
+        """Write every output file into ``folder`` (that of the settings where not given) and return it.
+
+        All files are first written into a temporary folder beside it, which then takes its place: a failure leaves
+        what was there. A folder that exists is replaced only if ``overwrite`` is true and it is empty or holds
+        nothing but an earlier output of dynakin.
+
+        Args:
+            keep_lost: write a trial that was lost too, its lost frames empty.
+            figures: folder for figures for papers (`save_figures`), in addition.
+            check: raise where a stage failed, once all else is written; else see ``failures``.
+
+        Raises:
+            LostError: the person was lost for so long that the trial is no estimate, and ``keep_lost`` is false:
+                nothing is written.
+            OutputError: no folder is given, or it cannot be written or holds something else; with ``check`` also where
+                some stage failed: all else is saved then.
+        """
+        if folder is None:
+            folder = None if self.settings is None or self.settings.output == Path() else self.settings.output
+        if folder is None:
+            raise OutputError("save: no folder was given, expected save(FOLDER) or run(..., output=FOLDER)")
+        folder = Path(folder)
+        if not keep_lost:
+            refuse_lost(self.estimate, "keep_lost=True")
+        self._write(folder, overwrite)
+        if figures is not None:
+            known = len(self.failures.found)
+            with self.failures.stage("figures"):
+                self.save_figures(figures)
+            if len(self.failures.found) > known:  # they are to stand in the files too
+                with self.failures.stage("what failed, in the files"):  # these stay as they were saved
+                    self._write(folder, overwrite=True)
+        if check and self.failures.found:
+            said = " ".join(self.failures.messages())
+            raise OutputError(f"{folder}: the results are saved ({LOG} has details). {said}")
+        return folder
+
+    def save_figures(
+        self, folder: str | Path, formats: Sequence[str] = FORMATS, *, sensitivity: Sensitivity | None = None
+    ) -> list[Path]:
+        """Write the paper's figures of this run into ``folder``, whatever it holds (see `dynakin.report.save_figures`);
+        one that fails stands in ``failures``.
+
+        Returns:
+            The files written.
+
+        Raises:
+            ConfigError: an unknown format. OutputError: the folder cannot be written.
+        """
+        return save_figures(
+            self.estimate,
+            folder,
+            formats,
+            comparison=self.comparison,
+            sensitivity=sensitivity,
+            failures=self.failures,
+        )
+
+    def _write(self, folder: Path, overwrite: bool) -> None:
+        estimate, failed, metrics = self.estimate, self.failures, self.metrics()
+        if self.settings is not None:
+            estimate = replace(estimate, config=estimate.config | {"output": str(folder.absolute())})
+        files: dict[str, Callable[[Estimate, Path], None]] = {
+            "coordinates.mot": motion_files.write_coordinates,
+            "speeds.sto": motion_files.write_speeds,
+            "accelerations.sto": motion_files.write_accelerations,
+            "moments.sto": motion_files.write_moments,
+            "moments_source.sto": motion_files.write_moment_sources,
+            "wrench.sto": motion_files.write_wrench,
+            "uncertainty.sto": motion_files.write_deviations,
+            "markers.trc": write_markers,
+            "parameters.json": write_parameters,
+            "estimate.nc": write_netcdf,
+        }
+        with replacing(folder, overwrite=overwrite) as made:
+            for name, write in files.items():
+                _written(made / name, failed, lambda path, write=write: write(estimate, path))  # type: ignore[misc]
+            with failed.stage("files of the body", writes=True):
+                body_files.write_body_files(estimate, made)
+            _written(made / "repetitions.csv", failed, self._write_repetitions)
+            write_config(estimate.config, made / "config.toml")
+            whole = replace(estimate, messages=[*estimate.messages, *failed.messages()])
+            _written(
+                made / "report.html",
+                failed,
+                lambda path: write_report(whole, path, metrics=metrics, comparison=self.comparison),
+            )
+            said = {"messages": [*estimate.messages, *failed.messages()]}
+            said["failures"] = [failure.stage for failure in failed.found]
+            write_metrics(metrics | said, made / "metrics.json")
+            if failed.found:
+                (made / LOG).write_text(failed.log(), encoding="utf-8", newline="\n")
+
+    def _write_repetitions(self, path: Path) -> None:
+        curves = estimate_curves(self.estimate) if self.comparison is None else self.comparison.curves()
+        write_curves(path, curve_points(self.estimate.recording.name, curves))
+
+
+def _written(path: Path, failed: Failures, write: Callable[[Path], None]) -> None:
+    """One file, or none: half a file looks like a whole one."""
+    done = False
+    with failed.stage(path.name, writes=True):
+        write(path)
+        done = True
+    if not done:
+        path.unlink(missing_ok=True)

@@ -1,0 +1,175 @@
+"""What a run does, stage by stage: settings, recording, estimate, comparison, observability."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from dynakin.config import RunConfig, make_config, read_config
+from dynakin.errors import ConfigError, DynakinError
+from dynakin.filter.estimator import Estimator
+from dynakin.filter.noise import Noise
+from dynakin.identification.observability.trial import Identifiability, identifiability
+from dynakin.model.subject import Subject
+from dynakin.pipeline.result import Result
+from dynakin.recordings.recording import Recording
+from dynakin.results.estimate import Estimate
+from dynakin.results.failures import Failures
+from dynakin.results.measures.tracking import refuse_lost
+from dynakin.validation.case import Case, case_of
+from dynakin.validation.methods import Trial, estimate_each, trial_of, with_lost
+
+Progress = Callable[[int, int], None]
+
+LARGEST_BENCH = 250
+"""States up to which a run also says what the recording tells of the constants: it filters a dozen motions more."""
+
+
+def run(
+    trial: str | Path | Recording | RunConfig,
+    *,
+    model: str | Path | None = None,
+    subject: Subject | None = None,
+    forces: str | Path | None = None,
+    static: str | Path | Recording | None = None,
+    noise: Noise | Mapping[str, Any] | None = None,
+    output: str | Path | None = None,
+    keep_lost: bool = False,
+    observability: bool = True,
+    progress: Progress | None = None,
+    **settings: Any,
+) -> Result:
+    """Estimate a trial, compare it with the reference methods and say what it tells of the constants.
+
+        result = dynakin.run("squat.c3d", model="squat7", mass_kg=70.0, height_m=1.75, sex="male")
+        result.save("out/squat")
+
+    Args:
+        trial: recording (.c3d, .trc, .csv), or one that was read; a configuration (.toml), over which the other
+            arguments win; or the settings themselves, without any other.
+        model: a built-in model by its name, or a .toml or .osim file.
+        subject: who is measured, instead of ``mass_kg``, ``height_m`` and ``sex``.
+        static: the same person and markers, standing.
+        noise: changes of the preset's noise settings, or all of them.
+        output: folder for `Result.save`, which nothing is written into before.
+        keep_lost: go on with a trial that was lost.
+        observability: whether to say what the recording tells of the constants; it takes longer than the estimate.
+        progress: called with (frames done, frames in all) now and then.
+        settings: further keys of a configuration (`dynakin print-config` lists them), such as ``preset``, ``smooth``.
+
+    Raises:
+        DynakinError: anything that is wrong with the input, in one line. LostError: the person was lost, and
+            ``keep_lost`` is false. What fails once the estimate is there is in ``Result.failures``.
+    """
+    given = settings | {"model": None if model is None else str(model), "forces": forces, "output": output}
+    if subject is not None:
+        given |= {"mass_kg": subject.mass_kg, "height_m": subject.height_m, "sex": subject.sex}
+    if noise is not None:
+        given["noise"] = noise.model_dump() if isinstance(noise, Noise) else dict(noise)
+    if isinstance(static, Recording):
+        given["static"] = static.path or static.name
+    elif static is not None:
+        given["static"] = static
+    if isinstance(trial, RunConfig):
+        if unused := [key for key, value in given.items() if value is not None]:
+            raise ConfigError(f"run: {unused[0]} is given next to settings, expected it in the settings")
+        config = trial
+    else:
+        source = Path(trial.path or trial.name) if isinstance(trial, Recording) else Path(trial)
+        config = configure(source, given, {"output": Path()})
+    case = case_of(
+        config,
+        recording=trial if isinstance(trial, Recording) else None,
+        static=static if isinstance(static, Recording) else None,
+    )
+    return run_case(case, keep_lost=keep_lost, observability=observability, progress=progress)
+
+
+def configure(trial: Path, given: Mapping[str, Any], defaults: Mapping[str, Any] | None = None) -> RunConfig:
+    """Merge a configuration file, if that is what ``trial`` is, with what is given, which wins (None: not given).
+
+    Raises:
+        ConfigError: a key that is unknown or missing, or a value that is wrong.
+    """
+    options = dict(defaults or {})
+    is_config = trial.suffix.casefold() == ".toml"
+    options |= read_config(trial) if is_config else {"trial": trial}
+    options |= {key: value for key, value in given.items() if value is not None}
+    return make_config(options, str(trial) if is_config else "run")
+
+
+def run_case(
+    case: Case,
+    *,
+    keep_lost: bool = False,
+    keep: str | None = "keep_lost=True",
+    observability: bool = True,
+    progress: Progress | None = None,
+) -> Result:
+    """`run` on a trial that is read.
+
+    Args:
+        keep: what the caller is asked with to keep the good frames of a trial that was lost; None: cannot be asked.
+
+    Raises:
+        DynakinError, LostError: as `run`.
+    """
+    failures = Failures()
+    estimates, _, estimators = estimate_each(
+        case.recording, case.setup, static=case.static, progress=progress, keep_lost=True, failures=failures
+    )
+    if not keep_lost:
+        for estimate in estimates.values():
+            refuse_lost(estimate, keep)
+    return judged(case, estimates, {}, estimators, failures, observability=observability)
+
+
+def judged(
+    case: Case,
+    estimates: Mapping[str, Estimate],
+    lost: Mapping[str, str],
+    estimators: Mapping[str, Estimator],
+    failures: Failures,
+    *,
+    whatever: bool = True,
+    observability: bool = True,
+) -> Result:
+    """What follows the estimates of a trial (see `estimate_each`), each stage on its own: the comparison of all with
+    the reference methods, and what the recording tells of the constants of the first.
+
+    Args:
+        failures: takes the stages that fail. whatever: as `trial_of` takes it.
+    """
+    estimates = {title: case.with_config(title, estimate) for title, estimate in estimates.items()}
+    title, first = next(iter(estimates.items()))
+    initial = list(estimators.values())[-1].initial
+    assert initial is not None
+    comparison: Trial | None = None
+    with failures.stage("comparison with the reference methods"):
+        setup = case.setup
+        comparison = trial_of(estimates, initial, setup.definition, setup.cutoff_hz, whatever=whatever)
+        comparison = with_lost(comparison, lost)
+    told: Identifiability | None = None
+    if observability:
+        with failures.stage("what the recording tells of the constants"):
+            told, note = _observability(estimators[title], first)
+            if note:
+                first = replace(first, messages=[*first.messages, f"{_LEFT_OUT}: {note}"])
+    return Result(first, initial, comparison, told, case.config, failures)
+
+
+_LEFT_OUT = "What the recording tells of the constants is left out"
+
+
+def _observability(estimator: Estimator, estimate: Estimate) -> tuple[Identifiability | None, str]:
+    """What the recording tells of the constants, or why that cannot be said, which is no failure."""
+    assert estimator.initial is not None
+    n_states = len(estimator.initial.names)
+    if n_states > LARGEST_BENCH:
+        return None, f"with {n_states} states it takes many minutes; dynakin model --identifiability tells."
+    try:
+        return identifiability(estimator, estimate), ""
+    except DynakinError as error:  # a trial of a few frames, say
+        return None, error.message
