@@ -17,10 +17,10 @@ from itertools import repeat
 import numpy as np
 
 import dynakin
-from dynakin.filter import presets
-from dynakin.filter.noise import Noise
 from dynakin.filter.samples import recording_arrays
 from dynakin.model.calibration.initial import InitialModel
+from dynakin.settings import presets
+from dynakin.settings.noise import Noise
 from dynakin.simulation.trial import SimulatedTrial, simulate
 from dynakin.validation.reference.methods import reference_methods
 from dynakin.validation.truth import LEG

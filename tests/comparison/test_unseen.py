@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dynakin.errors import ConfigError, RecordingError
-from dynakin.filter import presets
+from dynakin.settings import presets
 from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.trial import SimulatedTrial, simulate_squat
 from dynakin.validation.extrapolation import extrapolated, held, line, persisted

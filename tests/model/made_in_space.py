@@ -11,8 +11,8 @@ from dynakin import _core
 from dynakin.model.calibration.initial import InitialModel
 from dynakin.model.calibration.initialise import initialise
 from dynakin.model.definition import ModelDefinition, load_model
-from dynakin.model.subject import Subject
 from dynakin.recordings.recording import Plate, Recording
+from dynakin.settings.subject import Subject
 
 Array = npt.NDArray[np.float64]
 

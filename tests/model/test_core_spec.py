@@ -9,8 +9,8 @@ import pytest
 
 from dynakin.model.calibration.initialise import initialise
 from dynakin.model.definition import load_model
-from dynakin.model.subject import Subject
 from dynakin.recordings.recording import Recording
+from dynakin.settings.subject import Subject
 
 from .conftest import make, stand
 

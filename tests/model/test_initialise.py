@@ -14,10 +14,10 @@ from dynakin.model.calibration.frames import Trial
 from dynakin.model.calibration.measure import measure
 from dynakin.model.definition import load_model
 from dynakin.model.markers.marker_set import load_marker_set, match_markers
-from dynakin.model.priors import Bounds, Priors
-from dynakin.model.subject import Subject
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.recording import Recording
+from dynakin.settings.model import Bounds, Priors
+from dynakin.settings.subject import Subject
 
 from .conftest import FOOT_DIRECTION, LENGTHS, make, stand
 

@@ -31,9 +31,8 @@ from dynakin.cli.options import (
     forward_direction,
 )
 from dynakin.cli.summary import print_summary
-from dynakin.config import RunConfig, make_config, read_config
 from dynakin.errors import DynakinError
-from dynakin.filter import presets
+from dynakin.filter.build import estimator_of
 from dynakin.filter.zero import asked_angles
 from dynakin.identification.observability.trial import Identifiability, identifiability
 from dynakin.recordings.plates.loads import without_plate_loads
@@ -44,6 +43,8 @@ from dynakin.results.estimate import Estimate
 from dynakin.results.failures import Failures
 from dynakin.results.files.folder import check_folder_writable, check_output_writable
 from dynakin.results.measures.tracking import refuse_lost
+from dynakin.settings import presets
+from dynakin.settings.settings import Settings, read_keys
 from dynakin.validation.methods import Trial, trial_of
 
 LARGEST_BENCH = 250
@@ -138,16 +139,16 @@ def run(
         raise typer.Exit(1)
 
 
-def configure(trial: Path, given: dict[str, Any]) -> RunConfig:
+def configure(trial: Path, given: dict[str, Any]) -> Settings:
     """Merge a configuration file, if that is what ``trial`` is, with what the command line gives, which wins."""
     options = {key: value for key, value in given.items() if value is not None}
     if trial.suffix.casefold() == ".toml":
-        return make_config(read_config(trial) | options, str(trial))
-    return make_config({"trial": trial} | options, "run")
+        return Settings.of(read_keys(trial) | options, str(trial))
+    return Settings.of({"trial": trial} | options, "run")
 
 
 def estimate_from(
-    config: RunConfig,
+    config: Settings,
     failures: Failures,
     progress: Callable[[int, int], None] | None = None,
     *,
@@ -162,7 +163,7 @@ def estimate_from(
     Raises:
         DynakinError: anything that is wrong with the input, in one line. LostError: the person was lost.
     """
-    estimator = config.estimator()
+    estimator = estimator_of(config)
     recording = read(
         config.trial,
         config.forces,

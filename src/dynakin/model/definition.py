@@ -7,14 +7,15 @@ from importlib import resources
 from pathlib import Path
 
 from dynakin.errors import ModelError
+from dynakin.files import is_file
 from dynakin.model.markers.marker_set import load_marker_set
 from dynakin.model.markers.schema import MarkerSetFile
-from dynakin.model.opensim.definition import OpenSimDefinition, OpenSimOptions, load_opensim
+from dynakin.model.opensim.definition import OpenSimDefinition, load_opensim
 from dynakin.model.schema import ModelFile
-from dynakin.model.subject import Subject
 from dynakin.model.table import BodyTable, load_table
-from dynakin.model.validation import nearest, read_toml, validate
-from dynakin.recordings.formats.textfile import is_file
+from dynakin.settings.model import OpenSimOptions
+from dynakin.settings.strict import nearest, read_toml, validate
+from dynakin.settings.subject import Subject
 
 _FOLDER = resources.files("dynakin.model") / "builtin"
 

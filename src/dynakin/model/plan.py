@@ -9,9 +9,9 @@ import numpy.typing as npt
 
 from dynakin.model.calibration.posture import Geometry
 from dynakin.model.inertia import INERTIA_NAMES, PLANAR_INERTIA, RigidBody
-from dynakin.model.priors import Bounds, Interval, Priors
-from dynakin.model.schema import ModelFile
+from dynakin.model.schema import Interval, ModelFile
 from dynakin.model.state_priors import state_bounds, state_prior
+from dynakin.settings.model import Bounds, Priors
 
 Array = npt.NDArray[np.float64]
 

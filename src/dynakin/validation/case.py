@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from dynakin.config import RunConfig
-from dynakin.filter import presets as known_presets
+from dynakin.filter.build import definition_of, identified_of
 from dynakin.recordings.plates.loads import without_plate_loads
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
+from dynakin.settings import presets as known_presets
+from dynakin.settings.settings import Settings
 from dynakin.validation.setup import Setup
 
 
@@ -20,10 +21,10 @@ class Case:
     recording: Recording
     static: Recording | None
     setup: Setup
-    config: RunConfig
+    config: Settings
 
 
-def case_of(config: RunConfig, presets: Sequence[str], cutoff_hz: float) -> Case:
+def case_of(config: Settings, presets: Sequence[str], cutoff_hz: float) -> Case:
     """Read what a configuration names.
 
     Args:
@@ -33,11 +34,10 @@ def case_of(config: RunConfig, presets: Sequence[str], cutoff_hz: float) -> Case
         DynakinError: anything wrong with the input, in one line.
     """
     noise = {
-        known_presets.title(name): config.model_copy(update={"preset": name}).noise_settings()
-        for name in (presets or [config.preset])
+        known_presets.title(name): known_presets.preset(name, config.noise) for name in (presets or [config.preset])
     }
     setup = Setup(
-        config.definition(),
+        definition_of(config),
         noise,
         cutoff_hz,
         config.priors,
@@ -48,7 +48,7 @@ def case_of(config: RunConfig, presets: Sequence[str], cutoff_hz: float) -> Case
         config.estimate,
         config.plates,
         config.loads,
-        config.identified_subject(),
+        identified_of(config),
         config.smooth,
         config.zero,
         config.signs,

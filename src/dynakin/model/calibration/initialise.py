@@ -10,10 +10,10 @@ from dynakin.model.calibration.initial import InitialModel
 from dynakin.model.calibration.measure import measure
 from dynakin.model.definition import Definition
 from dynakin.model.opensim.definition import OpenSimDefinition
-from dynakin.model.priors import Bounds, Priors
 from dynakin.model.schema import ModelFile
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Recording
+from dynakin.settings.model import Bounds, Priors
 
 Array = npt.NDArray[np.float64]
 
@@ -40,7 +40,7 @@ def initialise(
         static: a recording of the same person and markers, standing; lengths and marker places come from it.
         side: limb markers of a lumped model: "right", "left", "both" (separate sites), "auto" (fewest gaps,
             right on a tie).
-        priors, bounds: other numbers than the defaults of ``dynakin.model.priors``.
+        priors, bounds: other numbers than the defaults of ``dynakin.settings.model``.
 
     Raises:
         ModelError: the model, the markers and the recording do not fit; one line says what was found and

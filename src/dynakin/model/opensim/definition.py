@@ -4,32 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
-
-from pydantic import Field
 
 from dynakin.model.opensim.description import OpenSimModel
 from dynakin.model.opensim.read import read_osim
 from dynakin.model.opensim.scales import scale_names
-from dynakin.model.subject import Subject
-from dynakin.model.validation import Strict, validate
-
-
-class OpenSimOptions(Strict):
-    """What of an OpenSim model can be estimated, and what is taken as the file has it."""
-
-    scale: Literal["all"] | tuple[str, ...] | None = "all"
-    """Bodies with a scale parameter, on which the joints placed on that body depend; []: none."""
-    share_sides: bool = True
-    """Whether mirrored bodies (femur_r, femur_l) share one."""
-    scale_masses: bool = True
-    """Whether all masses and inertias are multiplied so that they sum to the subject's mass."""
-    lightest_share: float = Field(default=0.01, ge=0.0, lt=1.0)
-    """Bodies of less than this part of the whole mass keep the file's mass and inertia: no recording tells of them."""
-    lock_unseen: bool = True
-    """Whether coordinates that move no measured marker (toes, often) are locked at the file's default value."""
-    leave_out: tuple[str, ...] = ()
-    """Markers of the file that are not measurements (regressed joint centres, say)."""
+from dynakin.settings.model import OpenSimOptions
+from dynakin.settings.strict import validate
+from dynakin.settings.subject import Subject
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,12 +19,13 @@ from dynakin.model.opensim.description import Marker, OpenSimModel
 from dynakin.model.opensim.sites import sites, with_mass
 from dynakin.model.opensim.skin import skin_of
 from dynakin.model.opensim.spec import free_coordinates, to_spec, unseen
-from dynakin.model.priors import Bounds, Interval, Priors
+from dynakin.model.schema import Interval
 from dynakin.model.spec import in_layout
 from dynakin.model.state_priors import state_bounds, state_prior
 from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_laboratory_frame
 from dynakin.recordings.landmarks import DEFAULT_PAIRS, FacingPairs
 from dynakin.recordings.recording import Recording
+from dynakin.settings.model import Bounds, Priors
 
 Array = npt.NDArray[np.float64]
 
@@ -106,7 +107,7 @@ def lay_on(
     table = {f"inertia/{s.name}/{k}": v for s in spec.segments for k, v in zip(INERTIA_NAMES, s.inertia, strict=True)}
     skin = np.array([skin_of(marker.name, marker.body) for marker, _ in chosen])
     known = priors or Priors()
-    known = known.model_copy(update={"marker_m": float(np.hypot(known.marker_m, fit.rms_m / np.sqrt(3.0)))})
+    known = known.changed(marker_m=float(np.hypot(known.marker_m, fit.rms_m / np.sqrt(3.0))))
     return InitialModel(
         spec=spec,
         names=tuple(names),

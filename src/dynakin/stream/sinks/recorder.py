@@ -15,13 +15,14 @@ from typing import Any
 import numpy as np
 
 from dynakin.errors import OutputError, RecordingError
+from dynakin.filter.build import estimator_of
 from dynakin.recordings.limits import FASTEST_HZ, SLOWEST_HZ
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
 from dynakin.results.files.folder import check_output_writable
 from dynakin.results.measures.tracking import refuse_lost
+from dynakin.settings.settings import Settings
 from dynakin.stream.fusion import DELAY_S, Fused, Fusion
-from dynakin.stream.settings import estimator_of
 from dynakin.stream.sinks.append import SYSTEM_ERROR
 from dynakin.stream.sinks.base import Sink, Status
 from dynakin.stream.sinks.record_format import packet_record, read_records, text_record
@@ -185,7 +186,7 @@ def finish(folder: str | Path, output: str | Path) -> Estimate:
     """
     check_output_writable(Path(output))
     settings = read_recorded(folder)[3]["settings"]
-    estimate = estimator_of(settings).run(recorded(folder))
+    estimate = estimator_of(Settings.of(settings, "live", ("model",))).run(recorded(folder))
     refuse_lost(estimate)  # live has no option to keep it
     estimate.save(Path(output))
     return estimate

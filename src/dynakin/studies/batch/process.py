@@ -7,14 +7,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from dynakin.config import make_config
 from dynakin.errors import DynakinError
-from dynakin.filter import presets
 from dynakin.recordings.smoothing import CUTOFF_HZ
 from dynakin.results.estimate import COMPONENTS
 from dynakin.results.failures import Failures
 from dynakin.results.files.versions import versions
 from dynakin.results.measures.fit import SignalFit
+from dynakin.settings import presets
+from dynakin.settings.settings import Settings
 from dynakin.studies.batch.dataset import Dataset, Session
 from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import Pool
@@ -78,7 +78,7 @@ def _mean(every: Sequence[Fits]) -> Fits:
 
 def work_on(options: Options, payload: Session) -> dict[str, Any]:
     """One trial: read, estimated, compared with the reference methods, and written where files are wanted."""
-    config = make_config(payload.content, payload.name)
+    config = Settings.of(payload.content, payload.name)
     case = case_of(config, options.presets, options.cutoff_hz)
     estimates, lost, initial = estimate_each(case.recording, case.setup, static=case.static)
     failures, trial = Failures(), None
@@ -88,7 +88,7 @@ def work_on(options: Options, payload: Session) -> dict[str, Any]:
     if options.files:
         Path(config.output).parent.mkdir(parents=True, exist_ok=True)
         preset = next(name for name in (options.presets or [config.preset]) if presets.title(name) == title)
-        used = config.model_copy(update={"preset": preset}).as_used()
+        used = config.changed(preset=preset).as_used()
         replace(first, config=used | first.config).save(config.output, comparison=trial, failures=failures)
     if trial is None or failures.found:
         saved = "the results are saved. " if options.files else ""
