@@ -17,10 +17,10 @@ from itertools import repeat
 import numpy as np
 
 import dynakin
-from dynakin.filter import presets
-from dynakin.filter.noise import Noise
 from dynakin.filter.samples import recording_arrays
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.settings import presets
+from dynakin.settings.noise import Noise
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.trial import simulate
 from dynakin.validation.reference.methods import reference_methods

@@ -18,9 +18,9 @@ import numpy as np
 
 import dynakin
 from dynakin.errors import DivergenceError, DynakinError
-from dynakin.filter import presets
-from dynakin.filter.noise import Noise
 from dynakin.results.estimate import Estimate
+from dynakin.settings import presets
+from dynakin.settings.noise import Noise
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.trial import simulate
@@ -32,8 +32,8 @@ START_S = 2.0
 MOTIONS = ("squat", "squat", "sit-to-stand", "sway")
 SETTINGS: dict[str, Callable[[], Noise]] = {
     "default": presets.default,
-    "gain": lambda: presets.default().model_copy(update={"constraint": "gain"}),
-    "sigmoid": lambda: presets.default().model_copy(update={"constraint": "sigmoid"}),
+    "gain": lambda: presets.default().changed(constraint="gain"),
+    "sigmoid": lambda: presets.default().changed(constraint="sigmoid"),
     "paper": presets.paper,
 }
 

@@ -18,9 +18,9 @@ from dataclasses import dataclass
 import numpy as np
 
 import dynakin
-from dynakin.filter import presets
-from dynakin.filter.noise import Noise
 from dynakin.results.measures.sources import DERIVED, MEASURED
+from dynakin.settings import presets
+from dynakin.settings.noise import Noise
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.trial import simulate
 

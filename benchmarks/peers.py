@@ -20,15 +20,15 @@ from opensim_peer import Kinematics, inverse_kinematics, load, residual
 from peers_times import times
 
 import dynakin
-from dynakin.filter.events import REFUSED
 from dynakin.filter.samples import recording_arrays
 from dynakin.model.definition import Definition, load_model
 from dynakin.model.opensim.definition import load_opensim
-from dynakin.model.subject import Subject
 from dynakin.recordings.formats.mot import read_table
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.soft_tissue import displacements
+from dynakin.results.records import REFUSED
+from dynakin.settings.subject import Subject
 from dynakin.validation.held_out import halves, identify_on, measured_wrench, predict_blind
 from dynakin.validation.setup import Setup
 
@@ -63,7 +63,7 @@ def distance_mm(measured: Array, placed: Array) -> float:
 
 
 def without_plates() -> dynakin.Noise:
-    return dynakin.presets.default().model_copy(update={"plate_force": 0.0, "plate_moment": 0.0, "plate_delay_s": 0.0})
+    return dynakin.presets.default().changed(plate_force=0.0, plate_moment=0.0, plate_delay_s=0.0)
 
 
 def filtered(estimate: tuple[str, ...], *, smooth: bool = False) -> tuple[float, Array]:

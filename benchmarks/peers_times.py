@@ -13,7 +13,7 @@ from opensim_peer import inverse_kinematics, load, without_patellae
 import dynakin
 from dynakin.filter.samples import recording_arrays
 from dynakin.model.opensim.definition import load_opensim
-from dynakin.model.subject import Subject
+from dynakin.settings.subject import Subject
 
 Array = NDArray[np.float64]
 ROUNDS = 3
@@ -24,7 +24,7 @@ def steps(file: Path, data: Path, mass: float, kinds: tuple[str, ...], plates: b
     recording = dynakin.read(data / "squats1.trc", data / "squats1_grf.mot")
     noise = dynakin.presets.default()
     if not plates:
-        noise = noise.model_copy(update={"plate_force": 0.0, "plate_moment": 0.0, "plate_delay_s": 0.0})
+        noise = noise.changed(plate_force=0.0, plate_moment=0.0, plate_delay_s=0.0)
     estimator = dynakin.Estimator(load_opensim(file, Subject(mass_kg=mass)), noise, estimate=kinds)
     initial = estimator.start(recording)
     markers, wrench = recording_arrays(recording, initial, gaps=True)

@@ -16,9 +16,9 @@ from dataclasses import replace
 from pathlib import Path
 
 import dynakin
-from dynakin.filter import presets
 from dynakin.filter.estimator import Estimator
-from dynakin.filter.noise import Noise
+from dynakin.settings import presets
+from dynakin.settings.noise import Noise
 from dynakin.studies.engine.pools import Pool, open_pool
 from dynakin.studies.tuning.fit import Fitter, usual_names
 from dynakin.studies.tuning.score import Shared, figures_of, left_out_mm
@@ -62,7 +62,7 @@ def main() -> None:
         }
     withheld = plates_withheld(recording, Setup(definition, noises), static=static)
     for name, noise in noises.items():
-        told = undoubting(noise.model_copy(update={"total_mass_use": "prior", "total_mass": base.total_mass}))
+        told = undoubting(noise.changed(total_mass_use="prior", total_mass=base.total_mass))
         row = figures_of(second, told, base)
         shown = {key: row[key] for key in ("nll", "nis_per_row", "ahead", "ahead_markers_mm", "ahead_fy", "fx", "fy")}
         shown["left_out_mm"] = left_out_mm(replace(second), told)

@@ -12,7 +12,7 @@ import time
 
 from tuning_truth import ERRORS, means, score, trial_of
 
-from dynakin.filter import presets
+from dynakin.settings import presets
 from dynakin.studies.engine.pools import open_pool
 from dynakin.studies.tuning.fit import Fitter, usual_names
 from dynakin.studies.tuning.score import Shared

@@ -13,8 +13,8 @@ import time
 from pathlib import Path
 
 import dynakin
-from dynakin.filter import presets
 from dynakin.filter.estimator import Estimator
+from dynakin.settings import presets
 from dynakin.studies.engine.folder import ROWS, open_folder
 from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import open_pool

@@ -17,8 +17,8 @@ import numpy as np
 from scipy.optimize import minimize
 
 import dynakin
-from dynakin.filter import presets
 from dynakin.filter.estimator import Estimator
+from dynakin.settings import presets
 from dynakin.simulation.trial import simulate
 from dynakin.studies.engine.pools import open_pool
 from dynakin.studies.tuning.likelihood import REACH, Likelihood

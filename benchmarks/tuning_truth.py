@@ -17,11 +17,11 @@ from typing import Any
 import numpy as np
 
 import dynakin
-from dynakin.filter import presets
 from dynakin.filter.estimator import Estimator
-from dynakin.filter.noise import Noise
 from dynakin.report.paper_figures.figures import save_sensitivity_figures
 from dynakin.report.paper_figures.sensitivity import Sensitivity
+from dynakin.settings import presets
+from dynakin.settings.noise import Noise
 from dynakin.simulation.trial import simulate
 from dynakin.studies.engine.folder import ROWS, open_folder, write_csv
 from dynakin.studies.engine.journal import Journal
@@ -30,7 +30,6 @@ from dynakin.studies.engine.tasks import Task
 from dynakin.studies.engine.work import work
 from dynakin.studies.tuning.grid import axis, combinations, mean_row
 from dynakin.studies.tuning.score import CRITERIA, figures_from, run_score
-from dynakin.studies.tuning.settings import changed
 from dynakin.studies.tuning.trial import TuningTrial, prepare, undoubting
 from dynakin.validation.truth import LEG
 
@@ -64,9 +63,9 @@ def trial_of(seed: int, duration: float, rate: float = 100.0, noise: Noise | Non
 def score(trials: list[WithTruth], payload: tuple[int, dict[str, Any], str]) -> dict[str, Any]:
     number, changes, base = payload
     told = trials[number]
-    noise = undoubting(changed(presets.preset(base), changes))
+    noise = undoubting(presets.preset(base, changes))
     sums = run_score(told.trial, noise, trace=True)
-    found = figures_from(sums, told.trial, Noise())
+    found = figures_from(sums, told.trial, presets.paper())
     window = slice(told.trial.first, told.trial.end)
     angle = np.degrees(sums["state"][window, : len(told.names)] - told.coordinates[window])
     all_names = [c.name for c in told.trial.initial.spec.coordinates]

@@ -9,12 +9,12 @@ import numpy as np
 
 from dynakin import _core
 from dynakin.errors import DynakinError, RecordingError
-from dynakin.filter import presets
 from dynakin.filter.estimator import Estimator
 from dynakin.identification.batch import FIRST_SIGMA, Posterior, at_start, identify_batch
 from dynakin.identification.trials import Common, MeasuredTrial, about
 from dynakin.identification.unknowns import Unknowns
 from dynakin.recordings.recording import Recording
+from dynakin.settings import presets
 from dynakin.validation.freeze import final_values
 from dynakin.validation.reference.base_parameters import base_parameters
 from dynakin.validation.reference.condensed import stacked

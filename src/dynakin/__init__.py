@@ -11,21 +11,21 @@ if not _cpu.supported():
     )
 
 from dynakin.errors import DynakinError
-from dynakin.filter import presets
 from dynakin.filter.estimator import Estimator
-from dynakin.filter.noise import Noise
 from dynakin.filter.samples import Sample
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import ModelDefinition, load_model
 from dynakin.model.opensim.definition import load_opensim
-from dynakin.model.priors import Bounds, Priors
-from dynakin.model.subject import Subject
 from dynakin.pipeline.result import Result
 from dynakin.pipeline.stages import run
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
+from dynakin.settings import presets
+from dynakin.settings.model import Bounds, Priors
+from dynakin.settings.noise import Noise
+from dynakin.settings.subject import Subject
 
 __version__ = metadata.version("dynakin")
 

@@ -10,26 +10,26 @@ from typing import Any
 import pytest
 
 from dynakin.cli.app import main
-from dynakin.config import RunConfig, make_config, read_config
-from dynakin.config_template import attribute_docs, config_template
 from dynakin.errors import ConfigError
-from dynakin.filter import presets
-from dynakin.filter.noise import Noise
-from dynakin.model.priors import Bounds, Priors
 from dynakin.pipeline.stages import configure
+from dynakin.settings import presets
+from dynakin.settings.model import Bounds, Priors
+from dynakin.settings.noise import Noise
+from dynakin.settings.settings import Settings, read_keys
+from dynakin.settings.template import attribute_docs, config_template
 
 REQUIRED = {"trial": "squat.c3d", "model": "squat7", "output": "out"}
 
 
-def _config(**keys: Any) -> RunConfig:
-    return make_config(REQUIRED | keys, "run.toml")
+def _config(**keys: Any) -> Settings:
+    return Settings.of(REQUIRED | keys, "run.toml")
 
 
 def test_printed_configuration_is_valid_as_it_stands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["print-config"]) == 0
     path = tmp_path / "run.toml"
     path.write_text(capsys.readouterr().out)
-    config = make_config(read_config(path), str(path))
+    config = Settings.of(read_keys(path), str(path))
     assert config.trial == tmp_path / "squat.c3d"
     assert config.noise_settings() == presets.default()
 
@@ -38,13 +38,13 @@ def test_every_key_is_printed_with_its_default_and_a_comment() -> None:
     text = config_template()
     everything = re.sub(r"^#(?=\w)", "", text, flags=re.MULTILINE)
     content = tomllib.loads(everything)
-    assert set(content) == set(RunConfig.model_fields) - {"ground", "identified", "versions"}
-    config = make_config(content, "template")
+    assert set(content) == set(Settings.model_fields) - {"ground", "identified", "versions"}
+    config = Settings.of(content, "template")
     assert config.noise == presets.default().model_dump(mode="json")
     assert config.priors == Priors() and config.bounds == Bounds()
     for key in ("markers", "table", "side", "vertical", "forward", "preset"):
-        assert content[key] == RunConfig.model_fields[key].default
-    for schema in (RunConfig, Noise, Priors, Bounds):
+        assert content[key] == Settings.model_fields[key].default
+    for schema in (Settings, Noise, Priors, Bounds):
         assert set(attribute_docs(schema)) == set(schema.model_fields)
 
 
@@ -80,7 +80,7 @@ def test_noise_changes_single_values_of_the_preset() -> None:
 
 def test_the_papers_settings_are_printed_too() -> None:
     content = tomllib.loads(re.sub(r"^#(?=\w)", "", config_template("paper"), flags=re.MULTILINE))
-    assert make_config(content, "template").noise_settings() == presets.paper()
+    assert Settings.of(content, "template").noise_settings() == presets.paper()
 
 
 def test_command_line_wins_over_the_file(tmp_path: Path) -> None:
@@ -98,20 +98,20 @@ def test_a_model_file_beside_the_configuration_is_found(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text("")
     path = tmp_path / "run.toml"
     path.write_text('model = "mine.toml"\nmarkers = "opencap"\n')
-    assert read_config(path) == {"model": str(tmp_path / "mine.toml"), "markers": "opencap"}
+    assert read_keys(path) == {"model": str(tmp_path / "mine.toml"), "markers": "opencap"}
 
 
 def test_what_is_not_toml_is_refused_with_its_line(tmp_path: Path) -> None:
     path = tmp_path / "run.toml"
     path.write_text('trial = "a.trc"\nmodel = \n')
     with pytest.raises(ConfigError, match=r"run\.toml.*line 2"):
-        read_config(path)
+        read_keys(path)
     with pytest.raises(ConfigError, match="cannot be read"):
-        read_config(tmp_path / "none.toml")
+        read_keys(tmp_path / "none.toml")
 
 
 def test_configuration_as_used_can_be_read_again() -> None:
     used = _config(mass_kg=70.0, forward=[0.0, 1.0, 0.0], noise={"force": 4.0}).as_used()
     assert Path(used["trial"]).is_absolute()
-    again = make_config({key: value for key, value in used.items() if value is not None}, "config.toml")
+    again = Settings.of({key: value for key, value in used.items() if value is not None}, "config.toml")
     assert again.as_used() == used

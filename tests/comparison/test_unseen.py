@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dynakin.errors import ConfigError, RecordingError
-from dynakin.filter import presets
+from dynakin.settings import presets
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.trial import simulate_squat

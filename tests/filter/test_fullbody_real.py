@@ -11,10 +11,10 @@ import pytest
 from dynakin import _core, read
 from dynakin.filter.estimator import Estimator
 from dynakin.model.definition import load_model
-from dynakin.model.subject import Subject
 from dynakin.recordings.formats.mot import read_table
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
+from dynakin.settings.subject import Subject
 
 Array = npt.NDArray[np.float64]
 

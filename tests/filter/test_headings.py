@@ -14,7 +14,6 @@ from scipy.spatial.transform import Rotation
 from dynakin import read
 from dynakin.filter.estimator import Estimator
 from dynakin.model.definition import load_model
-from dynakin.model.subject import Subject
 from dynakin.pipeline.result import Result
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
@@ -23,6 +22,7 @@ from dynakin.results.measures.angles import angle_columns, with_angles
 from dynakin.results.measures.facing import PELVIS, facing, nearly_singular
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.tracking import without_lost
+from dynakin.settings.subject import Subject
 
 Array = npt.NDArray[np.float64]
 QUARTER = Rotation.from_euler("Y", 90.0, degrees=True).as_matrix()

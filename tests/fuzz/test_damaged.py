@@ -10,21 +10,22 @@ from typing import Any
 import numpy as np
 import pytest
 
-from dynakin.config import make_config, read_config
 from dynakin.errors import ConfigError, DynakinError, ModelError, OutputError, RecordingError
-from dynakin.filter import presets
+from dynakin.filter.build import definition_of
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.samples import Sample
 from dynakin.model.definition import load_model
 from dynakin.model.markers.marker_set import load_marker_set
-from dynakin.model.subject import Subject
 from dynakin.model.table import load_table
-from dynakin.model.validation import read_toml
 from dynakin.recordings.formats.mot import read_table
 from dynakin.recordings.formats.trc import read_trc
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.results.files.folder import check_output_writable
+from dynakin.settings import presets
+from dynakin.settings.settings import Settings, read_keys
+from dynakin.settings.strict import read_toml
+from dynakin.settings.subject import Subject
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.trial import simulate_squat
 from dynakin.stream.sinks.record_format import packet_record, text_record
@@ -93,8 +94,8 @@ def test_file_names_that_no_file_can_have(tmp_path: Path, name: str) -> None:
     config = tmp_path / "a.toml"
     keys = 'trial = "a.trc"\nmodel = "squat7"\noutput = "o"\nmarkers = "x\\u0000"\n'
     config.write_text(f'{keys}table = "{"y" * 5000}"\n')
-    assert make_config(read_config(config), str(config)).table == "y" * 5000
-    refused(lambda: make_config(read_config(config), str(config)).definition(), ModelError, "no such table")
+    assert Settings.of(read_keys(config), str(config)).table == "y" * 5000
+    refused(lambda: definition_of(Settings.of(read_keys(config), str(config))), ModelError, "no such table")
 
 
 def test_elements_that_nest_too_deep(tmp_path: Path) -> None:

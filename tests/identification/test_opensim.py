@@ -12,7 +12,7 @@ import dynakin
 from dynakin.identification.subject import identify_subject
 from dynakin.model.inertia import RigidBody
 from dynakin.model.opensim.definition import load_opensim
-from dynakin.model.subject import Subject
+from dynakin.settings.subject import Subject
 
 
 def test_squats_and_standing(data_dir: Path) -> None:

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from dynakin.model.definition import load_model
-from dynakin.model.subject import Subject
 from dynakin.recordings.recording import Recording
+from dynakin.settings.subject import Subject
 from support.made_person import make, stand
 
 _core = pytest.importorskip("dynakin._core", reason="the compiled core is not built")

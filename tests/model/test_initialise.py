@@ -13,10 +13,10 @@ from dynakin.model.calibration.body import find_height
 from dynakin.model.calibration.frames import Trial
 from dynakin.model.definition import load_model
 from dynakin.model.markers.marker_set import load_marker_set, match_markers
-from dynakin.model.priors import Bounds, Priors
-from dynakin.model.subject import Subject
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.recording import Recording
+from dynakin.settings.model import Bounds, Priors
+from dynakin.settings.subject import Subject
 from support.made_person import FOOT_DIRECTION, LENGTHS, make, stand
 
 PERSON = Subject(mass_kg=70.0, height_m=1.75, sex="male")

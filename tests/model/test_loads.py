@@ -10,13 +10,14 @@ import pytest
 
 import dynakin
 from dynakin import _core
-from dynakin.config import make_config
 from dynakin.errors import ConfigError, ModelError, RecordingError
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.model.calibration.loads import CarriedLoad, with_loads
+from dynakin.model.calibration.loads import with_loads
 from dynakin.pipeline.stages import configure
-from dynakin.recordings.plates.loads import PlateLoad, without_plate_loads
+from dynakin.recordings.plates.loads import without_plate_loads
 from dynakin.results.measures.metrics import compute_metrics
+from dynakin.settings.loads import CarriedLoad, PlateLoad
+from dynakin.settings.settings import Settings
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.trial import simulate_squat
 
@@ -75,7 +76,7 @@ def test_the_filter_finds_the_person_beside_the_load(
 ) -> None:
     """A part of the trunk declared as a load: the same body, so the same movement and the same plates."""
     part = CarriedLoad(segment="trunk", mass_kg=7.0, place_m=(0.0, 0.2, 0.0), inertia_kg_m2=(0.1, 0.1, 0.1))
-    lighter = replace(definition, subject=SUBJECT.model_copy(update={"mass_kg": 63.0}))
+    lighter = replace(definition, subject=SUBJECT.changed(mass_kg=63.0))
     whole = dynakin.Estimator(definition).run(trial.recording)
     parts = dynakin.Estimator(lighter, loads=[part]).run(trial.recording)
     assert any("load 7 kg on the trunk" in message for message in parts.messages)
@@ -98,7 +99,7 @@ def test_loads_that_do_not_fit_are_told(initial: CalibratedModel, definition: dy
         dynakin.Estimator(nobody, loads=[BARBELL])
     keys = {"trial": "a.c3d", "model": "squat7", "output": "out"}
     bar = {"segment": "trunk", "mass_kg": 20.0, "place_m": [0.0, 0.3, 0.0]}
-    config = make_config(keys | {"loads": [bar], "mass_kg": 70.0}, "run.toml")
+    config = Settings.of(keys | {"loads": [bar], "mass_kg": 70.0}, "run.toml")
     assert config.loads == (CarriedLoad(**bar),) and config.as_used()["loads"][0]["mass_kg"] == 20.0
     for wrong, words in (
         ({"loads": [bar]}, "expected mass_kg"),
@@ -108,7 +109,7 @@ def test_loads_that_do_not_fit_are_told(initial: CalibratedModel, definition: dy
         ({"zero": "sitting"}, "zero"),
     ):
         with pytest.raises(ConfigError, match=words):
-            make_config(keys | wrong, "run.toml")
+            Settings.of(keys | wrong, "run.toml")
 
 
 def test_what_is_not_the_persons_comes_off_its_plate(trial: SimulatedTrial) -> None:

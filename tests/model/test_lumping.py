@@ -15,9 +15,9 @@ from dynakin.model.calibration.lumping import part_length
 from dynakin.model.definition import load_model
 from dynakin.model.inertia import RigidBody
 from dynakin.model.plan import ModelPlan
-from dynakin.model.subject import Subject
 from dynakin.model.table import PAIRED, load_table
 from dynakin.recordings.recording import Recording
+from dynakin.settings.subject import Subject
 
 Array = npt.NDArray[np.float64]
 PERSON = Subject(mass_kg=70.0, height_m=1.75, sex="female")

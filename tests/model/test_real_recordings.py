@@ -9,10 +9,10 @@ import pytest
 
 from dynakin.errors import ModelError
 from dynakin.model.definition import load_model
-from dynakin.model.subject import Subject
 from dynakin.recordings.formats.mot import read_table
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
+from dynakin.settings.subject import Subject
 
 OPENCAP = "opencap_subject4"
 PIG = "plugin_gait"

@@ -9,7 +9,7 @@ import pytest
 from dynakin.errors import ModelError
 from dynakin.model.definition import available_models, load_model
 from dynakin.model.markers.marker_set import load_marker_set
-from dynakin.model.subject import Subject
+from dynakin.settings.subject import Subject
 
 SOURCE = Path(__file__).resolve().parents[2] / "src" / "dynakin" / "model"
 

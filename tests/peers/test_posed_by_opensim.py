@@ -10,15 +10,15 @@ import numpy.typing as npt
 import pytest
 
 from dynakin import read
-from dynakin.filter import presets
 from dynakin.filter.estimator import Estimator
 from dynakin.model.definition import load_model
 from dynakin.model.opensim.definition import OpenSimDefinition
 from dynakin.model.opensim.export import of_definition, of_initial
 from dynakin.model.opensim.write import write_osim
-from dynakin.model.subject import Subject
 from dynakin.pipeline.result import Result
 from dynakin.results.estimate import Estimate
+from dynakin.settings import presets
+from dynakin.settings.subject import Subject
 
 opensim: Any = pytest.importorskip("opensim", reason="OpenSim is not installed (pip install opensim)")
 pytestmark = pytest.mark.peers
@@ -39,7 +39,7 @@ def estimated(folder: Path, name: str, model: str, mass: float, out: Path) -> tu
     recording = read(trial, folder / f"{name}_grf.mot") if trial.exists() else read(folder / f"{name}.c3d")
     recording = recording.window(recording.time[0], recording.time[0] + 0.5)
     definition = load_model(folder / model if model.endswith(".osim") else model, Subject(mass_kg=mass, height_m=1.74))
-    noise = presets.default().model_copy(update={"length_drift": 0.0})
+    noise = presets.default().changed(length_drift=0.0)
     estimator = Estimator(definition, noise, estimate=("lengths", "markers", "inertia"))
     estimate = estimator.run(recording, smooth=True)
     Result(estimate).save(out)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import dynakin
-from dynakin.model.calibration.posture import Geometry
+from dynakin.model.plan import Geometry
 from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.trial import simulate_squat
 from dynakin.validation.reference.chain import PlanarChain

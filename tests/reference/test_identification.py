@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dynakin.errors import RecordingError
-from dynakin.model.priors import Bounds
+from dynakin.settings.model import Bounds
 from dynakin.validation.reference.least_squares import bodies_of, identify, predicted_wrench
 from dynakin.validation.reference.regressor import parameter_names, table_parameters, wrench_regressor
 from dynakin.validation.reference.table_dynamics import table_dynamics

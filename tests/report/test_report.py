@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from dynakin.report.insights import in_short, insights
-from dynakin.report.labels import listed, moment_note, number, short_marker_names
+from dynakin.report.labels import moment_note, short_marker_names
 from dynakin.report.page import render_report
 from dynakin.report.plot import new_axes, thin, to_svg
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.metrics import compute_metrics
+from dynakin.results.naming import listed, number
 from support.estimates.synthetic import make_estimate
 from support.page import Structure
 

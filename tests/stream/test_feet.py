@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import dynakin
-from dynakin.filter import presets
 from dynakin.recordings.feet.loads import foot_loads
 from dynakin.results.measures.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
+from dynakin.settings import presets
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.trial import simulate
 from dynakin.stream.feet import LiveFeet

@@ -14,10 +14,11 @@ import numpy as np
 import pytest
 
 from dynakin.errors import OutputError, RecordingError
+from dynakin.filter.build import estimator_of
 from dynakin.recordings.recording import Recording
+from dynakin.settings.settings import Settings
 from dynakin.simulation.trial import simulate_squat
 from dynakin.stream.session import Live
-from dynakin.stream.settings import estimator_of
 from dynakin.stream.sinks.base import Callback, LiveFrame, Sink
 from dynakin.stream.sinks.recorder import FILE, Recorder, finish, recorded
 from dynakin.stream.sources.packets import Packet, PlatePacket
@@ -183,7 +184,12 @@ def test_a_session_whose_recorder_fails_goes_on_and_is_no_success(squat: Recordi
             self.closed += 1
 
     full, frames, said = Full(), list[LiveFrame](), list[str]()
-    live = Live(estimator_of(SETTINGS), [Replay(squat, speed=4.0)], [full, Callback(frames.append)], say=said.append)
+    live = Live(
+        estimator_of(Settings.of(SETTINGS, "live", ("model",))),
+        [Replay(squat, speed=4.0)],
+        [full, Callback(frames.append)],
+        say=said.append,
+    )
     live.run()
     assert said.count("the disk is full") == 1 and live.failures == ["the disk is full"]
     assert full.closed == 1 and len(frames) > full.frames >= 20

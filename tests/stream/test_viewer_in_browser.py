@@ -17,9 +17,10 @@ from typing import Any
 
 import pytest
 
+from dynakin.filter.build import estimator_of
+from dynakin.settings.settings import Settings
 from dynakin.simulation.trial import simulate_squat
 from dynakin.stream.session import Live
-from dynakin.stream.settings import estimator_of
 from dynakin.stream.sinks.base import Callback, LiveFrame, Started
 from dynakin.stream.sources.replay import Replay
 
@@ -92,7 +93,7 @@ def test_names_from_files_are_text_on_the_page(browser: Browser, tmp_path: Path)
 
     frames: list[LiveFrame] = []
     live = Live(
-        estimator_of(SETTINGS),
+        estimator_of(Settings.of(SETTINGS, "live", ("model",))),
         [Replay(simulate_squat(seed=1, duration_s=5.0).recording, speed=0.0)],
         [Callback(frames.append)],
         say=lambda text: None,

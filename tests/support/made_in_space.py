@@ -10,8 +10,8 @@ import numpy.typing as npt
 from dynakin import _core
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import ModelDefinition, load_model
-from dynakin.model.subject import Subject
 from dynakin.recordings.recording import Plate, Recording
+from dynakin.settings.subject import Subject
 
 Array = npt.NDArray[np.float64]
 

@@ -7,10 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from dynakin import _core
-from dynakin.filter import presets
 from dynakin.filter.augment import continuous_noise, initial_covariance
 from dynakin.filter.core_filter import core_filter
-from dynakin.filter.noise import Noise
+from dynakin.filter.noise import wrench_covariance
+from dynakin.settings import presets
+from dynakin.settings.noise import Noise
 from dynakin.studies.tuning.trial import TuningTrial
 
 Array = np.ndarray
@@ -38,7 +39,7 @@ def own_noise(**changes: float) -> Noise:
         "reference_point_m": (0.0, 0.0, 0.0),
         "plate_load_tolerance": None,
     }
-    return presets.default().model_copy(update=values | changes)
+    return presets.default().changed(**(values | changes))
 
 
 def own_trial(like: TuningTrial, noise: Noise, seed: int) -> TuningTrial:
@@ -77,7 +78,7 @@ def own_trial(like: TuningTrial, noise: Noise, seed: int) -> TuningTrial:
         markers.append(
             _core.marker_positions(model, x) + noise.marker_sd_m * rng.normal(size=(len(like.initial.spec.markers), 3))
         )
-        force = np.array(_core.wrench(model, x)) + np.sqrt(np.diag(noise.wrench_covariance())) * rng.normal(size=6)
+        force = np.array(_core.wrench(model, x)) + np.sqrt(np.diag(wrench_covariance(noise))) * rng.normal(size=6)
         force[wanted] += x[offsets]
         wrench.append(force)
     time = np.arange(FRAMES) * dt

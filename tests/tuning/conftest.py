@@ -5,10 +5,10 @@ from __future__ import annotations
 import pytest
 
 import dynakin
-from dynakin.filter import presets
 from dynakin.filter.estimator import Estimator
-from dynakin.filter.noise import Noise
 from dynakin.recordings.recording import Recording
+from dynakin.settings import presets
+from dynakin.settings.noise import Noise
 from dynakin.simulation.trial import simulate
 from dynakin.studies.tuning.score import Shared
 from dynakin.studies.tuning.trial import prepare

@@ -10,7 +10,7 @@ import pytest
 
 from dynakin.cli.app import main
 from dynakin.errors import ConfigError
-from dynakin.filter import presets
+from dynakin.settings import presets
 from dynakin.simulation.trial import simulate
 from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import open_pool

@@ -6,8 +6,8 @@ import pytest
 
 import dynakin
 from dynakin.errors import ConfigError
-from dynakin.filter import presets
 from dynakin.filter.estimator import Estimator
+from dynakin.settings import presets
 from dynakin.simulation.trial import simulate
 from dynakin.studies.engine.pools import open_pool
 from dynakin.studies.tuning.fit import Fitter, usual_names
@@ -52,7 +52,7 @@ def test_each_kind_of_model_is_fitted_by_what_has_an_effect_on_it(default: Share
 
 def test_a_setting_that_is_not_given_starts_as_the_usual_one() -> None:
     noise = presets.default()
-    assert value_of(noise.model_copy(update={"floating_jerk": None}), "floating_jerk") == noise.jerk
+    assert value_of(noise.changed(floating_jerk=None), "floating_jerk") == noise.jerk
 
 
 @pytest.mark.parametrize("pair", zip(FIXED, FLOATING, strict=True))

@@ -17,8 +17,8 @@ import pytest
 
 from dynakin.cli.app import main
 from dynakin.errors import ConfigError, DynakinError
-from dynakin.filter import presets
 from dynakin.report.paper_figures.sensitivity import read_sensitivity
+from dynakin.settings import presets
 from dynakin.simulation.trial import simulate
 from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import open_pool
@@ -128,7 +128,7 @@ def test_the_optimum_is_a_preset_that_run_takes(
     optimum = json.loads((folder / "grid.json").read_text())["optimum"]["nll"]
     noise = presets.preset(str(folder / "preset_nll.toml"))
     assert (noise.speed, noise.acceleration) == (optimum["speed"], optimum["acceleration"])
-    assert noise.model_copy(update={"speed": 1e2, "acceleration": 1e3}) == presets.paper()
+    assert noise.changed(speed=1e2, acceleration=1e3) == presets.paper()
     with (folder / "grid.csv").open(newline="") as file:
         cells = list(csv.DictReader(file))
     assert min((c for c in cells if c["nll"]), key=lambda c: float(c["nll"]))["speed"] == repr(optimum["speed"])
@@ -204,7 +204,7 @@ def test_a_folder_of_something_else_is_left_alone(files: Path, tmp_path: Path) -
 def test_all_diverged_is_said(paper: Shared) -> None:
     """Gains of nothing on a start that stands still, and a person who moves."""
     axes = [axis(name, 1e-30, 1e-29, 2) for name in ("coordinate", "speed", "acceleration")]
-    still = replace(paper, base=paper.base.model_copy(update={"marker_place": 0.0}))
+    still = replace(paper, base=paper.base.changed(marker_place=0.0))
     with open_pool("threads", 2) as pool:
         grid = run_grid(still, axes, pool)
     with pytest.raises(DynakinError, match="diverged in all of the 8 combinations"):

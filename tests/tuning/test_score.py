@@ -9,13 +9,13 @@ import numpy as np
 import pytest
 
 from dynakin.errors import ConfigError
-from dynakin.filter import presets
 from dynakin.filter.estimator import Estimator
 from dynakin.recordings.recording import Recording
 from dynakin.results.measures.fit import marker_rms_mm, signal_fit
 from dynakin.results.measures.metrics import compute_metrics
+from dynakin.settings import presets
 from dynakin.studies.tuning.score import Shared, figures_of, score_task
-from dynakin.studies.tuning.settings import changed, check_setting, value_of
+from dynakin.studies.tuning.settings import check_setting, value_of
 from dynakin.studies.tuning.trial import prepare, undoubting
 
 
@@ -51,7 +51,7 @@ def test_ahead_is_one_for_a_filter_that_only_holds_the_last_value(default: Share
 
 def test_a_declared_sigma_is_not_the_one_that_is_tried(paper: Shared) -> None:
     louder = {"marker_scale": 100.0, "force": 100.0 * paper.base.force, "moment": 100.0 * paper.base.moment}
-    trial, tried = paper.trials[0], changed(paper.base, louder)
+    trial, tried = paper.trials[0], paper.base.changed(**louder)
     found = score_task(paper, (0, louder))["sigma"]
     assert found == figures_of(trial, undoubting(tried), paper.base)["sigma"]
     assert found == pytest.approx(10.0 * figures_of(trial, undoubting(tried), tried)["sigma"])
@@ -95,4 +95,4 @@ def test_settings_are_checked() -> None:
     with pytest.raises(ConfigError, match="'jerk' is 0 in these settings"):
         value_of(presets.paper(), "jerk")
     with pytest.raises(ConfigError, match="force"):
-        changed(presets.paper(), {"force": -1.0})
+        presets.paper().changed(force=-1.0)

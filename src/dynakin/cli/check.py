@@ -18,13 +18,13 @@ from dynakin.errors import DynakinError
 from dynakin.model.definition import available_models, load_model
 from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
 from dynakin.model.markers.schema import MarkerSetFile
-from dynakin.model.subject import Subject
 from dynakin.recordings.frame import GroundFrame, find_ground_frame
 from dynakin.recordings.landmarks import plain_name
 from dynakin.recordings.plates.checks import check_plates
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.standing import standing_window
+from dynakin.settings.subject import Subject
 
 
 def check(

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from dynakin.cli.options import forward_direction
-from dynakin.config import make_config, read_config
 from dynakin.errors import ConfigError
+from dynakin.settings.settings import Settings, read_keys
 from dynakin.validation.case import Case, case_of
 from dynakin.validation.held_out import halves
 
@@ -52,7 +52,7 @@ def cases_of(
 
     Args:
         forces: none, or one a trial in the same order. presets: by name; none: the configuration's own.
-        given: the other keys of `RunConfig` that the command line gives. command: opens messages.
+        given: the other keys of `Settings` that the command line gives. command: opens messages.
 
     Raises:
         DynakinError: anything wrong with the input, in one line.
@@ -74,9 +74,9 @@ def cases_of(
 def _case(trial: Path, given: dict[str, Any], presets: Sequence[str], cutoff_hz: float, command: str) -> Case:
     options = {key: value for key, value in given.items() if value is not None}
     is_config = trial.suffix.casefold() == ".toml"
-    content = read_config(trial) if is_config else {"trial": trial}
+    content = read_keys(trial) if is_config else {"trial": trial}
     # a configuration's own output is not where a comparison goes
-    config = make_config(content | options | {"output": Path()}, str(trial) if is_config else command)
+    config = Settings.of(content | options | {"output": Path()}, str(trial) if is_config else command)
     return case_of(config, presets, cutoff_hz)
 
 

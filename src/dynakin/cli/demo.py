@@ -13,16 +13,16 @@ from rich.table import Table
 
 from dynakin.cli.console import busy, out, progress_bar, table
 from dynakin.cli.summary import end, print_summary
-from dynakin.filter import presets
 from dynakin.filter.estimator import Estimator
 from dynakin.identification.observability.trial import identifiability
 from dynakin.model.definition import load_model
-from dynakin.model.subject import Subject
 from dynakin.pipeline.result import Result
 from dynakin.results.estimate import Estimate
 from dynakin.results.files.folder import check_output_writable
 from dynakin.results.measures.fit import truth_error
 from dynakin.results.measures.metrics import evaluation_window
+from dynakin.settings import presets
+from dynakin.settings.subject import Subject
 from dynakin.validation.coverage import block_coverage, parameter_coverage
 from dynakin.validation.methods import trial_of
 from dynakin.validation.truth import FIGURES, LEG, parameter_errors, truth_errors

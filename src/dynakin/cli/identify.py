@@ -28,9 +28,9 @@ from dynakin.identification.report import base_in_words, segment_rows
 from dynakin.identification.subject import Identification, identify_subject
 from dynakin.model.definition import load_model
 from dynakin.model.identified import read_identified
-from dynakin.model.subject import Subject
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
+from dynakin.settings.subject import Subject
 
 
 def identify(

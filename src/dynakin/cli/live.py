@@ -26,10 +26,11 @@ from dynakin.cli.options import (
 from dynakin.cli.run import estimated
 from dynakin.cli.summary import end, print_summary
 from dynakin.errors import ConfigError
+from dynakin.filter.build import estimator_of
 from dynakin.recordings.read import FORCE_READERS, read
+from dynakin.settings.settings import Settings
 from dynakin.stream.fusion import DELAY_S
 from dynakin.stream.session import Live
-from dynakin.stream.settings import estimator_of
 from dynakin.stream.sinks.base import Sink
 from dynakin.stream.sinks.recorder import Recorder, finish
 from dynakin.stream.sources.plugins import SINKS, SOURCES, plugin
@@ -121,7 +122,7 @@ def live(
     sinks = _sinks(settings, record, publish, view, host, port)
     try:
         session = Live(
-            estimator_of(settings, lag),
+            estimator_of(Settings.of(settings, "live", ("model",)), lag),
             sources,
             sinks,
             delay_s=delay,

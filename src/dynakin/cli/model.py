@@ -20,7 +20,7 @@ from dynakin.model.markers.schema import Marker, MarkerSetFile
 from dynakin.model.opensim.definition import OpenSimDefinition
 from dynakin.model.schema import ModelFile
 from dynakin.model.schema import Segment as ModelSegment
-from dynakin.model.subject import Subject
+from dynakin.settings.subject import Subject
 
 
 def model(
@@ -165,7 +165,7 @@ def _markers(model: ModelFile, marker_set: MarkerSetFile) -> Table:
 
 
 def _states(model: ModelFile) -> Table:
-    from dynakin.model.priors import Bounds
+    from dynakin.settings.model import Bounds
 
     bounds = Bounds()
     free = sum(not c.locked for c in model.coordinates)

@@ -1,4 +1,4 @@
-"""Options that several commands have in common; what they mean is written once, in `dynakin.config`."""
+"""Options that several commands have in common; what they mean is written once, in `dynakin.settings`."""
 
 from __future__ import annotations
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import typer
 
 from dynakin.cli.options import Preset
-from dynakin.config_template import config_template
+from dynakin.settings.template import config_template
 
 
 def print_config(preset: Preset = None) -> None:

@@ -34,10 +34,10 @@ from dynakin.cli.options import (
     Vertical,
 )
 from dynakin.errors import ConfigError
-from dynakin.filter import presets
 from dynakin.recordings.smoothing import CUTOFF_HZ
 from dynakin.report.paper_figures.figures import save_sensitivity_figures
 from dynakin.report.paper_figures.sensitivity import GAIN_NAMES, GAIN_UNITS, Sensitivity
+from dynakin.settings import presets
 from dynakin.studies.engine.folder import ROWS, open_folder
 from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import open_pool
@@ -188,7 +188,7 @@ def _axis(text: str) -> Axis:
 
 def shared_of(cases: Sequence[Case], base: str, left_out: bool = False) -> Shared:
     """Trials made ready with the settings of a preset; changes in [noise] of the first configuration hold for all."""
-    noise = cases[0].config.model_copy(update={"preset": base}).noise_settings()
+    noise = presets.preset(base, cases[0].config.noise)
     ready = []
     for case in cases:
         with busy(f"reading {case.recording.name}"):

@@ -5,19 +5,17 @@ from __future__ import annotations
 from collections.abc import Collection
 from copy import copy
 from dataclasses import replace
-from typing import Literal, get_args
 
 import numpy as np
 import numpy.typing as npt
 
 import dynakin._core as _core
-from dynakin.filter.noise import Noise
+from dynakin.filter.noise import jerk_densities, plate_sd, soft_tissue_sd
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.settings.model import QUANTITIES, Quantity
+from dynakin.settings.noise import Noise
 
 Array = npt.NDArray[np.float64]
-Quantity = Literal["lengths", "markers", "soft_tissue", "inertia"]
-QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
-"""Parameters that can be estimated: segment lengths, marker places, displacements of skin and flesh, inertia."""
 
 
 def extended(initial: CalibratedModel, noise: Noise, estimate: Collection[Quantity] = QUANTITIES) -> CalibratedModel:
@@ -30,7 +28,7 @@ def extended(initial: CalibratedModel, noise: Noise, estimate: Collection[Quanti
         estimate: kinds of parameters to estimate; the others stay where the model has them.
     """
     spec = copy(initial.spec)  # the same measured model serves other settings, in other threads
-    sd = noise.soft_tissue_sd(initial.soft_tissue_m) * ("soft_tissue" in estimate)
+    sd = soft_tissue_sd(noise, initial.soft_tissue_m) * ("soft_tissue" in estimate)
     markers = spec.markers
     for marker, value in zip(markers, sd, strict=True):
         marker.soft_tissue = [bool(axis and value > 0.0) for axis in marker.measured]
@@ -39,7 +37,7 @@ def extended(initial: CalibratedModel, noise: Noise, estimate: Collection[Quanti
     spec.markers = markers
     _hold(spec, estimate)
     spec.wrench_offset = [
-        bool(seen and value > 0.0) for seen, value in zip(spec.wrench_measured, noise.plate_sd(), strict=True)
+        bool(seen and value > 0.0) for seen, value in zip(spec.wrench_measured, plate_sd(noise), strict=True)
     ]
     spec.wrench_delay = noise.plate_delay_s > 0.0
     names = list(_core.Model(spec).layout.names)
@@ -94,7 +92,7 @@ def _added_sd(spec: _core.ModelSpec, noise: Noise, soft_tissue: Array) -> dict[s
     }
     sd |= {
         f"plates/{name}": float(value)
-        for name, value in zip(("fx", "fy", "fz", "mx", "my", "mz"), noise.plate_sd(), strict=True)
+        for name, value in zip(("fx", "fy", "fz", "mx", "my", "mz"), plate_sd(noise), strict=True)
     }
     return sd | {"plates/delay": noise.plate_delay_s}
 
@@ -121,7 +119,7 @@ def continuous_noise(initial: CalibratedModel, noise: Noise, layout: _core.State
     """Density (n,) of the white noise that drives each element, and the rate (n,) 1/s at which it decays."""
     density, decay = np.zeros(layout.size), np.zeros(layout.size)
     kinds = {axis.coordinate: axis.kind for segment in initial.spec.segments for axis in segment.axes}
-    jerk = noise.jerk_densities(floating=bool(initial.feet))
+    jerk = jerk_densities(noise, floating=bool(initial.feet))
     offset, size = layout.blocks["accelerations"]
     for k in range(offset, offset + size):
         coordinate = layout.names[k].removesuffix("/acceleration")

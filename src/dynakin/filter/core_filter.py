@@ -9,9 +9,11 @@ import numpy.typing as npt
 
 import dynakin._core as _core
 from dynakin.errors import ConfigError
-from dynakin.filter.augment import QUANTITIES, Quantity, continuous_noise, extended, initial_covariance
-from dynakin.filter.noise import Noise, gate_limits
+from dynakin.filter.augment import continuous_noise, extended, initial_covariance
+from dynakin.filter.noise import gate_limits, marker_variance, process_variance, wrench_covariance
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.settings.model import QUANTITIES, Quantity
+from dynakin.settings.noise import Noise
 
 Array = npt.NDArray[np.float64]
 
@@ -52,11 +54,11 @@ def filter_settings(
     recovery = _core.RecoverySettings(blind_s=noise.blind_s, unseen_sd=unseen) if noise.recover else None
     density, decay = continuous_noise(initial, noise, layout)
     return _core.FilterSettings(
-        process_variance=noise.process_variance(layout),
+        process_variance=process_variance(noise, layout),
         process_density=density,
         decay_rate=decay,
         marker_variance=marker_variance(initial, noise, estimate),
-        wrench_covariance=noise.wrench_covariance(),
+        wrench_covariance=wrench_covariance(noise),
         reference_point=initial.plate_centre if point == "auto" else np.array(point, dtype=float),
         total_mass=initial.weighed_kg if noise.total_mass_use == "frame" else None,
         total_mass_variance=noise.total_mass,
@@ -68,15 +70,4 @@ def filter_settings(
         wrench_needs_markers=noise.recover,
         iterate_beyond=np.inf if noise.iterate_beyond is None else noise.iterate_beyond,
         recovery=recovery,
-    )
-
-
-def marker_variance(initial: CalibratedModel, noise: Noise, estimate: Collection[Quantity] = QUANTITIES) -> Array:
-    """R (M,) m^2 of the markers of a model that has the states these settings ask for."""
-    return noise.marker_variance(
-        initial.recorded_markers,
-        initial.marker_variance,
-        initial.soft_tissue_m,
-        initial.unmodelled_m,
-        "soft_tissue" in estimate,
     )

@@ -10,28 +10,29 @@ import numpy.typing as npt
 
 import dynakin._core as _core
 from dynakin.errors import ConfigError, DivergenceError, RecordingError
-from dynakin.filter import presets
 from dynakin.filter.alignment import PASSES, contradicted, delay_of, in_step, in_words, is_late
 from dynakin.filter.assemble import assemble
-from dynakin.filter.augment import QUANTITIES, Quantity, initial_covariance
+from dynakin.filter.augment import initial_covariance
 from dynakin.filter.closure import plates_misfit
 from dynakin.filter.core_filter import core_filter, filter_settings
 from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.filter.live import StepEstimate, deviations_of, step_estimate
-from dynakin.filter.noise import Noise
 from dynakin.filter.samples import Sample, recording_arrays, sample_arrays
 from dynakin.filter.smoothing import check_can_smooth, smoothed, whether_to_smooth
 from dynakin.filter.total_wrench import Ground, doubtful_mass, foot_wrenches, known_ground
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.model.calibration.loads import CarriedLoad, with_loads
+from dynakin.model.calibration.loads import with_loads
 from dynakin.model.definition import Definition
 from dynakin.model.identified import IdentifiedSubject, with_identified
-from dynakin.model.priors import Bounds, Priors
-from dynakin.model.validation import nearest
 from dynakin.recordings.limits import rate_problem
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.tracking import without_lost
+from dynakin.settings import presets
+from dynakin.settings.loads import CarriedLoad
+from dynakin.settings.model import QUANTITIES, Bounds, Priors, Quantity
+from dynakin.settings.noise import Noise
+from dynakin.settings.strict import nearest
 
 Array = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]
@@ -48,7 +49,7 @@ class Estimator:
     Args:
         model: what `load_model` returns.
         noise: `presets.default()` where not given.
-        priors, bounds: prior standard deviations and half widths of (9); see `dynakin.model.priors`.
+        priors, bounds: prior standard deviations and half widths of (9); see `dynakin.settings.model`.
         side: limb markers of a lumped model ("auto", "right", "left", "both").
         vertical, forward: laboratory directions, found in the recording where "auto".
         estimate: kinds of parameters to estimate, of "lengths", "markers", "soft_tissue" and "inertia"; the others stay

@@ -10,8 +10,8 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ConfigError
-from dynakin.filter.noise import Noise
 from dynakin.results.records import NOT_SMOOTHED
+from dynakin.settings.noise import Noise
 
 Array = npt.NDArray[np.float64]
 

@@ -12,7 +12,6 @@ from dynakin.arrays import runs
 from dynakin.errors import RecordingError
 from dynakin.filter.closure import EXCESS, Closure, closure
 from dynakin.filter.foot_wrenches import FootWrenches
-from dynakin.filter.noise import Noise
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet import loads as on_plates
 from dynakin.recordings.feet.distance import distance_to_hull
@@ -20,6 +19,7 @@ from dynakin.recordings.feet.loads import LOADED_N, NEAR_M, FootLoads, foot_load
 from dynakin.recordings.plates.checks import PlateCheck, check_plates
 from dynakin.recordings.recording import Recording
 from dynakin.results.measures.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
+from dynakin.settings.noise import Noise
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]

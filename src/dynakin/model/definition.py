@@ -12,21 +12,21 @@ import numpy as np
 
 import dynakin._core as _core
 from dynakin.errors import ModelError
+from dynakin.files import is_file
 from dynakin.model.calibration.calibrated import CalibratedModel, first_centre_of_pressure
 from dynakin.model.calibration.in_space import started
 from dynakin.model.calibration.measure import measure
 from dynakin.model.markers.marker_set import choose_marker_set, load_marker_set, match_markers
 from dynakin.model.markers.schema import MarkerSetFile
-from dynakin.model.opensim.definition import OpenSimDefinition, OpenSimOptions, load_opensim
-from dynakin.model.priors import Bounds, Priors
+from dynakin.model.opensim.definition import OpenSimDefinition, load_opensim
 from dynakin.model.schema import ModelFile
 from dynakin.model.spec import in_layout, to_core
-from dynakin.model.subject import Subject
 from dynakin.model.table import BodyTable, load_table
-from dynakin.model.validation import nearest, read_toml, validate
-from dynakin.recordings.formats.textfile import is_file
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Recording
+from dynakin.settings.model import Bounds, OpenSimOptions, Priors
+from dynakin.settings.strict import nearest, read_toml, validate
+from dynakin.settings.subject import Subject
 
 _FOLDER = resources.files("dynakin.model") / "builtin"
 

@@ -15,7 +15,7 @@ import dynakin._core as _core
 from dynakin.errors import ModelError
 from dynakin.model.calibration.calibrated import CalibratedModel, JointPrior
 from dynakin.model.inertia import INERTIA_NAMES
-from dynakin.model.validation import Strict, read_toml, validate
+from dynakin.settings.strict import Strict, read_toml, validate
 
 _WIDE = 3.0  # standard deviations that bounds leave on both sides
 _MASS_APART = 0.05

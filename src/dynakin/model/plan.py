@@ -8,9 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.model.inertia import INERTIA_NAMES, PLANAR_INERTIA, RigidBody
-from dynakin.model.priors import Bounds, Interval, Priors
-from dynakin.model.schema import ModelFile, Segment
+from dynakin.model.schema import Interval, ModelFile, Segment
 from dynakin.model.state_priors import state_bounds, state_prior
+from dynakin.settings.model import Bounds, Priors
 
 Array = npt.NDArray[np.float64]
 

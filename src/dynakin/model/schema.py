@@ -13,10 +13,11 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from dynakin.model.mirroring import SUFFIXES, mirrored
-from dynakin.model.validation import CoordinateName, Name, Strict, nearest
+from dynakin.settings.strict import CoordinateName, Name, Strict, nearest
 
 Vector3 = Annotated[tuple[float, float, float], Field(description="three numbers")]
 LandmarkPair = tuple[str, str]
+Interval = tuple[float, float]
 _MOST = 1000  # segments, lengths, coordinates: five times those of a whole body with fingers and vertebrae
 
 

@@ -7,8 +7,9 @@ from collections.abc import Iterable, Mapping
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.model.inertia import RigidBody
-from dynakin.model.priors import Bounds, Interval, Priors, inertia_bounds, inertia_prior
+from dynakin.model.inertia import INERTIA_NAMES, RigidBody
+from dynakin.model.schema import Interval
+from dynakin.settings.model import Bounds, Priors
 
 Array = npt.NDArray[np.float64]
 
@@ -71,4 +72,30 @@ def state_bounds(
     for segment, body in bodies.items():
         entry = inertia_bounds(body, reach[segment], bounds)
         found |= {f"inertia/{segment}/{name}": interval for name, interval in entry.items()}
+    return found
+
+
+def inertia_prior(body: RigidBody, length: float, priors: Priors) -> dict[str, float]:
+    """Standard deviation of each of the ten numbers."""
+    moment = priors.inertia_fraction * max(float(np.trace(body.inertia)) / 2.0, 1e-12)
+    planar = priors.inertia_fraction * max(float(body.inertia[2, 2]), 1e-12)
+    sd = dict.fromkeys(INERTIA_NAMES, moment)
+    sd |= dict.fromkeys(("mx", "my", "mz"), priors.first_moment_fraction * body.mass * length)
+    return sd | {"mass": priors.mass_fraction * body.mass, "izz": planar}
+
+
+def inertia_bounds(body: RigidBody, length: float, bounds: Bounds) -> dict[str, Interval]:
+    """(lower, upper) of each of the ten numbers."""
+    values = dict(zip(INERTIA_NAMES, body.vector, strict=True))
+    found: dict[str, Interval] = {}
+    for name, value in values.items():
+        if name == "mass":
+            half = bounds.mass_fraction * abs(value)
+        elif name in ("mx", "my", "mz"):
+            half = bounds.first_moment_fraction * body.mass * length
+        elif name in ("ixx", "iyy", "izz"):
+            half = bounds.inertia_fraction * abs(value)
+        else:  # products are bounded by the moments: |ixy| <= (ixx + iyy) / 2 for every real body
+            half = bounds.inertia_fraction * float(np.trace(body.inertia)) / 2.0
+        found[name] = (value - half, value + half)
     return found

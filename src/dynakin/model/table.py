@@ -21,9 +21,9 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ModelError
-from dynakin.model.subject import Sex
-from dynakin.model.validation import nearest
-from dynakin.recordings.formats.textfile import LARGEST_TEXT, is_file, read_bytes
+from dynakin.files import LARGEST_TEXT, is_file, read_bytes
+from dynakin.settings.strict import nearest
+from dynakin.settings.subject import Sex
 
 Array = npt.NDArray[np.float64]
 BUILTIN = ("dumas", "deleva")

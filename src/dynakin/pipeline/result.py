@@ -9,7 +9,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dynakin.config import RunConfig
 from dynakin.errors import OutputError
 from dynakin.identification.observability.trial import Identifiability
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -29,6 +28,7 @@ from dynakin.results.measures.mean_curves import curve_points, estimate_curves, 
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.tracking import refuse_lost
 from dynakin.results.records import Event
+from dynakin.settings.settings import Settings
 from dynakin.validation.methods import Trial
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ class Result:
     model: CalibratedModel | None = None
     comparison: Trial | None = None
     observability: Identifiability | None = None
-    settings: RunConfig | None = None
+    settings: Settings | None = None
     failures: Failures = field(default_factory=Failures)
 
     @property

@@ -7,17 +7,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from dynakin.config import RunConfig, make_config, read_config
 from dynakin.errors import ConfigError, DynakinError
 from dynakin.filter.estimator import Estimator
-from dynakin.filter.noise import Noise
 from dynakin.identification.observability.trial import Identifiability, identifiability
-from dynakin.model.subject import Subject
 from dynakin.pipeline.result import Result
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
 from dynakin.results.failures import Failures
 from dynakin.results.measures.tracking import refuse_lost
+from dynakin.settings.noise import Noise
+from dynakin.settings.settings import Settings, read_keys
+from dynakin.settings.subject import Subject
 from dynakin.validation.case import Case, case_of
 from dynakin.validation.methods import Trial, estimate_each, trial_of, with_lost
 
@@ -28,7 +28,7 @@ LARGEST_BENCH = 250
 
 
 def run(
-    trial: str | Path | Recording | RunConfig,
+    trial: str | Path | Recording | Settings,
     *,
     model: str | Path | None = None,
     subject: Subject | None = None,
@@ -72,7 +72,7 @@ def run(
         given["static"] = static.path or static.name
     elif static is not None:
         given["static"] = static
-    if isinstance(trial, RunConfig):
+    if isinstance(trial, Settings):
         if unused := [key for key, value in given.items() if value is not None]:
             raise ConfigError(f"run: {unused[0]} is given next to settings, expected it in the settings")
         config = trial
@@ -87,7 +87,7 @@ def run(
     return run_case(case, keep_lost=keep_lost, observability=observability, progress=progress)
 
 
-def configure(trial: Path, given: Mapping[str, Any], defaults: Mapping[str, Any] | None = None) -> RunConfig:
+def configure(trial: Path, given: Mapping[str, Any], defaults: Mapping[str, Any] | None = None) -> Settings:
     """Merge a configuration file, if that is what ``trial`` is, with what is given, which wins (None: not given).
 
     Raises:
@@ -95,9 +95,9 @@ def configure(trial: Path, given: Mapping[str, Any], defaults: Mapping[str, Any]
     """
     options = dict(defaults or {})
     is_config = trial.suffix.casefold() == ".toml"
-    options |= read_config(trial) if is_config else {"trial": trial}
+    options |= read_keys(trial) if is_config else {"trial": trial}
     options |= {key: value for key, value in given.items() if value is not None}
-    return make_config(options, str(trial) if is_config else "run")
+    return Settings.of(options, str(trial) if is_config else "run")
 
 
 def run_case(

@@ -8,7 +8,6 @@ of the file, a missing marker is NaN, and each plate keeps its own wrench, groun
 from dynakin.recordings.formats.options import ReadOptions
 from dynakin.recordings.frame import GroundFrame, find_ground_frame
 from dynakin.recordings.plates.checks import check_plates
-from dynakin.recordings.plates.loads import PlateLoad
 from dynakin.recordings.read import read, register_reader
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.recordings.standing import standing_window
@@ -16,7 +15,6 @@ from dynakin.recordings.standing import standing_window
 __all__ = [
     "GroundFrame",
     "Plate",
-    "PlateLoad",
     "ReadOptions",
     "Recording",
     "check_plates",

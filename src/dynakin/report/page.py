@@ -9,7 +9,7 @@ import jinja2
 import tomli_w
 
 from dynakin.report.insights import in_short, insights, what_was_run
-from dynakin.report.labels import is_planar, listed, number, parameter_label, short_marker_names
+from dynakin.report.labels import is_planar, parameter_label, short_marker_names
 from dynakin.report.playback import playback
 from dynakin.report.playback_spatial import spatial_playback
 from dynakin.report.sections.movement import sections
@@ -19,6 +19,7 @@ from dynakin.results.files.versions import versions
 from dynakin.results.measures.facing import facing
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.sources import UNKNOWN
+from dynakin.results.naming import listed, number
 
 if TYPE_CHECKING:
     from dynakin.validation.methods import Trial

@@ -11,9 +11,10 @@ import numpy as np
 from markupsafe import Markup
 
 from dynakin.report.body import chain_of, colours_of, floor_height, marker_segments, reaction
-from dynakin.report.labels import is_planar, number, sentence, short_marker_names, words
+from dynakin.report.labels import is_planar, short_marker_names
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.sources import DERIVED, moment_sources, wrench_sources
+from dynakin.results.naming import number, sentence, words
 
 _PICTURES_PER_SECOND = 30.0
 _MOST_BYTES = 750_000  # of base64 in the page

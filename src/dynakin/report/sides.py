@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynakin.report.colours import side_of
-from dynakin.report.labels import sentence, words
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.power import root_coordinates
 from dynakin.results.measures.sources import legs_of
 from dynakin.results.measures.symmetry import paired
+from dynakin.results.naming import sentence, words
 
 REGIONS = ("Legs", "Trunk and head", "Arms", "Whole body")
 

@@ -9,7 +9,6 @@ import numpy.typing as npt
 
 import dynakin._core as _core
 from dynakin.filter.foot_wrenches import FootWrenches
-from dynakin.filter.noise import Noise
 from dynakin.filter.total_wrench import foot_wrenches
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.contact import AFTER_S, ALOFT_M, NEAR_FLOOR_M, SLOW_M_S
@@ -25,6 +24,7 @@ from dynakin.recordings.feet.loads import (
     PlateLoad,
     divided,
 )
+from dynakin.settings.noise import Noise
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]

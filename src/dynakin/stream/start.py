@@ -10,11 +10,11 @@ from pathlib import Path
 import numpy as np
 
 from dynakin.errors import ModelError, RecordingError
+from dynakin.files import LARGEST_TEXT, read_bytes
 from dynakin.filter.estimator import Estimator
 from dynakin.model.calibration.body import steady_load
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition
-from dynakin.recordings.formats.textfile import LARGEST_TEXT, read_bytes
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.landmarks import DEFAULT_PAIRS
 from dynakin.recordings.plates.checks import LOADED_N, check_plates

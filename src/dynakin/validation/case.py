@@ -5,14 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from dynakin.config import RunConfig
 from dynakin.errors import ConfigError
-from dynakin.filter import presets as known_presets
+from dynakin.filter.build import definition_of, identified_of
 from dynakin.recordings.plates.loads import without_plate_loads
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.smoothing import CUTOFF_HZ
 from dynakin.results.estimate import Estimate
+from dynakin.settings import presets as known_presets
+from dynakin.settings.settings import Settings
 from dynakin.validation.setup import Setup
 
 
@@ -23,8 +24,8 @@ class Case:
     recording: Recording
     static: Recording | None
     setup: Setup
-    config: RunConfig
-    configs: dict[str, RunConfig]
+    config: Settings
+    configs: dict[str, Settings]
 
     def with_config(self, title: str, estimate: Estimate) -> Estimate:
         """An estimate with one of the presets, with the configuration as used in it."""
@@ -35,7 +36,7 @@ class Case:
 
 
 def case_of(
-    config: RunConfig,
+    config: Settings,
     presets: Sequence[str] = (),
     cutoff_hz: float = CUTOFF_HZ,
     *,
@@ -51,11 +52,9 @@ def case_of(
     Raises:
         DynakinError: anything wrong with the input, in one line.
     """
-    configs = {
-        known_presets.title(name): config.model_copy(update={"preset": name}) for name in (presets or [config.preset])
-    }
+    configs = {known_presets.title(name): config.changed(preset=name) for name in (presets or [config.preset])}
     setup = Setup(
-        config.definition(),
+        definition_of(config),
         {title: one.noise_settings() for title, one in configs.items()},
         cutoff_hz,
         config.priors,
@@ -66,7 +65,7 @@ def case_of(
         config.estimate,
         config.plates,
         config.loads,
-        config.identified_subject(),
+        identified_of(config),
         config.smooth,
         config.zero,
         config.signs,

@@ -15,13 +15,13 @@ from dynakin.filter.smoothing import can_smooth
 from dynakin.filter.total_wrench import known_ground
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition
-from dynakin.model.priors import Bounds, Priors
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import COMPONENTS, Estimate
 from dynakin.results.measures.fit import signal_fit
 from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.measures.tracking import why_lost, without_lost
+from dynakin.settings.model import Bounds, Priors
 from dynakin.validation.freeze import final_values, freeze, initial_values
 from dynakin.validation.reference.least_squares import identify, predicted_wrench
 from dynakin.validation.reference.methods import reference_methods
@@ -230,7 +230,7 @@ def start_as(
         forward, priors, bounds: as for `Definition.calibrate`.
     """
     known = {"mass_kg": measured.mass_kg, "height_m": measured.height_m}
-    return definition.with_subject(definition.subject.model_copy(update=known)).calibrate(
+    return definition.with_subject(definition.subject.changed(**known)).calibrate(
         recording,
         static=static,
         side=measured.side,

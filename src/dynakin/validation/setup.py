@@ -6,17 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from dynakin.errors import ConfigError
-from dynakin.filter import presets
-from dynakin.filter.augment import QUANTITIES, Quantity
 from dynakin.filter.estimator import Estimator
-from dynakin.filter.noise import Noise
 from dynakin.filter.zero import Zero
-from dynakin.model.calibration.loads import CarriedLoad
 from dynakin.model.definition import Definition
 from dynakin.model.identified import IdentifiedSubject
-from dynakin.model.priors import Bounds, Priors
 from dynakin.recordings.smoothing import CUTOFF_HZ
 from dynakin.results.measures.angles import Signs
+from dynakin.settings import presets
+from dynakin.settings.loads import CarriedLoad
+from dynakin.settings.model import QUANTITIES, Bounds, Priors, Quantity
+from dynakin.settings.noise import Noise
 
 
 @dataclass(frozen=True, eq=False)

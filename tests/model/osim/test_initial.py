@@ -11,15 +11,15 @@ import pytest
 import dynakin
 from dynakin import _core
 from dynakin.errors import ModelError
-from dynakin.filter import presets
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import load_model
 from dynakin.model.opensim.calibrate import feet_of, limits_of
 from dynakin.model.opensim.definition import load_opensim
 from dynakin.model.opensim.read import read_osim
 from dynakin.model.opensim.skin import skin_of
-from dynakin.model.subject import Subject
 from dynakin.recordings.recording import Recording
+from dynakin.settings import presets
+from dynakin.settings.subject import Subject
 from support.osim.files import small_model, version_4
 
 FILE = "optimized_scale_and_markers.osim"
@@ -59,7 +59,7 @@ def test_what_is_estimated_is_a_choice(folder: Path, squats: Recording) -> None:
     path = folder / FILE
 
     def started(estimate: tuple[str, ...], **options: object) -> CalibratedModel:
-        noise = presets.default().model_copy(update={"plate_force": 0.0, "plate_moment": 0.0, "plate_delay_s": 0.0})
+        noise = presets.default().changed(plate_force=0.0, plate_moment=0.0, plate_delay_s=0.0)
         return dynakin.Estimator(load_opensim(path, **options), noise, estimate=estimate).start(squats)
 
     nothing = started(())

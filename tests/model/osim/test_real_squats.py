@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 import dynakin
-from dynakin.filter.augment import Quantity
 from dynakin.filter.samples import recording_arrays
 from dynakin.model.opensim.definition import load_opensim
-from dynakin.model.subject import Subject
+from dynakin.settings.model import Quantity
+from dynakin.settings.subject import Subject
 
 OPENSIM_MM = 10.48
 """OpenSim's inverse kinematics with equal weights: RMS of 3-D distances, missing markers left out (`make peers`)."""
@@ -25,7 +25,7 @@ def estimator_of(folder: Path, estimate: tuple[Quantity, ...], noise: dynakin.No
 
 def marker_rms_mm(folder: Path, estimate: tuple[Quantity, ...]) -> float:
     """From markers alone."""
-    noise = dynakin.presets.default().model_copy(update={"plate_force": 0.0, "plate_moment": 0.0, "plate_delay_s": 0.0})
+    noise = dynakin.presets.default().changed(plate_force=0.0, plate_moment=0.0, plate_delay_s=0.0)
     recording = dynakin.read(folder / "squats1.trc", folder / "squats1_grf.mot")
     estimator = estimator_of(folder, estimate, noise)
     markers, wrench = recording_arrays(recording, estimator.start(recording), gaps=True)

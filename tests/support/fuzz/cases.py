@@ -11,9 +11,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel
 
-from dynakin.config import make_config, read_config
 from dynakin.errors import DynakinError
-from dynakin.filter import presets
 from dynakin.model.definition import load_model
 from dynakin.model.identified import read_identified
 from dynakin.model.markers.marker_set import load_marker_set
@@ -23,6 +21,8 @@ from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.plates.checks import check_plates
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Plate, Recording
+from dynakin.settings import presets
+from dynakin.settings.settings import Settings, read_keys
 from dynakin.stream.start import read_known
 from dynakin.studies.batch.dataset import read_dataset
 from support.fuzz.mutate import mutated_c3d, mutated_text
@@ -84,7 +84,7 @@ def _study(path: Path, corpus: Path) -> Any:
     for session in dataset.sessions:
         if dataset.output.resolve() not in Path(session.content["output"]).resolve().parents:
             raise Unclean(f"{session.name} is written to {session.content['output']}")
-    return [make_config(session.content, session.name) for session in dataset.sessions]
+    return [Settings.of(session.content, session.name) for session in dataset.sessions]
 
 
 READERS: Mapping[str, Callable[[Path, Path], Any]] = {
@@ -96,7 +96,7 @@ READERS: Mapping[str, Callable[[Path, Path], Any]] = {
     "set": lambda path, _: load_marker_set(path),
     "table": lambda path, _: load_table(path, None),
     "preset": lambda path, _: presets.preset(str(path)),
-    "config": lambda path, _: make_config(read_config(path), str(path)),
+    "config": lambda path, _: Settings.of(read_keys(path), str(path)),
     "study": _study,
     "subject": lambda path, _: read_identified(path),
     "known": lambda path, _: (read_known(path), read_values(path)),

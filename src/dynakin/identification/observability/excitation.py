@@ -62,10 +62,11 @@ def _trusting(estimator: Estimator) -> Estimator:
     """The same filter without gates, bounds and recovery: what it is shown is exact, and no verdict on a single frame
     shall decide between two motions."""
     assert estimator.initial is not None
-    free = {"marker_gate": 0.0, "wrench_gate": 0.0, "recover": False, "constraint": "none", "iterate_beyond": None}
     made = Estimator(
         estimator.model,
-        estimator.noise.model_copy(update=free),
+        estimator.noise.changed(
+            marker_gate=0.0, wrench_gate=0.0, recover=False, constraint="none", iterate_beyond=None
+        ),
         priors=estimator.priors,
         bounds=estimator.bounds,
         estimate=estimator.estimate,

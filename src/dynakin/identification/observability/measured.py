@@ -10,8 +10,8 @@ import numpy.typing as npt
 import dynakin._core as _core
 from dynakin.errors import ConfigError
 from dynakin.filter.augment import initial_covariance
-from dynakin.filter.core_filter import marker_variance
 from dynakin.filter.estimator import Estimator
+from dynakin.filter.noise import marker_variance, wrench_covariance
 from dynakin.model.calibration.calibrated import CalibratedModel
 
 Array = npt.NDArray[np.float64]
@@ -54,7 +54,7 @@ class MeasuredModel:
             initial,
             initial_covariance(initial, noise),
             np.sqrt(variance),
-            np.sqrt(np.diag(noise.wrench_covariance())),
+            np.sqrt(np.diag(wrench_covariance(noise))),
         )
 
     @property

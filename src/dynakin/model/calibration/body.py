@@ -9,11 +9,11 @@ import numpy.typing as npt
 
 from dynakin.errors import ModelError
 from dynakin.model.calibration.frames import Trial
-from dynakin.model.subject import Subject
 from dynakin.recordings.feet.loads import foot_loads
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.plates.checks import check_plates
 from dynakin.recordings.recording import Recording
+from dynakin.settings.subject import Subject
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]

@@ -10,9 +10,10 @@ import numpy.typing as npt
 import dynakin._core as _core
 from dynakin.errors import ModelError
 from dynakin.model.calibration.frames import Trial
-from dynakin.model.calibration.pose_start import Interval, PoseFit, near, start_posture
+from dynakin.model.calibration.pose_start import PoseFit, near, start_posture
 from dynakin.model.calibration.sites import Candidate, site_of
 from dynakin.model.plan import ModelPlan, Site
+from dynakin.model.schema import Interval
 from dynakin.model.spec import to_core
 
 Array = npt.NDArray[np.float64]

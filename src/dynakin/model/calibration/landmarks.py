@@ -13,7 +13,7 @@ from dynakin.model.calibration.beside import lateral, offset_point
 from dynakin.model.markers.marker_set import MarkerKey, MarkerMatch
 from dynakin.model.markers.schema import Offset, PelvisRegression, PolarRegression, Recipe, by_sex
 from dynakin.model.mirroring import SUFFIXES
-from dynakin.model.subject import Sex
+from dynakin.settings.subject import Sex
 
 Array = npt.NDArray[np.float64]
 Positions = dict[MarkerKey, Array]

@@ -4,33 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Annotated
 
 import numpy as np
-from pydantic import Field
 
 import dynakin._core as _core
 from dynakin.errors import ModelError
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.model.validation import Name, Strict, nearest
-
-Positive = Annotated[float, Field(gt=0.0)]
-NotNegative = Annotated[float, Field(ge=0.0)]
-
-
-class CarriedLoad(Strict):
-    """A rigid body of known mass that moves with a segment."""
-
-    segment: str
-    """The segment that it is fixed to."""
-    mass_kg: Positive
-    """Its mass, kg; `mass_kg` of the person does not hold it."""
-    place_m: tuple[float, float, float]
-    """Its centre of mass in the segment's frame, m."""
-    inertia_kg_m2: tuple[NotNegative, NotNegative, NotNegative] = (0.0, 0.0, 0.0)
-    """Moments of inertia about its own centre, along the segment's axes; not given: all of it in one point."""
-    name: Name = "load"
-    """Its own name among the segments."""
+from dynakin.settings.loads import CarriedLoad
+from dynakin.settings.strict import nearest
 
 
 def with_loads(initial: CalibratedModel, loads: Sequence[CarriedLoad]) -> CalibratedModel:

@@ -19,12 +19,12 @@ from dynakin.model.markers.marker_set import MarkerKey, MarkerMatch, choose_mark
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.model.plan import Geometry, ModelPlan
 from dynakin.model.schema import ModelFile
-from dynakin.model.subject import Subject
 from dynakin.model.table import BodyTable
 from dynakin.recordings.feet.contact import foot_contact
 from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_laboratory_frame
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.standing import standing_window
+from dynakin.settings.subject import Subject
 
 Array = npt.NDArray[np.float64]
 

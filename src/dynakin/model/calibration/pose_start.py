@@ -16,9 +16,9 @@ from scipy.spatial.transform import Rotation
 
 import dynakin._core as _core
 from dynakin.errors import ModelError
+from dynakin.model.schema import Interval
 
 Array = npt.NDArray[np.float64]
-Interval = tuple[float, float]
 
 GOOD_M = 0.010
 """Root mean square distance from which on nothing else is tried: less than skin moves."""

@@ -8,10 +8,10 @@ from importlib import resources
 from pathlib import Path
 
 from dynakin.errors import ModelError
+from dynakin.files import is_file
 from dynakin.model.markers.schema import Marker, MarkerSetFile
-from dynakin.model.validation import nearest, read_toml, validate
-from dynakin.recordings.formats.textfile import is_file
 from dynakin.recordings.landmarks import FacingPairs, plain_name
+from dynakin.settings.strict import nearest, read_toml, validate
 
 MarkerKey = tuple[str, str]
 """(name of the marker in its set, "right", "left" or "centre")."""

@@ -8,8 +8,8 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from dynakin.model.subject import Sex
-from dynakin.model.validation import Name, Strict, nearest
+from dynakin.settings.strict import Name, Strict, nearest
+from dynakin.settings.subject import Sex
 
 Vector3 = tuple[float, float, float]
 

@@ -13,11 +13,11 @@ from dynakin.model.calibration.body import find_mass
 from dynakin.model.opensim.description import Marker, OpenSimModel
 from dynakin.model.opensim.sites import with_mass
 from dynakin.model.opensim.spec import free_coordinates
-from dynakin.model.priors import Interval
-from dynakin.model.subject import Subject
+from dynakin.model.schema import Interval
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.landmarks import DEFAULT_PAIRS, FacingPairs
 from dynakin.recordings.recording import Recording
+from dynakin.settings.subject import Subject
 
 Array = npt.NDArray[np.float64]
 

@@ -6,10 +6,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
-from pydantic import Field
 
 import dynakin._core as _core
 from dynakin.model.calibration.calibrated import CalibratedModel, first_centre_of_pressure
@@ -33,34 +31,17 @@ from dynakin.model.opensim.scales import scale_names
 from dynakin.model.opensim.sites import sites
 from dynakin.model.opensim.skin import skin_of
 from dynakin.model.opensim.spec import to_spec, unseen
-from dynakin.model.priors import Bounds, Priors
 from dynakin.model.spec import in_layout
 from dynakin.model.state_priors import state_bounds, state_prior
-from dynakin.model.subject import Subject
-from dynakin.model.validation import Strict, validate
 from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_laboratory_frame
 from dynakin.recordings.recording import Recording
+from dynakin.settings.model import Bounds, OpenSimOptions, Priors
+from dynakin.settings.strict import validate
+from dynakin.settings.subject import Subject
 
 _MODEL_M = 0.003
 """Standard deviation of a marker for what a generic skeleton, scaled, gets wrong of a person's joints: on `squats1` the
 normalised innovations are consistent with it (1.1), and far too large with the cameras' noise alone (1.9 to 18)."""
-
-
-class OpenSimOptions(Strict):
-    """What of an OpenSim model can be estimated, and what is taken as the file has it."""
-
-    scale: Literal["all"] | tuple[str, ...] | None = "all"
-    """Bodies with a scale parameter, on which the joints placed on that body depend; []: none."""
-    share_sides: bool = True
-    """Whether mirrored bodies (femur_r, femur_l) share one."""
-    scale_masses: bool = True
-    """Whether all masses and inertias are multiplied so that they sum to the subject's mass."""
-    lightest_share: float = Field(default=0.01, ge=0.0, lt=1.0)
-    """Bodies of less than this part of the whole mass keep the file's mass and inertia: no recording tells of them."""
-    lock_unseen: bool = True
-    """Whether coordinates that move no measured marker (toes, often) are locked at the file's default value."""
-    leave_out: tuple[str, ...] = ()
-    """Markers of the file that are not measurements (regressed joint centres, say)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -182,7 +163,7 @@ class OpenSimDefinition:
         }
         skin = np.array([skin_of(marker.name, marker.body) for marker, _ in chosen])
         known = priors or Priors()
-        known = known.model_copy(update={"marker_m": float(np.hypot(known.marker_m, fit.rms_m / np.sqrt(3.0)))})
+        known = known.changed(marker_m=float(np.hypot(known.marker_m, fit.rms_m / np.sqrt(3.0))))
         return CalibratedModel(
             spec=spec,
             names=tuple(names),

@@ -9,14 +9,14 @@ import numpy as np
 
 from dynakin.elements import element
 from dynakin.errors import ModelError
+from dynakin.files import LARGEST_TEXT, is_file, read_bytes
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.opensim.definition import OpenSimDefinition
 from dynakin.model.opensim.description import OpenSimModel
 from dynakin.model.opensim.from_core import from_core
 from dynakin.model.opensim.identified import identified
 from dynakin.model.opensim.sites import with_mass
-from dynakin.model.validation import read_toml
-from dynakin.recordings.formats.textfile import LARGEST_TEXT, is_file, read_bytes
+from dynakin.settings.strict import read_toml
 
 
 def read_values(path: Path) -> dict[str, float]:

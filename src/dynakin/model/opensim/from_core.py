@@ -28,8 +28,7 @@ from dynakin.model.opensim.description import (
     Vector,
 )
 from dynakin.model.opensim.functions import IDENTITY, Function, joined, polynomial
-
-Interval = tuple[float, float]
+from dynakin.model.schema import Interval
 
 
 def from_core(

@@ -11,7 +11,7 @@ from dynakin.model.opensim.description import GROUND, Coordinate, Joint, Marker,
 from dynakin.model.opensim.frames import Frames, read_offset
 from dynakin.model.opensim.joints import read_axes, read_coordinate
 from dynakin.model.opensim.xml_file import Node, read_xml
-from dynakin.model.validation import nearest
+from dynakin.settings.strict import nearest
 
 _OLDEST = 20000  # before that, OpenSim 1's files are built otherwise
 _MOST = 1000  # bodies or joints: whole bodies with fingers and vertebrae have a fifth

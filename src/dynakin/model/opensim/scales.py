@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 
 from dynakin.errors import ModelError
 from dynakin.model.opensim.description import OpenSimModel
-from dynakin.model.validation import nearest
+from dynakin.settings.strict import nearest
 
 PREFIX = "scale_"
 _SIDES = (("_r", "_l"), ("_right", "_left"), ("r_", "l_"), ("right_", "left_"), ("_R", "_L"), ("R_", "L_"))

@@ -9,9 +9,9 @@ import numpy as np
 
 from dynakin.errors import ModelError
 from dynakin.model.opensim.description import GROUND, Marker, OpenSimModel
-from dynakin.model.validation import nearest
 from dynakin.recordings.landmarks import plain_name
 from dynakin.recordings.recording import Recording
+from dynakin.settings.strict import nearest
 
 _FEWEST = 3
 

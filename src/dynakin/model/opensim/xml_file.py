@@ -9,7 +9,7 @@ from typing import NoReturn
 from xml.parsers import expat
 
 from dynakin.errors import ModelError
-from dynakin.recordings.formats.textfile import LARGEST_TEXT, read_bytes
+from dynakin.files import LARGEST_TEXT, read_bytes
 
 _DEEPEST = 100  # elements in one another; OpenSim's own files have 15
 

@@ -10,9 +10,9 @@ import struct
 from pathlib import Path
 
 from dynakin.errors import RecordingError
+from dynakin.files import require_file
 from dynakin.recordings.formats.c3d_counts import Header, check_counts
 from dynakin.recordings.formats.c3d_records import read_records
-from dynakin.recordings.formats.textfile import require_file
 
 _KEY = 0x50
 _BLOCK = 512

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import ClassVar
 
 import numpy as np
 
@@ -13,27 +11,7 @@ from dynakin.recordings.landmarks import DEFAULT_PAIRS
 from dynakin.recordings.plates.pressure import DEFAULT_THRESHOLD_N, Surface, centre_of_pressure
 from dynakin.recordings.recording import Array, Plate, Recording
 from dynakin.recordings.vertical import axis_vector, find_vertical
-
-Vector3 = tuple[float, float, float]
-
-
-@dataclass(frozen=True)
-class PlateLoad:
-    """A constant wrench that something else than the person leaves on a plate, laboratory frame.
-
-    Attributes:
-        plate: its name, as `dynakin check` shows it.
-        force_n: as the plate reads it (its reaction: a weight of 50 N reads +50 N along the vertical).
-        point_m: where the force acts.
-        moment_nm: beside that, about the point.
-    """
-
-    plate: str
-    force_n: Vector3
-    point_m: Vector3
-    moment_nm: Vector3 = (0.0, 0.0, 0.0)
-
-    __pydantic_config__: ClassVar = {"extra": "forbid", "allow_inf_nan": False}  # of a configuration
+from dynakin.settings.loads import PlateLoad
 
 
 def without_plate_loads(recording: Recording, loads: Sequence[PlateLoad], vertical: str = "auto") -> Recording:

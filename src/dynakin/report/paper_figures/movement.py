@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from dynakin.report.body import chain_of, colours_of, floor_height, marker_segments
 from dynakin.report.colours import SIDE_COLOURS, side_of
-from dynakin.report.labels import COMPONENT_LABELS, is_planar, moment_note, number, sentence, words
+from dynakin.report.labels import COMPONENT_LABELS, is_planar, moment_note
 from dynakin.report.method_styles import DERIVED_LINE, LineStyle, method_styles
 from dynakin.report.plot import ESTIMATED, INK, MEASURED, QUIET, draw_sourced
 from dynakin.report.sections.panels import band_is_too_wide
@@ -20,6 +20,7 @@ from dynakin.results.measures.fit import signal_fit
 from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.measures.repetitions import repetitions_of
 from dynakin.results.measures.sources import DERIVED, moment_sources, wrench_sources
+from dynakin.results.naming import number, sentence, words
 from dynakin.validation.differences import angle_differences, moment_differences
 from dynakin.validation.methods import AT, CLASSICAL, Method, Trial
 

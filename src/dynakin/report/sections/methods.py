@@ -7,7 +7,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from dynakin.report.labels import COMPONENT_LABELS, moment_note, number, sentence, words
+from dynakin.report.labels import COMPONENT_LABELS, moment_note
 from dynakin.report.method_styles import DERIVED_LINE, LineStyle, method_styles
 from dynakin.report.sections.method_panels import overlaid
 from dynakin.report.sections.panels import Panel
@@ -16,6 +16,7 @@ from dynakin.report.text_tables import table2_text
 from dynakin.results.estimate import COMPONENTS
 from dynakin.results.measures.mean_curves import MEASURED
 from dynakin.results.measures.sources import DERIVED, moment_sources
+from dynakin.results.naming import number, sentence, words
 from dynakin.validation.differences import AngleDifference, MomentDifference, angle_differences, moment_differences
 from dynakin.validation.methods import AT, CLASSICAL, Method, Trial
 from dynakin.validation.statistics import Spread

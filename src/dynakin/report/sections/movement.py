@@ -9,16 +9,7 @@ import numpy as np
 
 from dynakin.elements import element
 from dynakin.report.chart import Bound, Line, chart
-from dynakin.report.labels import (
-    COMPONENT_LABELS,
-    is_planar,
-    moment_note,
-    number,
-    sentence,
-    short_marker_names,
-    signed_percent,
-    words,
-)
+from dynakin.report.labels import COMPONENT_LABELS, is_planar, moment_note, short_marker_names, signed_percent
 from dynakin.report.method_styles import DERIVED_LINE
 from dynakin.report.plot import ESTIMATED
 from dynakin.report.sections import panels as charts
@@ -41,6 +32,7 @@ from dynakin.results.estimate import AXES, COMPONENTS, Estimate
 from dynakin.results.measures.mean_curves import MeanCurve, estimate_curves
 from dynakin.results.measures.repetitions import Found, repetitions_of
 from dynakin.results.measures.sources import DERIVED, UNKNOWN, moment_sources, wrench_sources
+from dynakin.results.naming import number, sentence, words
 from dynakin.results.records import Parameter
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.axes import Axes
 
-from dynakin.report.labels import number
 from dynakin.report.plot import ESTIMATED, INK, LIMIT, MEASURED, QUIET, draw_sourced, new_axes, thin, to_svg
+from dynakin.results.naming import number
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from dynakin.report.labels import COMPONENT_LABELS, moment_note, sentence, words
+from dynakin.report.labels import COMPONENT_LABELS, moment_note
 from dynakin.report.method_styles import method_styles
 from dynakin.report.sections.method_panels import curve_unit, repeated
 from dynakin.report.sections.panels import Panel
@@ -14,6 +14,7 @@ from dynakin.report.sections.section import Section
 from dynakin.results.estimate import COMPONENTS, Estimate
 from dynakin.results.measures.mean_curves import MEASURED, MeanCurve
 from dynakin.results.measures.repetitions import Found
+from dynakin.results.naming import sentence, words
 
 
 def repetition_section(

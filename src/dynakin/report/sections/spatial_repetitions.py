@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from dynakin.report.chart import Line, chart
 from dynakin.report.colours import SIDE_COLOURS
-from dynakin.report.labels import COMPONENT_LABELS, listed
+from dynakin.report.labels import COMPONENT_LABELS
 from dynakin.report.plot import ESTIMATED, MEASURED
 from dynakin.report.sections.method_panels import curve_unit, percent_label
 from dynakin.report.sections.panels import Panel
@@ -17,6 +17,7 @@ from dynakin.results.estimate import COMPONENTS, Estimate
 from dynakin.results.measures.mean_curves import MEASURED as MEASURED_NAME
 from dynakin.results.measures.mean_curves import PERCENT, MeanCurve
 from dynakin.results.measures.repetitions import Found
+from dynakin.results.naming import listed
 
 
 def spatial_repetition_section(estimate: Estimate, found: Found, curves: Sequence[MeanCurve]) -> Section:

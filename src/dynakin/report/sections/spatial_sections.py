@@ -11,7 +11,7 @@ import numpy.typing as npt
 from dynakin.report.body import marker_segments
 from dynakin.report.chart import Line, chart
 from dynakin.report.colours import SIDE_COLOURS
-from dynakin.report.labels import COMPONENT_LABELS, listed, number, sentence, short_marker_names, words
+from dynakin.report.labels import COMPONENT_LABELS, short_marker_names
 from dynakin.report.method_styles import DERIVED_LINE, LineStyle
 from dynakin.report.plot import ESTIMATED, MEASURED
 from dynakin.report.sections.panels import Panel, band_is_too_wide, rms_bars
@@ -27,6 +27,7 @@ from dynakin.results.measures.pressure import centre_of_pressure, floor_height
 from dynakin.results.measures.sources import DERIVED, UNKNOWN, measured_only, moment_sources, wrench_sources
 from dynakin.results.measures.sources import MEASURED as MOMENT_MEASURED
 from dynakin.results.measures.stances import compared_stances
+from dynakin.results.naming import listed, number, sentence, words
 
 Array = npt.NDArray[np.float64]
 

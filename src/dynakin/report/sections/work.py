@@ -9,7 +9,6 @@ import numpy as np
 
 from dynakin.report.chart import Line, chart
 from dynakin.report.colours import SIDE_COLOURS
-from dynakin.report.labels import listed, number
 from dynakin.report.method_styles import DERIVED_LINE
 from dynakin.report.sections.section import NOTHING, Section, needs
 from dynakin.report.sections.spatial_sections import SIDE_LINES
@@ -17,6 +16,7 @@ from dynakin.report.sides import Joint, joints_of
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.sources import DERIVED, measured_moments, moment_sources
+from dynakin.results.naming import listed, number
 
 _NOT_MEANT = 0.02
 """Below this share of the largest of its kind a quantity is too small for a ratio of the sides to say anything."""

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dynakin.errors import OutputError
-from dynakin.recordings.formats.textfile import is_text
+from dynakin.files import is_text
 
 OUTPUT_FILES = (
     "coordinates.mot",

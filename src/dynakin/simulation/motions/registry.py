@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynakin.errors import ConfigError
-from dynakin.recordings.formats.textfile import is_file
+from dynakin.files import is_file
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.mechanics import Motion
 from dynakin.simulation.motions.gait import gait_movement

@@ -9,7 +9,7 @@ from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 
 from dynakin.errors import ConfigError
-from dynakin.recordings.formats.textfile import LARGEST_TEXT, is_file, read_bytes
+from dynakin.files import LARGEST_TEXT, is_file, read_bytes
 
 _HIGHEST = {"soft_tissue_random": 1.0, "plate_gain_sd": 0.5}
 _SIGNED = {"plate_lag_s": 0.5}

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from dynakin.recordings.formats.textfile import read_bytes
+from dynakin.files import read_bytes
 from dynakin.stream.sources.packets import MarkerPacket, Packet, PlatePacket
 
 _MAGIC = b"DKR1"

@@ -14,13 +14,13 @@ from typing import Any
 
 import numpy as np
 
-from dynakin.config import make_config
 from dynakin.errors import OutputError, RecordingError
 from dynakin.pipeline.result import Result
 from dynakin.pipeline.stages import run_case
 from dynakin.recordings.limits import FASTEST_HZ, SLOWEST_HZ
 from dynakin.recordings.recording import Recording
 from dynakin.results.files.folder import check_output_writable
+from dynakin.settings.settings import Settings
 from dynakin.stream.fusion import DELAY_S, Fused, Fusion
 from dynakin.stream.sinks.append import SYSTEM_ERROR
 from dynakin.stream.sinks.base import Sink, Status
@@ -187,7 +187,7 @@ def finish(folder: str | Path, output: str | Path) -> Result:
     """
     check_output_writable(Path(output))
     settings = read_recorded(folder)[3]["settings"]
-    config = make_config(settings | {"trial": Path(folder), "output": Path(output)}, "live")
+    config = Settings.of(settings | {"trial": Path(folder), "output": Path(output)}, "live")
     result = run_case(case_of(config, recording=recorded(folder)), keep=None)  # live has no option to keep it
     result.save(output, check=False)
     return result

@@ -7,7 +7,7 @@ from importlib import metadata
 from typing import Any
 
 from dynakin.errors import ConfigError
-from dynakin.model.validation import nearest
+from dynakin.settings.strict import nearest
 
 SOURCES, SINKS = "dynakin.sources", "dynakin.sinks"
 """Groups of entry points. Each names a function (address, options) -> Source or Sink."""

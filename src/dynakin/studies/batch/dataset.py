@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dynakin.config import RunConfig, read_config
 from dynakin.errors import ConfigError
-from dynakin.model.validation import nearest
-from dynakin.recordings.formats.textfile import is_file
+from dynakin.files import is_file
+from dynakin.settings.settings import Settings, read_keys
+from dynakin.settings.strict import nearest
 
 # Keys of their own; all others are those of a run's configuration and hold for everything below them.
 _OF_DATASET = ("subjects", "trials", "presets")
@@ -56,7 +56,7 @@ def read_dataset(path: Path, output: Path | None = None) -> Dataset:
         ConfigError: the file cannot be read, a key is unknown or missing, no trial is found for a subject, or two
             trials of a subject have one name.
     """
-    content = read_config(path, paths=("output",))  # the others lie with subjects and trials
+    content = read_keys(path, paths=("output",))  # the others lie with subjects and trials
     entries = content.get("subjects")
     if not isinstance(entries, list) or not entries or not all(isinstance(entry, dict) for entry in entries):
         raise ConfigError(f"{path}: no subjects, expected a table [[subjects]] for each")
@@ -81,7 +81,7 @@ def read_dataset(path: Path, output: Path | None = None) -> Dataset:
 
 def _run_keys(content: dict[str, Any], own: tuple[str, ...], where: str) -> dict[str, Any]:
     """Those keys that a run's configuration has."""
-    known = [key for key in RunConfig.model_fields if key not in _NOT_HERE]
+    known = [key for key in Settings.model_fields if key not in _NOT_HERE]
     for key in content:
         if key not in own and key not in known:
             expected = ", ".join((*own, *known))

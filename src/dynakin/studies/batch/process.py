@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from dynakin.config import make_config
 from dynakin.errors import DynakinError
 from dynakin.pipeline.stages import judged
 from dynakin.recordings.smoothing import CUTOFF_HZ
@@ -16,6 +15,7 @@ from dynakin.results.failures import Failures
 from dynakin.results.files.versions import versions
 from dynakin.results.measures.fit import SignalFit
 from dynakin.results.measures.metrics import compute_metrics
+from dynakin.settings.settings import Settings
 from dynakin.studies.batch.dataset import Dataset, Session
 from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import Pool
@@ -79,7 +79,7 @@ def _mean(every: Sequence[Fits]) -> Fits:
 
 def work_on(options: Options, payload: Session) -> dict[str, Any]:
     """One trial: read, estimated, compared with the reference methods, and written where files are wanted."""
-    config = make_config(payload.content, payload.name)
+    config = Settings.of(payload.content, payload.name)
     case = case_of(config, options.presets, options.cutoff_hz)
     failures = Failures()
     estimates, lost, estimators = estimate_each(case.recording, case.setup, static=case.static, failures=failures)

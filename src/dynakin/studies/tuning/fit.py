@@ -10,15 +10,15 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ConfigError
-from dynakin.filter.noise import Noise
 from dynakin.results.files.versions import versions
+from dynakin.settings.noise import Noise
 from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import Pool
 from dynakin.studies.engine.work import Progress
 from dynakin.studies.tuning.likelihood import REACH, Likelihood
 from dynakin.studies.tuning.optimise import SETTLED, Optimum, curvature, deviations, minimise
 from dynakin.studies.tuning.score import CRITERIA, Shared
-from dynakin.studies.tuning.settings import changed, check_effect, check_setting, together, value_of, without_effect
+from dynakin.studies.tuning.settings import check_effect, check_setting, together, value_of, without_effect
 
 Array = npt.NDArray[np.float64]
 
@@ -99,7 +99,7 @@ class Fit:
     @property
     def noise(self) -> Noise:
         """The fitted settings."""
-        return changed(self.shared.base, together(self.shared.base, {s.name: s.value for s in self.settings}))
+        return self.shared.base.changed(**together(self.shared.base, {s.name: s.value for s in self.settings}))
 
 
 def usual_names(noise: Noise, floating: Collection[bool] = (False,)) -> tuple[str, ...]:
@@ -184,7 +184,7 @@ class Fitter:
         """The optimum on all trials and its settings, and nothing else of `run`."""
         everything = self._likelihood(self.shared)
         optimum = self._minimise(everything, np.zeros(len(self.names)))
-        return optimum, changed(self.shared.base, together(self.shared.base, everything.settings(optimum.point)))
+        return optimum, self.shared.base.changed(**together(self.shared.base, everything.settings(optimum.point)))
 
     def _likelihood(self, shared: Shared, trials: Sequence[int] | None = None) -> Likelihood:
         return Likelihood(shared, self.names, self.pool, self.journal, trials, self.criterion)

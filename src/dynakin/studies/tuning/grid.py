@@ -11,15 +11,15 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ConfigError, DynakinError
-from dynakin.filter.noise import Noise
 from dynakin.results.estimate import COMPONENTS
 from dynakin.results.files.versions import versions
+from dynakin.settings.noise import Noise
 from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import Pool
 from dynakin.studies.engine.tasks import Task
 from dynakin.studies.engine.work import Progress, work
 from dynakin.studies.tuning.score import CRITERIA, Shared, score_task
-from dynakin.studies.tuning.settings import changed, check_effect, check_setting
+from dynakin.studies.tuning.settings import check_effect, check_setting
 
 Array = npt.NDArray[np.float64]
 
@@ -146,7 +146,7 @@ def run_grid(
     check_effect([axis.name for axis in axes], shared.base, shared.floating)
     for axis in axes:
         for value in axis.values:
-            changed(shared.base, {axis.name: value})
+            shared.base.changed(**{axis.name: value})
     trials = range(len(shared.trials))
     tasks = [Task(f"{k:07d}/{trial:04d}", (trial, cell)) for k, cell in enumerate(settings) for trial in trials]
     outcomes = work(pool, score_task, shared, tasks, journal=journal, progress=progress)

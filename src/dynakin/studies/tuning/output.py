@@ -8,13 +8,13 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from dynakin.filter.preset_file import write_preset
 from dynakin.results.files.versions import versions
+from dynakin.settings.presets import write_preset
 from dynakin.studies.engine.folder import write_csv, write_json
 from dynakin.studies.tuning.fit import Fit
 from dynakin.studies.tuning.grid import Grid
 from dynakin.studies.tuning.score import CRITERIA
-from dynakin.studies.tuning.settings import UNITS, changed
+from dynakin.studies.tuning.settings import UNITS
 
 PAPER = "paper"
 
@@ -45,7 +45,7 @@ def write_grid(folder: Path, grid: Grid, base: str) -> None:
             f"Written by `dynakin tune grid` on {', '.join(grid.trials)}.",
             f"Least {title} ({best[name]:.6g}{'' if unit == '1' else ' ' + unit}): {at}.",
         ]
-        write_preset(folder / f"preset_{name}.toml", changed(grid.base, grid.settings(best)), base, remarks)
+        write_preset(folder / f"preset_{name}.toml", grid.base.changed(**grid.settings(best)), base, remarks)
         summary["optimum"][name] = {**best, "at_edge": grid.at_edge(best)}
     write_json(folder / "grid.json", summary)
 

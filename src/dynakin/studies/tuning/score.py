@@ -11,10 +11,10 @@ import numpy.typing as npt
 
 import dynakin._core as _core
 from dynakin.filter.augment import extended
-from dynakin.filter.core_filter import core_filter, marker_variance
-from dynakin.filter.noise import Noise
+from dynakin.filter.core_filter import core_filter
+from dynakin.filter.noise import marker_variance, wrench_covariance
 from dynakin.results.estimate import COMPONENTS
-from dynakin.studies.tuning.settings import changed
+from dynakin.settings.noise import Noise
 from dynakin.studies.tuning.trial import TuningTrial, undoubting
 
 Array = npt.NDArray[np.float64]
@@ -60,7 +60,7 @@ def score_task(shared: Shared, payload: tuple[int, Mapping[str, float]]) -> dict
     """
     number, changes = payload
     trial = shared.trials[number]
-    noise = undoubting(changed(shared.base, changes))
+    noise = undoubting(shared.base.changed(**changes))
     figures = figures_of(trial, noise, shared.base)
     if figures["divergence"] is None and shared.left_out:
         figures["left_out"] = left_out_mm(trial, noise)
@@ -157,7 +157,7 @@ def _declared_sd(trial: TuningTrial, noise: Noise) -> Array:
     point = initial.plate_centre if noise.reference_point_m == "auto" else np.array(noise.reference_point_m)
     x, y, z = point
     lever = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
-    wrench = noise.wrench_covariance()
+    wrench = wrench_covariance(noise)
     moments = np.diag(wrench[3:, 3:]) + np.diag(lever @ wrench[:3, :3] @ lever.T)
     return np.asarray(np.sqrt(np.concatenate([np.repeat(markers, 3), np.diag(wrench)[:3], moments])))
 

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from typing import Any
 
-from dynakin.errors import ConfigError, ModelError
-from dynakin.filter.noise import Noise
-from dynakin.model.validation import nearest, validate
+from dynakin.errors import ConfigError
+from dynakin.settings.noise import Noise
+from dynakin.settings.strict import nearest
 
 # Settings on a scale of their own kind, so that a logarithm makes sense: variances, deviations, times. -> unit
 UNITS = {
@@ -106,18 +105,6 @@ def check_effect(names: Sequence[str], noise: Noise, floating: Collection[bool])
     """
     for name, why in without_effect(names, noise, floating).items():
         raise ConfigError(f"setting {name!r} has no effect on {why}")
-
-
-def changed(noise: Noise, changes: Mapping[str, Any]) -> Noise:
-    """The settings with some of them replaced.
-
-    Raises:
-        ConfigError: a value out of its range; the message names the setting.
-    """
-    try:
-        return validate(Noise, noise.model_dump() | dict(changes), "noise")
-    except ModelError as error:
-        raise ConfigError(error.message) from None
 
 
 def value_of(noise: Noise, name: str) -> float:

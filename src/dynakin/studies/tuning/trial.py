@@ -8,13 +8,13 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.filter.alignment import in_step
-from dynakin.filter.augment import QUANTITIES, Quantity
 from dynakin.filter.estimator import Estimator
-from dynakin.filter.noise import Noise
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.recording import Recording
 from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.records import FOLLOWING, REFUSED
+from dynakin.settings.model import QUANTITIES, Quantity
+from dynakin.settings.noise import Noise
 from dynakin.studies.engine.journal import digest
 
 Array = npt.NDArray[np.float64]
@@ -120,7 +120,7 @@ def prepare(
 def undoubting(noise: Noise) -> Noise:
     """The same settings without gates and recovery: a trial that is ready needs none, and a filter that diverges is to
     be seen to."""
-    return noise.model_copy(update={"marker_gate": 0.0, "wrench_gate": 0.0, "recover": False, "unseen_sd": None})
+    return noise.changed(marker_gate=0.0, wrench_gate=0.0, recover=False, unseen_sd=None)
 
 
 def _doubts(noise: Noise) -> bool:

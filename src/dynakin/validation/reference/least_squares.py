@@ -14,7 +14,7 @@ from scipy.optimize import lsq_linear
 
 from dynakin.model.inertia import RigidBody
 from dynakin.model.plan import ModelPlan
-from dynakin.model.priors import Bounds
+from dynakin.settings.model import Bounds
 from dynakin.validation.reference.base_parameters import BaseParameters, base_parameters
 from dynakin.validation.reference.chain import Kinematics, PlanarChain
 from dynakin.validation.reference.condensed import DECLARED_SIGMA, Condensed, condense

@@ -10,11 +10,10 @@ from typing import Any
 import tomli_w
 from pydantic import BaseModel
 
-from dynakin.config import RunConfig
-from dynakin.filter import presets
-from dynakin.filter.noise import Noise
-from dynakin.model.opensim.definition import OpenSimOptions
-from dynakin.model.priors import Bounds, Priors
+from dynakin.settings import presets
+from dynakin.settings.model import Bounds, OpenSimOptions, Priors
+from dynakin.settings.noise import Noise
+from dynakin.settings.settings import NEEDED, Settings
 
 _HEADER = """\
 # Configuration of `dynakin run`. Keys with a # right before them hold their default or, where there is none, an
@@ -31,12 +30,12 @@ def config_template(preset: str = "default") -> str:
     Raises:
         ConfigError: the preset is unknown.
     """
-    docs = attribute_docs(RunConfig)
+    docs = attribute_docs(Settings)
     parts = [_HEADER]
-    for key, field in RunConfig.model_fields.items():
+    for key, field in Settings.model_fields.items():
         if key in _RECORD or key in _TABLES:
             continue
-        required = field.is_required()
+        required = key in NEEDED
         value = (field.examples or [None])[0] if required or field.default is None else field.default
         if key == "preset":
             value, required = preset, True

@@ -8,12 +8,12 @@ import re
 import tomllib
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Annotated, Any, TypeVar
+from typing import Annotated, Any, Self, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, model_validator
 
-from dynakin.errors import DynakinError, ModelError
-from dynakin.recordings.formats.textfile import LARGEST_TEXT, read_bytes
+from dynakin.errors import ConfigError, DynakinError, ModelError
+from dynakin.files import LARGEST_TEXT, read_bytes
 
 _MOST_PARTS = 64  # of a dotted key: ours have three; the standard library's reader needs their square in time
 _LONG_KEY = re.compile(
@@ -67,6 +67,15 @@ class Strict(BaseModel):
                     )
         return data
 
+    def changed(self, /, **values: Any) -> Self:
+        """The same with some values replaced, checked like those of a file.
+
+        Raises:
+            ConfigError: an unknown key, or a value that is wrong; the message names it.
+        """
+        present = {name: getattr(self, name) for name in type(self).model_fields}
+        return validate(type(self), present | values, type(self).__name__.lower(), ConfigError)
+
 
 Schema = TypeVar("Schema", bound=BaseModel)
 
@@ -109,11 +118,11 @@ def _place(location: tuple[int | str, ...], data: Any) -> str:
     return text
 
 
-def validate(schema: type[Schema], data: Any, where: str) -> Schema:
+def validate(schema: type[Schema], data: Any, where: str, raises: type[DynakinError] = ModelError) -> Schema:
     """``data`` as an instance of ``schema``.
 
     Raises:
-        ModelError: with the first thing that is wrong; ``where`` (a file, "subject") opens the message.
+        ModelError (or ``raises``): with the first thing that is wrong; ``where`` (a file, "subject") opens the message.
     """
     try:
         return schema.model_validate(data)
@@ -125,4 +134,4 @@ def validate(schema: type[Schema], data: Any, where: str) -> Schema:
         place = _place(tuple(first["loc"]), data)
         message = str(first["msg"]).removeprefix("Value error, ")
         found = "" if first["type"] in {"value_error", "missing"} else f", found {first['input']!r}"
-        raise ModelError(f"{where}: {place + ': ' if place else ''}{message}{found}") from None
+        raise raises(f"{where}: {place + ': ' if place else ''}{message}{found}") from None

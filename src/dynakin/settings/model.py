@@ -1,4 +1,5 @@
-"""Bounds of equation (9) and the prior standard deviations at the first frame: every number, with its reason.
+"""What of a model is estimated, with which prior standard deviations at the first frame, and within which bounds of
+equation (9): every number, with its reason.
 
 The paper gives the bounds as +-20 % and says nothing of P at the first frame; a prior of 1e6 would let the
 gauges of the model (a terminal segment's length against its free markers, say) wander, so all are finite
@@ -7,13 +8,15 @@ here.
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, Literal, get_args
 
-import numpy as np
 from pydantic import Field
 
-from dynakin.model.inertia import INERTIA_NAMES, RigidBody
-from dynakin.model.validation import Strict
+from dynakin.settings.strict import Strict
+
+Quantity = Literal["lengths", "markers", "soft_tissue", "inertia"]
+QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
+"""Parameters that can be estimated: segment lengths, marker places, displacements of skin and flesh, inertia."""
 
 Positive = Annotated[float, Field(gt=0.0)]
 
@@ -67,30 +70,18 @@ class Bounds(Strict):
     """Of the absolute value, as in (9)."""
 
 
-Interval = tuple[float, float]
+class OpenSimOptions(Strict):
+    """What of an OpenSim model can be estimated, and what is taken as the file has it."""
 
-
-def inertia_prior(body: RigidBody, length: float, priors: Priors) -> dict[str, float]:
-    """Standard deviation of each of the ten numbers."""
-    moment = priors.inertia_fraction * max(float(np.trace(body.inertia)) / 2.0, 1e-12)
-    planar = priors.inertia_fraction * max(float(body.inertia[2, 2]), 1e-12)
-    sd = dict.fromkeys(INERTIA_NAMES, moment)
-    sd |= dict.fromkeys(("mx", "my", "mz"), priors.first_moment_fraction * body.mass * length)
-    return sd | {"mass": priors.mass_fraction * body.mass, "izz": planar}
-
-
-def inertia_bounds(body: RigidBody, length: float, bounds: Bounds) -> dict[str, Interval]:
-    """(lower, upper) of each of the ten numbers."""
-    values = dict(zip(INERTIA_NAMES, body.vector, strict=True))
-    found: dict[str, Interval] = {}
-    for name, value in values.items():
-        if name == "mass":
-            half = bounds.mass_fraction * abs(value)
-        elif name in ("mx", "my", "mz"):
-            half = bounds.first_moment_fraction * body.mass * length
-        elif name in ("ixx", "iyy", "izz"):
-            half = bounds.inertia_fraction * abs(value)
-        else:  # products are bounded by the moments: |ixy| <= (ixx + iyy) / 2 for every real body
-            half = bounds.inertia_fraction * float(np.trace(body.inertia)) / 2.0
-        found[name] = (value - half, value + half)
-    return found
+    scale: Literal["all"] | tuple[str, ...] | None = "all"
+    """Bodies with a scale parameter, on which the joints placed on that body depend; []: none."""
+    share_sides: bool = True
+    """Whether mirrored bodies (femur_r, femur_l) share one."""
+    scale_masses: bool = True
+    """Whether all masses and inertias are multiplied so that they sum to the subject's mass."""
+    lightest_share: float = Field(default=0.01, ge=0.0, lt=1.0)
+    """Bodies of less than this part of the whole mass keep the file's mass and inertia: no recording tells of them."""
+    lock_unseen: bool = True
+    """Whether coordinates that move no measured marker (toes, often) are locked at the file's default value."""
+    leave_out: tuple[str, ...] = ()
+    """Markers of the file that are not measurements (regressed joint centres, say)."""

@@ -4,40 +4,33 @@ from __future__ import annotations
 
 from typing import Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from dynakin.errors import ModelError
-from dynakin.model.validation import nearest, validate
+from dynakin.settings.strict import Strict, validate
 
 Sex = Literal["male", "female"]
 
 
-class _SubjectFields(BaseModel):
+class _Fields(Strict):
     """The plain fields, so that ``Subject(...)`` can turn pydantic's error into a ModelError."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
 
     mass_kg: float | None = Field(default=None, gt=0.0, lt=500.0)
     height_m: float | None = Field(default=None, gt=0.3, lt=2.8)
     sex: Sex | None = None
 
 
-class Subject(_SubjectFields):
+class Subject(_Fields):
     """Mass (kg), height (m) and sex of the person; what is None is measured or estimated, and said.
 
     Raises:
-        ModelError: an unknown key, or a value out of range; the message names the key (``mass_kg`` of 0,
-        say).
+        ModelError: an unknown key, or a value out of range; the message names the key (``mass_kg`` of 0, say).
     """
 
     def __init__(self, **fields: Any) -> None:
         """Keywords ``mass_kg``, ``height_m``, ``sex``."""
-        for key in fields:
-            if key not in _SubjectFields.model_fields:
-                known = _SubjectFields.model_fields
-                raise ModelError(f"subject: unknown key {key!r}{nearest(key, known)}; expected {', '.join(known)}")
         try:
-            checked = validate(_SubjectFields, fields, "subject")
+            checked = validate(_Fields, fields, "subject")
         except ModelError as error:
             raise ModelError(error.message + _hint(fields)) from None
         super().__init__(**checked.model_dump())

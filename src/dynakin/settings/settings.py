@@ -1,40 +1,39 @@
-"""The configuration of a run: one definition of every key, its default and its meaning, for file and command line."""
+"""The settings of a run: one definition of every key, its default and its meaning, for file and command line."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from dynakin.errors import ConfigError, ModelError
-from dynakin.filter import presets
-from dynakin.filter.augment import QUANTITIES, Quantity
-from dynakin.filter.estimator import Estimator
-from dynakin.filter.noise import Noise
-from dynakin.model.calibration.loads import CarriedLoad
-from dynakin.model.definition import Definition, available_models, load_model
-from dynakin.model.identified import IdentifiedSubject, read_identified
-from dynakin.model.opensim.definition import OpenSimOptions
-from dynakin.model.priors import Bounds, Priors
-from dynakin.model.subject import Sex, Subject
-from dynakin.model.validation import Strict, nearest, read_toml, validate
-from dynakin.recordings.formats.textfile import is_file
-from dynakin.recordings.plates.loads import PlateLoad
+from dynakin.errors import ConfigError, DynakinError
+from dynakin.files import is_file
+from dynakin.settings import presets
+from dynakin.settings.loads import CarriedLoad, PlateLoad
+from dynakin.settings.model import QUANTITIES, Bounds, OpenSimOptions, Priors, Quantity
+from dynakin.settings.noise import Noise
+from dynakin.settings.strict import Strict, read_toml, validate
+from dynakin.settings.subject import Sex, Subject
 
 # Keys that name files: relative to the configuration file that they stand in.
 _PATHS = ("trial", "forces", "static", "parameters", "output")
+NEEDED = {
+    "trial": "TRIAL",
+    "model": "--model NAME (fullbody, sagittal7, squat7, a .toml or .osim file)",
+    "output": "-o OUT",
+}
 
 
-class RunConfig(Strict):
-    """What `dynakin run` needs to know; the keys of the file are the options of the command line."""
+class Settings(Strict):
+    """What a run needs to know; the keys of a configuration file are the options of the command line."""
 
-    trial: Path = Field(examples=["squat.c3d"])
+    trial: Path = Field(default=Path(), examples=["squat.c3d"])
     """Recording to estimate: .c3d, .trc or .csv. Paths are relative to this file."""
     model: str = Field(examples=["squat7"])
     """Built-in model (fullbody, squat7, sagittal7) or a .toml or .osim file of your own."""
-    output: Path = Field(examples=["out/squat"])
+    output: Path = Field(default=Path(), examples=["out/squat"])
     """Folder for the results. It is replaced if it holds an earlier output, and refused if it holds anything else."""
 
     forces: Path | None = Field(default=None, examples=["squat_grf.mot"])
@@ -106,6 +105,22 @@ class RunConfig(Strict):
     versions: dict[str, Any] = Field(default_factory=dict)
     """Written into an output's config.toml for the record. Not read."""
 
+    @classmethod
+    def of(cls, content: Mapping[str, Any], where: str, needed: Iterable[str] = NEEDED) -> Self:
+        """Settings from the keys of a file, of the command line, or both.
+
+        Args:
+            where: the file, or the command; opens the message of what is wrong. needed: keys that must be given.
+
+        Raises:
+            ConfigError: a key that is unknown (the nearest is suggested) or missing, or a value that is wrong.
+        """
+        for key in needed:
+            if content.get(key) is None:
+                option = NEEDED[key]
+                raise ConfigError(f'{where}: {key} is missing, expected {option} or {key} = "..." in the configuration')
+        return validate(cls, content, where, ConfigError)
+
     @model_validator(mode="after")
     def _checked(self) -> Self:
         try:
@@ -113,7 +128,7 @@ class RunConfig(Strict):
             self.noise_settings()
             if self.loads and self.mass_kg is None:
                 raise ConfigError("loads: the plates carry them too, expected mass_kg, the person's own")
-        except (ModelError, ConfigError) as error:
+        except DynakinError as error:
             raise ValueError(error.message) from None
         return self
 
@@ -121,60 +136,13 @@ class RunConfig(Strict):
         """Who is measured."""
         return Subject(mass_kg=self.mass_kg, height_m=self.height_m, sex=self.sex)
 
-    def definition(self) -> Definition:
-        """The model, not measured yet.
-
-        Raises:
-            ModelError: as `load_model`.
-        """
-        return load_model(self.model, self.subject(), self.markers, self.table, self.opensim)
-
     def noise_settings(self) -> Noise:
         """The preset with the changes of [noise].
 
         Raises:
             ConfigError: an unknown preset, an unknown key in [noise], or a value out of range.
         """
-        for key in self.noise:
-            if key not in Noise.model_fields:
-                known = ", ".join(Noise.model_fields)
-                raise ConfigError(
-                    f"noise: unknown key {key!r}{nearest(key, Noise.model_fields)}; expected keys: {known}"
-                )
-        changed = presets.preset(self.preset).model_dump() | self.noise
-        try:
-            return validate(Noise, changed, "noise")
-        except ModelError as error:
-            raise ConfigError(error.message) from None
-
-    def identified_subject(self) -> IdentifiedSubject | None:
-        """The identified subject that it names.
-
-        Raises:
-            ModelError: as `read_identified`.
-        """
-        return None if self.parameters is None else read_identified(self.parameters)
-
-    def estimator(self, lag: int = 0) -> Estimator:
-        """An estimator of its model with its settings.
-
-        Raises:
-            ModelError, ConfigError: the model or a setting is wrong.
-        """
-        return Estimator(
-            self.definition(),
-            self.noise_settings(),
-            priors=self.priors,
-            bounds=self.bounds,
-            side=self.side,
-            vertical=self.vertical,
-            forward=self.forward,
-            estimate=self.estimate,
-            plates=self.plates,
-            loads=self.loads,
-            parameters=self.identified_subject(),
-            lag=lag,
-        )
+        return presets.preset(self.preset, self.noise)
 
     def as_used(self) -> dict[str, Any]:
         """Plain data for an output's config.toml: every path absolute, so that the file works from where it lies."""
@@ -183,11 +151,11 @@ class RunConfig(Strict):
             plain["preset"] = str(Path(self.preset).absolute())
         for key in _PATHS:
             path = getattr(self, key)
-            plain[key] = None if path is None else str(path.absolute())
+            plain[key] = None if path in (None, Path()) else str(path.absolute())
         return plain
 
 
-def read_config(path: Path, paths: Sequence[str] = _PATHS) -> dict[str, Any]:
+def read_keys(path: Path, paths: Sequence[str] = _PATHS) -> dict[str, Any]:
     """The keys of a configuration file, its relative paths made relative to where the file lies.
 
     Args:
@@ -205,19 +173,3 @@ def read_config(path: Path, paths: Sequence[str] = _PATHS) -> dict[str, Any]:
         if isinstance(value, str) and is_file(path.parent / value):
             content[key] = str(path.parent / value)
     return content
-
-
-def make_config(content: dict[str, Any], where: str) -> RunConfig:
-    """A checked configuration; ``where`` (the file, or the command) opens the message of what is wrong.
-
-    Raises:
-        ConfigError: a key that is unknown (the nearest is suggested) or missing, or a value that is wrong.
-    """
-    models = f"--model NAME ({', '.join(available_models())}, a .toml or .osim file)"
-    for key, option in (("trial", "TRIAL"), ("model", models), ("output", "-o OUT")):
-        if content.get(key) is None:
-            raise ConfigError(f'{where}: {key} is missing, expected {option} or {key} = "..." in the configuration')
-    try:
-        return validate(RunConfig, content, where)
-    except ModelError as error:
-        raise ConfigError(error.message) from None

@@ -1,0 +1,60 @@
+"""What is in a file, with errors of one line that name it."""
+
+from __future__ import annotations
+
+import stat
+from pathlib import Path
+
+from dynakin.errors import DynakinError, RecordingError
+
+LARGEST_TEXT = 64 * 2**20
+"""Bytes of a model, table or configuration: the largest known (whole bodies with muscles) have a tenth."""
+
+
+def is_text(name: str) -> bool:
+    """Whether a name can be written as UTF-8; one of a file need not."""
+    try:
+        name.encode()
+    except UnicodeEncodeError:
+        return False
+    return True
+
+
+def is_file(path: Path) -> bool:
+    """Whether there is such a file; a name that no file can have (5,000 characters, a NUL) is none."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
+def require_file(path: Path, raises: type[DynakinError] = RecordingError) -> None:
+    """Raise RecordingError (or ``raises``) unless ``path`` is a file: a pipe would be waited for for ever."""
+    if not is_text(str(path)):
+        raise raises(f"{path}: its name is no UTF-8 text, which outputs could not tell; rename it")
+    try:
+        mode = path.stat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        raise raises(f"{path}: cannot be read (no such file)") from None
+    except (OSError, ValueError) as error:
+        raise raises(f"{path}: cannot be read ({getattr(error, 'strerror', None) or error})") from None
+    if stat.S_ISDIR(mode):
+        raise raises(f"{path}: is a folder, expected a file")
+    if not stat.S_ISREG(mode):
+        raise raises(f"{path}: is a pipe or device, expected a file")
+
+
+def read_bytes(path: Path, raises: type[DynakinError] = RecordingError, largest: float = float("inf")) -> bytes:
+    """What is in a file.
+
+    Raises:
+        RecordingError (or ``raises``): no such file, not readable, or of more than ``largest`` bytes.
+    """
+    require_file(path, raises)
+    try:
+        size = path.stat().st_size
+        if size > largest:
+            raise raises(f"{path}: found {size} bytes, expected at most {largest:.0f}")
+        return path.read_bytes()
+    except OSError as error:
+        raise raises(f"{path}: cannot be read ({error.strerror or error})") from None

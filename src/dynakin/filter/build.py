@@ -1,0 +1,48 @@
+"""From settings to what they ask for: a model that is not measured yet, an estimator."""
+
+from __future__ import annotations
+
+from dynakin.filter.estimator import Estimator
+from dynakin.model.definition import Definition, load_model
+from dynakin.model.identified import IdentifiedSubject, read_identified
+from dynakin.settings.settings import Settings
+
+
+def definition_of(settings: Settings) -> Definition:
+    """The model, not measured yet.
+
+    Raises:
+        ModelError: as `load_model`.
+    """
+    return load_model(settings.model, settings.subject(), settings.markers, settings.table, settings.opensim)
+
+
+def identified_of(settings: Settings) -> IdentifiedSubject | None:
+    """The identified subject that the settings name.
+
+    Raises:
+        ModelError: as `read_identified`.
+    """
+    return None if settings.parameters is None else read_identified(settings.parameters)
+
+
+def estimator_of(settings: Settings, lag: int = 0) -> Estimator:
+    """An estimator of the model with these settings.
+
+    Raises:
+        ModelError, ConfigError: the model or a setting is wrong.
+    """
+    return Estimator(
+        definition_of(settings),
+        settings.noise_settings(),
+        priors=settings.priors,
+        bounds=settings.bounds,
+        side=settings.side,
+        vertical=settings.vertical,
+        forward=settings.forward,
+        estimate=settings.estimate,
+        plates=settings.plates,
+        loads=settings.loads,
+        parameters=identified_of(settings),
+        lag=lag,
+    )

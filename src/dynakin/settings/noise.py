@@ -1,0 +1,109 @@
+"""What the filter assumes of noise: process and measurement, what it doubts, and how constraints are kept."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from dynakin.settings.strict import Strict
+
+NotNegative = Annotated[float, Field(ge=0.0)]
+Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=True)]  # infinite: as if there were no such measurement
+Seconds = Annotated[float, Field(gt=0.0)]
+Probability = Annotated[float, Field(ge=0.0, lt=1.0)]
+
+
+class Noise(Strict):
+    """SI units; what is called a variance is squared. The defaults are those that anyone should use: white jerk, soft
+    tissue as a process of its own, bounds by projection, gates, recovery; how each number was found stands in
+    docs/validation.md."""
+
+    coordinate: NotNegative = 0.0
+    """Q of each coordinate, rad^2 or m^2 a step."""
+    speed: NotNegative = 0.0
+    """Q of each speed, (rad/s)^2 a step."""
+    acceleration: NotNegative = 0.0
+    """Q of each acceleration, (rad/s^2)^2 a step."""
+    length: NotNegative = 0.0
+    """Q of each segment length: constants."""
+    marker_place: NotNegative = 0.0
+    """Q of each local marker coordinate, m^2 a step."""
+    inertia: NotNegative = 0.0
+    """Q of each inertial parameter: constants."""
+    jerk: NotNegative = 60.0
+    """Spectral density of the jerk of each rotation, rad^2/s^5: white jerk keeps angles, speeds and accelerations
+    derivatives of each other at any time step."""
+    jerk_translation: NotNegative = 10.0
+    """The same of each translation, m^2/s^5."""
+
+    floating_jerk: NotNegative | None = 3e4
+    """The jerk's density of each rotation of a model that is fixed nowhere: it walks, and its limbs swing. Not given:
+    as ``jerk``."""
+    floating_jerk_translation: NotNegative | None = 1e3
+    """The same of each translation."""
+
+    length_drift: NotNegative = 3e-6
+    """Spectral density of a random walk of each length, m^2/s: skin that follows an angle and joints that are no hinges
+    look like lengths, and do not average out; without it a length is thought to be known the better the longer."""
+    length_skin: NotNegative = 0.6
+    """Part of the skin's declared displacement that is added to the standard deviation of the lengths about it when
+    they are told, not in the filter: skin that follows an angle never averages out."""
+    soft_tissue: NotNegative = 0.5
+    """Standard deviation of the displacement of skin and flesh under each marker, as a fraction of the size that its
+    marker set declares; 0: none is estimated."""
+    soft_tissue_least_m: NotNegative = 0.002
+    """Where the standard deviation is below this, this much is taken for noise of the marker instead, without a state
+    of its own: a foot is not as rigid, nor its toe as fixed in the ground, as a model has it."""
+    soft_tissue_time_s: Seconds = 6.0
+    """Time constant of that displacement (first-order Gauss-Markov process)."""
+    floating_soft_tissue_time_s: Seconds | None = 0.5
+    """The same for a model that is fixed nowhere; not given: as ``soft_tissue_time_s``. A step lasts half a second, and
+    skin that takes longer to come back looks like longer bones."""
+
+    marker_sd_m: Positive | None = 0.0007
+    """Noise of the cameras, m, for all markers; not given: R of the marker set, which holds soft tissue too."""
+    marker_scale: Positive = 1.0
+    """Factor on the R of all markers that the marker set gives."""
+    marker: dict[str, Positive] = Field(default_factory=dict)
+    """R of single markers, m^2, by their name in the recording, instead of the marker set's."""
+    force: Positive = 36.0
+    """R of each force component of the total wrench, N^2."""
+    moment: Positive = 4.0
+    """R of each moment component about the reference point, (N m)^2."""
+    reference_point_m: tuple[float, float, float] | Literal["auto"] = "auto"
+    """Where the wrench's noise is declared, in the ground frame; auto: the mean centre of pressure of the first
+    second."""
+    plate_force: NotNegative = 5.0
+    """Standard deviation of a slow error of each force (plates and model alike), N; 0: none is estimated."""
+    plate_moment: NotNegative = 2.0
+    """The same of each moment about the ground origin, N m."""
+    plate_time_s: Seconds = 30.0
+    """Time constant of that slow error."""
+    plate_load_tolerance: Positive | None = 0.15
+    """Plates whose load is further from the person's weight than this part of it are not used: something that the model
+    does not have bears on them. Not given: they always are."""
+    plate_delay_s: NotNegative = 0.02
+    """Prior standard deviation of the plates' delay behind the markers, s; 0: none is estimated."""
+    total_mass: Positive = 0.25
+    """Variance of the declared total mass, kg^2."""
+    total_mass_use: Literal["frame", "prior"] = "prior"
+    """Whether the total mass is measured at each frame (5), or known once, at the start."""
+
+    marker_gate: Probability = 1e-9
+    """A marker is refused where its innovation is less likely than this; 0: never."""
+    wrench_gate: Probability = 1e-9
+    """The same for the plates."""
+    recover: bool = True
+    """Whether a motion that most markers contradict, or that was not seen for blind_s, is sought anew."""
+    blind_s: Seconds = 0.2
+    """How long the motion is believed without markers that fit, s."""
+    unseen_sd: Positive | None = 0.5
+    """Standard deviation of a coordinate (rad or m) from which on it is held where it is, because no marker tells of it
+    any more; not given: it is carried on with the speed it last had. Needs ``recover``."""
+    iterate_beyond: Positive | None = 0.2
+    """Standard deviation of a coordinate (rad or m) beyond which an update is linearised anew; not given: never."""
+
+    constraint: Literal["projection", "gain", "sigmoid", "none"] = "projection"
+    """How bounds are kept: by projection in the metric of P^-1, by restricting the gain (7), by a smooth map, or not
+    at all."""

@@ -1,0 +1,127 @@
+"""Named noise settings, and those of one's own as a file: what `tune` writes, and what `--preset FILE.toml` reads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import tomli_w
+
+from dynakin.errors import ConfigError, OutputError
+from dynakin.settings.noise import Noise
+from dynakin.settings.strict import nearest, read_toml
+
+_KEYS = ("base", "noise")
+
+
+def default() -> Noise:
+    """Settings for anyone: the defaults of `Noise`."""
+    return Noise()
+
+
+def paper() -> Noise:
+    """Bonnet et al., Table I, as it stands: its R as variances, its Q added at each step."""
+    return Noise(
+        coordinate=1e3,
+        speed=1e2,
+        acceleration=1e3,
+        marker_place=1e-4,
+        jerk=0.0,
+        jerk_translation=0.0,
+        floating_jerk=None,
+        floating_jerk_translation=None,
+        length_drift=0.0,
+        length_skin=0.0,
+        soft_tissue=0.0,
+        soft_tissue_least_m=0.0,
+        soft_tissue_time_s=1.0,
+        floating_soft_tissue_time_s=None,
+        marker_sd_m=None,
+        force=0.1,
+        moment=0.1,
+        reference_point_m=(0.0, 0.0, 0.0),
+        plate_force=0.0,
+        plate_moment=0.0,
+        plate_time_s=1.0,
+        plate_load_tolerance=None,
+        plate_delay_s=0.0,
+        total_mass=1e-4,
+        total_mass_use="frame",
+        marker_gate=0.0,
+        wrench_gate=0.0,
+        recover=False,
+        unseen_sd=None,
+        iterate_beyond=None,
+        constraint="gain",
+    )
+
+
+PRESETS = {"default": default, "paper": paper}
+
+
+def preset(name: str, changes: Mapping[str, Any] | None = None) -> Noise:
+    """The preset of that name, or the settings of a file whose name ends in .toml, with changes.
+
+    Raises:
+        ConfigError: there is none (the message lists those that there are), or a change is wrong. As `read_preset`.
+    """
+    found = read_preset(Path(name)) if is_file(name) else _built_in(name, " or a .toml file")
+    return found.changed(**changes or {})
+
+
+def _built_in(name: str, otherwise: str = "") -> Noise:
+    if name not in PRESETS:
+        raise ConfigError(f"preset {name!r} is unknown; expected {', '.join(PRESETS)}{otherwise}")
+    return PRESETS[name]()
+
+
+def is_file(name: str) -> bool:
+    """Whether a preset is a file of the user's."""
+    return name.casefold().endswith(".toml")
+
+
+def title(name: str) -> str:
+    """What a preset is called in tables: a file by its name without folder and ending."""
+    return Path(name).stem if is_file(name) else name
+
+
+def read_preset(path: Path) -> Noise:
+    """The settings of a file: ``base``, the built-in preset from which it starts ("default" where not given), and the
+    table ``noise`` with what is different.
+
+    Raises:
+        ConfigError: the file cannot be read, or a key or value is wrong; the message names it.
+    """
+    content = read_toml(path, ConfigError)
+    for key in content:
+        if key not in _KEYS:
+            raise ConfigError(f"{path}: unknown key {key!r}{nearest(key, _KEYS)}; expected keys: {', '.join(_KEYS)}")
+    base, noise = content.get("base", "default"), content.get("noise", {})
+    if not isinstance(base, str) or not isinstance(noise, dict):
+        raise ConfigError(f'{path}: expected base = "NAME" and a table [noise]')
+    try:
+        start = _built_in(base)  # not another file, which could name this one
+    except ConfigError as error:
+        raise ConfigError(f"{path}: base: {error.message}") from None
+    try:
+        return start.changed(**noise)
+    except ConfigError as error:
+        raise ConfigError(f"{path}: {error.message}") from None
+
+
+def write_preset(path: Path, noise: Noise, base: str, remarks: Sequence[str] = ()) -> None:
+    """Write settings so that they stay what they are when presets change: every key that has a value.
+
+    Args:
+        base: the built-in preset that they come from. remarks: lines that open the file.
+
+    Raises:
+        OutputError: the file cannot be written.
+    """
+    values: dict[str, Any] = {k: v for k, v in noise.model_dump(mode="json").items() if v is not None}
+    text = "".join(f"# {line}\n" for line in remarks) + tomli_w.dumps({"base": base, "noise": values})
+    try:
+        path.write_text(text, encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from None
