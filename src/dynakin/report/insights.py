@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, Literal
+from functools import wraps
+from typing import Any, Literal, ParamSpec
 
 from dynakin.report.convergence import convergence
 from dynakin.report.labels import (
@@ -16,7 +18,6 @@ from dynakin.report.labels import (
     short_marker_names,
     words,
 )
-from dynakin.report.sections.section import needs
 from dynakin.results.estimate import Estimate
 from dynakin.results.failures import FAILED, LOG
 from dynakin.results.measures.bounds import counts_in_words
@@ -65,6 +66,24 @@ class Insight:
     advice: str = ""
 
 
+P = ParamSpec("P")
+
+
+def needs(*blocks: str) -> Callable[[Callable[P, Insight | None]], Callable[P, Insight | None]]:
+    """Of a finding made from metrics, its last argument: nothing is said where one of these blocks of ``metrics.json``
+    is None, because the stage that makes it failed (`dynakin.results.failures`)."""
+
+    def with_them(make: Callable[P, Insight | None]) -> Callable[P, Insight | None]:
+        @wraps(make)
+        def made(*args: P.args, **others: P.kwargs) -> Insight | None:
+            metrics: Any = args[-1]
+            return None if any(metrics[block] is None for block in blocks) else make(*args, **others)
+
+        return made
+
+    return with_them
+
+
 def what_was_run(estimate: Estimate) -> str:
     """One sentence: the recording, the model, the data used."""
     recording, time = estimate.recording, estimate.time
@@ -111,7 +130,7 @@ def insights(estimate: Estimate, metrics: dict[str, Any]) -> list[Insight]:
     return [insight for insight in found if insight is not None]
 
 
-@needs("moments", otherwise=None)
+@needs("moments")
 def _moments(metrics: dict[str, Any]) -> Insight | None:
     """Why moments are not measured, and what that leaves out; how many are is said before all findings."""
     found = metrics["moments"]
@@ -154,7 +173,7 @@ def _tracking(metrics: dict[str, Any]) -> Insight | None:
     return Insight("warning", "Lost", found["verdict"] + whole, advice)
 
 
-@needs("markers", otherwise=None)
+@needs("markers")
 def _markers(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     mean = metrics["markers"]["mean_rms_mm"]
     if mean is None:
@@ -181,7 +200,7 @@ def _markers(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     )
 
 
-@needs("wrench", otherwise=None)
+@needs("wrench")
 def _wrench(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     rms = metrics["wrench"]["rms"]
     told = [text for text in estimate.messages if text.startswith(PLATE_WORDS) and not doubts_mass(text)]
@@ -201,7 +220,7 @@ def _wrench(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     )
 
 
-@needs("prediction", "wrench", otherwise=None)
+@needs("prediction", "wrench")
 def _prediction(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     """How much of the fit is the model, and how much is following the measurement of the same frame."""
     ahead, fitted = metrics["prediction"]["wrench"]["rms"], metrics["wrench"]["rms"]
@@ -232,7 +251,7 @@ def _prediction(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     )
 
 
-@needs("consistency", otherwise=None)
+@needs("consistency")
 def _consistency(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     if estimate.why_lost is not None:
         return None
@@ -289,7 +308,7 @@ def _constants(estimate: Estimate) -> list[Insight]:
     return found
 
 
-@needs("bounds", otherwise=None)
+@needs("bounds")
 def _bounds(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     free = [p for p in estimate.parameters if p.estimated and p.lower is not None]
     names = short_marker_names(estimate.marker_names)
@@ -315,7 +334,7 @@ def _bounds(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     )
 
 
-@needs("adaptation", otherwise=None)
+@needs("adaptation")
 def _adaptation(metrics: dict[str, Any]) -> Insight | None:
     """When the estimate settled, beside the time from which the figures are taken."""
     found = metrics["adaptation"]
@@ -334,7 +353,7 @@ def _adaptation(metrics: dict[str, Any]) -> Insight | None:
     )
 
 
-@needs("soft_tissue", otherwise=None)
+@needs("soft_tissue")
 def _soft_tissue(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     """Markers that move on their segments further than skin does."""
     names = short_marker_names(estimate.marker_names)
@@ -370,7 +389,7 @@ def _joint_limits(estimate: Estimate) -> Insight | None:
     return Insight("warning", "Joint limits", f"Held at its limit for part of the time: {listed(stuck)}.")
 
 
-@needs("events", otherwise=None)
+@needs("events")
 def _missing(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     gaps: dict[str, int] = metrics["events"]["missing_frames"]
     if not gaps:
