@@ -30,30 +30,34 @@ class Plot:
 
 
 def repetition_section(page: Page) -> Section:
-    """Of the page's estimate: in a plane by method, in space legs and trunk, each limb over its own foot's cycles."""
-    if page.planar:
-        return method_repetitions(page.estimate, page.repetitions, page.curves)
-    own = [curve for curve in page.curves if curve.method.startswith("EKF")]
+    """Of the page's estimate: in a plane by method, in space right and left together."""
+    make = method_repetitions if page.planar else side_repetitions
+    return make(page.estimate, page.repetitions, page.curves)
+
+
+def side_repetitions(estimate: Estimate, found: Found, curves: Sequence[MeanCurve]) -> Section:
+    """The filter's curves of legs and trunk and of the wrench, each limb over its own foot's cycles; or why there are
+    none."""
+    own = [curve for curve in curves if curve.method.startswith("EKF")]
     if not own:
-        return Section("repetitions", "Repetitions", "", notes=(page.repetitions.note,))
-    joints = [joint for joint in joints_of(page.estimate) if joint.region in ("Legs", "Trunk and head")]
-    curves, styles = {(curve.side, curve.quantity): curve for curve in own}, side_lines(page.estimate)
-    angles = [_sides(joint, curves, "", styles) for joint in joints]
-    moments = {joint.name.lower(): _sides(joint, curves, "/moment", styles) for joint in joints}
-    kept = ("EKF", MEASURED)
-    total = [curve for curve in page.curves if curve.quantity in COMPONENTS and curve.method.startswith(kept)]
+        return Section("repetitions", "Repetitions", "", notes=(found.note,))
+    joints = [joint for joint in joints_of(estimate) if joint.region in ("Legs", "Trunk and head")]
+    by_quantity, styles = {(curve.side, curve.quantity): curve for curve in own}, side_lines(estimate)
+    angles = [_sides(joint, by_quantity, "", styles) for joint in joints]
+    moments = {joint.name.lower(): _sides(joint, by_quantity, "/moment", styles) for joint in joints}
+    wrench = [curve for curve in curves if curve.quantity in COMPONENTS and curve.method.startswith(("EKF", MEASURED))]
     missing = [name for name, plot in moments.items() if plot is None]
     plots = {
         "angles": [plot for plot in angles if plot],
         "moments": [plot for plot in moments.values() if plot],
-        "wrench": plots_by_method(page.estimate, total),
+        "wrench": plots_by_method(estimate, wrench),
     }
     more = " All curves are in repetitions.csv."
     more += f" No cycle is left of the moments of {listed(missing, 12)}." if missing else ""
-    keys = {kind: side_key(page.estimate) for kind in ("angles", "moments")} | {
+    keys = dict.fromkeys(KINDS, side_key(estimate)) | {
         "wrench": tuple(method_styles((MEASURED, own[0].method)).values())
     }
-    return _section(page.repetitions, plots, keys, more=more)
+    return _section(found, plots, keys, more=more)
 
 
 def method_repetitions(

@@ -101,14 +101,19 @@ var dynakinPlayer = (function () {
     pen.moveTo(a[0], a[1]); pen.lineTo(b[0], b[1]); pen.stroke();
   }
   function floor(project, frame) {
-    var y = data.view.floor, half = data.view.radius * 1.15, step = data.view.square, k;
+    var y = data.view.floor, half = data.view.radius * 1.15, step = data.view.square, k, level;
     var cx = data.view.follow ? arrays.centre(frame, 0) : data.view.x, cz = data.view.follow ? arrays.centre(frame, 1) : data.view.z;
-    for (k = Math.ceil((cx - half) / step); k * step <= cx + half; k++) {
-      // Seen from the side a line across is a mark below the floor.
-      stroke(project(k * step, y, cz - half), project(k * step, y - (data.view.turns ? 0 : 22), cz + half), FLOOR, data.view.turns ? 1 : 2);
+    // From the side the squares are a line with a mark for each, all across the picture.
+    if (!data.view.turns) {
+      level = project(cx, y, cz)[1];
+      stroke([0, level], [size.width, level], FLOOR, 2);
+      half = Math.min(0.5 * size.width / (size.scale * zoom), 100 * step);
     }
-    if (!data.view.turns) { stroke(project(cx - half, y, cz), project(cx + half, y, cz), FLOOR, 2); return; }
-    for (k = Math.ceil((cz - half) / step); k * step <= cz + half; k++) {
+    for (k = Math.ceil((cx - half) / step); k * step <= cx + half; k++) {
+      if (data.view.turns) { stroke(project(k * step, y, cz - half), project(k * step, y, cz + half), FLOOR, 1); }
+      else { stroke(project(k * step, y, cz), project(k * step, y - 22, cz), FLOOR, 2); }
+    }
+    for (k = Math.ceil((cz - half) / step); data.view.turns && k * step <= cz + half; k++) {
       stroke(project(cx - half, y, k * step), project(cx + half, y, k * step), FLOOR, 1);
     }
   }
