@@ -28,15 +28,9 @@ from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.sources import UNKNOWN
 from dynakin.validation.methods import Trial
 
-_EITHER = (
-    repetition_section,
-    methods_section,
-    length_section,
-    mass_section,
-    observability_section,
-)
+_BOTH = (repetition_section, methods_section, length_section, mass_section, observability_section)
 SECTIONS: dict[str, tuple[Callable[[Page], Section | None], ...]] = {
-    "plane": (marker_section, wrench_section, angle_section, moment_section, *_EITHER),
+    "plane": (marker_section, wrench_section, angle_section, moment_section, *_BOTH),
     "space": (
         angle_section,
         moment_section,
@@ -46,7 +40,7 @@ SECTIONS: dict[str, tuple[Callable[[Page], Section | None], ...]] = {
         mass_centre_section,
         marker_section,
         wrench_section,
-        *_EITHER,
+        *_BOTH,
     ),
 }
 """The sections of a run's page in their order, by what the model moves in; one without anything to show is left out."""

@@ -91,8 +91,7 @@ def save_sensitivity_figure(path: str | Path, folder: str | Path, formats: Seque
     Raises:
         ConfigError: an unknown format, or no such file. OutputError: the folder cannot be written.
     """
-    grid = read_sensitivity(path)
-    return _write({SENSITIVITY_FIGURE: lambda: sensitivity_figure(grid)}, Path(folder), formats)
+    return save_sensitivity_figures({SENSITIVITY_FIGURE: read_sensitivity(path)}, folder, formats)
 
 
 def save_sensitivity_figures(

@@ -207,7 +207,7 @@ def _base_table(base: Mapping[str, Mapping[str, Any]]) -> TextTable:
 
 def _panel(key: str, groups: Mapping[str, Sequence[ShareRow]]) -> Panel:
     count = sum(len(rows) for rows in groups.values()) + 1.6 * len(groups)
-    figure, axes = new_axes(4.3, 0.35 + _ROW_IN * count, fitted=True)
+    figure, axes = new_axes(4.3, 0.35 + _ROW_IN * count)
     place, ticks, labels = 0.0, [], []
     for title, rows in groups.items():
         place -= 1.6

@@ -110,7 +110,7 @@ def _rms_bars(key: str, title: str, rms: dict[str, float | None], most: float | 
     """RMS distance of each marker as labelled bars, in the order given; ``most`` fills the width, else the largest."""
     names = [name for name, value in rms.items() if value is not None]
     values = [value for value in rms.values() if value is not None]
-    figure, axes = new_axes(4.3, 0.42 + 0.2 * len(names), fitted=True)
+    figure, axes = new_axes(4.3, 0.42 + 0.2 * len(names))
     places = np.arange(len(names))[::-1]
     most = most or max(values, default=1.0)
     decimals = 1 if most >= 1.0 else 2
@@ -136,7 +136,7 @@ def _rms_bars(key: str, title: str, rms: dict[str, float | None], most: float | 
 
 def _plane_paths(key: str, names: list[str], measured: np.ndarray, estimated: np.ndarray) -> Panel:
     """Paths of the markers in the sagittal plane, (T, M, 2) m, each labelled where it starts."""
-    figure, axes = new_axes(4.3, 4.6, fitted=True)
+    figure, axes = new_axes(4.3, 4.6)
     step = max(1, len(measured) // 400)
     for index in range(len(names)):
         axes.plot(*measured[::step, index].T, color=MEASURED, linewidth=3.0, solid_capstyle="round")
