@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from dynakin.errors import ConfigError, OutputError
-from dynakin.report.direct_labels import spread
 from dynakin.report.paper_figures.figures import FIGURES, save_figures
 from dynakin.report.paper_figures.movement import middle_cycle
+from dynakin.report.paper_figures.parameters import spread
 from dynakin.results.estimate import Estimate
 from dynakin.validation.methods import Trial
 

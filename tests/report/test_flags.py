@@ -12,15 +12,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from dynakin.report.chart import Panel
 from dynakin.report.insights import in_short, insights
 from dynakin.report.page import render_report
 from dynakin.report.paper_figures.figures import save_figures
-from dynakin.report.playback_spatial import spatial_playback
+from dynakin.report.playback import playback
+from dynakin.report.sections.forces import foot_section, wrench_section
+from dynakin.report.sections.joints import moment_section
 from dynakin.report.sections.methods import moment_part
-from dynakin.report.sections.movement import moment_section, wrench_section
-from dynakin.report.sections.panels import Panel
-from dynakin.report.sections.spatial_repetitions import spatial_repetition_section
-from dynakin.report.sections.spatial_sections import foot_section, spatial_moment_section, spatial_wrench_section
+from dynakin.report.sections.repetitions import side_repetitions
+from dynakin.report.sections.section import Page
 from dynakin.report.sections.work import asymmetry_section, power_section
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.mean_curves import mean_curves, signals
@@ -66,39 +67,39 @@ def test_derived_stretches_are_dashed_in_every_panel(walker: Estimate, metrics: 
     whole = make_walker()
     for section, sure in (
         (
-            spatial_moment_section(walker, metrics).parts[0],
-            spatial_moment_section(whole, compute_metrics(whole)).parts[0],
+            moment_section(Page(walker, metrics)).parts[0],
+            moment_section(Page(whole, compute_metrics(whole))).parts[0],
         ),
-        (power_section(walker, metrics), power_section(whole, compute_metrics(whole))),
+        (power_section(Page(walker, metrics)), power_section(Page(whole, compute_metrics(whole)))),
     ):
         assert dashes(titled(section.panels, "Knee")) == 1 and dashes(titled(sure.panels, "Knee")) == 0
-    left = foot_section(walker, metrics).parts[1].panels
+    left = foot_section(Page(walker, metrics)).parts[1].panels
     assert (
         dashes(titled(left, "Vertical")) == 1
-        and dashes(titled(foot_section(walker, metrics).parts[0].panels, "V")) == 0
+        and dashes(titled(foot_section(Page(walker, metrics)).parts[0].panels, "V")) == 0
     )
-    assert dashes(titled(spatial_wrench_section(walker, metrics).panels, "Vertical")) == 1
+    assert dashes(titled(wrench_section(Page(walker, metrics)).panels, "Vertical")) == 1
     for section in (
-        spatial_moment_section(walker, metrics),
-        power_section(walker, metrics),
-        foot_section(walker, metrics),
+        moment_section(Page(walker, metrics)),
+        power_section(Page(walker, metrics)),
+        foot_section(Page(walker, metrics)),
     ):
         assert any(line.label == DERIVED_WORDS and line.dash == "dashed" for line in section.lines)
-    assert not any(line.label == DERIVED_WORDS for line in power_section(whole, compute_metrics(whole)).lines)
+    assert not any(line.label == DERIVED_WORDS for line in power_section(Page(whole, compute_metrics(whole))).lines)
 
 
 def test_a_derived_stretch_has_no_band_and_no_peak(walker: Estimate, metrics: dict[str, Any]) -> None:
-    knee = titled(spatial_moment_section(walker, metrics).parts[0].panels, "Knee")
+    knee = titled(moment_section(Page(walker, metrics)).parts[0].panels, "Knee")
     assert knee.note == "right 0.00 to 1.17; left 0.00 to 1.17"  # derived it would be 1.75
     band = re.findall(r'<path d="([^"]+)" class="spread" fill="#D55E00"', knee.svg)
     assert len(band) == 1 and band[0].count("M") == 2
-    assert titled(foot_section(walker, metrics).parts[1].panels, "Vertical").note.startswith("peak 700 N")
+    assert titled(foot_section(Page(walker, metrics)).parts[1].panels, "Vertical").note.startswith("peak 700 N")
     beside = make_walker((1, 2))
     found = compute_metrics(beside)
-    assert "no peak" in titled(foot_section(beside, found).parts[1].panels, "Vertical").note
-    text = asymmetry_section(beside, found).text
+    assert "no peak" in titled(foot_section(Page(beside, found)).parts[1].panels, "Vertical").note
+    text = asymmetry_section(Page(beside, found)).text
     assert "The left foot has no stance that is measured from touch-down to toe-off" in text
-    assert asymmetry_section(beside, found).tables[0].rows[0][1:] == ("–", "–")
+    assert asymmetry_section(Page(beside, found)).tables[0].rows[0][1:] == ("–", "–")
 
 
 def test_absent_legs_are_not_drawn_and_the_page_says_so_first() -> None:
@@ -108,7 +109,7 @@ def test_absent_legs_are_not_drawn_and_the_page_says_so_first() -> None:
     data["moments"][:, :3] = np.nan
     gone = replace(walker, data=data)
     metrics = compute_metrics(gone)
-    section = spatial_moment_section(gone, metrics)
+    section = moment_section(Page(gone, metrics))
     assert section.text.startswith("Leg moments: absent in all 301 frames.")
     assert [panel.title for part in section.parts for panel in [*part.panels, *part.folded]] == ["Arm flex"]
     assert "Absent in every frame: right knee and left knee." in section.text
@@ -116,8 +117,8 @@ def test_absent_legs_are_not_drawn_and_the_page_says_so_first() -> None:
     data["moment_source"][:], data["moments"][:] = ABSENT, np.nan
     nothing = replace(walker, data=data)
     found = compute_metrics(nothing)
-    assert "muscles" not in spatial_moment_section(nothing, found).text
-    assert spatial_moment_section(nothing, found).parts == [] and found["work"] == {}
+    assert "muscles" not in moment_section(Page(nothing, found)).text
+    assert moment_section(Page(nothing, found)).parts == [] and found["work"] == {}
     html = render_report(gone)
     summary = html[html.index('id="summary"') :]
     assert summary.index("Leg moments: absent in all 301 frames.") < summary.index("findings to look at")
@@ -125,7 +126,7 @@ def test_absent_legs_are_not_drawn_and_the_page_says_so_first() -> None:
 
 
 def test_the_film_dashes_what_is_derived(walker: Estimate) -> None:
-    found = spatial_playback(walker)
+    found = playback(walker)
     content = json.loads(str(found.data))
     frames = np.searchsorted(walker.time, np.array(content["time"]) - 1e-6)
     packed = content["arrays"]["derived"]
@@ -147,30 +148,30 @@ def test_mean_curves_say_how_many_cycles_are_left(walker: Estimate) -> None:
         walker.coordinate_names, walker.is_rotation(), walker.data["coordinates"].values, measured_moments(walker.data)
     )
     curves = mean_curves(time, cycles, {"EKF": own}, 60.0)
-    section = spatial_repetition_section(walker, Found("gait", cycles, "2 gait cycles."), curves)
+    section = side_repetitions(walker, Found("gait", cycles, "2 gait cycles."), curves)
     knee = titled(section.parts[1].panels, "Knee")
     assert "left: 1 of 2 repetitions" in knee.note
     gone = mean_curves(time, cycles[1:], {"EKF": [s for s in own if s.quantity != "knee_angle_r/moment"]}, 60.0)
-    section = spatial_repetition_section(walker, Found("gait", cycles[1:], "1 gait cycle."), gone)
+    section = side_repetitions(walker, Found("gait", cycles[1:], "1 gait cycle."), gone)
     assert "No cycle is left of the moments of knee." in section.text
     assert all(not panel.title.startswith("Knee") for part in section.parts[1:] for panel in part.panels)
 
 
 def test_planar_panels_dash_what_is_derived_and_leave_out_what_is_absent(estimate: Estimate) -> None:
     derived = with_source(estimate, DERIVED, slice(0, 300))
-    section = moment_section(derived, compute_metrics(derived))
+    section = moment_section(Page(derived, compute_metrics(derived)))
     knee, shoulder = titled(section.panels, "Knee"), titled(section.panels, "Shoulder")
     assert dashes(knee) == 1 and dashes(shoulder) == 0
     assert any(line.label == DERIVED_WORDS for line in section.lines)
     assert "derived from the motion in 300" in section.text
     absent = with_source(estimate, ABSENT, slice(None))
-    section = moment_section(absent, compute_metrics(absent))
+    section = moment_section(Page(absent, compute_metrics(absent)))
     assert "Knee" not in [panel.title for panel in section.panels]
     assert "knee" not in compute_metrics(absent)["peak_moments_per_kg"]
     data = estimate.data.copy(deep=True)
     data["wrench_measured"][100:200] = np.nan
     missing = replace(estimate, data=data)
-    assert dashes(titled(wrench_section(missing, compute_metrics(missing)).panels, "Vertical")) == 1
+    assert dashes(titled(wrench_section(Page(missing, compute_metrics(missing))).panels, "Vertical")) == 1
 
 
 def test_moments_by_method_are_compared_where_measured_and_dashed_elsewhere(

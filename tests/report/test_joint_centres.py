@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 
 import numpy as np
@@ -32,5 +33,6 @@ def test_joints_are_as_far_apart_as_the_lengths(run: Estimate) -> None:
 
 def test_player_shows_all_segments_and_both_arrows(run: Estimate) -> None:
     found = playback(run)
-    assert [bone["segment"] for bone in found.bones][-1] == "forearm" and len(found.bones) == 7
-    assert found.has_reaction and len(set(found.segments.values())) == 7
+    bones, arrows = (json.loads(str(found.data))[name] for name in ("bones", "arrows"))
+    assert bones[-1][2] == found.colours["forearm"] and len(bones) == 7 and len(arrows) == 2
+    assert found.has_reaction and len(set(found.colours.values())) == 7

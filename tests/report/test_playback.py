@@ -11,10 +11,10 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from dynakin.report.body import chain_of, reaction
-from dynakin.report.colours import segment_colours
+from dynakin.report.body import chain_of
 from dynakin.report.page import render_report
 from dynakin.report.playback import playback
+from dynakin.report.styles import segment_colours
 from dynakin.results.estimate import Estimate
 from support.estimates.synthetic import make_estimate
 
@@ -31,16 +31,18 @@ def content(jointed: Estimate) -> dict[str, Any]:
 
 
 def test_positions_in_the_page_are_the_estimates(jointed: Estimate, content: dict[str, Any]) -> None:
-    frames = np.searchsorted(jointed.time, np.array(content["time"]) - 1e-6)
+    frames, arrays = np.searchsorted(jointed.time, np.array(content["time"]) - 1e-6), content["arrays"]
     assert len(frames) == 401  # thirty pictures a second out of a hundred
     for kind in ("measured", "estimated"):
-        expected = 1000.0 * jointed.data[f"markers_{kind}"].values[frames][:, :, :2] * [1.0, -1.0]
-        np.testing.assert_allclose(unpacked(content[kind]), expected.reshape(len(frames), -1), atol=0.1)
-    assert np.isnan(unpacked(content["measured"])).any()  # gaps stay gaps
-    knee = unpacked(content["points"])[:, 4]
+        expected = 1000.0 * jointed.data[f"markers_{kind}"].values[frames] * [1.0, 1.0, 0.0]  # in the model's plane
+        np.testing.assert_allclose(unpacked(arrays[kind])[:, 0::3], expected[:, :, 0], atol=0.1)
+        np.testing.assert_allclose(unpacked(arrays[kind])[:, 1::3], expected[:, :, 1], atol=0.1)
+        assert not unpacked(arrays[kind])[:, 2::3].any()
+    assert np.isnan(unpacked(arrays["measured"])).any()  # gaps stay gaps
+    knee = unpacked(arrays["points"])[:, 6]
     np.testing.assert_allclose(knee, 10.0 * np.array(content["time"]), atol=0.1)
     degrees = np.degrees(jointed.data["coordinates"].values[frames, :7])
-    np.testing.assert_allclose(unpacked(content["angles"])[:, :7], degrees, atol=0.01)
+    np.testing.assert_allclose(unpacked(arrays["angles"])[:, :7], degrees, atol=0.01)
 
 
 def test_chain_joins_each_joint_to_the_next_and_the_last_to_its_farthest_marker(jointed: Estimate) -> None:
@@ -53,14 +55,18 @@ def test_chain_joins_each_joint_to_the_next_and_the_last_to_its_farthest_marker(
     )
 
 
-def test_force_acts_where_its_moment_vanishes() -> None:
-    wrench = np.array([[30.0, 600.0, 0, 0, 0, -72.0], [0.0, 1.0, 0, 0, 0, -1.0], [np.nan] * 6])
-    point, force = reaction(wrench, -0.05)
-    x, y = point[0]
-    assert y == -0.05
-    assert x * 600.0 - y * 30.0 == pytest.approx(-72.0)
-    np.testing.assert_array_equal(force[0], [30.0, 600.0])
-    assert np.isnan(point[1:]).all()  # hardly loaded, not known
+def test_force_acts_where_its_moment_vanishes(jointed: Estimate) -> None:
+    wrench = np.full((len(jointed.time), 6), np.nan)
+    wrench[:, [0, 1, 5]] = [30.0, 600.0, -72.0]
+    wrench[90:], wrench[60:90] = np.nan, [0.0, 1.0, np.nan, np.nan, np.nan, -1.0]
+    data = jointed.data.assign(wrench_measured=(("time", "component"), wrench))
+    found = json.loads(str(playback(replace(jointed, data=data)).data))
+    point, force = (unpacked(found["arrays"][f"measured_{name}"]) for name in ("points", "forces"))
+    x, y, z = 1e-3 * point[0]
+    assert y == pytest.approx(jointed.floor_height_m, abs=1e-4) and z == 0.0
+    assert x * 600.0 - y * 30.0 == pytest.approx(-72.0, abs=0.05)
+    np.testing.assert_allclose(force[0], [30.0, 600.0, 0.0], atol=0.02)
+    assert np.isnan(point[20:, :2]).all()  # hardly loaded, not known
 
 
 def test_long_recordings_are_thinned_and_walkers_followed() -> None:
@@ -74,23 +80,37 @@ def test_long_recordings_are_thinned_and_walkers_followed() -> None:
     assert dims["marker"] == 10
     found = playback(replace(made, data=long))
     assert len(found.data) < 1_000_000
-    assert json.loads(str(found.data))["follow"]
-    assert found.view[2] < 3000.0
+    view = json.loads(str(found.data))["view"]
+    assert view["follow"] and 2 * view["radius"] < 3000
 
 
 def test_without_joints_and_plates_there_are_markers_only(estimate: Estimate) -> None:
     empty = {str(n): estimate.data[n] * np.nan for n in estimate.data if "wrench" in str(n)}
     found = playback(replace(estimate, data=estimate.data.assign(empty)))
-    assert found.bones == [] and not found.has_reaction and len(found.markers) == 10
+    content = json.loads(str(found.data))
+    assert content["bones"] == [] and not found.has_reaction and len(content["markers"]) == 10
     html = render_report(replace(estimate, data=estimate.data.assign(empty)))
-    assert "Ground reaction, measured" not in html and 'class="arrow' not in html
+    assert "Ground reaction, measured" not in html and "The arrow is" not in html
+
+
+def test_a_planar_figure_is_seen_from_the_right_in_its_segments_colours(
+    jointed: Estimate, content: dict[str, Any]
+) -> None:
+    found = playback(jointed)
+    assert len(content["bones"]) == 6  # the forearm carries no marker here
+    assert [bone[2] for bone in content["bones"]] == list(found.colours.values())
+    view = content["view"]
+    assert (view["azimuth"], view["elevation"], view["turns"]) == (0, 0, False) and found.views == {}
+    assert [row["title"] for row in found.rows][-2:] == [
+        "Ground reaction, measured, N",
+        "Ground reaction, estimated, N",
+    ]
 
 
 def test_player_can_be_used_by_keyboard_and_asks_for_reduced_motion(jointed: Estimate) -> None:
     html = render_report(jointed)
     assert '<input id="player-time" type="range" min="0" max="400"' in html
     assert '<button type="button">' in html and "prefers-reduced-motion: reduce" in html
-    assert html.count('class="bone"') == 6  # the forearm carries no marker here
 
 
 def test_a_segment_has_one_colour_whatever_the_others() -> None:
@@ -103,8 +123,8 @@ def test_a_motion_beyond_all_measure_has_few_ticks_and_one_frame_is_shown(estima
     """0.1 asked for 6.8 TiB of ticks, and divided by the rate of a single frame."""
     far = estimate.data["markers_estimated"].copy(deep=True)
     far[5, 0, 0] = 1e9
-    shown = playback(replace(estimate, data=estimate.data.assign(markers_estimated=far)))
-    assert len(shown.ticks_mm) < 300
+    view = json.loads(str(playback(replace(estimate, data=estimate.data.assign(markers_estimated=far))).data))["view"]
+    assert 2 * view["radius"] / view["square"] < 300
     one = estimate.data.isel(time=slice(0, 1))
     recording = replace(estimate.recording, time=estimate.time[:1], markers=estimate.recording.markers[:1], plates=())
     assert playback(replace(estimate, data=one, recording=recording)).last == 0

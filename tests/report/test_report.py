@@ -11,8 +11,10 @@ import pytest
 
 from dynakin.report.insights import in_short, insights
 from dynakin.report.labels import moment_note, short_marker_names
-from dynakin.report.page import render_report
+from dynakin.report.page import SECTIONS, render_report
 from dynakin.report.plot import new_axes, thin, to_svg
+from dynakin.report.sections.section import Page, Section
+from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.naming import listed, number
@@ -189,3 +191,17 @@ def test_numbers_in_the_words_of_a_figure_keep_their_digits() -> None:
     figure, axes = new_axes()
     axes.annotate("0.00174 kg m²", (0.123456, 0.5))
     assert "0.00174 kg m²" in to_svg(figure, "digits", "a figure")
+
+
+def test_a_section_is_a_function_in_the_list(estimate: Estimate, monkeypatch: pytest.MonkeyPatch) -> None:
+    def marker_count(page: Page) -> Section:
+        count = TextTable("Markers in use", ("markers",), [(str(len(page.estimate.marker_names)),)], (0,))
+        return Section("count", "How many", "", tables=[count])
+
+    def nothing(page: Page) -> None:
+        return None
+
+    monkeypatch.setitem(SECTIONS, "plane", (nothing, marker_count, lambda page: Section("bare", "Bare", "words")))
+    html = render_report(estimate)
+    assert re.findall(r'<section id="([^"]+)"', html) == ["summary", "movement", "count", "details"]
+    assert '<a href="#count">How many</a>' in html and '<td class="number">10</td>' in html

@@ -12,13 +12,15 @@ import numpy as np
 import pytest
 
 from dynakin.report.chart import Bound, Line, chart
-from dynakin.report.colours import SIDE_COLOURS, side_of
 from dynakin.report.page import render_report
 from dynakin.report.paper_figures.figures import save_figures
-from dynakin.report.playback_spatial import spatial_playback
-from dynakin.report.sections.spatial_sections import foot_section, spatial_angle_section, spatial_moment_section
+from dynakin.report.playback import playback
+from dynakin.report.sections.forces import foot_section
+from dynakin.report.sections.joints import angle_section, moment_section
+from dynakin.report.sections.section import Page
 from dynakin.report.sections.work import asymmetry_section, power_section
 from dynakin.report.sides import joints_of
+from dynakin.report.styles import SIDE_COLOURS, side_of
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.angles import with_angles
 from dynakin.results.measures.metrics import compute_metrics
@@ -78,7 +80,7 @@ def test_page_has_every_section_and_no_residual(html: str) -> None:
 
 
 def test_angles_say_which_side_moved_how_far(spatial: Estimate) -> None:
-    legs = spatial_angle_section(spatial).parts[0]
+    legs = angle_section(Page(spatial, {})).parts[0]
     knee = next(panel for panel in legs.panels if panel.title.startswith("Knee"))
     assert knee.title == "Knee angle (+ flexion)"
     assert knee.note == "right 0 to 80.0; left 0 to 40.0"
@@ -87,14 +89,14 @@ def test_angles_say_which_side_moved_how_far(spatial: Estimate) -> None:
 
 def test_angles_follow_the_zero_and_the_signs_that_were_asked_for(spatial: Estimate) -> None:
     zero = {"knee_angle_r": np.radians(10.0)}
-    section = spatial_angle_section(with_angles(spatial, zero, "clinical"))
+    section = angle_section(Page(with_angles(spatial, zero, "clinical"), {}))
     knee = section.parts[0].panels[1]
     assert knee.note == "right −10.0 to 70.0; left 0 to 40.0"
     assert "standing zero" in section.text and "clinical" in section.text
 
 
 def test_moments_are_per_kg_and_derived_ones_dashed(spatial: Estimate, metrics: dict[str, Any]) -> None:
-    section = spatial_moment_section(spatial, metrics)
+    section = moment_section(Page(spatial, metrics))
     knee, hip = section.parts[0].panels[1], section.parts[0].panels[0]
     assert knee.note == "right −1.50 to 0.00; left −0.75 to 0.00"
     assert "stroke-dasharray" in knee.svg and knee.svg.count("stroke-dasharray") == 1  # the left one only
@@ -110,7 +112,7 @@ def test_moments_are_per_kg_and_derived_ones_dashed(spatial: Estimate, metrics: 
 
 
 def test_feet_show_what_was_changed_in_place_of_a_residual(spatial: Estimate, metrics: dict[str, Any]) -> None:
-    section = foot_section(spatial, metrics)
+    section = foot_section(Page(spatial, metrics))
     right, left = section.tables[0].rows
     assert right[0] == "Right foot, adjustment" and right[2] == "2.0"
     assert set(left[1:]) == {"0"}
@@ -120,11 +122,11 @@ def test_feet_show_what_was_changed_in_place_of_a_residual(spatial: Estimate, me
 
 
 def test_work_and_symmetry_tables_hold_the_metrics(spatial: Estimate, metrics: dict[str, Any]) -> None:
-    work = power_section(spatial, metrics).tables[0]
+    work = power_section(Page(spatial, metrics)).tables[0]
     knee = next(row for row in work.rows if row[0] == "Knee")
     assert knee[1] == "right"
     assert float(knee[2]) == pytest.approx(metrics["work"]["knee_angle_r"]["positive_j"], rel=0.01)
-    tables = {table.title: table for table in asymmetry_section(spatial, metrics).tables}
+    tables = {table.title: table for table in asymmetry_section(Page(spatial, metrics)).tables}
     rows = {row[0]: row for row in tables["Legs: symmetry index, %"].rows}
     assert rows["Knee angle"][1] == "+67"  # (80 - 40) / 60
     assert rows["Hip flexion"][1] == "0"
@@ -132,7 +134,7 @@ def test_work_and_symmetry_tables_hold_the_metrics(spatial: Estimate, metrics: d
 
 
 def test_film_holds_positions_forces_and_centres_of_pressure(spatial: Estimate) -> None:
-    found = spatial_playback(spatial)
+    found = playback(spatial)
     content = json.loads(str(found.data))
     frames = np.searchsorted(spatial.time, np.array(content["time"]) - 1e-6)
     arrays = {name: unpacked(packed) for name, packed in content["arrays"].items()}
@@ -155,7 +157,7 @@ def test_film_holds_positions_forces_and_centres_of_pressure(spatial: Estimate) 
 
 
 def test_who_walks_is_followed() -> None:
-    view = json.loads(str(spatial_playback(make_spatial(walk_m=4.0)).data))["view"]
+    view = json.loads(str(playback(make_spatial(walk_m=4.0)).data))["view"]
     assert view["follow"] and view["radius"] < 1500
 
 

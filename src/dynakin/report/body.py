@@ -1,4 +1,4 @@
-"""The body as lines and an arrow: segments between joint centres, and the ground reaction where it acts."""
+"""The body as lines: segments between joint centres, and their colours."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynakin.elements import element
-from dynakin.report.colours import segment_colours
+from dynakin.report.labels import is_planar
+from dynakin.report.sides import values_of
+from dynakin.report.styles import SIDE_COLOURS, segment_colours, side_of
 from dynakin.results.estimate import Estimate
-
-# Below this share of the largest vertical force the point of action is noise, and no arrow is drawn.
-_LOADED = 0.05
+from dynakin.results.naming import words
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,19 @@ def colours_of(estimate: Estimate) -> dict[str, str]:
     return segment_colours(list(dict.fromkeys([*segment_names(estimate), *parameters])))
 
 
+def painted(estimate: Estimate, chain: Chain) -> tuple[dict[str, str], dict[str, str]]:
+    """Colour of each segment that is drawn or carries a marker, and the words of a key with theirs: in a plane each its
+    own; in space its side's, because thirty segments in six colours say nothing."""
+    segments = dict.fromkeys([*(bone.segment for bone in chain.bones), *marker_segments(estimate).values()])
+    if is_planar(estimate):
+        colours = colours_of(estimate)
+        return colours, {words(bone.segment): colours[bone.segment] for bone in chain.bones}
+    return (
+        {name: SIDE_COLOURS[side_of(name)] for name in segments},
+        {side or "middle": colour for side, colour in SIDE_COLOURS.items()},
+    )
+
+
 def chain_of(estimate: Estimate) -> Chain:
     """The chain of segments; without bones where the estimate holds no joint centres.
 
@@ -57,11 +70,11 @@ def chain_of(estimate: Estimate) -> Chain:
     if "joint_centres" not in estimate.data:
         return Chain(np.zeros((len(estimate.time), 0, 3)), ())
     data = estimate.data
-    points = [*np.moveaxis(data["joint_centres"].transpose("joint", "time", "axis").values, 0, 0)]
+    points = [*np.moveaxis(values_of(estimate, "joint_centres"), 1, 0)]
     parents = [int(parent) for parent in data["joint_parent"].values]
     segments = [str(name) for name in data["joint_segment"].values]
     bones = [Bone(p, j, segments[p]) for j, p in enumerate(parents) if p >= 0]
-    markers = np.nan_to_num(data["markers_estimated"].transpose("time", "marker", "axis").values)
+    markers = np.nan_to_num(values_of(estimate, "markers_estimated"))
     carriers = marker_segments(estimate)
     for joint, segment in enumerate(segments):
         own = [k for k, name in enumerate(estimate.marker_names) if carriers.get(name) == segment]
@@ -71,31 +84,3 @@ def chain_of(estimate: Estimate) -> Chain:
         bones.append(Bone(joint, len(points), segment))
         points.append(markers[:, own[int(np.argmax(far))]])
     return Chain(np.stack(points, axis=1), tuple(bones))
-
-
-def floor_height(estimate: Estimate) -> float:
-    """Height of the plates' surface in the ground frame, m; that of the ground's origin where no plate tells."""
-    heights = [estimate.ground.points_to_ground(plate.cop)[:, 1] for plate in estimate.recording.plates]
-    every = np.concatenate(heights) if heights else np.zeros(0)
-    every = every[np.isfinite(every)]
-    return float(np.median(every)) if len(every) else 0.0
-
-
-def reaction(wrench: np.ndarray, floor: float) -> tuple[np.ndarray, np.ndarray]:
-    """Where the ground reaction acts on the floor and how large it is, in the sagittal plane.
-
-    Args:
-        wrench: (T, 6) N, N m about the ground's origin; m_z = x f_y - y f_x gives x on the floor y.
-        floor: m.
-
-    Returns:
-        points (T, 2) m and forces (T, 2) N; NaN where the foot is not loaded or the wrench not known.
-    """
-    fx, fy, mz = wrench[:, 0], wrench[:, 1], wrench[:, 5]
-    known = np.isfinite(fx) & np.isfinite(fy) & np.isfinite(mz)
-    largest = float(np.max(fy[known], initial=0.0))
-    loaded = known & (fy > _LOADED * largest)
-    point, force = np.full((len(wrench), 2), np.nan), np.full((len(wrench), 2), np.nan)
-    point[loaded] = np.column_stack([(mz + floor * fx)[loaded] / fy[loaded], np.full(loaded.sum(), floor)])
-    force[loaded] = np.column_stack([fx[loaded], fy[loaded]])
-    return point, force

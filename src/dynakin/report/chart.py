@@ -11,8 +11,8 @@ import numpy as np
 import numpy.typing as npt
 from matplotlib.ticker import MaxNLocator
 
+from dynakin.arrays import runs
 from dynakin.report.plot import GRID, LIMIT, thin, with_next
-from dynakin.report.sections.panels import Panel
 
 Array = npt.NDArray[np.float64]
 Place = Callable[[Array], Array]
@@ -24,11 +24,21 @@ _MARGIN = 0.08
 _MOST_POINTS = 240
 
 
+@dataclass(frozen=True)
+class Panel:
+    """One figure with its title and a line below the title."""
+
+    title: str
+    note: str
+    svg: str
+
+
 @dataclass(frozen=True, eq=False)
 class Line:
     """values (T,), NaN where there is nothing to draw; ``sd`` (T,) adds a band of two standard deviations.
 
-    dashed: (T,) bool, where the line is drawn dashed instead of solid; there it may leave the panel. width in points.
+    dashed: (T,) bool, where the line is drawn dashed; there it may leave the panel. width in points. dashes: of the
+    whole line, in tenths of a point.
     """
 
     values: Array
@@ -36,6 +46,7 @@ class Line:
     width: float = 1.2
     sd: Array | None = None
     dashed: npt.NDArray[np.bool_] | None = None
+    dashes: str = ""
 
 
 @dataclass(frozen=True)
@@ -86,11 +97,12 @@ def chart(
         )
     for line in lines:
         dashed = np.zeros(len(time), dtype=bool) if line.dashed is None else line.dashed
-        for part, more in ((~dashed, ""), (dashed, ' stroke-dasharray="36 26"')):
+        for part, more in ((~dashed, line.dashes), (dashed, "36 26")):
             own = np.where(with_next(part), np.clip(line.values, low, high), np.nan)
             if path := _path(*thin(time, own, _MOST_POINTS), x, y):
-                parts.append(f'<path d="{path}" stroke="{line.colour}" stroke-width="{10 * line.width:.0f}"{more}/>')
-    label = escape(f"{title} in {unit} over time", quote=True)
+                pattern = f' stroke-dasharray="{more}"' if more else ""
+                parts.append(f'<path d="{path}" stroke="{line.colour}" stroke-width="{10 * line.width:.0f}"{pattern}/>')
+    label = escape(f"{title} in {unit} over {x_label.partition(',')[0]}", quote=True)
     svg = f'<svg class="chart" viewBox="0 0 {_WIDTH} {_HEIGHT}" role="img" aria-label="{label}">{"".join(parts)}</svg>'
     return Panel(title, note, svg)
 
@@ -157,18 +169,14 @@ def _labels(ticks: Array) -> list[str]:
 
 def _path(at: Array, values: Array, x: Place, y: Place) -> str:
     """Stretches between gaps, as moves and relative steps of whole numbers; a stretch of one point is not seen."""
-    known = np.isfinite(values)
-    if not known.any():
-        return ""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(int)))
-    parts = []
-    for first, last in edges.reshape(-1, 2):
-        if last - first > 1:
-            parts.append(_run(x(at[first:last]), y(values[first:last])))
-    return "".join(parts)
+    return "".join(
+        _steps(x(at[first:last]), y(values[first:last]))
+        for first, last in runs(np.isfinite(values))
+        if last - first > 1
+    )
 
 
-def _run(across: Array, down: Array) -> str:
+def _steps(across: Array, down: Array) -> str:
     steps = np.diff(np.column_stack([across, down]), axis=0).astype(int)
     moved = "".join(f"{dx}{' ' if dy >= 0 else ''}{dy} " for dx, dy in steps.tolist())
     return f"M{int(across[0])} {int(down[0])}l{moved.rstrip()}"
@@ -179,13 +187,18 @@ def _band(time: Array, line: Line, low: float, high: float, x: Place, y: Place) 
     assert line.sd is not None
     kept = np.unique(np.linspace(0, len(time) - 1, _MOST_POINTS // 2).astype(int))
     values, half = line.values[kept], 2.0 * line.sd[kept]
-    known = np.isfinite(values) & np.isfinite(half)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], known, [False]]).astype(int)))
     parts = []
-    for first, last in edges.reshape(-1, 2):
+    for first, last in runs(np.isfinite(values) & np.isfinite(half)):
         own = slice(first, last)
         across = x(time[kept][own])
         above = y(np.clip(values[own] + half[own], low, high))
         below = y(np.clip(values[own] - half[own], low, high))
-        parts.append(_run(np.concatenate([across, across[::-1]]), np.concatenate([above, below[::-1]])) + "z")
+        parts.append(_steps(np.concatenate([across, across[::-1]]), np.concatenate([above, below[::-1]])) + "z")
     return f'<path d="{"".join(parts)}" class="spread" fill="{line.colour}"/>' if parts else ""
+
+
+def band_is_too_wide(values: np.ndarray, sd: np.ndarray) -> bool:
+    """Whether a band of two standard deviations hides how the values move; what is NaN has no band."""
+    if not np.isfinite(sd).any() or not np.isfinite(values).any():
+        return False
+    return bool(2.0 * np.nanmedian(sd) > max(0.6 * float(np.nanmax(values) - np.nanmin(values)), 1e-12))

@@ -11,7 +11,7 @@ import tomli_w
 from dynakin.report.insights import Insight
 from dynakin.report.page import render_page
 from dynakin.report.sections.methods import ABOUT_METHODS, ABOUT_TABLE2, angle_part, moment_part, wrench_part
-from dynakin.report.sections.repetitions import repetition_section
+from dynakin.report.sections.repetitions import method_repetitions
 from dynakin.report.sections.section import Section
 from dynakin.report.text_tables import angle_text, moment_text, name_of, table2_text, unseen_text
 from dynakin.results.estimate import COMPONENTS
@@ -124,7 +124,7 @@ def _sections(trials: Sequence[Trial], tables: Mapping[str, Sequence[Any]]) -> l
         estimate = next(iter(trial.estimates.values()))
         title = "Repetitions" if len(trials) == 1 else f"Repetitions of {trial.name}"
         key = f"repetitions-{k + 1}"
-        found.append(repetition_section(estimate, trial.repetitions, trial.curves(), key=key, title=title))
+        found.append(method_repetitions(estimate, trial.repetitions, trial.curves(), key=key, title=title))
     return [section for section in found if not section.empty]
 
 

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
 from dynakin.report.convergence import convergence
 from dynakin.report.labels import COMPONENT_LABELS, parameter_label, short_marker_names
-from dynakin.report.sections.section import needs
 from dynakin.results.estimate import Estimate
 from dynakin.results.failures import FAILED, LOG
 from dynakin.results.measures.bounds import counts_in_words
@@ -22,6 +22,7 @@ from dynakin.results.records import doubts_mass
 FOLLOWING = 4.0
 
 Level = Literal["good", "note", "warning"]
+Metrics = dict[str, Any]
 
 
 # How the sentences begin that a run says of its plates as a whole.
@@ -79,33 +80,17 @@ def in_short(found: list[Insight]) -> str:
     return f"{sentence(plural(len(titles), 'finding'))} to look at before using this run: {listed(titles, 8)}."
 
 
-def insights(estimate: Estimate, metrics: dict[str, Any]) -> list[Insight]:
-    """All findings, in the order of the report."""
-    found = [
-        _mass(estimate),
-        _failed(estimate),
-        _tracking(metrics),
-        _moments(metrics),
-        _markers(estimate, metrics),
-        _wrench(estimate, metrics),
-        _prediction(estimate, metrics),
-        _consistency(estimate, metrics),
-        _speeds(estimate),
-        _adaptation(metrics),
-        *_constants(estimate),
-        _bounds(estimate, metrics),
-        _soft_tissue(estimate, metrics),
-        _joint_limits(estimate),
-        _missing(estimate, metrics),
-        _gated(estimate),
-        _locked(estimate),
-        _step_time(estimate),
-    ]
-    return [insight for insight in found if insight is not None]
+def insights(estimate: Estimate, metrics: Metrics) -> list[Insight]:
+    """All findings, in the order of the report; one whose blocks of ``metrics`` are None, because the stage that makes
+    them failed (`dynakin.results.failures`), is left out."""
+    found: list[Insight] = []
+    for make, blocks in FINDINGS:
+        if all(metrics[block] is not None for block in blocks) and (made := make(estimate, metrics)):
+            found += made if isinstance(made, list) else [made]
+    return found
 
 
-@needs("moments", otherwise=None)
-def _moments(metrics: dict[str, Any]) -> Insight | None:
+def _moments(estimate: Estimate, metrics: Metrics) -> Insight | None:
     """Why moments are not measured, and what that leaves out; how many are is said before all findings."""
     found = metrics["moments"]
     if all(count["measured"] == found["frames"] for count in found["legs"].values()):
@@ -122,7 +107,7 @@ def _moments(metrics: dict[str, Any]) -> Insight | None:
     return Insight("warning", "Joint moments", " ".join(text), advice)
 
 
-def _mass(estimate: Estimate) -> Insight | None:
+def _mass(estimate: Estimate, metrics: Metrics) -> Insight | None:
     """Plates that contradict the mass: forces, moments and inertia are all wrong then."""
     told = [text.removeprefix("Warning: ") for text in estimate.messages if doubts_mass(text)]
     if not told:
@@ -130,14 +115,14 @@ def _mass(estimate: Estimate) -> Insight | None:
     return Insight("warning", "Mass", sentence(" ".join(told)), "Give the mass as weighed, with all that is worn.")
 
 
-def _failed(estimate: Estimate) -> Insight | None:
+def _failed(estimate: Estimate, metrics: Metrics) -> Insight | None:
     told = [message.removeprefix(FAILED).strip() for message in estimate.messages if message.startswith(FAILED)]
     if not told:
         return None
     return Insight("warning", "Not made", " ".join(told), f"{LOG} has the details; please report them.")
 
 
-def _tracking(metrics: dict[str, Any]) -> Insight | None:
+def _tracking(estimate: Estimate, metrics: Metrics) -> Insight | None:
     """Frames that are no estimate; nothing is said where there are none."""
     found = metrics["tracking"]
     if not found or not found["lost_frames"]:
@@ -147,8 +132,7 @@ def _tracking(metrics: dict[str, Any]) -> Insight | None:
     return Insight("warning", "Lost", found["verdict"] + whole, advice)
 
 
-@needs("markers", otherwise=None)
-def _markers(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
+def _markers(estimate: Estimate, metrics: Metrics) -> Insight | None:
     mean = metrics["markers"]["mean_rms_mm"]
     if mean is None:
         return None
@@ -174,8 +158,7 @@ def _markers(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     )
 
 
-@needs("wrench", otherwise=None)
-def _wrench(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
+def _wrench(estimate: Estimate, metrics: Metrics) -> Insight | None:
     rms = metrics["wrench"]["rms"]
     told = [text for text in estimate.messages if text.startswith(PLATE_WORDS) and not doubts_mass(text)]
     if not rms:
@@ -194,8 +177,7 @@ def _wrench(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     )
 
 
-@needs("prediction", "wrench", otherwise=None)
-def _prediction(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
+def _prediction(estimate: Estimate, metrics: Metrics) -> Insight | None:
     """How much of the fit is the model, and how much is following the measurement of the same frame."""
     ahead, fitted = metrics["prediction"]["wrench"]["rms"], metrics["wrench"]["rms"]
     ratio = {name: ahead[name] / fitted[name] for name in fitted if fitted[name] and ahead.get(name) is not None}
@@ -225,8 +207,7 @@ def _prediction(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     )
 
 
-@needs("consistency", otherwise=None)
-def _consistency(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
+def _consistency(estimate: Estimate, metrics: Metrics) -> Insight | None:
     if why_lost(estimate) is not None:
         return None
     found = window_consistency(estimate, evaluation_window(estimate.time))
@@ -243,7 +224,7 @@ def _consistency(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     return Insight(level, "Uncertainty", found.verdict + figure, advice)
 
 
-def _speeds(estimate: Estimate) -> Insight | None:
+def _speeds(estimate: Estimate, metrics: Metrics) -> Insight | None:
     _, verdict = speed_consistency(estimate, evaluation_window(estimate.time))
     return Insight("warning", "Speeds", verdict, _advice(estimate, "speeds")) if verdict else None
 
@@ -254,7 +235,7 @@ def _advice(estimate: Estimate, finding: str) -> str:
     return ADVICE[finding][int(white_jerk)]
 
 
-def _constants(estimate: Estimate) -> list[Insight]:
+def _constants(estimate: Estimate, metrics: Metrics) -> list[Insight]:
     """What became of lengths, masses and moments of inertia."""
     names = short_marker_names(estimate.marker_names)
     found = []
@@ -282,8 +263,7 @@ def _constants(estimate: Estimate) -> list[Insight]:
     return found
 
 
-@needs("bounds", otherwise=None)
-def _bounds(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
+def _bounds(estimate: Estimate, metrics: Metrics) -> Insight | None:
     free = [p for p in estimate.parameters if p.estimated and p.lower is not None]
     names = short_marker_names(estimate.marker_names)
     stuck = [parameter_label(p, names) for p in free if p.at_bound]
@@ -308,8 +288,7 @@ def _bounds(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     )
 
 
-@needs("adaptation", otherwise=None)
-def _adaptation(metrics: dict[str, Any]) -> Insight | None:
+def _adaptation(estimate: Estimate, metrics: Metrics) -> Insight | None:
     """When the estimate settled, beside the time from which the figures are taken."""
     found = metrics["adaptation"]
     if not found["verdict"]:
@@ -327,8 +306,7 @@ def _adaptation(metrics: dict[str, Any]) -> Insight | None:
     )
 
 
-@needs("soft_tissue", otherwise=None)
-def _soft_tissue(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
+def _soft_tissue(estimate: Estimate, metrics: Metrics) -> Insight | None:
     """Markers that move on their segments further than skin does."""
     names = short_marker_names(estimate.marker_names)
     markers = {names[name]: found for name, found in metrics["soft_tissue"]["markers"].items()}
@@ -355,7 +333,7 @@ def _soft_tissue(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     )
 
 
-def _joint_limits(estimate: Estimate) -> Insight | None:
+def _joint_limits(estimate: Estimate, metrics: Metrics) -> Insight | None:
     names = set(estimate.coordinate_names)
     stuck = sorted({words(e.subject) for e in estimate.events if e.kind == "at_bound" and e.subject in names})
     if not stuck:
@@ -363,8 +341,7 @@ def _joint_limits(estimate: Estimate) -> Insight | None:
     return Insight("warning", "Joint limits", f"Held at its limit for part of the time: {listed(stuck)}.")
 
 
-@needs("events", otherwise=None)
-def _missing(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
+def _missing(estimate: Estimate, metrics: Metrics) -> Insight | None:
     gaps: dict[str, int] = metrics["events"]["missing_frames"]
     if not gaps:
         return Insight("good", "Gaps", "Every marker in use was measured in every frame.")
@@ -376,7 +353,7 @@ def _missing(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     return Insight("note", "Gaps", f"Markers missing for part of the recording: {listed(text)}.")
 
 
-def _gated(estimate: Estimate) -> Insight | None:
+def _gated(estimate: Estimate, metrics: Metrics) -> Insight | None:
     gated = [event for event in estimate.events if event.kind in ("gated", "reset")]
     if not gated:
         return None
@@ -384,7 +361,7 @@ def _gated(estimate: Estimate) -> Insight | None:
     return Insight("warning", "Left out or reset", f"{listed(told, 4)}.")
 
 
-def _locked(estimate: Estimate) -> Insight | None:
+def _locked(estimate: Estimate, metrics: Metrics) -> Insight | None:
     free = {str(name) for name in estimate.data["element"].values}
     locked = [words(name) for name in estimate.coordinate_names if name not in free]
     if not locked:
@@ -393,7 +370,7 @@ def _locked(estimate: Estimate) -> Insight | None:
     return Insight("note", "Locked", f"{sentence(listed(locked))} {verb} held still; the notes below say why.")
 
 
-def _step_time(estimate: Estimate) -> Insight:
+def _step_time(estimate: Estimate, metrics: Metrics) -> Insight:
     timing = estimate.timing
     factor, unit = (1e-3, "ms") if timing.median_us >= 1000.0 else (1.0, "µs")
     times = number(timing.realtime_factor, digits=2)
@@ -404,3 +381,26 @@ def _step_time(estimate: Estimate) -> Insight:
         f"A step took {number(factor * timing.median_us, unit)} (median; 99 of 100 within "
         f"{number(factor * timing.p99_us, unit)}), {speed} the recording went.",
     )
+
+
+FINDINGS: tuple[tuple[Callable[[Estimate, Metrics], Insight | list[Insight] | None], tuple[str, ...]], ...] = (
+    (_mass, ()),
+    (_failed, ()),
+    (_tracking, ()),
+    (_moments, ("moments",)),
+    (_markers, ("markers",)),
+    (_wrench, ("wrench",)),
+    (_prediction, ("prediction", "wrench")),
+    (_consistency, ("consistency",)),
+    (_speeds, ()),
+    (_adaptation, ("adaptation",)),
+    (_constants, ()),
+    (_bounds, ("bounds",)),
+    (_soft_tissue, ("soft_tissue",)),
+    (_joint_limits, ()),
+    (_missing, ("events",)),
+    (_gated, ()),
+    (_locked, ()),
+    (_step_time, ()),
+)
+"""What looks for each finding, and the blocks of the metrics that it needs."""

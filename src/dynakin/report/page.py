@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import jinja2
 import tomli_w
@@ -11,8 +12,14 @@ import tomli_w
 from dynakin.report.insights import in_short, insights, what_was_run
 from dynakin.report.labels import is_planar, parameter_label, short_marker_names
 from dynakin.report.playback import playback
-from dynakin.report.playback_spatial import spatial_playback
-from dynakin.report.sections.movement import sections
+from dynakin.report.sections.constants import length_section, mass_section, observability_section
+from dynakin.report.sections.forces import foot_section, mass_centre_section, wrench_section
+from dynakin.report.sections.joints import angle_section, moment_section
+from dynakin.report.sections.markers import marker_section
+from dynakin.report.sections.methods import methods_section
+from dynakin.report.sections.repetitions import repetition_section
+from dynakin.report.sections.section import Page, Section
+from dynakin.report.sections.work import asymmetry_section, power_section
 from dynakin.results.estimate import Estimate
 from dynakin.results.files.config import plain
 from dynakin.results.files.versions import versions
@@ -20,9 +27,24 @@ from dynakin.results.measures.facing import facing
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.sources import UNKNOWN
 from dynakin.results.naming import listed, number
+from dynakin.validation.methods import Trial
 
-if TYPE_CHECKING:
-    from dynakin.validation.methods import Trial
+_BOTH = (repetition_section, methods_section, length_section, mass_section, observability_section)
+SECTIONS: dict[str, tuple[Callable[[Page], Section | None], ...]] = {
+    "plane": (marker_section, wrench_section, angle_section, moment_section, *_BOTH),
+    "space": (
+        angle_section,
+        moment_section,
+        foot_section,
+        power_section,
+        asymmetry_section,
+        mass_centre_section,
+        marker_section,
+        wrench_section,
+        *_BOTH,
+    ),
+}
+"""The sections of a run's page in their order, by what the model moves in; one without anything to show is left out."""
 
 KEY_LABELS = {
     "measured": "measured",
@@ -53,7 +75,7 @@ def render_report(estimate: Estimate, *, metrics: dict[str, Any] | None = None, 
     estimate = facing(estimate)
     metrics = metrics or compute_metrics(estimate)
     found = insights(estimate, metrics)
-    preset, planar = estimate.config.get("preset"), is_planar(estimate)
+    preset = estimate.config.get("preset")
     return render_page(
         "report.html.j2",
         eyebrow="dynakin report",
@@ -69,14 +91,19 @@ def render_report(estimate: Estimate, *, metrics: dict[str, Any] | None = None, 
         insights=found,
         in_short=in_short(found),
         warnings=sum(insight.level == "warning" for insight in found),
-        player=playback(estimate) if planar else spatial_playback(estimate),
-        player_template="player.html.j2" if planar else "player_spatial.html.j2",
-        sections=sections(estimate, metrics, comparison),
+        player=playback(estimate),
+        sections=sections_of(Page(estimate, metrics, comparison)),
         messages=estimate.messages,
         events=[event for event in estimate.events if event.kind != "missing"],
         parameters=_parameter_groups(estimate),
         configuration=tomli_w.dumps(plain(estimate.config)),
     )
+
+
+def sections_of(page: Page) -> list[Section]:
+    """The `SECTIONS` that have something to show."""
+    made = (make(page) for make in SECTIONS["plane" if page.planar else "space"])
+    return [section for section in made if section is not None and not section.empty]
 
 
 def write_report(

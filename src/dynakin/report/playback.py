@@ -1,4 +1,7 @@
-"""The movement for the page's player: every position as a small whole number, few enough to keep the page light."""
+"""The movement for the page's player, which turns it: positions as small whole numbers, few enough for a light page.
+
+A planar model is seen from the right and does not turn.
+"""
 
 from __future__ import annotations
 
@@ -8,127 +11,214 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 from markupsafe import Markup
 
-from dynakin.report.body import chain_of, colours_of, floor_height, marker_segments, reaction
+from dynakin.report.body import chain_of, marker_segments, painted
 from dynakin.report.labels import is_planar, short_marker_names
+from dynakin.report.plot import INK, MEASURED
+from dynakin.report.sides import Joint, joints_of, normalising_mass, values_of
+from dynakin.report.styles import SIDE_COLOURS
 from dynakin.results.estimate import Estimate
+from dynakin.results.measures.feet import foot_sources
+from dynakin.results.measures.pressure import centre_of_pressure, floor_height
 from dynakin.results.measures.sources import DERIVED, moment_sources, wrench_sources
 from dynakin.results.naming import number, sentence, words
+from dynakin.units import GRAVITY_M_S2
+
+Array = npt.NDArray[np.float64]
 
 _PICTURES_PER_SECOND = 30.0
 _MOST_BYTES = 750_000  # of base64 in the page
 _MISSING = -32768
-_FOLLOWED_FROM_M = 2.6  # a person who covers more ground than this is followed
-_MARGIN_MM = 90.0
-_MOST_TICKS = 200  # half a metre apart: no person is followed for longer than that in one page
+_FOLLOWED_FROM_MM = 1200.0
+"""A person whose middle covers more ground than this is followed."""
+_MOST_SQUARES = 200  # along the floor
+_VIEWS = {"Right": (0, 0), "Front": (90, 0), "Left": (180, 0), "Back": (-90, 0), "Above": (0, 90), "Aslant": (40, 12)}
+"""Azimuth and elevation in degrees: 0 looks from the right, 90 from the front."""
 
 
 @dataclass(frozen=True)
 class Playback:
-    """What the template needs: elements to draw, the view in millimetres, and the numbers as JSON."""
+    """What the template needs, and the numbers as JSON."""
 
-    bones: list[dict[str, str]]
-    markers: list[dict[str, str]]
-    rows: list[str]
-    view: tuple[float, float, float, float]
-    floor_mm: float
-    ticks_mm: list[float]
+    rows: list[dict[str, Any]]
+    views: dict[str, tuple[int, int]]
     curve: str
     curve_label: str
     last: int
     end_time: str
+    feet: list[str]
     has_reaction: bool
+    has_measured: bool
+    has_mass_centre: bool
     has_derived: bool
-    segments: dict[str, str]
+    moment_unit: str
+    colours: dict[str, str]
     note: str
     data: Markup
 
 
 def playback(estimate: Estimate) -> Playback:
-    """The player's content; segments where the estimate holds joint centres, arrows where it holds a wrench."""
-    chain, colours = chain_of(estimate), colours_of(estimate)
-    measured, estimated = (_plane(estimate.data[f"markers_{kind}"].values) for kind in ("measured", "estimated"))
-    floor = floor_height(estimate)
-    arrows, forces = _arrows(estimate, floor, np.nanmax([_height(measured), _height(estimated)]))
-    angles = estimate.data["coordinates"].transpose("time", "coordinate").values
-    angles = angles * np.where(estimate.is_rotation(), 180.0 / np.pi, 1000.0)
-    moments = estimate.data["moments"].transpose("time", "coordinate").values
-    derived = np.column_stack([moment_sources(estimate.data), wrench_sources(estimate.data)[:, :2].max(axis=1)])
-    points = _plane(chain.points)
-    arrays = {
-        "points": points,
-        "measured": measured,
-        "estimated": estimated,
-        "arrows": arrows,
-        "forces": forces,
-        "angles": angles,
-        "moments": moments,
-        "derived": (derived == DERIVED).astype(float),
+    """The player's content; segments where the estimate holds joint centres, arrows where it holds wrenches."""
+    planar, mass = is_planar(estimate), normalising_mass(estimate)
+    chain, joints = chain_of(estimate), joints_of(estimate)
+    colours, key = painted(estimate, chain)
+    measured, estimated = (_seen(estimate, values_of(estimate, f"markers_{k}")) for k in ("measured", "estimated"))
+    points = _seen(estimate, chain.points)
+    view, centre = _view(estimate, np.concatenate([points, measured, estimated], axis=1))
+    arrays: dict[str, Array] = {
+        "points": points.reshape(len(points), -1),
+        "measured": measured.reshape(len(measured), -1),
+        "estimated": estimated.reshape(len(estimated), -1),
+        "centre": centre,
+        **_joint_values(estimate, joints),
     }
-    frames = frames_shown(estimate, sum(array.shape[1] for array in arrays.values()))
-    view, followed = _view([points, measured, estimated, arrows], floor)
+    arrows = _arrows(estimate, arrays)
+    forces = np.concatenate([arrays[f"{kind}_sizes"].ravel() for kind in ("measured", "estimated")])
+    forces = forces[np.isfinite(forces)]
+    heaviest = (estimate.mass_kg or 0.0) * GRAVITY_M_S2 or float(forces.max(initial=0.0)) or 1.0
+    view["mm_per_newton"] = float(f"{0.5 * view['height'] / heaviest:.6g}")
+    if "mass_centre" in estimate.data and not planar:
+        arrays["mass_centre"] = 1000.0 * values_of(estimate, "mass_centre")
+    frames = _frames_shown(estimate, sum(array.shape[1] for array in arrays.values()))
     carriers, names = marker_segments(estimate), short_marker_names(estimate.marker_names)
-    content: dict[str, Any] = {
+    content = {
         "time": [round(float(t), 3) for t in estimate.time[frames]],
-        "bones": [[bone.start, bone.end] for bone in chain.bones],
-        "units": [["deg", "N m"] if rotation else ["mm", "N"] for rotation in estimate.is_rotation()],
-        "follow": followed,
+        "bones": [[b.start, b.end, colours[b.segment]] for b in chain.bones],
+        "markers": [[names[n], colours.get(carriers.get(n, ""), SIDE_COLOURS[""])] for n in estimate.marker_names],
+        "arrows": arrows,
         "view": view,
-        **{name: packed(array[frames]) for name, array in arrays.items()},
+        "arrays": {name: _packed(array[frames]) for name, array in arrays.items()},
     }
-    curve, curve_label = curve_of(estimate, angles)
-    left, right = _extent([points, measured, estimated], 0)
-    half = 500.0 * max(1.0, np.ceil((right - left) / (500.0 * _MOST_TICKS)))
+    curve, label = _curve(estimate)
     return Playback(
-        bones=[{"segment": words(bone.segment), "colour": colours[bone.segment]} for bone in chain.bones],
-        markers=[
-            {"name": names[name], "colour": colours.get(carriers.get(name, ""), "#1d2530")}
-            for name in estimate.marker_names
-        ],
-        rows=[sentence(words(name)) for name in estimate.coordinate_names],
-        view=view,
-        floor_mm=-1000.0 * floor,
-        ticks_mm=[float(x) for x in np.arange(half * np.floor(left / half) - half, right + 2.0 * half, half)],
+        rows=[*_rows(joints, 2 if mass else 1), *([] if estimate.foot_names else _reaction_rows(arrays))],
+        views={} if planar else _VIEWS,
         curve=curve,
-        curve_label=curve_label,
+        curve_label=label,
         last=len(frames) - 1,
         end_time=f"{estimate.time[frames[-1]]:.2f} s",
-        has_reaction=bool(np.isfinite(arrows).any()),
-        segments={words(name): colours[name] for name in dict.fromkeys(bone.segment for bone in chain.bones)},
-        note="Moments of legs and arms are those of both sides together." if is_planar(estimate) else "",
-        has_derived=bool((derived == DERIVED).any()),
+        feet=estimate.foot_names,
+        has_reaction=bool(len(forces)),
+        has_measured=bool(np.isfinite(arrays["measured_sizes"]).any()),
+        has_mass_centre="mass_centre" in arrays,
+        has_derived=bool(arrays["derived"].any() or arrays["moments_derived"].any()),
+        moment_unit="N m/kg" if mass else "N m",
+        colours=key,
+        note="Moments of legs and arms are those of both sides together." if planar else "",
         data=Markup(json.dumps(content, separators=(",", ":")).replace("<", "\\u003c")),
     )
 
 
-def _plane(points: np.ndarray) -> np.ndarray:
-    """Points (T, P, 3) m as (T, 2 P) mm of the picture: forward to the right, up as negative."""
-    flat = np.stack([1000.0 * points[:, :, 0], -1000.0 * points[:, :, 1]], axis=2)
-    return np.asarray(flat.reshape(len(points), -1))
+def _seen(estimate: Estimate, points: Array) -> Array:
+    """Points (T, P, 3) in mm; those of a planar model lie in its plane."""
+    return np.asarray(1000.0 * np.where(estimate.modelled_axes(), points, 0.0))
 
 
-def _height(plane: np.ndarray) -> float:
-    return float(np.ptp(plane[:, 1::2][np.isfinite(plane[:, 1::2])])) if np.isfinite(plane[:, 1::2]).any() else np.nan
+def _view(estimate: Estimate, every: Array) -> tuple[dict[str, Any], Array]:
+    """What the camera has to hold, mm, and the middle of the body on the floor (T, 2) that it may follow."""
+    known = np.isfinite(every).all(axis=2, keepdims=True)
+    count = np.maximum(known.sum(axis=1), 1)
+    filled = np.where(known, every, 0.0)
+    centre = (filled.sum(axis=1) / count)[:, [0, 2]]
+    middle = 0.5 * (centre.min(axis=0) + centre.max(axis=0))
+    follow = bool(np.linalg.norm(np.ptp(centre, axis=0)) > _FOLLOWED_FROM_MM)
+    about = centre if follow else np.broadcast_to(middle, centre.shape)
+    away = np.linalg.norm(every[:, :, [0, 2]] - about[:, None], axis=2)
+    heights = every[:, :, 1]
+    floor = 1000.0 * floor_height(estimate)
+    top = float(np.nanmax(heights)) if known.any() else floor + 1000.0
+    low = min(float(np.nanmin(heights)), floor) if known.any() else floor
+    radius = max(round(float(np.nanmax(away))) if known.any() else 500, 300)
+    turns = not is_planar(estimate)
+    azimuth, elevation = _VIEWS["Aslant" if turns else "Right"]
+    return {
+        "azimuth": azimuth,
+        "elevation": elevation,
+        "turns": turns,
+        "follow": follow,
+        "x": round(float(middle[0])),
+        "z": round(float(middle[1])),
+        "middle": round(0.5 * (low + top)),
+        "floor": round(floor),
+        "height": max(round(top - low), 100),
+        "radius": radius,
+        "square": 500 * max(1, -(-2 * radius // (500 * _MOST_SQUARES))),
+    }, centre
 
 
-def _arrows(estimate: Estimate, floor: float, height_mm: float) -> tuple[np.ndarray, np.ndarray]:
-    """Measured and estimated arrows (T, 8) mm, x0 y0 x1 y1 each, and their sizes (T, 2) N."""
-    pairs = [
-        reaction(estimate.data[f"wrench_{kind}"].transpose("time", "component").values, floor)
+def _arrows(estimate: Estimate, arrays: dict[str, Array]) -> list[dict[str, Any]]:
+    """Adds points of action (mm), forces and their sizes (N) to ``arrays``; what to draw of them, measured ones
+    behind."""
+    entries: list[dict[str, Any]] = []
+    feet, modelled = estimate.foot_names, estimate.modelled_axes()
+    derived = foot_sources(estimate.data) if feet else wrench_sources(estimate.data).max(axis=1, keepdims=True)
+    arrays["derived"] = (derived == DERIVED).astype(float)
+    for kind, name in (("measured", "foot_wrench_measured"), ("estimated", "foot_wrench")):
+        wrench = values_of(estimate, name) if feet else values_of(estimate, f"wrench_{kind}")[:, None]
+        points = [centre_of_pressure(wrench[:, k], floor_height(estimate))[0] for k in range(wrench.shape[1])]
+        point = np.where(modelled, np.stack(points, axis=1), 0.0)
+        known = np.isfinite(point).all(axis=2, keepdims=True)
+        force = np.where(known, np.where(modelled, wrench[..., :3], 0.0), np.nan)
+        arrays[f"{kind}_points"] = 1000.0 * point.reshape(len(point), -1)
+        arrays[f"{kind}_forces"] = force.reshape(len(force), -1)
+        arrays[f"{kind}_sizes"] = np.linalg.norm(force, axis=2)
+        entries += [
+            {
+                "points": f"{kind}_points",
+                "forces": f"{kind}_forces",
+                "k": k,
+                "colour": MEASURED if kind == "measured" else SIDE_COLOURS.get(feet[k], INK) if feet else INK,
+                "width": 6 if kind == "measured" else 2.5,
+                "behind": kind == "measured",
+                "derived": kind == "estimated",
+            }
+            for k in range(wrench.shape[1])
+        ]
+    return entries
+
+
+def _joint_values(estimate: Estimate, joints: list[Joint]) -> dict[str, Array]:
+    """Angles in degrees (mm) and moments, in space per kg, of the joints' columns, in the order of `_rows`."""
+    columns = [k for joint in joints for k in joint.columns.values()]
+    moments = values_of(estimate, "moments") / (normalising_mass(estimate) or 1.0)
+    derived = (moment_sources(estimate.data) == DERIVED).astype(float)
+    return {
+        "angles": _degrees(estimate)[:, columns],
+        "moments": moments[:, columns],
+        "moments_derived": derived[:, columns],
+    }
+
+
+def _degrees(estimate: Estimate) -> Array:
+    return np.asarray(values_of(estimate, "coordinates") * np.where(estimate.is_rotation(), 180.0 / np.pi, 1000.0))
+
+
+def _rows(joints: list[Joint], moment_digits: int) -> list[dict[str, Any]]:
+    """A row a joint: the packed column of each side ("" stands across both), and (array, digits) below angle and
+    moment."""
+    rows: list[dict[str, Any]] = []
+    at = 0
+    for joint in joints:
+        columns = {side: at + k for k, side in enumerate(joint.columns)}
+        at += len(columns)
+        moment = None if joint.region == "Whole body" else ("moments", moment_digits)
+        shown = (("angles", 1 if joint.rotation else 0), moment)
+        rows.append({"title": joint.title, "columns": columns, "shown": shown})
+    return rows
+
+
+def _reaction_rows(arrays: dict[str, Array]) -> list[dict[str, Any]]:
+    """Sizes of the ground reaction, where it is one arrow."""
+    return [
+        {"title": f"Ground reaction, {kind}, N", "columns": {"": 0}, "shown": (None, (f"{kind}_sizes", 0))}
         for kind in ("measured", "estimated")
+        if np.isfinite(arrays[f"{kind}_sizes"]).any()
     ]
-    sizes = np.column_stack([np.linalg.norm(force, axis=1) for _, force in pairs])
-    # Half the height of the markers at the usual load, so that the arrow ends inside the picture.
-    scale = 0.5 * height_mm / float(np.nanpercentile(sizes, 90)) if np.isfinite(sizes).any() else 0.0
-    parts = []
-    for point, force in pairs:
-        start = 1000.0 * point * [1.0, -1.0]
-        parts += [start, start + scale * force * [1.0, -1.0]]
-    return np.hstack(parts), sizes
 
 
-def frames_shown(estimate: Estimate, columns: int) -> np.ndarray:
+def _frames_shown(estimate: Estimate, columns: int) -> np.ndarray:
     """Frames that are shown: thirty a second, fewer where the page would become heavy."""
     frames = len(estimate.time)
     bytes_in_all = frames * columns * 2 * 4 / 3
@@ -137,7 +227,7 @@ def frames_shown(estimate: Estimate, columns: int) -> np.ndarray:
     return np.arange(0, frames, step)
 
 
-def packed(values: np.ndarray) -> dict[str, Any]:
+def _packed(values: np.ndarray) -> dict[str, Any]:
     """(N, C) as little-endian 16-bit numbers in base64: value = scale x number, -32768 missing."""
     finite = values[np.isfinite(values)]
     scale = float(np.max(np.abs(finite), initial=0.0)) / 32000.0 or 1.0
@@ -151,31 +241,9 @@ def packed(values: np.ndarray) -> dict[str, Any]:
     }
 
 
-def _extent(planes: list[np.ndarray], axis: int) -> tuple[float, float]:
-    every = np.concatenate([plane[:, axis::2].ravel() for plane in planes])
-    every = every[np.isfinite(every)]
-    return (float(every.min()), float(every.max())) if len(every) else (-500.0, 500.0)
-
-
-def _view(planes: list[np.ndarray], floor: float) -> tuple[tuple[float, float, float, float], bool]:
-    """View box (x, y, width, height) mm, and whether it follows the person."""
-    top, bottom = _extent(planes, 1)
-    top, bottom = top - _MARGIN_MM, max(bottom, -1000.0 * floor) + _MARGIN_MM
-    left, right = _extent(planes, 0)
-    followed = right - left > 1000.0 * _FOLLOWED_FROM_M
-    if followed:
-        middle, half = 0.5 * (left + right), 0.5 * (bottom - top)
-        left, right = middle - half, middle + half
-    left, right = left - _MARGIN_MM, right + _MARGIN_MM
-    spare = 0.62 * (bottom - top) - (right - left)  # never so slim that the figure stands in a slit
-    if spare > 0.0:
-        left, right = left - 0.5 * spare, right + 0.5 * spare
-    return (round(left), round(top), round(right - left), round(bottom - top)), followed
-
-
-def curve_of(estimate: Estimate, angles: np.ndarray) -> tuple[str, str]:
+def _curve(estimate: Estimate) -> tuple[str, str]:
     """The coordinate that moves most as an SVG path in a box of 1000 x 100, above the slider, and its label."""
-    rotations = np.flatnonzero(estimate.is_rotation())
+    rotations, angles = np.flatnonzero(estimate.is_rotation()), _degrees(estimate)
     if not len(rotations):
         return "", ""
     ranges = np.nan_to_num(np.ptp(angles[:, rotations], axis=0))

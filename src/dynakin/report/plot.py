@@ -63,16 +63,12 @@ _TAG = re.compile(r"<[^>]*>")
 _LONG_NUMBER = re.compile(r"-?\d+\.\d{3,}")
 
 
-def new_axes(width_in: float = 3.6, height_in: float = 2.0, *, fitted: bool = False) -> tuple[Figure, Axes]:
-    """A figure with one set of axes in the report's style.
-
-    Panels of a grid share fixed margins, so that their time axes stand below each other; ``fitted`` ones make room
-    for their own labels.
-    """
+def new_axes(width_in: float = 3.6, height_in: float = 2.0) -> tuple[Figure, Axes]:
+    """A figure with one set of axes in the report's style, which makes room for its labels."""
     with mpl.rc_context(_STYLE):
-        figure = Figure(figsize=(width_in, height_in), layout="constrained" if fitted else None)
+        figure = Figure(figsize=(width_in, height_in), layout="constrained")
         figure.patch.set_alpha(0.0)
-        axes = figure.add_subplot() if fitted else figure.add_axes((0.16, 0.21, 0.82, 0.74))
+        axes = figure.add_subplot()
         axes.patch.set_alpha(0.0)
         axes.yaxis.set_major_locator(MaxNLocator(5))
     return figure, axes

@@ -1,4 +1,7 @@
-"""A body with a right and a left: which coordinates belong together, and in what order a reader looks for them."""
+"""Which coordinates belong together, how each side is drawn, and in what order a reader looks for them.
+
+In a plane there are no sides: each coordinate stands alone, in the model's order.
+"""
 
 from __future__ import annotations
 
@@ -6,7 +9,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynakin.report.colours import side_of
+from dynakin.report.labels import is_planar
+from dynakin.report.plot import ESTIMATED
+from dynakin.report.styles import SIDE_COLOURS, LineStyle, side_of
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.power import root_coordinates
 from dynakin.results.measures.sources import legs_of
@@ -14,6 +19,29 @@ from dynakin.results.measures.symmetry import paired
 from dynakin.results.naming import sentence, words
 
 REGIONS = ("Legs", "Trunk and head", "Arms", "Whole body")
+"""Of a body in space; a planar one has "" only."""
+
+
+def values_of(estimate: Estimate, name: str) -> np.ndarray:
+    """A variable of the estimate as an array, time first."""
+    return np.asarray(estimate.data[name].transpose("time", ...).values, dtype=float)
+
+
+def side_lines(estimate: Estimate) -> dict[str, LineStyle]:
+    """Line of the right, the left and the middle; in a plane that of the estimate."""
+    if is_planar(estimate):
+        return {"": LineStyle("estimated", ESTIMATED, 1.2, band=True)}
+    return {side: LineStyle(side, colour, 1.2, band=True) for side, colour in SIDE_COLOURS.items()}
+
+
+def side_key(estimate: Estimate) -> tuple[LineStyle, ...]:
+    """`side_lines` in a key; what stands in the middle needs no name."""
+    return tuple(line for line in side_lines(estimate).values() if line.label)
+
+
+def normalising_mass(estimate: Estimate) -> float | None:
+    """Body mass, kg, that the page divides moments and powers by; None in a plane, whose limbs are both sides'."""
+    return None if is_planar(estimate) else estimate.mass_kg
 
 
 @dataclass(frozen=True)
@@ -38,8 +66,13 @@ class Joint:
 
 
 def joints_of(estimate: Estimate) -> list[Joint]:
-    """All coordinates that move, right and left together, legs first and what places the whole body last."""
+    """All coordinates that move, right and left together, legs first and what places the whole body last.
+
+    In a plane the locked ones as well, and each by itself.
+    """
     names, rotation = estimate.coordinate_names, estimate.is_rotation()
+    if is_planar(estimate):
+        return [Joint(name, {"": k}, "", bool(rotation[k])) for k, name in enumerate(names)]
     pairs = {k: (stem, right, left) for stem, right, left in paired(names) for k in (right, left)}
     root, legs = root_coordinates(estimate), legs_of(estimate.data)
     moving = _moving(estimate)
@@ -64,8 +97,7 @@ def joints_of(estimate: Estimate) -> list[Joint]:
 
 def _moving(estimate: Estimate) -> np.ndarray:
     """(C,) bool: not locked."""
-    sd = estimate.data["coordinates_sd"].transpose("time", "coordinate").values
-    values = estimate.data["coordinates"].transpose("time", "coordinate").values
+    values, sd = values_of(estimate, "coordinates"), values_of(estimate, "coordinates_sd")
     return np.asarray((np.nan_to_num(sd) > 0.0).any(axis=0) | (np.ptp(np.nan_to_num(values), axis=0) > 0.0))
 
 

@@ -11,9 +11,14 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from dynakin.errors import ConfigError, OutputError
-from dynakin.report.paper_figures.movement import angles_figure, knee_moment_figure, markers_figure, wrench_figure
+from dynakin.report.paper_figures.movement import (
+    angles_figure,
+    knee_moment_figure,
+    markers_figure,
+    repetitions_figure,
+    wrench_figure,
+)
 from dynakin.report.paper_figures.parameters import inertias_figure, lengths_and_masses_figure
-from dynakin.report.paper_figures.repetitions import repetitions_figure
 from dynakin.report.paper_figures.sensitivity import Sensitivity, read_sensitivity, sensitivity_figure
 from dynakin.report.plot import FILE_STYLE
 from dynakin.results.estimate import Estimate
@@ -86,8 +91,7 @@ def save_sensitivity_figure(path: str | Path, folder: str | Path, formats: Seque
     Raises:
         ConfigError: an unknown format, or no such file. OutputError: the folder cannot be written.
     """
-    grid = read_sensitivity(path)
-    return _write({SENSITIVITY_FIGURE: lambda: sensitivity_figure(grid)}, Path(folder), formats)
+    return save_sensitivity_figures({SENSITIVITY_FIGURE: read_sensitivity(path)}, folder, formats)
 
 
 def save_sensitivity_figures(

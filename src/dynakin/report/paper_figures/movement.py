@@ -1,23 +1,40 @@
-"""Figures 4 to 7 of the paper: markers over a cycle, joint angles, wrench, knee moment."""
+"""Figures 4 to 7 of the paper: markers over a cycle, joint angles, wrench, knee moment; and mean curves."""
 
 from __future__ import annotations
+
+import textwrap
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
-from dynakin.report.body import chain_of, colours_of, floor_height, marker_segments
-from dynakin.report.colours import SIDE_COLOURS, side_of
+from dynakin.report.body import chain_of, marker_segments, painted
+from dynakin.report.chart import band_is_too_wide
 from dynakin.report.labels import COMPONENT_LABELS, is_planar, moment_note
-from dynakin.report.method_styles import DERIVED_LINE, LineStyle, method_styles
 from dynakin.report.plot import ESTIMATED, INK, MEASURED, QUIET, draw_sourced
-from dynakin.report.sections.panels import band_is_too_wide
-from dynakin.report.sides import joints_of
+from dynakin.report.sections.repetitions import (
+    KINDS,
+    ONE_SD,
+    Plot,
+    curve_unit,
+    drawn,
+    kind_of,
+    note_of,
+    percent_label,
+    plots_by_method,
+)
+from dynakin.report.sides import joints_of, side_lines, values_of
+from dynakin.report.styles import DERIVED_LINE, LineStyle, method_styles
 from dynakin.results.estimate import COMPONENTS, Estimate
 from dynakin.results.measures.fit import signal_fit
+from dynakin.results.measures.mean_curves import PERCENT, estimate_curves
 from dynakin.results.measures.metrics import evaluation_window
+from dynakin.results.measures.pressure import floor_height
 from dynakin.results.measures.repetitions import repetitions_of
 from dynakin.results.measures.sources import DERIVED, moment_sources, wrench_sources
 from dynakin.results.naming import number, sentence, words
@@ -32,9 +49,7 @@ def markers_figure(estimate: Estimate, comparison: Trial | None = None) -> Figur
     cycle = middle_cycle(estimate)
     frames = np.linspace(cycle.start, cycle.stop - 1, _PICTURES).astype(int)
     chain, carriers = chain_of(estimate), marker_segments(estimate)
-    segments = dict.fromkeys([*(b.segment for b in chain.bones), *carriers.values()])
-    planar = is_planar(estimate)
-    colours = colours_of(estimate) if planar else {name: SIDE_COLOURS[side_of(name)] for name in segments}
+    colours, key = painted(estimate, chain)
     measured = estimate.data["markers_measured"].values[:, :, :2]
     estimated = estimate.data["markers_estimated"].values[:, :, :2]
     paint = [colours.get(carriers.get(name, ""), INK) for name in estimate.marker_names]
@@ -61,88 +76,55 @@ def markers_figure(estimate: Estimate, comparison: Trial | None = None) -> Figur
     axes.set_xlim(span)
     axes.set_ylim(floor - 0.42, float(np.nanmax(shown[:, :, 1])) + 0.08)
     axes.axis("off")
-    whose = "segment" if planar else "side"
+    whose = "segment" if is_planar(estimate) else "side"
     axes.set_title(f"Markers over one cycle: measured (hollow) and estimated (filled, in the {whose}’s colour)")
-    names = dict.fromkeys(b.segment for b in chain.bones)
-    if not planar:  # thirty segments in six colours tell nothing, three colours do
-        colours = {side or "middle": colour for side, colour in SIDE_COLOURS.items()}
-        names = dict.fromkeys(colours)
-    letters = sum(len(name) + 4 for name in names)
-    at, step = span[0] + 1.0, (span[1] - span[0] - 1.0) / max(letters, 1 if planar else 60)
-    for name in names:
-        axes.text(at, floor - 0.32, words(name), color=colours[name], va="center", weight="bold")
+    letters = sum(len(name) + 4 for name in key)
+    at, step = span[0] + 1.0, (span[1] - span[0] - 1.0) / max(letters, 60)
+    for name, colour in key.items():
+        axes.text(at, floor - 0.32, name, color=colour, va="center", weight="bold")
         at += (len(name) + 4) * step
     return figure
 
 
 def angles_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
-    """Figure 5: every free coordinate with its band, beside the classical method's."""
-    free = [
-        k for k in range(len(estimate.coordinate_names)) if np.any(_by_coordinate(estimate, "coordinates_sd")[:, k])
-    ]
-    if not free:
+    """Figure 5: every free coordinate with its band, right and left over each other, beside the classical method's."""
+    values, sd = values_of(estimate, "coordinates"), values_of(estimate, "coordinates_sd")
+    joints = [joint for joint in joints_of(estimate) if np.any(sd[:, list(joint.columns.values())])]
+    if not joints:
         return None
-    if not is_planar(estimate):
-        return _paired_angles_figure(estimate)
-    classical = _reference(comparison, CLASSICAL)
+    styles, alone = side_lines(estimate), is_planar(estimate)
+    classical = _reference(comparison, CLASSICAL) if alone else None
     differences = {row.coordinate: row for row in angle_differences([] if comparison is None else [comparison])}
-    columns = min(4, len(free))
-    rows = -(-len(free) // columns)
-    figure = Figure(figsize=(7.2, 0.5 + 1.75 * rows), layout="constrained")
-    every = figure.subplots(rows, columns, squeeze=False).ravel()
-    values, sd = _by_coordinate(estimate, "coordinates"), _by_coordinate(estimate, "coordinates_sd")
-    for axes, k in zip(every, free, strict=False):
-        name = estimate.coordinate_names[k]
-        factor, unit = (180.0 / np.pi, "deg") if estimate.is_rotation()[k] else (1000.0, "mm")
-        title, notes = sentence(words(name)), []
-        if classical is not None:
-            _draw(axes, estimate.time, factor * classical.coordinates[:, k], classical, zorder=3)
-            notes.append(f"RMS difference {number(differences[name].rms.mean, unit)}")
-        axes.plot(estimate.time, factor * values[:, k], color=ESTIMATED, linewidth=1.2)
-        axes.margins(y=0.12)
-        half = 2.0 * factor * sd[:, k]
-        low, high = factor * values[:, k] - half, factor * values[:, k] + half
-        if not band_is_too_wide(factor * values[:, k], factor * sd[:, k]):
-            axes.fill_between(estimate.time, low, high, color=ESTIMATED, alpha=0.18, linewidth=0)
-            notes.append(f"2 sd: {number(float(np.median(half)), unit, digits=2)}")
-        else:  # it would press the line flat
-            notes.append(f"2 sd: {number(float(np.median(half)), unit, digits=2)} (too wide)")
-        axes.set_xlabel("\n".join(notes))
-        axes.set_title(f"{title}, {unit}")
-        axes.set_xlim(float(estimate.time[0]), float(estimate.time[-1]))
-    for axes in every[len(free) :]:
-        axes.set_visible(False)
-    figure.supxlabel("time, s", fontsize=8, color=QUIET)
-    _key(figure, every[0], band=True, other=classical)
-    return figure
-
-
-def _paired_angles_figure(estimate: Estimate) -> Figure:
-    """Figure 5 in space: right and left over each other, with their bands."""
-    joints = joints_of(estimate)
     columns = min(4, len(joints))
     rows = -(-len(joints) // columns)
-    figure = Figure(figsize=(7.2, 0.5 + 1.55 * rows), layout="constrained")
+    figure = Figure(figsize=(7.2, 0.5 + (1.75 if alone else 1.55) * rows), layout="constrained")
     every = figure.subplots(rows, columns, squeeze=False).ravel()
-    values, sd = _by_coordinate(estimate, "coordinates"), _by_coordinate(estimate, "coordinates_sd")
     for axes, joint in zip(every, joints, strict=False):
         factor, unit = (180.0 / np.pi, "deg") if joint.rotation else (1000.0, "mm")
+        notes = []
         for side, k in joint.columns.items():
-            colour = SIDE_COLOURS[side]
-            axes.plot(estimate.time, factor * values[:, k], color=colour, linewidth=1.1)
-            if not band_is_too_wide(factor * values[:, k], factor * sd[:, k]):
-                low, high = (factor * (values[:, k] + sign * sd[:, k]) for sign in (-2.0, 2.0))
-                axes.fill_between(estimate.time, low, high, color=colour, alpha=0.18, linewidth=0)
+            own, half, colour = factor * values[:, k], 2.0 * factor * sd[:, k], styles[side].colour
+            if classical is not None:
+                _draw(axes, estimate.time, factor * classical.coordinates[:, k], classical, zorder=3)
+                notes.append(f"RMS difference {number(differences[joint.stem].rms.mean, unit)}")
+            axes.plot(estimate.time, own, color=colour, linewidth=1.2)
+            wide = band_is_too_wide(own, 0.5 * half)  # it would press the line flat
+            if not wide:
+                axes.fill_between(estimate.time, own - half, own + half, color=colour, alpha=0.18, linewidth=0)
+            notes.append(f"2 sd: {number(float(np.median(half)), unit, digits=2)}{' (too wide)' if wide else ''}")
+        if alone:
+            axes.margins(y=0.12)
+            axes.set_xlabel("\n".join(notes))
         axes.set_title(f"{joint.title}, {unit}")
         axes.set_xlim(float(estimate.time[0]), float(estimate.time[-1]))
     for axes in every[len(joints) :]:
         axes.set_visible(False)
     figure.supxlabel("time, s", fontsize=8, color=QUIET)
-    handles: list[Artist] = []
-    for side in dict.fromkeys(side for joint in joints for side in joint.columns):
-        handles += every[0].plot([], [], color=SIDE_COLOURS[side], linewidth=1.4, label=side or "middle")
-    handles.append(every[0].fill_between([], [], [], color=QUIET, alpha=0.18, label="± 2 standard deviations"))
-    figure.legend(handles=handles, loc="outside upper left", ncols=4, borderaxespad=0.2, columnspacing=1.8)
+    if alone:
+        _key(figure, every[0], [_EKF, *_styles(classical)], band=ESTIMATED)
+    else:
+        shown = dict.fromkeys(side for joint in joints for side in joint.columns)
+        _key(figure, every[0], [replace(styles[side], label=side or "middle", width=1.4) for side in shown], band=QUIET)
     return figure
 
 
@@ -172,7 +154,8 @@ def wrench_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure
             axes.set_title(f"RMS difference: {', '.join(rms)}", loc="right", color=QUIET, weight="normal", fontsize=8)
         axes.set_xlim(float(estimate.time[0]), float(estimate.time[-1]))
     every[-1].set_xlabel("time, s")
-    _key(figure, every[0], measured=True, other=at, derived=bool(derived[:, shown].any()))
+    dashed = [_DERIVED] if derived[:, shown].any() else []
+    _key(figure, every[0], [LineStyle("measured", MEASURED, 2.8), _EKF, *dashed, *_styles(at)])
     return figure
 
 
@@ -182,7 +165,7 @@ def knee_moment_figure(estimate: Estimate, comparison: Trial | None = None) -> F
     if not is_planar(estimate):
         moved = {k for joint in joints_of(estimate) for k in joint.columns.values()}
         names = [name for name in names if estimate.coordinate_names.index(name) in moved]
-    known = np.isfinite(_by_coordinate(estimate, "moments")).any(axis=0)
+    known = np.isfinite(values_of(estimate, "moments")).any(axis=0)
     names = [name for name in names if known[estimate.coordinate_names.index(name)]]
     if not names:
         return None
@@ -209,12 +192,8 @@ def knee_moment_figure(estimate: Estimate, comparison: Trial | None = None) -> F
         else:
             axes.set_xlabel("time, s")
         axes.set_xlim(float(estimate.time[0]), float(estimate.time[-1]))
-    _key(figure, every[0], other=at, derived=bool((source == DERIVED).any()))
+    _key(figure, every[0], [_EKF, *([_DERIVED] if (source == DERIVED).any() else []), *_styles(at)])
     return figure
-
-
-def _by_coordinate(estimate: Estimate, name: str) -> np.ndarray:
-    return np.asarray(estimate.data[name].transpose("time", "coordinate").values)
 
 
 def middle_cycle(estimate: Estimate) -> slice:
@@ -240,28 +219,72 @@ def _style(method: Method) -> LineStyle:
     return method_styles([method.name])[method.name]
 
 
+def _styles(method: Method | None) -> list[LineStyle]:
+    return [] if method is None else [_style(method)]
+
+
+_EKF = LineStyle("EKF", ESTIMATED, 1.4)
+_DERIVED = replace(DERIVED_LINE, colour=ESTIMATED, width=1.4)
+
+
 def _key(
     figure: Figure,
     axes: Axes,
+    styles: Sequence[LineStyle],
     *,
-    measured: bool = False,
-    band: bool = False,
-    other: Method | None = None,
-    derived: bool = False,
+    band: str = "",
+    what: str = "± 2 standard deviations",
+    columns: int = 4,
 ) -> None:
-    """One line of words above the panels, each with the line that it names."""
+    """One line of words above the panels, each with the line that it names; ``band``: its colour."""
     handles: list[Artist] = []
-    if measured:
-        handles += axes.plot([], [], color=MEASURED, linewidth=2.8, label="measured")
-    handles += axes.plot([], [], color=ESTIMATED, linewidth=1.4, label="EKF")
-    if derived:
-        pattern = DERIVED_LINE.pattern
-        handles += axes.plot([], [], color=ESTIMATED, linewidth=1.4, linestyle=pattern, label=DERIVED_LINE.label)
-    if band:
-        handles.append(axes.fill_between([], [], [], color=ESTIMATED, alpha=0.18, label="± 2 standard deviations"))
-    if other is not None:
-        style = _style(other)
+    for style in styles:
         handles += axes.plot(
-            [], [], color=style.colour, linewidth=style.width, linestyle=style.pattern, label=other.name
+            [], [], color=style.colour, linewidth=style.width, linestyle=style.pattern, label=style.label
         )
-    figure.legend(handles=handles, loc="outside upper left", ncols=4, borderaxespad=0.2, columnspacing=1.8)
+    if band:
+        handles.append(Patch(color=band, alpha=0.18, linewidth=0, label=what))
+    figure.legend(handles=handles, loc="outside upper left", ncols=columns, borderaxespad=0.2, columnspacing=1.6)
+
+
+_COLUMNS = 4
+
+
+def repetitions_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
+    """Joint angles, moments and wrench over 0 to 100 % of a repetition: mean, and one standard deviation as a band."""
+    curves = estimate_curves(estimate) if comparison is None else comparison.curves()
+    plots = plots_by_method(estimate, curves)
+    if not plots:
+        return None
+    rows = [
+        kept[k : k + _COLUMNS]
+        for kind in KINDS
+        if (kept := [plot for plot in plots if kind_of(plot.curves[0][1]) == kind])
+        for k in range(0, len(kept), _COLUMNS)
+    ]
+    figure = Figure(figsize=(7.2, 0.55 + 1.5 * len(rows)), layout="constrained")
+    places = figure.subplots(len(rows), _COLUMNS, squeeze=False)
+    for row, panels in zip(rows, places, strict=True):
+        for axes in panels[len(row) :]:
+            axes.set_visible(False)
+        for plot, axes in zip(row, panels, strict=False):
+            _mean_curves(axes, plot)
+            titles = (plot.title, note_of(estimate, plot.curves[0][1]))
+            axes.set_title("\n".join(textwrap.fill(text, 24) for text in titles if text), fontsize=7.5)
+    n = int(max(curve.n.max() for curve in curves))
+    figure.supxlabel(f"{percent_label(curves[0].movement)}, n = {n}", fontsize=8, color=QUIET)
+    styles = method_styles(dict.fromkeys(curve.method for curve in curves)).values()
+    _key(figure, figure.axes[0], list(styles), band=ESTIMATED if n > 1 else "", what=ONE_SD, columns=5)
+    return figure
+
+
+def _mean_curves(axes: Axes, plot: Plot) -> None:
+    for style, curve in plot.curves:
+        mean, sd = drawn(curve)
+        axes.plot(PERCENT, mean, color=style.colour, linewidth=style.width, linestyle=style.pattern)
+        if style.band:
+            axes.fill_between(PERCENT, mean - sd, mean + sd, color=style.colour, alpha=0.2, linewidth=0)
+    axes.set_xlim(0.0, 100.0)
+    axes.set_xticks([0, 25, 50, 75, 100])
+    axes.margins(y=0.1)
+    axes.set_ylabel(curve_unit(plot.curves[0][1]), fontsize=7.5)

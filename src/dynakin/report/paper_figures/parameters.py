@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dynakin.report.body import colours_of
-from dynakin.report.direct_labels import label_ends
 from dynakin.report.labels import signed_percent
 from dynakin.report.plot import LIMIT, QUIET, thin
 from dynakin.results.estimate import Estimate
@@ -102,7 +103,7 @@ def _changes(axes: Axes, estimate: Estimate, parameters: list[Parameter]) -> Non
             fontsize=7,
         )
     axes.axhline(0.0, color=QUIET, linewidth=0.6)
-    label_ends(axes, labels, height_in=_PANEL_IN)
+    _label_ends(axes, labels, height_in=_PANEL_IN)
 
 
 def _label(p: Parameter) -> str:
@@ -110,3 +111,54 @@ def _label(p: Parameter) -> str:
     factor, unit = (1000.0, "mm") if p.unit == "m" else (1.0, p.unit.replace("m2", "m²"))
     band = number(2.0 * factor * p.sd, unit, digits=2)
     return f"{words(p.segment)} {number(factor * p.value)} ± {band} ({change})"
+
+
+def _label_ends(
+    axes: Axes, labels: Sequence[tuple[str, float, str]], *, size: float = 7.5, height_in: float = 2.5
+) -> None:
+    """Write (text, y in data, colour) to the right of the axes, pushed apart; call it after the limits are set.
+
+    Args:
+        height_in: of the axes, inches: how much a line of text takes.
+    """
+    low, high = axes.get_ylim()
+    gap = 1.25 * size / 72.0 / height_in
+    wanted = np.array([(y - low) / (high - low) for _, y, _ in labels])
+    for (text, _, colour), y, start in zip(labels, spread(wanted, gap), wanted, strict=True):
+        axes.annotate(
+            text,
+            (1.0, float(np.clip(start, 0.0, 1.0))),
+            xycoords="axes fraction",
+            xytext=(1.05, y),
+            textcoords="axes fraction",
+            va="center",
+            color=colour,
+            fontsize=size,
+            annotation_clip=False,
+            arrowprops={
+                "arrowstyle": "-",
+                "color": colour,
+                "linewidth": 0.5,
+                "shrinkA": 1,
+                "shrinkB": 0,
+                "relpos": (0.0, 0.5),
+            },
+        )
+
+
+def spread(wanted: np.ndarray, gap: float) -> np.ndarray:
+    """Places as near as they get to ``wanted`` that keep their order and are at least ``gap`` apart."""
+    order = np.argsort(np.round(wanted / gap, 2), kind="stable")  # those at one place stay in the order given
+    groups = [(float(wanted[k]), 1) for k in order]  # middle, members
+    merged: list[tuple[float, int]] = []
+    for group in groups:
+        merged.append(group)
+        while len(merged) > 1 and merged[-1][0] - merged[-2][0] < 0.5 * gap * (merged[-1][1] + merged[-2][1]):
+            (b, n), (a, m) = merged.pop(), merged.pop()
+            merged.append(((a * m + b * n) / (m + n), m + n))
+    placed = np.empty_like(wanted)
+    at = 0
+    for middle, members in merged:
+        placed[order[at : at + members]] = middle + gap * (np.arange(members) - 0.5 * (members - 1))
+        at += members
+    return placed

@@ -7,11 +7,11 @@ from typing import TypeVar
 
 import numpy as np
 
+from dynakin.report.chart import Line, Panel, chart
 from dynakin.report.labels import COMPONENT_LABELS, moment_note
-from dynakin.report.method_styles import DERIVED_LINE, LineStyle, method_styles
-from dynakin.report.sections.method_panels import overlaid
-from dynakin.report.sections.panels import Panel
-from dynakin.report.sections.section import Section
+from dynakin.report.plot import MEASURED as MEASURED_COLOUR
+from dynakin.report.sections.section import Page, Section
+from dynakin.report.styles import DERIVED_LINE, LineStyle, method_styles
 from dynakin.report.text_tables import table2_text
 from dynakin.results.estimate import COMPONENTS
 from dynakin.results.measures.mean_curves import MEASURED
@@ -33,8 +33,11 @@ ABOUT_METHODS = (
 )
 
 
-def methods_section(trial: Trial) -> Section:
+def methods_section(page: Page) -> Section | None:
     """All of one trial in one section: the filter's page."""
+    trial = page.comparison
+    if trial is None:
+        return None
     seconds = trial.time[trial.window]
     title = f"Difference to what was measured, {seconds[0]:g} to {seconds[-1]:g} s"
     rows = table2([trial])
@@ -45,13 +48,8 @@ def methods_section(trial: Trial) -> Section:
         f"{ABOUT_METHODS} {ABOUT_TABLE2}" if referred else "",
         tables=[table2_text(rows, title), table2_text(rows, "Every marker", single_markers=True)] if referred else [],
         notes=trial.notes,
-        parts=trial_parts(trial, "methods") if referred else [],
+        parts=[part for make in PARTS if (part := make(trial, "methods")).panels] if referred else [],
     )
-
-
-def trial_parts(trial: Trial, key: str) -> list[Section]:
-    """Wrench, angles and moments over time by method; one without a reference method is left out."""
-    return [part for part in (wrench_part(trial, key), angle_part(trial, key), moment_part(trial, key)) if part.panels]
 
 
 def wrench_part(trial: Trial, key: str) -> Section:
@@ -67,17 +65,7 @@ def wrench_part(trial: Trial, key: str) -> Section:
         lines = _lines(trial, methods, [method.wrench[:, k] for method in methods])
         measured = (method_styles([MEASURED])[MEASURED], trial.measured_wrench[:, k])
         note = _each({method.name: rms[component, method.name] for method in reversed(methods)}, unit)
-        panels.append(
-            overlaid(
-                f"{key}-{component}",
-                title,
-                unit,
-                trial.time,
-                [measured, *lines],
-                derived=derived[:, k],
-                note=f"RMS: {note}",
-            )
-        )
+        panels.append(_overlaid(title, unit, trial, [measured, *lines], derived[:, k], note=f"RMS: {note}"))
     styles = _key(trial, [MEASURED], methods, derived=bool(derived.any()))
     return Section(f"{key}-wrench", "Ground reaction by method", "", panels, lines=styles)
 
@@ -96,7 +84,7 @@ def angle_part(trial: Trial, key: str) -> Section:
         note = f"RMS difference {_each({row.method: row.rms for row in rows}, unit)}"
         if len(rows) == 1:
             note += f", {number(rows[0].rms_about_mean.mean, unit)} about its mean"
-        panels.append(overlaid(f"{key}-angle-{name}", sentence(words(name)), unit, trial.time, lines, note=note))
+        panels.append(_overlaid(sentence(words(name)), unit, trial, lines, note=note))
     return Section(
         f"{key}-angles",
         "Joint angles beside the classical method",
@@ -122,9 +110,7 @@ def moment_part(trial: Trial, key: str) -> Section:
         about = moment_note(estimate, name)
         note = f"{about}; {note}" if about else note
         title = f"{sentence(words(name))} moment"
-        panels[name] = overlaid(
-            f"{key}-moment-{name}", title, unit, trial.time, lines, derived=derived[:, k], note=note
-        )
+        panels[name] = _overlaid(title, unit, trial, lines, derived[:, k], note=note)
     knees = [panel for name, panel in panels.items() if "knee" in name]
     others = [panel for name, panel in panels.items() if "knee" not in name]
     return Section(
@@ -136,6 +122,28 @@ def moment_part(trial: Trial, key: str) -> Section:
         folded_title="The other joints’ moments against AT",
         lines=_key(trial, [], methods, derived=bool(derived.any())),
     )
+
+
+PARTS = (wrench_part, angle_part, moment_part)
+"""By method over time; one without a reference method has no panels."""
+
+
+def _overlaid(
+    title: str,
+    unit: str,
+    trial: Trial,
+    lines: Sequence[tuple[LineStyle, np.ndarray]],
+    derived: np.ndarray | None = None,
+    *,
+    note: str,
+) -> Panel:
+    """Signals (T,) of several methods over time, the first at the bottom; solid ones but the measured are dashed where
+    they are ``derived`` (T,) bool, because a contact is not measured."""
+    drawn = []
+    for style, values in lines:
+        own = derived if style.dash == "solid" and style.colour != MEASURED_COLOUR else None
+        drawn.append(Line(values, style.colour, style.width, dashed=own, dashes=style.dashes))
+    return chart(title, unit, trial.time, drawn, note=note)
 
 
 def _lines(trial: Trial, methods: Sequence[Method], values: list[np.ndarray]) -> list[tuple[LineStyle, np.ndarray]]:

@@ -1,42 +1,56 @@
-"""What a page is made of: a heading, words, tables and panels."""
+"""What a page shows, and what it is made of: sections with a heading, words, tables and panels."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from functools import wraps
-from typing import Any, ParamSpec, TypeVar
+from functools import cached_property
+from typing import Any
 
-from dynakin.report.method_styles import LineStyle
-from dynakin.report.sections.panels import Panel
+from dynakin.report.chart import Panel
+from dynakin.report.labels import is_planar
+from dynakin.report.styles import LineStyle
 from dynakin.report.text_tables import TextTable
+from dynakin.results.estimate import Estimate
+from dynakin.results.measures.mean_curves import MeanCurve, estimate_curves
+from dynakin.results.measures.repetitions import Found, repetitions_of
+from dynakin.validation.methods import Trial
 
-P = ParamSpec("P")
-S = TypeVar("S")
-T = TypeVar("T")
 
+@dataclass(frozen=True, eq=False)
+class Page:
+    """What a section is made from: one estimate (facing forward), its metrics, and, where they were run, the reference
+    methods on the same trial.
 
-def needs(*blocks: str, otherwise: T) -> Callable[[Callable[P, S]], Callable[P, S | T]]:
-    """Of a finding or a section made from metrics, its last argument: ``otherwise`` where one of these blocks of
-    ``metrics.json`` is None, because the stage that makes it failed (`dynakin.results.failures`)."""
+    A block of ``metrics`` is None where the stage that makes it failed (`dynakin.results.failures`).
+    """
 
-    def with_them(make: Callable[P, S]) -> Callable[P, S | T]:
-        @wraps(make)
-        def made(*args: P.args, **others: P.kwargs) -> S | T:
-            metrics: Any = args[-1]
-            return otherwise if any(metrics[block] is None for block in blocks) else make(*args, **others)
+    estimate: Estimate
+    metrics: dict[str, Any]
+    comparison: Trial | None = None
 
-        return made
+    @cached_property
+    def planar(self) -> bool:
+        """Whether the model explains the markers in one plane only."""
+        return is_planar(self.estimate)
 
-    return with_them
+    @cached_property
+    def repetitions(self) -> Found:
+        """Squats or gait cycles."""
+        return repetitions_of(self.estimate) if self.comparison is None else self.comparison.repetitions
+
+    @cached_property
+    def curves(self) -> Sequence[MeanCurve]:
+        """Mean curves over the repetitions, of every method."""
+        return estimate_curves(self.estimate) if self.comparison is None else self.comparison.curves()
 
 
 @dataclass(frozen=True)
 class Section:
     """A heading, paragraphs, tables and panels; ``folded`` panels open on a click.
 
-    key: names of the lines that all pages know ("measured", "estimated", "band", "bound"); lines: those of methods.
-    band: what the bands of ``lines`` are. notes: further lines of words. parts: sections of their own, below a smaller
+    key: names of the lines that all pages know ("measured", "estimated", "band", "bound"); lines: further ones. band:
+    what the bands of ``lines`` are. notes: further lines of words. parts: sections of their own, below a smaller
     heading.
     """
 
@@ -58,7 +72,3 @@ class Section:
     def empty(self) -> bool:
         """Whether there is nothing to show."""
         return not (self.panels or self.wide or self.folded or self.tables or self.notes or self.parts)
-
-
-NOTHING = Section("", "", "")
-"""A section that is left out."""

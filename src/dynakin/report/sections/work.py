@@ -7,12 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from dynakin.report.chart import Line, chart
-from dynakin.report.colours import SIDE_COLOURS
-from dynakin.report.method_styles import DERIVED_LINE
-from dynakin.report.sections.section import NOTHING, Section, needs
-from dynakin.report.sections.spatial_sections import SIDE_LINES
-from dynakin.report.sides import Joint, joints_of
+from dynakin.report.chart import Line, Panel, chart
+from dynakin.report.sections.section import Page, Section
+from dynakin.report.sides import Joint, joints_of, normalising_mass, side_key, side_lines, values_of
+from dynakin.report.styles import DERIVED_LINE
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.sources import DERIVED, measured_moments, moment_sources
@@ -22,10 +20,11 @@ _NOT_MEANT = 0.02
 """Below this share of the largest of its kind a quantity is too small for a ratio of the sides to say anything."""
 
 
-@needs("work", otherwise=NOTHING)
-def power_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
+def power_section(page: Page) -> Section | None:
     """Power of the joints over the body mass, and the work of each coordinate."""
-    work, mass = metrics["work"], estimate.mass_kg
+    estimate, work, mass = page.estimate, page.metrics["work"], normalising_mass(page.estimate)
+    if work is None:
+        return None
     powers = estimate.powers() / (mass or 1.0)
     drawn = np.asarray((np.nan_to_num(powers) != 0.0).any(axis=0))
     joints = [
@@ -34,20 +33,22 @@ def power_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
         if joint.region != "Whole body" and any(drawn[k] for k in joint.columns.values())
     ]
     if not joints:
-        return Section("powers", "Powers and work", "")
+        return None
     unit = "W/kg" if mass else "W"
     derived = moment_sources(estimate.data) == DERIVED
-    panels = {"Legs": [], "": []}  # type: dict[str, list[Any]]
+    legs: list[Panel] = []
+    others: list[Panel] = []
+    colours = {side: line.colour for side, line in side_lines(estimate).items()}
     for joint in joints:
-        lines = [Line(powers[:, k], SIDE_COLOURS[side], dashed=derived[:, k]) for side, k in joint.columns.items()]
+        lines = [Line(powers[:, k], colours[side], dashed=derived[:, k]) for side, k in joint.columns.items()]
         note = "; ".join(
             f"{f'{side} ' if side else ''}peak {number(own['peak_w'] / (mass or 1.0), unit, digits=2)}"
             for side, k in joint.columns.items()
             if (own := work.get(_name(estimate, k)))
         )
         shown = chart(joint.name, unit, estimate.time, lines[::-1], note=note, least_range=0.05)
-        panels["Legs" if joint.region == "Legs" else ""].append(shown)
-    window = metrics["window"]
+        (legs if joint.region == "Legs" else others).append(shown)
+    window = page.metrics["window"]
     seconds = f"{window['start_s']:.4g} to {window['end_s']:.4g} s"
     return Section(
         "powers",
@@ -55,10 +56,10 @@ def power_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
         "Moment times speed: positive where energy is added to the body. Work is the sum of its positive and of its "
         "negative parts. Peaks and work are those of measured moments: where a leg’s are not measured throughout, of "
         "its stances and swings that are measured from end to end.",
-        panels["Legs"] or panels[""],
-        folded=panels[""] if panels["Legs"] else [],
+        legs or others,
+        folded=others if legs else [],
         folded_title="Powers of trunk and arms",
-        lines=(*SIDE_LINES, *((DERIVED_LINE,) if derived.any() else ())),
+        lines=(*side_key(estimate), *((DERIVED_LINE,) if derived.any() else ())),
         tables=[table for table in (_work_table(estimate, joints, work, f"Work, {seconds}"),) if table.rows],
     )
 
@@ -79,10 +80,12 @@ def _work_table(estimate: Estimate, joints: list[Joint], work: Mapping[str, Any]
     return TextTable(title, (*headings, "frames"), rows, tuple(range(2, 9)), folded=len(rows) > 12)
 
 
-@needs("asymmetry", "work", otherwise=NOTHING)
-def asymmetry_section(estimate: Estimate, metrics: dict[str, Any]) -> Section:
+def asymmetry_section(page: Page) -> Section | None:
     """Symmetry indices of legs, and folded of arms."""
+    estimate, metrics = page.estimate, page.metrics
     found = metrics["asymmetry"]
+    if found is None or metrics["work"] is None:
+        return None
     joints = [joint for joint in joints_of(estimate) if len(joint.columns) == 2]
     small = _too_small(estimate, metrics, joints)
     keys = ("range", "peak_moment", "positive_work", "negative_work")
@@ -121,10 +124,7 @@ def _compared(found: Mapping[str, Any]) -> str:
 
 def _too_small(estimate: Estimate, metrics: dict[str, Any], joints: list[Joint]) -> set[tuple[str, str]]:
     """(stem, quantity) whose larger side is a small part of the body's largest."""
-    values, moments = (
-        estimate.data["coordinates"].transpose("time", "coordinate").values,
-        measured_moments(estimate.data),
-    )
+    values, moments = values_of(estimate, "coordinates"), measured_moments(estimate.data)
     sizes: dict[str, dict[str, float]] = {"range": {}, "peak_moment": {}, "positive_work": {}, "negative_work": {}}
     for joint in joints:
         columns = list(joint.columns.values())

@@ -1,4 +1,4 @@
-"""The section on what the recording tells of each constant, what it cannot tell, and what would tell more."""
+"""The constants: lengths and masses over time, and what the recording tells of each, cannot tell, and what would."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from dynakin.elements import element
-from dynakin.report.labels import is_planar, parameter_label, short_marker_names
+from dynakin.report.chart import Bound, Line, Panel, chart
+from dynakin.report.labels import parameter_label, short_marker_names, signed_percent
 from dynakin.report.plot import ESTIMATED, GRID, INK, MEASURED, QUIET, new_axes, to_svg
-from dynakin.report.sections.panels import Panel
-from dynakin.report.sections.section import Section
+from dynakin.report.sections.section import Page, Section
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.posterior import JUDGEMENT_WORDS, KNOWN, NOTHING, group_of, told_in_words
@@ -31,9 +31,60 @@ class ShareRow:
     sizes: str
 
 
-def identifiability_section(estimate: Estimate, metrics: Mapping[str, Any]) -> Section:
+_KEY = ("estimated", "band", "bound")
+
+
+def length_section(page: Page) -> Section:
+    """Segment lengths over time between their bounds."""
+    lengths = [p for p in page.estimate.parameters if p.kind == "length" and p.estimated]
+    return Section(
+        "lengths",
+        "Segment lengths",
+        "How the filter settles on each length. A line on its bound says that the model does not fit there.",
+        [_path(page, p, words(element(p.name).owner), *_length_unit(p)) for p in lengths],
+        key=_KEY,
+    )
+
+
+def mass_section(page: Page) -> Section:
+    """Segment masses over time between their bounds."""
+    masses = [p for p in page.estimate.parameters if p.name.endswith("/mass") and p.kind == "inertia" and p.estimated]
+    sides = " Limbs count both sides." if page.planar else ""
+    return Section(
+        "masses",
+        "Segment masses",
+        f"From the anthropometric table to what the plates and the movement suggest.{sides} Masses are hard to "
+        "tell apart from a squat alone: read them with their bands.",
+        [_path(page, p, words(p.segment), 1.0, "kg") for p in masses],
+        key=_KEY,
+    )
+
+
+def _length_unit(p: Parameter) -> tuple[float, str]:
+    return (1.0, "") if p.unit == "1" else (1000.0, "mm")
+
+
+def _path(page: Page, p: Parameter, title: str, factor: float, unit: str) -> Panel:
+    """A constant over time, with its band and the bounds that are near."""
+    path = page.estimate.data["state"].sel(element=p.name).values
+    sd = np.hypot(page.estimate.data["state_sd"].sel(element=p.name).values, p.skin_sd)
+    change = p.change_percent()
+    note = f"{number(factor * p.initial)} to {number(factor * p.value, unit)}"
+    if change is not None:
+        note += f" ({signed_percent(change)})"
+    if p.at_bound:
+        note += ", on its bound"
+    # bounds far from the path are left out: they would press it flat
+    reach, middle = 3.0 * float(np.ptp(path)) + 2.0 * float(np.nanmax(sd)), float(np.median(path))
+    levels = ((p.lower, "lower bound"), (p.upper, "upper bound"))
+    bounds = [Bound(factor * v, word) for v, word in levels if v is not None and abs(v - middle) <= reach]
+    line = Line(factor * path, ESTIMATED, 1.3, factor * sd)
+    return chart(sentence(title), unit, page.estimate.time, [line], note=note, bounds=bounds)
+
+
+def observability_section(page: Page) -> Section | None:
     """Posterior against prior of every constant; base parameters, advice and gauges where they were looked for."""
-    block = metrics.get("identifiability") or {}
+    estimate, block = page.estimate, page.metrics.get("identifiability") or {}
     groups = _groups(estimate, block.get("parameters", {}))
     base = block.get("base_parameters", {}).get("parameters", {})
     if base:
@@ -42,10 +93,10 @@ def identifiability_section(estimate: Estimate, metrics: Mapping[str, Any]) -> S
             for name, entry in base.items()
         ]
     if not groups:
-        return Section("identifiability", "What the recording tells", "")
+        return None
     left = {title: groups[title] for title in groups if title in ("Lengths", "Masses", "First moments")}
     left |= {title: groups[title] for title in groups if title == "Moments of inertia"}
-    if not is_planar(estimate):  # in space there are nine numbers a segment, too many to look at one by one
+    if not page.planar:  # in space there are nine numbers a segment, too many to look at one by one
         left = {title: rows for title, rows in groups.items() if title in ("Lengths", "Masses")}
         groups = left | {title: rows for title, rows in groups.items() if title == "Marker places"}
     right = {title: rows for title, rows in groups.items() if title not in left}
@@ -157,7 +208,7 @@ def _base_table(base: Mapping[str, Mapping[str, Any]]) -> TextTable:
 
 def _panel(key: str, groups: Mapping[str, Sequence[ShareRow]]) -> Panel:
     count = sum(len(rows) for rows in groups.values()) + 1.6 * len(groups)
-    figure, axes = new_axes(4.3, 0.35 + _ROW_IN * count, fitted=True)
+    figure, axes = new_axes(4.3, 0.35 + _ROW_IN * count)
     place, ticks, labels = 0.0, [], []
     for title, rows in groups.items():
         place -= 1.6

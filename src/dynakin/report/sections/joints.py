@@ -1,0 +1,169 @@
+"""Angles and moments of the joints: right and left over each other, in a plane each coordinate by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from dynakin.report.chart import Line, Panel, band_is_too_wide, chart
+from dynakin.report.labels import moment_note
+from dynakin.report.sections.section import Page, Section
+from dynakin.report.sides import REGIONS, Joint, joints_of, normalising_mass, side_key, side_lines, values_of
+from dynakin.report.styles import DERIVED_LINE
+from dynakin.results.measures.angles import convention_of
+from dynakin.results.measures.feet import ROUNDING
+from dynakin.results.measures.power import root_coordinates
+from dynakin.results.measures.sources import DERIVED, MEASURED, UNKNOWN, moment_sources
+from dynakin.results.naming import listed, number
+
+BAND = "± 2 standard deviations"
+
+
+def angle_section(page: Page) -> Section:
+    """Coordinates with their bands of uncertainty."""
+    estimate, lines_of = page.estimate, side_lines(page.estimate)
+    values, sd = values_of(estimate, "coordinates"), values_of(estimate, "coordinates_sd")
+    offset, clinical = np.zeros(values.shape[1]), False
+    about = "Each in the direction in which the model counts, from the model’s zero."
+    if "zero_offset" in estimate.data:
+        offset = estimate.data["zero_offset"].values
+        clinical = estimate.data.attrs["angle_signs"] == "clinical"
+        zero = "from the standing zero" if np.any(offset) else "from the model’s zero"
+        about = f"As in angles.sto: {zero}, {'clinical' if clinical else 'OpenSim’s'} signs."
+
+    def draw(joint: Joint) -> Panel:
+        factor, unit = (180.0 / np.pi, "deg") if joint.rotation else (1000.0, "mm")
+        name = estimate.coordinate_names[next(iter(joint.columns.values()))]
+        found = convention_of(name) if joint.rotation else None
+        sign = found[0].sign if clinical and found else 1
+        ranges, lines = [], []
+        for side, k in joint.columns.items():
+            own = sign * factor * (values[:, k] - offset[k])
+            low, high = float(np.nanmin(own)), float(np.nanmax(own))
+            band, wide = _band(own, factor * sd[:, k])
+            lines.append(Line(own, lines_of[side].colour, 1.2, band))
+            moved = f"{number(low)} to {number(high)}" if high > low else f"locked at {number(low, unit)}"
+            ranges.append(f"{f'{side} ' if side else ''}{moved}{wide}")
+        title = joint.title
+        if found:
+            way = found[0].positive if sign == found[0].sign else found[0].negative
+            title = f"{title} (+ {way})"
+        least = 2.0 if joint.rotation else 10.0
+        return chart(title, unit, estimate.time, lines[::-1], note="; ".join(ranges), least_range=least)
+
+    panels, parts = _by_region("angles", joints_of(estimate), draw)
+    return Section(
+        "angles",
+        "Joint angles",
+        f"{about} The band is two standard deviations wide on either side, as the filter itself believes; one that "
+        "would hide the line is not drawn, its size stands above the panel.",
+        panels,
+        lines=side_key(estimate),
+        band=BAND,
+        parts=parts,
+    )
+
+
+def moment_section(page: Page) -> Section:
+    """Moments, in space over the body mass; what is derived is dashed, what is absent left out."""
+    estimate, lines_of = page.estimate, side_lines(page.estimate)
+    mass = normalising_mass(estimate)
+    moments = values_of(estimate, "moments") / (mass or 1.0)
+    sd = values_of(estimate, "moments_sd") / (mass or 1.0) if "moments_sd" in estimate.data else None
+    source, peaks = moment_sources(estimate.data), page.metrics["peak_moments_per_kg"] if mass else None
+    found = page.metrics["moments"] or UNKNOWN
+
+    def draw(joint: Joint) -> Panel | None:
+        unit = ("N m" if joint.rotation else "N") + ("/kg" if mass else "")
+        notes, lines = [], []
+        for side, k in joint.columns.items():
+            who, name = f"{side} " if side else "", estimate.coordinate_names[k]
+            if not np.isfinite(moments[:, k]).any():
+                notes.append(f"{who}absent")
+                continue
+            derived = source[:, k] == DERIVED
+            band, wide = _band(moments[:, k], None if sd is None else np.where(derived, np.nan, sd[:, k]))
+            lines.append(Line(moments[:, k], lines_of[side].colour, 1.2, band, derived))
+            if peaks and name in peaks:
+                notes.append(f"{who}{_two_digits(peaks[name]['smallest'])} to {_two_digits(peaks[name]['largest'])}")
+            elif peaks is not None:
+                notes.append(f"{who}no whole measured stance")
+            elif about := f"{moment_note(estimate, name)}{wide}".strip():
+                notes.append(about)
+        note = "; ".join(notes)
+        return chart(joint.name, unit, estimate.time, lines[::-1], note=note, least_range=0.02) if lines else None
+
+    joints = [joint for joint in joints_of(estimate) if joint.region != "Whole body"]
+    panels, parts = _by_region("moments", joints, draw)
+    absent = [
+        f"{side} {joint.name.lower()}".strip()
+        for joint in joints
+        for side, k in joint.columns.items()
+        if not np.isfinite(moments[:, k]).any()
+    ]
+    text = [found["verdict"]]
+    if shown := bool(panels or parts):
+        about = "What muscles and ligaments do about each joint, in the direction in which its coordinate grows"
+        text.append(f"{about}, over the body mass." if mass else f"{about}.")
+        text += [_IN_A_PLANE] if page.planar else _left_at_root(page, source)
+    if (source == DERIVED).any():
+        text.append("Derived moments are dashed, and no peak, work or mean curve holds them.")
+    if absent:
+        text.append(f"Absent in every frame: {listed(absent, 12)}.")
+    return Section(
+        "moments",
+        "Joint moments",
+        " ".join(text),
+        panels,
+        lines=(*side_key(estimate), *((DERIVED_LINE,) if (source == DERIVED).any() else ())) if shown else (),
+        band=BAND if sd is not None and shown else "",
+        notes=tuple(found["reasons"]),
+        parts=parts,
+    )
+
+
+_IN_A_PLANE = (
+    "The model has one leg and one arm for both sides, so theirs are the sums of both. At the toe there is no joint: "
+    "its “moment” is the ground’s about the toe."
+)
+
+
+def _left_at_root(page: Page, source: np.ndarray) -> list[str]:
+    """What the model needs at its root and nothing gives, in the frames in which that is measured; in words."""
+    names = root_coordinates(page.estimate)
+    root = [k for k, name in enumerate(page.estimate.coordinate_names) if name in names]
+    known = values_of(page.estimate, "moments")[:, root][(source[:, root] == MEASURED).all(axis=1)]
+    if not known.size or not np.isfinite(known).any():
+        return []
+    most = float(np.nanmax(np.abs(known)))
+    left = "nothing" if most <= ROUNDING else f"at most {number(most, 'N or N m', digits=2)}"
+    return [f"At the root {left} is left in the {len(known)} frames in which every contact is measured."]
+
+
+def _band(values: np.ndarray, sd: np.ndarray | None) -> tuple[np.ndarray | None, str]:
+    """The deviation to draw; where its band would press the line flat none, and its size in words."""
+    if sd is None or not band_is_too_wide(values, sd):
+        return sd, ""
+    return None, f" (2 sd {number(2.0 * float(np.nanmedian(sd)), digits=2)})"
+
+
+def _two_digits(value: float) -> str:
+    return f"{round(value, 2) + 0.0:.2f}".replace("-", "−")
+
+
+def _by_region(
+    key: str, joints: list[Joint], draw: Callable[[Joint], Panel | None]
+) -> tuple[list[Panel], list[Section]]:
+    """Legs open, the rest folded: a page of twenty-five panels hides what is asked for most. Without regions all are
+    open."""
+    drawn = [(joint.region, panel) for joint in joints if (panel := draw(joint)) is not None]
+    parts = []
+    for region in REGIONS:
+        panels = [panel for its, panel in drawn if its == region]
+        anchor = f"{key}-{region.split()[0].lower()}"
+        if panels and region == "Legs":
+            parts.append(Section(anchor, region, "", panels))
+        elif panels:
+            parts.append(Section(anchor, "", "", folded=panels, folded_title=region))
+    return [panel for its, panel in drawn if not its], parts
