@@ -15,7 +15,8 @@ from dynakin.config import make_config
 from dynakin.errors import ConfigError, OutputError
 from dynakin.pipeline import stages
 from dynakin.results.files.folder import OUTPUT_FILES
-from dynakin.simulation.trial import SimulatedTrial, simulate_squat
+from dynakin.simulation.output import SimulatedTrial
+from dynakin.simulation.trial import simulate_squat
 
 KEYS = {"model": "sagittal7", "markers": "opencap", "mass_kg": 70.0, "height_m": 1.75}
 OPTIONS = ["--model", "sagittal7", "--markers", "opencap", "--mass", "70", "--height", "1.75"]

@@ -6,7 +6,6 @@ import dataclasses
 
 import numpy as np
 import pytest
-from filter.test_estimator import estimator, samples, with_markers
 
 import dynakin
 from dynakin.errors import ConfigError
@@ -15,8 +14,10 @@ from dynakin.pipeline.result import Result
 from dynakin.report.insights import insights
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.metrics import compute_metrics
+from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
-from dynakin.simulation.trial import SimulatedTrial, simulate_squat
+from dynakin.simulation.trial import simulate_squat
+from support.squat_estimator import estimator, samples, with_markers
 
 START_S = 3.0
 

@@ -18,7 +18,8 @@ from dynakin.model.calibration.loads import CarriedLoad, with_loads
 from dynakin.pipeline.stages import configure
 from dynakin.recordings.plates.loads import PlateLoad, without_plate_loads
 from dynakin.results.measures.metrics import compute_metrics
-from dynakin.simulation.trial import SimulatedTrial, simulate_squat
+from dynakin.simulation.output import SimulatedTrial
+from dynakin.simulation.trial import simulate_squat
 
 SUBJECT = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
 BARBELL = CarriedLoad(
