@@ -11,24 +11,23 @@ import dynakin
 from dynakin.simulation import simulate_squat
 
 if len(sys.argv) == 3:
-    recording = dynakin.read(sys.argv[1], forces=sys.argv[2])
+    trial, forces = sys.argv[1:]
     subject = dynakin.Subject()  # mass from the plates, mean of both sexes' tables
 else:
-    recording = simulate_squat(seed=1).recording
+    trial, forces = simulate_squat(seed=1).recording, None
     subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
 
-model = dynakin.load_model("sagittal7", subject=subject, markers="opencap")
-result = dynakin.Estimator(model).run(recording)  # smooth=False: each frame as it would be live
+result = dynakin.run(  # with smooth=False each frame as it would be live
+    trial, forces=forces, model="sagittal7", markers="opencap", subject=subject
+)
 
-for message in result.messages:  # what was found, left out, assumed
+for message in result.estimate.messages:  # what was found, left out, assumed
     print("-", message)
 metrics = result.metrics()
 print(f"markers: {metrics['markers']['mean_rms_mm']:.2f} mm RMS on average (after the frame was used)")
 print("wrench:", {name: round(rms, 2) for name, rms in metrics["wrench"]["rms"].items()}, "N, N m RMS")
 print(metrics["consistency"]["verdict"])
-knee = result.data["moments"].sel(coordinate="knee")
-sd = float(result.data["moments_sd"].sel(coordinate="knee").mean())
-print(
-    f"knee moment, both legs: {float(knee.min()):.0f} to {float(knee.max()):.0f} N m, standard deviation {sd:.1f} N m"
-)
+knee = result.to_dataframe("moments")["knee"]
+sd = result.to_dataframe("moments_sd")["knee"].mean()
+print(f"knee moment, both legs: {knee.min():.0f} to {knee.max():.0f} N m, standard deviation {sd:.1f} N m")
 print("written to", result.save("out/example_01"))

@@ -151,13 +151,13 @@ def judged(
         setup = case.setup
         comparison = trial_of(estimates, initial, setup.definition, setup.cutoff_hz, whatever=whatever)
         comparison = with_lost(comparison, lost)
-    told: Identifiability | None = None
+    observed: Identifiability | None = None
     if observability:
         with failures.stage("what the recording tells of the constants"):
-            told, note = _observability(estimators[title], first)
+            observed, note = _observability(estimators[title], first)
             if note:
                 first = replace(first, messages=[*first.messages, f"{_LEFT_OUT}: {note}"])
-    return Result(first, initial, comparison, told, case.config, failures)
+    return Result(first, initial, comparison, observed, case.config, failures)
 
 
 _LEFT_OUT = "What the recording tells of the constants is left out"
