@@ -6,30 +6,12 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
 
 from dynakin.cli.console import busy, out, print_error, progress_bar
-from dynakin.cli.options import (
-    Estimated,
-    Force,
-    ForceThreshold,
-    Forward,
-    Height,
-    Markers,
-    Mass,
-    ModelName,
-    PlateFilter,
-    Preset,
-    Sex,
-    Side,
-    Smooth,
-    Static,
-    TableName,
-    Vertical,
-    forward_direction,
-)
+from dynakin.cli.options import OF_A_MODEL, OF_THE_LABORATORY, OF_THE_PLATES, Given, with_settings
 from dynakin.cli.summary import print_summary
 from dynakin.errors import DynakinError
 from dynakin.filter.build import estimator_of
@@ -51,30 +33,23 @@ LARGEST_BENCH = 250
 """States up to which a run also tells what the recording says of the constants: it filters a dozen motions more."""
 
 
+@with_settings(
+    "forces",
+    *OF_A_MODEL,
+    "parameters",
+    "preset",
+    "smooth",
+    "estimate",
+    *OF_THE_LABORATORY,
+    *OF_THE_PLATES,
+    "zero",
+    "signs",
+    "output",
+)
 def run(
     trial: Annotated[Path, typer.Argument(help="Recording (.c3d, .trc, .csv), or a configuration (.toml).")],
-    forces: Force = None,
-    model: ModelName = None,
-    markers: Markers = None,
-    static: Static = None,
-    parameters: Annotated[
-        Path | None, typer.Option(help="Subject that dynakin identify wrote: start from its parameters.")
-    ] = None,
-    mass: Mass = None,
-    height: Height = None,
-    sex: Sex = None,
-    preset: Preset = None,
-    smooth: Smooth = None,
-    side: Side = None,
-    estimate: Estimated = None,
-    vertical: Vertical = None,
-    forward: Forward = None,
-    table: TableName = None,
-    plate_filter: PlateFilter = None,
-    zero: Annotated[str | None, typer.Option(help="Zero of the joint angles: model, standing.")] = None,
-    signs: Annotated[str | None, typer.Option(help="Names and signs of the joint angles: opensim, clinical.")] = None,
-    force_threshold: ForceThreshold = None,
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder for the results.")] = None,
+    *,
+    given: Given,
     figures: Annotated[
         Path | None, typer.Option(help="Also write figures for papers (SVG, PDF, PNG) into this folder.")
     ] = None,
@@ -86,28 +61,6 @@ def run(
     ] = None,
 ) -> None:
     """Estimate coordinates, moments, lengths and masses from a recording, and write a report."""
-    given = {
-        "forces": forces,
-        "model": model,
-        "markers": markers,
-        "static": static,
-        "parameters": parameters,
-        "mass_kg": mass,
-        "height_m": height,
-        "sex": sex,
-        "preset": preset,
-        "smooth": smooth,
-        "side": side,
-        "estimate": estimated(estimate),
-        "vertical": vertical,
-        "forward": forward_direction(forward),
-        "table": table,
-        "plate_filter_hz": plate_filter,
-        "zero": zero,
-        "signs": signs,
-        "force_threshold_n": force_threshold,
-        "output": output,
-    }
     config = configure(trial, given)
     check_output_writable(config.output)
     if sensitivity is not None and figures is None:
@@ -139,12 +92,11 @@ def run(
         raise typer.Exit(1)
 
 
-def configure(trial: Path, given: dict[str, Any]) -> Settings:
+def configure(trial: Path, given: Given) -> Settings:
     """Merge a configuration file, if that is what ``trial`` is, with what the command line gives, which wins."""
-    options = {key: value for key, value in given.items() if value is not None}
     if trial.suffix.casefold() == ".toml":
-        return Settings.of(read_keys(trial) | options, str(trial))
-    return Settings.of({"trial": trial} | options, "run")
+        return Settings.of(read_keys(trial), str(trial), given=given)
+    return Settings.of({"trial": trial}, "run", given=given)
 
 
 def estimate_from(
@@ -199,10 +151,3 @@ def estimate_from(
             note = f"What the recording tells of the constants is left out: {error.message}"
             estimate = replace(estimate, messages=[*estimate.messages, note])
     return estimate, comparison, told
-
-
-def estimated(text: str | None) -> list[str] | None:
-    """`--estimate lengths,markers` as a list; "none" is an empty one. The words are checked with the configuration."""
-    if text is None:
-        return None
-    return [] if text.strip() == "none" else [part.strip() for part in text.split(",") if part.strip()]
