@@ -16,7 +16,7 @@ from dynakin.settings import presets
 from dynakin.settings.model import Bounds, Priors
 from dynakin.settings.noise import Noise
 from dynakin.settings.settings import Settings, read_keys
-from dynakin.settings.template import attribute_docs, config_template
+from dynakin.settings.template import config_template
 
 REQUIRED = {"trial": "squat.c3d", "model": "squat7", "output": "out"}
 
@@ -45,7 +45,7 @@ def test_every_key_is_printed_with_its_default_and_a_comment() -> None:
     for key in ("markers", "table", "side", "vertical", "forward", "preset"):
         assert content[key] == Settings.model_fields[key].default
     for schema in (Settings, Noise, Priors, Bounds):
-        assert set(attribute_docs(schema)) == set(schema.model_fields)
+        assert all(field.description for field in schema.model_fields.values())
 
 
 @pytest.mark.parametrize(
@@ -86,7 +86,7 @@ def test_the_papers_settings_are_printed_too() -> None:
 def test_command_line_wins_over_the_file(tmp_path: Path) -> None:
     path = tmp_path / "run.toml"
     path.write_text('trial = "a.trc"\nforces = "/far/b.mot"\nmodel = "squat7"\noutput = "out"\nmass_kg = 70.0\n')
-    config = configure(path, {"mass_kg": 80.0, "model": None, "output": Path("elsewhere")})
+    config = configure(path, {"mass_kg": 80.0, "output": Path("elsewhere")})
     assert config.mass_kg == 80.0
     assert config.model == "squat7"
     assert config.trial == tmp_path / "a.trc"
@@ -115,3 +115,38 @@ def test_configuration_as_used_can_be_read_again() -> None:
     assert Path(used["trial"]).is_absolute()
     again = Settings.of({key: value for key, value in used.items() if value is not None}, "config.toml")
     assert again.as_used() == used
+
+
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        (["run", "--side", "middle"], "run: --side: Input should be"),
+        (["run", "--estimate", "length"], "run: --estimate[0]: Input should be"),
+        (["tune", "fit", "--side", "middle"], "tune fit: --side: Input should be"),
+        (["compare", "--sex", "other"], "compare: --sex: Input should be"),
+        (["check", "--sex", "other"], "check: --sex: Input should be"),
+    ],
+)
+def test_a_wrong_value_is_named_by_its_option(
+    words: list[str], expected: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command = 2 if words[0] == "tune" else 1
+    others = [] if words[0] == "check" else ["--model", "squat7", "-o", str(tmp_path / "out")]
+    assert main([*words[:command], "none.trc", *words[command:], *others]) == 2
+    assert expected in capsys.readouterr().err
+
+
+def test_a_wrong_value_of_the_file_is_named_by_its_key(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "run.toml"
+    path.write_text('trial = "a.trc"\nmodel = "squat7"\noutput = "out"\nside = "middle"\n')
+    assert main(["run", str(path), "--mass", "70"]) == 2
+    assert "run.toml: side: Input should be" in capsys.readouterr().err
+
+
+def test_options_are_the_settings_themselves(capsys: pytest.CaptureFixture[str]) -> None:
+    """Every command that has an option of a setting says of it what the setting says of itself."""
+    meaning = Settings.model_fields["plate_filter_hz"].description
+    assert meaning is not None
+    for command in (["run"], ["compare"], ["tune", "grid"], ["tune", "fit"]):
+        assert main([*command, "--help"]) == 0
+        assert meaning in " ".join(capsys.readouterr().out.split())

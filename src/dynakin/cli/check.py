@@ -13,9 +13,10 @@ from rich.table import Table
 from rich.text import Text
 
 from dynakin.cli.console import out, table
-from dynakin.cli.options import Force, Forward, Height, Markers, Mass, Sex, Side, Static, Vertical, forward_direction
+from dynakin.cli.options import OF_A_MODEL, OF_THE_LABORATORY, Given, with_settings
 from dynakin.errors import DynakinError
-from dynakin.model.definition import available_models, load_model
+from dynakin.filter.build import definition_of
+from dynakin.model.definition import available_models
 from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.recordings.frame import GroundFrame, find_ground_frame
@@ -24,37 +25,30 @@ from dynakin.recordings.plates.checks import check_plates
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.standing import standing_window
-from dynakin.settings.subject import Subject
+from dynakin.settings.settings import Settings
 
 
+@with_settings("forces", *OF_A_MODEL, *OF_THE_LABORATORY, model="Model that is to be used; else all built-in ones.")
 def check(
     trial: Annotated[Path, typer.Argument(help="Recording: .c3d, .trc or .csv.")],
-    forces: Force = None,
-    model: Annotated[str | None, typer.Option(help="Model that is to be used; else all built-in ones.")] = None,
-    markers: Markers = None,
-    static: Static = None,
-    mass: Mass = None,
-    height: Height = None,
-    sex: Sex = None,
-    side: Side = None,
-    vertical: Vertical = None,
-    forward: Forward = None,
+    *,
+    given: Given,
 ) -> None:
     """Say what is in a recording, what is missing, and what `run` would do with it."""
     console = out()
-    subject = Subject(mass_kg=mass, height_m=height, sex=sex)
-    recording = read(trial, forces)
-    still = None if static is None else read(static)
-    direction = forward_direction(forward) or "auto"
+    names = [given["model"]] if "model" in given else available_models()
+    settings = Settings.of({"trial": trial, "model": names[0]}, "check", given=given, needed=())
+    recording = read(trial, settings.forces)
+    still = None if settings.static is None else read(settings.static)
     _print_recording(console, recording)
     console.print(_marker_table(recording))
     _print_plates(console, recording)
-    ground = _print_ground(console, recording, vertical or "auto", direction)
+    ground = _print_ground(console, recording, settings.vertical, settings.forward)
     if ground is not None:
-        _print_plate_check(console, recording, ground, mass)
+        _print_plate_check(console, recording, ground, settings.mass_kg)
     console.print(_marker_set_table(recording))
-    for name in [model] if model else available_models():
-        definition = load_model(name, subject, markers=markers or "auto")
+    for name in names:
+        definition = definition_of(settings.changed(model=name))
         console.print(f"What `run --model {name}` would do", style="bold")
         try:
             if definition.planar and not recording.plates:
@@ -62,9 +56,9 @@ def check(
             found = definition.calibrate(
                 recording,
                 static=still,
-                side=side or "auto",
-                vertical=vertical or "auto",
-                forward=direction,  # type: ignore[arg-type]
+                side=settings.side,
+                vertical=settings.vertical,
+                forward=settings.forward,
             )
             plates = check_plates(recording, found.ground, found.mass_kg if definition.planar else None)
             if recording.plates and plates.refusal:

@@ -11,25 +11,9 @@ import typer
 from rich.console import Console
 from rich.padding import Padding
 
-from dynakin.cli.compare_inputs import cases_of, chosen_trials, given_keys, halves_of
+from dynakin.cli.compare_inputs import cases_of, chosen_trials, halves_of
 from dynakin.cli.console import as_table, busy, out, print_error, progress_bar
-from dynakin.cli.options import (
-    ForceEach,
-    ForceThreshold,
-    Forward,
-    Height,
-    Markers,
-    Mass,
-    ModelName,
-    PlateFilter,
-    Sex,
-    Side,
-    Smooth,
-    Static,
-    TableName,
-    Trials,
-    Vertical,
-)
+from dynakin.cli.options import OF_A_MODEL, OF_THE_LABORATORY, OF_THE_PLATES, ForceEach, Given, Trials, with_settings
 from dynakin.recordings.smoothing import CUTOFF_HZ
 from dynakin.report.comparison_page import render_comparison
 from dynakin.report.text_tables import angle_text, moment_text, table2_text, unseen_text
@@ -45,24 +29,14 @@ from dynakin.validation.unseen import HORIZON_S, unseen, unseen_figures
 HORIZON_MS = 1000.0 * HORIZON_S
 
 
+@with_settings(*OF_A_MODEL, *OF_THE_LABORATORY, *OF_THE_PLATES, "smooth")
 def compare(
     trials: Trials = None,
     forces: ForceEach = None,
-    model: ModelName = None,
-    markers: Markers = None,
-    static: Static = None,
-    mass: Mass = None,
-    height: Height = None,
-    sex: Sex = None,
+    *,
+    given: Given,
     preset: Annotated[list[str] | None, typer.Option(help="Noise settings: default, paper. May be repeated.")] = None,
-    smooth: Smooth = None,
     cutoff: Annotated[float, typer.Option("--cutoff-hz", help="Low-pass of AT and classical, Hz.")] = CUTOFF_HZ,
-    side: Side = None,
-    vertical: Vertical = None,
-    forward: Forward = None,
-    table: TableName = None,
-    plate_filter: PlateFilter = None,
-    force_threshold: ForceThreshold = None,
     halved: Annotated[
         bool, typer.Option("--halves", help="Identify on each trial's first half, judge on its second.")
     ] = False,
@@ -77,10 +51,6 @@ def compare(
     """Compare the filter with the table and the classical method, over one or many trials (the paper's Table II)."""
     if output is not None:
         check_comparison_folder(output)
-    given = given_keys(
-        model, markers, static, mass, height, sex, side, vertical, forward, table, plate_filter, force_threshold
-    )
-    given["smooth"] = smooth
     chosen = chosen_trials(trials or [], identify_trial, test_trial, halved or not_seen)
     cases = cases_of(chosen, forces or [], preset or [], cutoff, given)
     console = out()

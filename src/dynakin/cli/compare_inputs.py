@@ -5,9 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
-from dynakin.cli.options import forward_direction
+from dynakin.cli.options import Given
 from dynakin.errors import ConfigError
 from dynakin.settings.settings import Settings, read_keys
 from dynakin.validation.case import Case, case_of
@@ -45,14 +44,14 @@ def cases_of(
     forces: Sequence[Path],
     presets: Sequence[str],
     cutoff_hz: float,
-    given: dict[str, Any],
+    given: Given,
     command: str = "compare",
 ) -> list[Case]:
     """One case a trial; a trial may be a configuration (.toml) of its own, over which the command line wins.
 
     Args:
         forces: none, or one a trial in the same order. presets: by name; none: the configuration's own.
-        given: the other keys of `Settings` that the command line gives. command: opens messages.
+        given: further keys of the settings, of the command line. command: opens messages.
 
     Raises:
         DynakinError: anything wrong with the input, in one line.
@@ -65,51 +64,17 @@ def cases_of(
             f"{command}: --forces was given {_times(len(forces))} for {len(trials)} trials, expected one for each, "
             "in the same order, or none"
         )
-    return [
-        _case(trial, {**given, "forces": forces[k] if forces else None}, presets, cutoff_hz, command)
-        for k, trial in enumerate(trials)
-    ]
+    files = [{"forces": force} for force in forces] or [{}] * len(trials)
+    return [_case(trial, given | file, presets, cutoff_hz, command) for trial, file in zip(trials, files, strict=True)]
 
 
-def _case(trial: Path, given: dict[str, Any], presets: Sequence[str], cutoff_hz: float, command: str) -> Case:
-    options = {key: value for key, value in given.items() if value is not None}
+def _case(trial: Path, given: Given, presets: Sequence[str], cutoff_hz: float, command: str) -> Case:
     is_config = trial.suffix.casefold() == ".toml"
     content = read_keys(trial) if is_config else {"trial": trial}
     # a configuration's own output is not where a comparison goes
-    config = Settings.of(content | options | {"output": Path()}, str(trial) if is_config else command)
+    config = Settings.of(content | {"output": Path()}, str(trial) if is_config else command, given=given)
     return case_of(config, presets, cutoff_hz)
 
 
 def _times(n: int) -> str:
     return "once" if n == 1 else f"{n} times"
-
-
-def given_keys(
-    model: str | None,
-    markers: str | None,
-    static: Path | None,
-    mass: float | None,
-    height: float | None,
-    sex: str | None,
-    side: str | None,
-    vertical: str | None,
-    forward: str | None,
-    table: str | None,
-    plate_filter: float | None,
-    force_threshold: float | None,
-) -> dict[str, Any]:
-    """The command line's options by the keys of a configuration."""
-    return {
-        "model": model,
-        "markers": markers,
-        "static": static,
-        "mass_kg": mass,
-        "height_m": height,
-        "sex": sex,
-        "side": side,
-        "vertical": vertical,
-        "forward": forward_direction(forward),
-        "table": table,
-        "plate_filter_hz": plate_filter,
-        "force_threshold_n": force_threshold,
-    }

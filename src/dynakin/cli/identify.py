@@ -9,30 +9,19 @@ from typing import Annotated
 import typer
 
 from dynakin.cli.console import out, progress_bar, table
-from dynakin.cli.options import (
-    Forward,
-    Height,
-    Markers,
-    Mass,
-    ModelName,
-    Sex,
-    Side,
-    Static,
-    Vertical,
-    forward_direction,
-)
+from dynakin.cli.options import OF_A_MODEL, OF_THE_LABORATORY, Given, with_settings
 from dynakin.errors import ConfigError
-from dynakin.filter.estimator import Estimator
+from dynakin.filter.build import estimator_of
 from dynakin.identification.change import change_between, change_in_words
 from dynakin.identification.report import base_in_words, segment_rows
 from dynakin.identification.subject import Identification, identify_subject
-from dynakin.model.definition import load_model
 from dynakin.model.identified import read_identified
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
-from dynakin.settings.subject import Subject
+from dynakin.settings.settings import Settings
 
 
+@with_settings(*OF_A_MODEL, *OF_THE_LABORATORY)
 def identify(
     trials: Annotated[
         list[Path] | None, typer.Argument(help="Recordings of one subject with force plates (.c3d, .trc, .csv).")
@@ -41,15 +30,8 @@ def identify(
         list[Path] | None,
         typer.Option("--forces", help="Ground forces of the trials, in their order; else TRIAL_grf.mot beside."),
     ] = None,
-    model: ModelName = None,
-    markers: Markers = None,
-    static: Static = None,
-    mass: Mass = None,
-    height: Height = None,
-    sex: Sex = None,
-    side: Side = None,
-    vertical: Vertical = None,
-    forward: Forward = None,
+    *,
+    given: Given,
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Subject file (.toml) to write.")] = None,
     compare: Annotated[
         bool, typer.Option("--compare", help="Arguments are two subject files: what changed between the sessions.")
@@ -60,18 +42,13 @@ def identify(
     if compare:
         _compare(paths)
         return
-    if not paths or model is None or output is None:
+    if not paths or "model" not in given or output is None:
         raise ConfigError("identify: expected TRIAL..., --model NAME and -o subject.toml (or --compare A B)")
     _check_trials(paths)
     _check_output(output)
-    recordings, standing = _read(paths, forces or [], static)
-    definition = load_model(model, Subject(mass_kg=mass, height_m=height, sex=sex), markers=markers or "auto")
-    estimator = Estimator(
-        definition,
-        side=side or "auto",
-        vertical=vertical or "auto",
-        forward=forward_direction(forward) or "auto",  # type: ignore[arg-type]
-    )
+    settings = Settings.of({}, "identify", ("model",), given)
+    recordings, standing = _read(paths, forces or [], settings.static)
+    estimator = estimator_of(settings)
     with progress_bar("identifying") as progress:
         found = identify_subject(estimator, recordings, static=standing, progress=progress)
     found.subject.write(output)

@@ -11,19 +11,11 @@ import typer
 
 from dynakin.cli.console import busy, out
 from dynakin.cli.options import (
-    Estimated,
-    Forward,
-    Height,
-    Markers,
-    Mass,
-    Preset,
-    Sex,
-    Side,
-    TableName,
-    Vertical,
-    forward_direction,
+    OF_A_MODEL,
+    OF_THE_LABORATORY,
+    Given,
+    with_settings,
 )
-from dynakin.cli.run import estimated
 from dynakin.cli.summary import end, print_summary
 from dynakin.errors import ConfigError
 from dynakin.filter.build import estimator_of
@@ -42,6 +34,14 @@ _LIVE_STANDING_S, _REPLAY_STANDING_S, _SHORT_STANDING_S = (2.0, 20.0), (2.0, 3.0
 _SHORT_S = 6.0
 
 
+@with_settings(
+    *OF_A_MODEL,
+    "preset",
+    "estimate",
+    *OF_THE_LABORATORY,
+    "table",
+    model="Model: fullbody (if not given), squat7, sagittal7, or a .toml or .osim file of your own.",
+)
 def live(
     source: Annotated[
         str | None,
@@ -51,18 +51,8 @@ def live(
         ),
     ] = None,
     forces: Annotated[str | None, typer.Option(help="Plates: another source, or a force file beside replay.")] = None,
-    model: Annotated[str, typer.Option(help="Model: fullbody, squat7, sagittal7, a .toml or .osim file.")] = "fullbody",
-    markers: Markers = None,
-    mass: Mass = None,
-    height: Height = None,
-    sex: Sex = None,
-    preset: Preset = None,
-    side: Side = None,
-    estimate: Estimated = None,
-    vertical: Vertical = None,
-    forward: Forward = None,
-    table: TableName = None,
-    static: Annotated[Path | None, typer.Option(help="Recording of the same person standing.")] = None,
+    *,
+    given: Given,
     parameters: Annotated[
         Path | None,
         typer.Option(help="A known person: parameters.json of an earlier run, or what dynakin identify wrote (.toml)."),
@@ -100,21 +90,10 @@ def live(
         raise typer.BadParameter(
             "--source is missing, expected simulate:squat, replay:FILE, lsl:NAME, qtm:HOST or a plug-in's KIND:..."
         )
-    given = {
-        "markers": markers,
-        "mass_kg": mass,
-        "height_m": height,
-        "sex": sex,
-        "preset": preset,
-        "side": side,
-        "estimate": estimated(estimate),
-        "vertical": vertical,
-        "forward": forward_direction(forward),
-        "table": table,
-    }
+    static = given.pop("static", None)
     if parameters is not None and parameters.suffix.casefold() == ".toml":
         given["parameters"], parameters = str(parameters.absolute()), None
-    settings = {"model": model} | {key: value for key, value in given.items() if value is not None}
+    settings = {"model": "fullbody"} | given
     sources = _sources(source, forces)
     standing, wait = _LIVE_STANDING_S
     if isinstance(sources[0], Replay):
@@ -122,7 +101,7 @@ def live(
     sinks = _sinks(settings, record, publish, view, host, port)
     try:
         session = Live(
-            estimator_of(Settings.of(settings, "live", ("model",)), lag),
+            estimator_of(Settings.of({}, "live", ("model",), settings), lag),
             sources,
             sinks,
             delay_s=delay,

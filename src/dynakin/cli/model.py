@@ -13,21 +13,25 @@ from rich.tree import Tree
 from dynakin.cli.console import out, table
 from dynakin.cli.identifiability import print_identifiability
 from dynakin.cli.opensim_model import export_model, print_opensim
-from dynakin.cli.options import Force, Height, Markers, Mass, Sex
-from dynakin.model.definition import ModelDefinition, available_models, load_built_in_or_toml, load_model
+from dynakin.cli.options import Given, with_settings
+from dynakin.filter.build import definition_of
+from dynakin.model.definition import ModelDefinition, available_models, load_built_in_or_toml
 from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
 from dynakin.model.markers.schema import Marker, MarkerSetFile
 from dynakin.model.opensim.definition import OpenSimDefinition
 from dynakin.model.schema import ModelFile
 from dynakin.model.schema import Segment as ModelSegment
-from dynakin.settings.subject import Subject
+from dynakin.settings.model import Bounds
+from dynakin.settings.settings import Settings, option_names
 
 
+@with_settings("markers", "forces", "mass_kg", "height_m", "sex")
 def model(
     name: Annotated[
         str | None, typer.Argument(help="squat7, sagittal7, fullbody, a .toml or .osim file; none: list them.")
     ] = None,
-    markers: Markers = None,
+    *,
+    given: Given,
     identifiable: Annotated[
         bool, typer.Option("--identifiability", help="What its measurements can tell: base parameters and gauges.")
     ] = False,
@@ -35,10 +39,6 @@ def model(
         Path | None,
         typer.Option(help="With --identifiability: what this recording tells, and what would tell more."),
     ] = None,
-    forces: Force = None,
-    mass: Mass = None,
-    height: Height = None,
-    sex: Sex = None,
     export: Annotated[
         Path | None,
         typer.Option(
@@ -51,13 +51,13 @@ def model(
 ) -> None:
     """Print a model: its tree, coordinates, states, markers and bounds; or what it lets one identify; or export it."""
     console = out()
-    of_a_person = {"--trial": trial, "--forces": forces, "--mass": mass, "--height": height, "--sex": sex}
-    needless = [option for option, value in of_a_person.items() if value is not None]
+    needless = ["--trial"] if trial is not None else []
+    needless += [option_names(key)[0] for key in ("forces", "mass_kg", "height_m", "sex") if key in given]
     if needless and not identifiable and export is None:
         raise typer.BadParameter(f"{needless[0]} is of use only with --identifiability or --export")
     if parameters is not None and export is None:
         raise typer.BadParameter("--parameters is of use only with --export FILE")
-    if forces is not None and trial is None:
+    if "forces" in given and trial is None:
         raise typer.BadParameter("--forces is of use only with --trial FILE")
     if name is None:
         if identifiable:
@@ -66,9 +66,10 @@ def model(
             raise typer.BadParameter("--export: expected a model's name before it")
         console.print(_list())
         return
-    definition = load_model(name, Subject(mass_kg=mass, height_m=height, sex=sex), markers=markers or "auto")
+    settings = Settings.of({"model": name}, "model", ("model",), given)
+    definition = definition_of(settings)
     if export is not None:
-        export_model(definition, export, parameters, mass, trial, forces)
+        export_model(definition, export, parameters, settings.mass_kg, trial, settings.forces)
         console.print(f"Written {export}", soft_wrap=True)
         return
     if isinstance(definition, OpenSimDefinition):
@@ -77,7 +78,7 @@ def model(
         print_opensim(console, definition)
         return
     if identifiable:
-        print_identifiability(definition, trial, forces)
+        print_identifiability(definition, trial, settings.forces)
         return
     console.print(f"{definition.name}: {definition.model.description}")
     console.print()
@@ -165,8 +166,6 @@ def _markers(model: ModelFile, marker_set: MarkerSetFile) -> Table:
 
 
 def _states(model: ModelFile) -> Table:
-    from dynakin.settings.model import Bounds
-
     bounds = Bounds()
     free = sum(not c.locked for c in model.coordinates)
     carrying = sum(s.inertia_estimated and bool(s.parts or s.inertia) for s in model.segments)

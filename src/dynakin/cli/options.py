@@ -1,50 +1,72 @@
-"""Options that several commands have in common; what they mean is written once, in `dynakin.settings`."""
+"""Options that several commands have in common: those that are keys of the settings are made from their definitions."""
 
 from __future__ import annotations
 
+import inspect
+from collections.abc import Callable
+from functools import wraps
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, get_args
 
 import typer
+
+from dynakin.settings.settings import Settings, option_names
+
+Given = dict[str, Any]
+"""What was given on the command line, by the key of the settings."""
+Command = Callable[..., None]
 
 Trials = Annotated[
     list[Path] | None, typer.Argument(metavar="TRIAL...", help="Recordings, or a configuration (.toml) for each.")
 ]
 ForceEach = Annotated[list[Path] | None, typer.Option("--forces", help="Ground forces, one a trial, in order.")]
-ModelName = Annotated[str | None, typer.Option(help="Model: fullbody, squat7, sagittal7, a .toml or .osim file.")]
-Force = Annotated[Path | None, typer.Option("--forces", help="Ground forces: .mot, .sto or .csv.")]
-Markers = Annotated[str | None, typer.Option(help="Marker set: auto, a built-in one or a .toml file.")]
-Static = Annotated[Path | None, typer.Option(help="Recording of the same person standing.")]
-Mass = Annotated[float | None, typer.Option("--mass", help="Body mass, kg; else from the plates.")]
-Height = Annotated[float | None, typer.Option("--height", help="Body height, m; else from the markers.")]
-Sex = Annotated[str | None, typer.Option("--sex", help="male or female, for the table; else the mean of both.")]
-Preset = Annotated[str | None, typer.Option(help="Noise settings: default, paper or a .toml file.")]
-Smooth = Annotated[
-    bool | None,
-    typer.Option("--smooth/--live-like", help="Each frame from all frames (default), or as it would be live."),
-]
-Side = Annotated[str | None, typer.Option(help="Markers of a one-legged model: auto, right, left, both.")]
-Vertical = Annotated[str | None, typer.Option(help="Laboratory axis that points up: auto, +Y, +Z, ...")]
-Forward = Annotated[
-    str | None,
-    typer.Option(help="Facing direction: auto, an axis or three numbers (0,1,0); given, X of the results is along it."),
-]
-Estimated = Annotated[
-    str | None, typer.Option("--estimate", help="Parameters: some of lengths,markers,soft_tissue,inertia; or none.")
-]
-TableName = Annotated[str | None, typer.Option("--table", help="Inertia table: dumas, deleva or a .csv file.")]
-PlateFilter = Annotated[float | None, typer.Option("--plate-filter-hz", help="Low-pass filter on the plates, Hz.")]
-ForceThreshold = Annotated[
-    float | None, typer.Option("--force-threshold-n", help="Load below which a plate counts as empty, N.")
-]
 Backend = Annotated[str, typer.Option(help="Who works: processes or threads of this machine, or dask.")]
 Jobs = Annotated[int | None, typer.Option(help="Workers at a time on this machine; else one a core.")]
 Scheduler = Annotated[str | None, typer.Option(help="Address of the Dask cluster's scheduler, tcp://HOST:PORT.")]
 
+OF_A_MODEL = ("model", "markers", "static", "mass_kg", "height_m", "sex")
+OF_THE_LABORATORY = ("side", "vertical", "forward")
+OF_THE_PLATES = ("table", "plate_filter_hz", "force_threshold_n")
 
-def forward_direction(text: str | None) -> str | tuple[float, ...] | None:
-    """`--forward 0,1,0` as numbers; a word stays a word and is checked with the configuration."""
-    if text is None or "," not in text:
+
+def with_settings(*keys: str, **meanings: str) -> Callable[[Command], Command]:
+    """A command with the options of these keys of the settings in the place of its parameter ``given``, which takes
+    the values of those that were given (`Given`).
+
+    Args:
+        meanings: help text of a key, where the command's differs from the setting's own.
+    """
+
+    def decorated(command: Command) -> Command:
+        @wraps(command)
+        def called(**arguments: Any) -> None:
+            values = {key: arguments.pop(key) for key in keys}
+            given = {key: _READ.get(key, _same)(value) for key, value in values.items() if value is not None}
+            command(given=given, **arguments)
+
+        parameters = []
+        for parameter in inspect.signature(command, eval_str=True).parameters.values():
+            own = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)]
+            parameters += [_option(key, meanings) for key in keys] if parameter.name == "given" else own
+        called.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+        return called
+
+    return decorated
+
+
+def _option(key: str, meanings: dict[str, str]) -> inspect.Parameter:
+    field = Settings.model_fields[key]
+    kinds = {field.annotation, *get_args(field.annotation)} - {type(None)}
+    kind = next((kind for kind in (Path, bool) if kind in kinds), float if float in kinds and str not in kinds else str)
+    assert field.description is not None
+    text = meanings.get(key) or " ".join(field.description.split("\n\n")[0].split())
+    option = typer.Option(None, *option_names(key), help=text)
+    return inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=option, annotation=kind | None)
+
+
+def _forward(text: str) -> str | tuple[float, ...]:
+    """`--forward 0,1,0` as numbers; a word stays a word and is checked with the settings."""
+    if "," not in text:
         return text
     try:
         return tuple(float(part) for part in text.split(","))
@@ -52,3 +74,15 @@ def forward_direction(text: str | None) -> str | tuple[float, ...] | None:
         raise typer.BadParameter(
             f"--forward is {text!r}, expected auto, an axis (+X) or three numbers (0,1,0)"
         ) from None
+
+
+def _estimate(text: str) -> list[str]:
+    """`--estimate lengths,markers` as a list; "none" is an empty one. The words are checked with the settings."""
+    return [] if text.strip() == "none" else [part.strip() for part in text.split(",") if part.strip()]
+
+
+def _same(value: Any) -> Any:
+    return value
+
+
+_READ: dict[str, Callable[[Any], Any]] = {"forward": _forward, "estimate": _estimate}

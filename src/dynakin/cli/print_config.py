@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import typer
 
-from dynakin.cli.options import Preset
+from dynakin.cli.options import Given, with_settings
 from dynakin.settings.template import config_template
 
 
-def print_config(preset: Preset = None) -> None:
+@with_settings("preset")
+def print_config(given: Given) -> None:
     """Print a commented configuration file for `run`."""
-    typer.echo(config_template(preset or "default"), nl=False)
+    typer.echo(config_template(given.get("preset", "default")), nl=False)

@@ -8,25 +8,7 @@ from typing import Annotated
 import typer
 
 from dynakin.cli.console import busy, out, progress_bar
-from dynakin.cli.options import (
-    Estimated,
-    Force,
-    ForceThreshold,
-    Forward,
-    Height,
-    Markers,
-    Mass,
-    ModelName,
-    PlateFilter,
-    Preset,
-    Sex,
-    Side,
-    Smooth,
-    Static,
-    TableName,
-    Vertical,
-    forward_direction,
-)
+from dynakin.cli.options import OF_A_MODEL, OF_THE_LABORATORY, OF_THE_PLATES, Given, with_settings
 from dynakin.cli.summary import end, print_summary
 from dynakin.pipeline.stages import configure, run_case
 from dynakin.report.paper_figures.sensitivity import read_sensitivity
@@ -34,30 +16,23 @@ from dynakin.results.files.folder import check_folder_writable, check_output_wri
 from dynakin.validation.case import case_of
 
 
+@with_settings(
+    "forces",
+    *OF_A_MODEL,
+    "parameters",
+    "preset",
+    "smooth",
+    "estimate",
+    *OF_THE_LABORATORY,
+    *OF_THE_PLATES,
+    "zero",
+    "signs",
+    "output",
+)
 def run(
     trial: Annotated[Path, typer.Argument(help="Recording (.c3d, .trc, .csv), or a configuration (.toml).")],
-    forces: Force = None,
-    model: ModelName = None,
-    markers: Markers = None,
-    static: Static = None,
-    parameters: Annotated[
-        Path | None, typer.Option(help="Subject that dynakin identify wrote: start from its parameters.")
-    ] = None,
-    mass: Mass = None,
-    height: Height = None,
-    sex: Sex = None,
-    preset: Preset = None,
-    smooth: Smooth = None,
-    side: Side = None,
-    estimate: Estimated = None,
-    vertical: Vertical = None,
-    forward: Forward = None,
-    table: TableName = None,
-    plate_filter: PlateFilter = None,
-    zero: Annotated[str | None, typer.Option(help="Zero of the joint angles: model, standing.")] = None,
-    signs: Annotated[str | None, typer.Option(help="Names and signs of the joint angles: opensim, clinical.")] = None,
-    force_threshold: ForceThreshold = None,
-    output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder for the results.")] = None,
+    *,
+    given: Given,
     figures: Annotated[
         Path | None, typer.Option(help="Also write figures for papers (SVG, PDF, PNG) into this folder.")
     ] = None,
@@ -69,29 +44,7 @@ def run(
     ] = None,
 ) -> None:
     """Estimate coordinates, moments, lengths and masses from a recording, and write a report."""
-    given = {
-        "forces": forces,
-        "model": model,
-        "markers": markers,
-        "static": static,
-        "parameters": parameters,
-        "mass_kg": mass,
-        "height_m": height,
-        "sex": sex,
-        "preset": preset,
-        "smooth": smooth,
-        "side": side,
-        "estimate": estimated(estimate),
-        "vertical": vertical,
-        "forward": forward_direction(forward),
-        "table": table,
-        "plate_filter_hz": plate_filter,
-        "zero": zero,
-        "signs": signs,
-        "force_threshold_n": force_threshold,
-        "output": output,
-    }
-    config = configure(trial, given)
+    config = configure(trial, given, options=True)
     check_output_writable(config.output)
     if sensitivity is not None and figures is None:
         raise typer.BadParameter("--sensitivity is a figure for papers, expected --figures FOLDER with it")
@@ -116,10 +69,3 @@ def run(
         with failures.stage("what failed, in the files"):  # these stay as they were saved
             result.save(config.output, keep_lost=keep_lost, check=False)
     end(result)
-
-
-def estimated(text: str | None) -> list[str] | None:
-    """`--estimate lengths,markers` as a list; "none" is an empty one. The words are checked with the configuration."""
-    if text is None:
-        return None
-    return [] if text.strip() == "none" else [part.strip() for part in text.split(",") if part.strip()]

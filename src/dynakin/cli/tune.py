@@ -11,27 +11,19 @@ import numpy as np
 import typer
 from rich.padding import Padding
 
-from dynakin.cli.compare_inputs import cases_of, given_keys
+from dynakin.cli.compare_inputs import cases_of
 from dynakin.cli.console import as_table, busy, out, progress_bar
 from dynakin.cli.options import (
+    OF_A_MODEL,
+    OF_THE_LABORATORY,
+    OF_THE_PLATES,
     Backend,
     ForceEach,
-    ForceThreshold,
-    Forward,
-    Height,
+    Given,
     Jobs,
-    Markers,
-    Mass,
-    ModelName,
-    PlateFilter,
-    Preset,
     Scheduler,
-    Sex,
-    Side,
-    Static,
-    TableName,
     Trials,
-    Vertical,
+    with_settings,
 )
 from dynakin.errors import ConfigError
 from dynakin.recordings.smoothing import CUTOFF_HZ
@@ -55,27 +47,18 @@ tune = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Choose noi
 
 Output = Annotated[Path, typer.Option("-o", "--output", help="Folder for table, figures and presets.")]
 
+_of_trials = with_settings(*OF_A_MODEL, "preset", *OF_THE_LABORATORY, *OF_THE_PLATES)
 _GAINS = ("coordinate", "speed", "acceleration")
 
 
 @tune.command()
+@_of_trials
 def grid(
     output: Output,
     trials: Trials = None,
     forces: ForceEach = None,
-    model: ModelName = None,
-    markers: Markers = None,
-    static: Static = None,
-    mass: Mass = None,
-    height: Height = None,
-    sex: Sex = None,
-    preset: Preset = None,
-    side: Side = None,
-    vertical: Vertical = None,
-    forward: Forward = None,
-    table: TableName = None,
-    plate_filter: PlateFilter = None,
-    force_threshold: ForceThreshold = None,
+    *,
+    given: Given,
     vary: Annotated[
         list[str] | None,
         typer.Option(help="NAME=FROM:TO:STEPS, logarithmic; may be repeated. Else [grid], else the paper's gains."),
@@ -91,9 +74,7 @@ def grid(
 
     A run that was stopped goes on where it was when it is started again with the same folder.
     """
-    given = given_keys(
-        model, markers, static, mass, height, sex, side, vertical, forward, table, plate_filter, force_threshold
-    )
+    preset = given.pop("preset", None)
     cases = cases_of(trials or [], forces or [], [], CUTOFF_HZ, given, "tune grid")
     axes = axes_of(vary or [], cases)
     base = preset or ("paper" if not vary and cases[0].config.grid is None else cases[0].config.preset)
@@ -117,23 +98,13 @@ def grid(
 
 
 @tune.command()
+@_of_trials
 def fit(
     output: Output,
     trials: Trials = None,
     forces: ForceEach = None,
-    model: ModelName = None,
-    markers: Markers = None,
-    static: Static = None,
-    mass: Mass = None,
-    height: Height = None,
-    sex: Sex = None,
-    preset: Preset = None,
-    side: Side = None,
-    vertical: Vertical = None,
-    forward: Forward = None,
-    table: TableName = None,
-    plate_filter: PlateFilter = None,
-    force_threshold: ForceThreshold = None,
+    *,
+    given: Given,
     vary: Annotated[
         list[str] | None, typer.Option(help="Setting to fit; may be repeated. Else those that the preset uses.")
     ] = None,
@@ -146,9 +117,7 @@ def fit(
 
     A run that was stopped goes on where it was when it is started again with the same folder.
     """
-    given = given_keys(
-        model, markers, static, mass, height, sex, side, vertical, forward, table, plate_filter, force_threshold
-    )
+    preset = given.pop("preset", None)
     cases = cases_of(trials or [], forces or [], [], CUTOFF_HZ, given, "tune fit")
     base = preset or cases[0].config.preset
     shared = shared_of(cases, base)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dynakin.filter.estimator import Estimator
-from dynakin.model.definition import Definition, load_model
+from dynakin.model.definition import ModelDefinition, load_model
 from dynakin.model.identified import IdentifiedSubject, read_identified
+from dynakin.model.opensim.definition import OpenSimDefinition
 from dynakin.settings.settings import Settings
 
 
-def definition_of(settings: Settings) -> Definition:
+def definition_of(settings: Settings) -> ModelDefinition | OpenSimDefinition:
     """The model, not measured yet.
 
     Raises:

@@ -87,17 +87,22 @@ def run(
     return run_case(case, keep_lost=keep_lost, observability=observability, progress=progress)
 
 
-def configure(trial: Path, given: Mapping[str, Any], defaults: Mapping[str, Any] | None = None) -> Settings:
+def configure(
+    trial: Path, given: Mapping[str, Any], defaults: Mapping[str, Any] | None = None, *, options: bool = False
+) -> Settings:
     """Merge a configuration file, if that is what ``trial`` is, with what is given, which wins (None: not given).
+
+    Args:
+        options: what is given are options of the command line, and messages call them so.
 
     Raises:
         ConfigError: a key that is unknown or missing, or a value that is wrong.
     """
-    options = dict(defaults or {})
     is_config = trial.suffix.casefold() == ".toml"
-    options |= read_keys(trial) if is_config else {"trial": trial}
-    options |= {key: value for key, value in given.items() if value is not None}
-    return Settings.of(options, str(trial) if is_config else "run")
+    content = {**(defaults or {}), **(read_keys(trial) if is_config else {"trial": trial})}
+    known = {key: value for key, value in given.items() if value is not None}
+    where = str(trial) if is_config else "run"
+    return Settings.of(content, where, given=known) if options else Settings.of(content | known, where)
 
 
 def run_case(

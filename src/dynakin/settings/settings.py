@@ -17,6 +17,14 @@ from dynakin.settings.noise import Noise
 from dynakin.settings.strict import Strict, read_toml, validate
 from dynakin.settings.subject import Sex, Subject
 
+# How keys are called on the command line, where it is not --key.
+_OPTIONS = {
+    "trial": ("TRIAL",),
+    "output": ("-o", "--output"),
+    "mass_kg": ("--mass",),
+    "height_m": ("--height",),
+    "smooth": ("--smooth/--live-like",),
+}
 # Keys that name files: relative to the configuration file that they stand in.
 _PATHS = ("trial", "forces", "static", "parameters", "output")
 NEEDED = {
@@ -30,9 +38,11 @@ class Settings(Strict):
     """What a run needs to know; the keys of a configuration file are the options of the command line."""
 
     trial: Path = Field(default=Path(), examples=["squat.c3d"])
-    """Recording to estimate: .c3d, .trc or .csv. Paths are relative to this file."""
+    """Recording to estimate: .c3d, .trc or .csv.
+
+    Paths are relative to this file."""
     model: str = Field(examples=["squat7"])
-    """Built-in model (fullbody, squat7, sagittal7) or a .toml or .osim file of your own."""
+    """Model: fullbody, squat7, sagittal7, or a .toml or .osim file of your own."""
     output: Path = Field(default=Path(), examples=["out/squat"])
     """Folder for the results. It is replaced if it holds an earlier output, and refused if it holds anything else."""
 
@@ -48,9 +58,9 @@ class Settings(Strict):
     """Table of inertial parameters: dumas, deleva, or a .csv file of your own."""
 
     mass_kg: float | None = Field(default=None, examples=[70.0])
-    """Body mass. Not given: from the plates while the person stands still."""
+    """Body mass, kg. Not given: from the plates while the person stands still."""
     height_m: float | None = Field(default=None, examples=[1.75])
-    """Body height. Not given: from the markers, where a length needs it."""
+    """Body height, m. Not given: from the markers, where a length needs it."""
     sex: Sex | None = Field(default=None, examples=["female"])
     """male or female, for the table. Not given: the mean of both."""
 
@@ -62,19 +72,19 @@ class Settings(Strict):
     side: Literal["auto", "right", "left", "both"] = "auto"
     """Which side's markers a model uses that has one leg for both: auto (fewest gaps), right, left, both."""
     estimate: tuple[Quantity, ...] = QUANTITIES
-    """Which parameters are estimated: lengths, markers (their places), soft_tissue (displacements), inertia. The others
-    stay as they are at the start."""
+    """Which parameters are estimated, of lengths, markers (their places), soft_tissue (displacements) and inertia; as
+    an option with commas, or none. The others stay as they are at the start."""
     plates: dict[str, Literal["right", "left"]] | None = Field(default=None, examples=[{"plate 1": "right"}])
     """Which foot stands on a plate ("plate 1" = "right"), for floating models. Not given: found."""
     vertical: str = "auto"
     """Axis of the laboratory that points up: auto (found), or one of +X -X +Y -Y +Z -Z."""
     forward: str | tuple[float, float, float] = "auto"
-    """Direction in which the person faces, in the laboratory: auto (found), an axis, or three numbers. Given, X of all
-    results is along it; else a floating model is estimated in the laboratory's own frame."""
+    """Direction in which the person faces, in the laboratory: auto (found), an axis, or three numbers (0,1,0). Given, X
+    of all results is along it; else a floating model is estimated in the laboratory's own frame."""
     plate_filter_hz: float | None = Field(default=None, examples=[20.0])
-    """Low-pass filter on the plates. Not given: only what resampling to the marker rate needs."""
+    """Low-pass filter on the plates, Hz. Not given: only what resampling to the marker rate needs."""
     force_threshold_n: float | None = Field(default=None, examples=[10.0])
-    """Load below which a plate counts as empty. Not given: 10 N for plates that are resampled."""
+    """Load below which a plate counts as empty, N. Not given: 10 N for plates that are resampled."""
 
     zero: Literal["model", "standing"] = "model"
     """Zero of the joint angles in angles.sto: model, or standing (in the static trial, else in the trial itself)."""
@@ -106,20 +116,29 @@ class Settings(Strict):
     """Written into an output's config.toml for the record. Not read."""
 
     @classmethod
-    def of(cls, content: Mapping[str, Any], where: str, needed: Iterable[str] = NEEDED) -> Self:
+    def of(
+        cls,
+        content: Mapping[str, Any],
+        where: str,
+        needed: Iterable[str] = NEEDED,
+        given: Mapping[str, Any] | None = None,
+    ) -> Self:
         """Settings from the keys of a file, of the command line, or both.
 
         Args:
-            where: the file, or the command; opens the message of what is wrong. needed: keys that must be given.
+            where: the file, or the command; opens the message of what is wrong. needed: keys that must be there.
+            given: keys of the command line, which win; messages call them by their options.
 
         Raises:
             ConfigError: a key that is unknown (the nearest is suggested) or missing, or a value that is wrong.
         """
+        given = given or {}
+        content = {**content, **given}
         for key in needed:
             if content.get(key) is None:
                 option = NEEDED[key]
                 raise ConfigError(f'{where}: {key} is missing, expected {option} or {key} = "..." in the configuration')
-        return validate(cls, content, where, ConfigError)
+        return validate(cls, content, where, ConfigError, {key: option_names(key)[0] for key in given})
 
     @model_validator(mode="after")
     def _checked(self) -> Self:
@@ -153,6 +172,11 @@ class Settings(Strict):
             path = getattr(self, key)
             plain[key] = None if path in (None, Path()) else str(path.absolute())
         return plain
+
+
+def option_names(key: str) -> tuple[str, ...]:
+    """How a key is called on the command line."""
+    return _OPTIONS.get(key, ("--" + key.replace("_", "-"),))
 
 
 def read_keys(path: Path, paths: Sequence[str] = _PATHS) -> dict[str, Any]:

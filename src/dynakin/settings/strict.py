@@ -6,7 +6,7 @@ from __future__ import annotations
 import difflib
 import re
 import tomllib
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Self, TypeVar
 
@@ -51,9 +51,16 @@ def nearest(word: str, known: Iterable[str]) -> str:
 
 
 class Strict(BaseModel):
-    """Base of everything read from a file: unknown keys are refused, instances cannot be changed."""
+    """Base of everything read from a file: unknown keys are refused, instances cannot be changed. The docstring below a
+    field is its meaning, wherever it is shown."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, str_strip_whitespace=True, allow_inf_nan=False)
+    model_config = ConfigDict(
+        extra="forbid",
+        frozen=True,
+        str_strip_whitespace=True,
+        allow_inf_nan=False,
+        use_attribute_docstrings=True,
+    )
 
     @model_validator(mode="before")
     @classmethod
@@ -101,8 +108,8 @@ def read_toml(path: Path, raises: type[DynakinError] = ModelError) -> dict[str, 
         raise raises(f"{path}: not a TOML file: {error}") from None
 
 
-def _place(location: tuple[int | str, ...], data: Any) -> str:
-    """'segments[2] "shank": axes[0]' from pydantic's location."""
+def _place(location: tuple[int | str, ...], data: Any, names: Mapping[str, str]) -> str:
+    """'segments[2] "shank": axes[0]' from pydantic's location; names: of keys that are called otherwise."""
     text, node = "", data
     for step in location:
         if isinstance(step, int):
@@ -113,13 +120,22 @@ def _place(location: tuple[int | str, ...], data: Any) -> str:
         elif "[" in step or step[:1].isupper():
             continue  # pydantic's name of a branch of a union, no key of the file
         else:
-            text += f".{step}" if text else str(step)
+            text += f".{step}" if text else names.get(step, step)
             node = node.get(step) if isinstance(node, dict) else None
     return text
 
 
-def validate(schema: type[Schema], data: Any, where: str, raises: type[DynakinError] = ModelError) -> Schema:
+def validate(
+    schema: type[Schema],
+    data: Any,
+    where: str,
+    raises: type[DynakinError] = ModelError,
+    names: Mapping[str, str] | None = None,
+) -> Schema:
     """``data`` as an instance of ``schema``.
+
+    Args:
+        names: how messages call keys, where not by themselves.
 
     Raises:
         ModelError (or ``raises``): with the first thing that is wrong; ``where`` (a file, "subject") opens the message.
@@ -131,7 +147,7 @@ def validate(schema: type[Schema], data: Any, where: str, raises: type[DynakinEr
         first = found_errors[0]
         if first["type"] == "literal_error" and not isinstance(first["input"], str) and len(found_errors) > 1:
             first = found_errors[1]  # "a word or a table", and it is a table: say what is wrong in that
-        place = _place(tuple(first["loc"]), data)
+        place = _place(tuple(first["loc"]), data, names or {})
         message = str(first["msg"]).removeprefix("Value error, ")
         found = "" if first["type"] in {"value_error", "missing"} else f", found {first['input']!r}"
         raise raises(f"{where}: {place + ': ' if place else ''}{message}{found}") from None

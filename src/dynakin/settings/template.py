@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import ast
-import inspect
 import textwrap
 from typing import Any
 
@@ -30,7 +28,6 @@ def config_template(preset: str = "default") -> str:
     Raises:
         ConfigError: the preset is unknown.
     """
-    docs = attribute_docs(Settings)
     parts = [_HEADER]
     for key, field in Settings.model_fields.items():
         if key in _RECORD or key in _TABLES:
@@ -39,7 +36,7 @@ def config_template(preset: str = "default") -> str:
         value = (field.examples or [None])[0] if required or field.default is None else field.default
         if key == "preset":
             value, required = preset, True
-        parts.append("\n" + _comment(docs[key]) + ("" if required else "#") + _line(key, value))
+        parts.append("\n" + _comment(field.description) + ("" if required else "#") + _line(key, value))
     defaults: dict[str, BaseModel] = {
         "noise": presets.preset(preset),
         "priors": Priors(),
@@ -47,30 +44,16 @@ def config_template(preset: str = "default") -> str:
         "opensim": OpenSimOptions(),
     }
     for table, schema in _TABLES.items():
-        table_docs = attribute_docs(schema)
-        lines = [f"\n\n{_comment(docs[table])}[{table}]\n"]
+        lines = [f"\n\n{_comment(Settings.model_fields[table].description)}[{table}]\n"]
         for key, value in defaults[table].model_dump(mode="json").items():
-            meaning = "\n" + _comment(table_docs.get(key, ""))
+            meaning = "\n" + _comment(schema.model_fields[key].description)
             lines.append(meaning + (f"# {key}: not given\n" if value is None else "#" + _line(key, value)))
         parts.append("".join(lines))
     return "".join(parts)
 
 
-def attribute_docs(schema: type[BaseModel]) -> dict[str, str]:
-    """The docstring below each attribute of a class: the one place where a key's meaning is written."""
-    body = ast.parse(textwrap.dedent(inspect.getsource(schema))).body[0]
-    assert isinstance(body, ast.ClassDef)
-    docs: dict[str, str] = {}
-    for node, after in zip(body.body, body.body[1:], strict=False):
-        if not (isinstance(node, ast.AnnAssign) and isinstance(node.target, ast.Name)):
-            continue
-        if isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant) and isinstance(after.value.value, str):
-            docs[node.target.id] = " ".join(after.value.value.split())
-    return docs
-
-
-def _comment(text: str) -> str:
-    return "".join(f"# {line}\n" for line in textwrap.wrap(text, _WIDTH))
+def _comment(text: str | None) -> str:
+    return "".join(f"# {line}\n" for line in textwrap.wrap(" ".join((text or "").split()), _WIDTH))
 
 
 def _line(key: str, value: Any) -> str:
