@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynakin/dynamics.hpp"
+
 namespace dynakin {
 namespace {
 
@@ -35,14 +37,6 @@ Consistency::Consistency(const Model& model) : model_(model) {
   }
 }
 
-InertiaVector Consistency::inertia(const Body& body, const Eigen::VectorXd& x) const {
-  const Segment& segment = model_.segments()[body.segment];
-  InertiaVector phi = segment.inertia;
-  for (int k = 0; k < k_inertia_count; ++k)
-    if (segment.inertia_column[k] != k_none) phi(k) = x(segment.inertia_column[k]);
-  return phi;
-}
-
 // Linear in phi. Space: [Sigma h; h' m] with Sigma = tr(I)/2 1 - I. Plane: [izz mx my; mx m 0; my 0 m], padded by a
 // one.
 Consistency::Matrix4 Consistency::pseudo_inertia(const Body& body, const InertiaVector& phi) const {
@@ -67,7 +61,7 @@ Consistency::Matrix4 Consistency::pseudo_inertia(const Body& body, const Inertia
 }
 
 double Consistency::smallest_eigenvalue(int body, const Eigen::VectorXd& x) const {
-  const Matrix4 J = pseudo_inertia(bodies_[body], inertia(bodies_[body], x));
+  const Matrix4 J = pseudo_inertia(bodies_[body], inertia_of(model_.segments()[bodies_[body].segment], x));
   return Eigen::SelfAdjointEigenSolver<Matrix4>(J, Eigen::EigenvaluesOnly).eigenvalues()(0);
 }
 
@@ -79,7 +73,7 @@ bool Consistency::holds(const Eigen::VectorXd& x) const {
 
 bool Consistency::cut(int which, const Eigen::VectorXd& x, HalfSpace& out) const {
   const Body& body = bodies_[which];
-  const InertiaVector phi = inertia(body, x);
+  const InertiaVector phi = inertia_of(model_.segments()[body.segment], x);
   Matrix4 J = pseudo_inertia(body, phi);
   J.diagonal().array() -= body.margin * tolerated / margin;
   if (J.llt().info() == Eigen::Success) return false;  // far cheaper than the eigenvalues, and the usual case

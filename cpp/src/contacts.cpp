@@ -32,8 +32,7 @@ ContactMoments::ContactMoments(const Model& model, std::vector<int> feet)
     if (feet_[i] < 0 || feet_[i] >= n_segments)
       throw std::invalid_argument("feet: segment " + std::to_string(feet_[i]) + ", expected 0 to " +
                                   std::to_string(n_segments - 1));
-    if (std::find(feet_.begin(), feet_.begin() + static_cast<std::ptrdiff_t>(i), feet_[i]) !=
-        feet_.begin() + static_cast<std::ptrdiff_t>(i))
+    if (std::count(feet_.begin(), feet_.end(), feet_[i]) > 1)
       throw std::invalid_argument("feet: segment '" + model.segments()[feet_[i]].name +
                                   "' is given twice, expected different ones");
   }

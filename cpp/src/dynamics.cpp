@@ -1,16 +1,7 @@
 #include "dynakin/dynamics.hpp"
 
-#include "force_derivatives.hpp"
-
 namespace dynakin {
 namespace {
-
-InertiaVector inertia_of(const Segment& segment, const StateRef& x) {
-  InertiaVector phi = segment.inertia;
-  for (int k = 0; k < k_inertia_count; ++k)
-    if (segment.inertia_column[k] != k_none) phi(k) = x(segment.inertia_column[k]);
-  return phi;
-}
 
 SpatialInertia to_ground(const InertiaVector& phi, const SegmentState& s) {
   Matrix3 I_B;
@@ -27,6 +18,13 @@ SpatialInertia to_ground(const InertiaVector& phi, const SegmentState& s) {
 }
 
 }  // namespace
+
+InertiaVector inertia_of(const Segment& segment, const StateRef& x) {
+  InertiaVector phi = segment.inertia;
+  for (int k = 0; k < k_inertia_count; ++k)
+    if (segment.inertia_column[k] != k_none) phi(k) = x(segment.inertia_column[k]);
+  return phi;
+}
 
 Force by_position(const SubtreeState& t, const Motion& S, const Motion& Sd, const Motion& Sdd) {
   return cross_dual(S, t.force) + t.inertia * Sdd + t.response * Sd;
@@ -141,6 +139,27 @@ void wrench_jacobian(const Model& model, const KinematicState& state, const Dyna
       out.col(c) += by_position(t, p.screw, p.screw_rate, p.screw_second).vector();
     }
     inertia_columns(segment, state.segments[i], out);
+  }
+}
+
+MassCentre mass_centre(const Model& model, const DynamicState& dynamics) {
+  MassCentre out;
+  for (std::size_t i = 0; i < model.segments().size(); ++i) {
+    if (model.segments()[i].parent != k_none) continue;
+    out.position += dynamics.subtrees[i].inertia.first_moment;
+    out.velocity += dynamics.subtrees[i].response.momentum;
+  }
+  out.position /= dynamics.mass;
+  out.velocity /= dynamics.mass;
+  return out;
+}
+
+void joint_loads(const Model& model, const KinematicState& state, const DynamicState& dynamics,
+                 const std::vector<Force>* external, std::vector<Force>& out) {
+  subtree_external(model, external, out);
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const Force load = dynamics.subtrees[i].force - out[i];
+    out[i] = {load.lin, load.ang - state.segments[i].p_GB.cross(load.lin)};
   }
 }
 

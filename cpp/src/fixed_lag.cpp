@@ -15,18 +15,15 @@ FixedLag::FixedLag(Filter& filter, int lag, bool deviations)
   if (deviations) P_ = filter.covariance();
   ring_.reserve(static_cast<std::size_t>(lag) + 1);
   for (int k = 0; k <= lag; ++k)
-    ring_.push_back(
-        {0.0, filter.state(), filter.covariance(), FrameTape(filter.model().state_size(), filter.tape_rows())});
+    ring_.push_back({0.0, filter.belief(), FrameTape(filter.model().state_size(), filter.tape_rows())});
 }
 
 // A frame that is refused counts as one in which nothing was measured.
-StepReport FixedLag::record(Frame& now, double dt, const Eigen::Ref<const MarkerMatrix>& markers,
-                            const Vector6& wrench) {
+StepReport FixedLag::record(Frame& now, double dt, const MarkerRef& markers, const Vector6& wrench) {
   const auto keep = [&] {
     filter_.record_to(nullptr);
     now.dt = dt;
-    now.x = filter_.state();
-    now.P = filter_.covariance();
+    now.filtered = filter_.belief();
   };
   now.tape.clear();
   filter_.record_to(&now.tape);
@@ -40,7 +37,7 @@ StepReport FixedLag::record(Frame& now, double dt, const Eigen::Ref<const Marker
   }
 }
 
-StepReport FixedLag::step(double dt, const Eigen::Ref<const MarkerMatrix>& markers, const Vector6& wrench) {
+StepReport FixedLag::step(double dt, const MarkerRef& markers, const Vector6& wrench) {
   const bool first = frames_ == 0;
   if (!first) filter_.predict(dt);
   ++frames_;
@@ -53,7 +50,7 @@ StepReport FixedLag::step(double dt, const Eigen::Ref<const MarkerMatrix>& marke
     pass_.undo(back(by).tape, back(by).dt);
     delay_ += back(by).dt;
   }
-  const Frame& then = back(lag_);
+  const Belief& then = back(lag_).filtered;
   pass_.smooth(then.x, then.P, x_);
   if (deviations_) pass_.smooth(then.P, P_);
   pass_.bound(x_, deviations_ ? P_ : then.P);

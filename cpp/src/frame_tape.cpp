@@ -20,8 +20,6 @@ void FrameTape::clear() {
   any_forgotten = pulled = cut = false;
 }
 
-void FrameTape::clear_chunks() { ends.clear(); }
-
 void FrameTape::add_chunk(const std::vector<RowBlock>& blocks, int first, int end,
                           const Eigen::Ref<const Eigen::MatrixXd>& L, const Eigen::Ref<const Eigen::MatrixXd>& Z_chunk,
                           const Eigen::Ref<const Eigen::VectorXd>& w_chunk) {

@@ -6,15 +6,8 @@
 namespace dynakin {
 
 const char* describe(Verdict verdict) {
-  switch (verdict) {
-    case Verdict::missing:
-      return "missing";
-    case Verdict::accepted:
-      return "accepted";
-    case Verdict::refused:
-      return "refused";
-  }
-  return "unknown";
+  static constexpr const char* words[] = {"missing", "accepted", "refused"};
+  return words[static_cast<int>(verdict)];
 }
 
 namespace {

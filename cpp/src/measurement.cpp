@@ -84,8 +84,7 @@ void Measurement::evaluate(const Eigen::VectorXd& x) {
   predicted_(3 * n_markers + 6) = dynamics_.mass;
 }
 
-void Measurement::linearise(const Eigen::VectorXd& x, const Eigen::Ref<const MarkerMatrix>& markers,
-                            const Vector6& wrench) {
+void Measurement::linearise(const Eigen::VectorXd& x, const MarkerRef& markers, const Vector6& wrench) {
   evaluate(x);
   for (std::size_t m = 0; m < model_.markers().size(); ++m) marker_rows(static_cast<int>(m), markers.col(m));
   wrench_rows(wrench);

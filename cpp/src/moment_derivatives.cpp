@@ -1,7 +1,5 @@
 #include "dynakin/moment_derivatives.hpp"
 
-#include "force_derivatives.hpp"
-
 namespace dynakin {
 namespace {
 

@@ -58,10 +58,8 @@ OutputDeviation::OutputDeviation(const Model& model)
       work_(model),
       moment_variances_(static_cast<Eigen::Index>(model.coordinates().size()), model.state_size()) {
   std::size_t widest = 0;
-  for (std::size_t m = 0; m < model.markers().size(); ++m) {
-    const auto& columns = model.marker_columns(static_cast<int>(m));
-    widest = std::max(widest, columns.size());
-  }
+  for (std::size_t m = 0; m < model.markers().size(); ++m)
+    widest = std::max(widest, model.marker_columns(static_cast<int>(m)).size());
   marker_J_.setZero(3, static_cast<Eigen::Index>(widest));
   wrench_J_.setZero(6, model.state_size());
   moment_J_.setZero(static_cast<Eigen::Index>(model.coordinates().size()), model.state_size());

@@ -1,118 +1,148 @@
-// How a filter loses and finds its motion again: the part of Filter that seldom runs.
+#include "dynakin/recovery.hpp"
+
 #include <Eigen/Geometry>
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 
-#include "dynakin/filter.hpp"
-
 namespace dynakin {
 
 const char* describe(Tracking tracking) {
-  switch (tracking) {
-    case Tracking::following:
-      return "following";
-    case Tracking::doubtful:
-      return "doubtful";
-    case Tracking::lost:
-      return "lost";
-    case Tracking::found:
-      return "found";
-    case Tracking::restarted:
-      return "restarted";
-  }
-  return "unknown";
+  static constexpr const char* words[] = {"following", "doubtful", "lost", "found", "restarted"};
+  return words[static_cast<int>(tracking)];
 }
 
-// Seconds of dt over which the motion is carried on. White jerk says nothing of what a person does meanwhile that is
-// worth having: beyond blind_s without a marker that is believed the motion is held where it was. Where frames are
-// further apart than that, blind_s reaches to the next one, but never twice as far.
-double Filter::carried_on(double dt) {
+Recovery::Recovery(Correction& correction)
+    : c_(correction),
+      model_(correction.model),
+      settings_(correction.settings.recovery),
+      measurement_(correction.measurement),
+      gate_(correction.gate),
+      now_(correction.now),
+      forgotten_(correction.model.state_size()) {
+  from_.setZero(3, static_cast<Eigen::Index>(model_.markers().size()));
+  to_ = from_;
+}
+
+void Recovery::start() {
+  start_ = kept_ = sought_ = c_.before = now_;
+  ahead_ = posture_ = best_ = now_.x;
+  memory_ = {};
+}
+
+void Recovery::restart() {
+  now_ = start_;
+  memory_.unbelieved_s = k_infinity;
+  memory_.held = true;
+  if (c_.tape) c_.tape->cut = true;
+}
+
+double Recovery::carry_on(double dt) {
   constexpr double rounding = 1e-9;
-  const double blind = settings_.recovery.blind_s;
-  if (dt > 0.0) shortest_step_s_ = std::min(shortest_step_s_, dt);
-  const double left = held_ ? 0.0 : std::clamp(1.5 * shortest_step_s_, blind, 2.0 * blind) - unbelieved_s_;
-  if (!held_ && dt <= left + rounding) return dt;
-  held_ = true;
+  const double blind = settings_.blind_s;
+  const double unbelieved = memory_.unbelieved_s;
+  memory_.unbelieved_s += dt;
+  memory_.sought_s += dt;
+  if (!settings_.enabled) return dt;
+  if (dt > 0.0) memory_.shortest_step_s = std::min(memory_.shortest_step_s, dt);
+  const double left = memory_.held ? 0.0 : std::clamp(1.5 * memory_.shortest_step_s, blind, 2.0 * blind) - unbelieved;
+  if (!memory_.held && dt <= left + rounding) return dt;
+  memory_.held = true;
   return std::clamp(left, 0.0, dt);
+}
+
+// A joint whose markers have not been seen for long would be carried on with the speed it last had, to the end of its
+// range; it is held instead.
+void Recovery::hold() {
+  if (memory_.held) return hold_motion();
+  if (!settings_.enabled) return;
+  const double most = settings_.unseen_sd * settings_.unseen_sd;
+  unseen_ = false;
+  for (int i = 0; i < model_.n_free(); ++i) {
+    if (!(now_.P(i, i) > most)) continue;
+    hold_coordinate(i);
+    unseen_ = true;
+  }
 }
 
 // Believes a frame if at most half of its markers are refused. Where that has not been so for longer than blind_s, the
 // markers may be right and the motion wrong: it is held, and sought from the markers alone. A motion that is held is so
 // uncertain that no gate would refuse a marker: it has to be found, not merely agreed with.
-Tracking Filter::believe(const MarkerRef& markers) {
-  if (held_) return seek(markers);
-  const int measured = gate_.markers_measured();
-  return measured > 0 && 2 * gate_.markers_refused() <= measured ? Tracking::following : doubt();
+Tracking Recovery::correct(const MarkerRef& markers, const Vector6& wrench) {
+  Tracking tracking = Tracking::following;
+  if (memory_.held)
+    tracking = seek(markers);
+  else if (settings_.enabled && !(gate_.markers_measured() > 0 && believes_most()))
+    tracking = doubt();
+  if (settings_.enabled && tracking == Tracking::following) return fit(markers, wrench);
+  if (tracking != Tracking::found) c_.correct(markers, wrench);
+  return tracking;
 }
 
 // Nothing of this frame is used, or where no marker is measured perhaps the plates.
-Tracking Filter::doubt() {
+Tracking Recovery::doubt() {
   const int measured = gate_.markers_measured();
   const int plates = static_cast<int>(model_.markers().size());
   for (int sensor = 0; sensor < plates; ++sensor) measurement_.leave_out(sensor);
-  if (measured > 0 || settings_.wrench_needs_markers) measurement_.leave_out(plates);
+  if (measured > 0 || c_.settings.wrench_needs_markers) measurement_.leave_out(plates);
   return measured > 0 ? Tracking::doubtful : Tracking::following;
 }
 
 // Of a motion that is held: from where it is and from the posture of the first frame, then from both turned as a whole
 // to where the markers are. What leaves the fewest refused, half of them at most, is taken.
-Tracking Filter::seek(const MarkerRef& markers) {
+Tracking Recovery::seek(const MarkerRef& markers) {
   const int n = model_.n_free(), measured = gate_.markers_measured();
-  const Eigen::VectorXd held = x_.head(n);
-  const Eigen::MatrixXd wide = P_;
-  Eigen::VectorXd start, best;
+  bool found = false;
+  kept_ = now_;
   int fewest = measured / 2 + 1;
   const bool enough = measured > 0 && 2 * measured >= measurement_.markers_in_use();
   for (int k = 0; enough && k < 4 && fewest > 0; ++k) {
-    x_.head(n) = k % 2 == 0 ? held : x0_.head(n);
-    P_ = wide;
+    now_.x.head(n) = (k % 2 == 0 ? kept_ : start_).x.head(n);
+    now_.P = kept_.P;
     if (k >= 2 && !turn_towards(markers)) continue;
-    start = x_.head(n);
+    posture_ = now_.x;
     if (!seek_motion(markers, fewest - 1)) continue;
     fewest = gate_.markers_refused();
-    best = start;
+    best_ = posture_;
+    found = true;
   }
-  if (best.size() > 0) {
+  if (found) {
     if (fewest > 0) {
-      x_.head(n) = best;
-      P_ = wide;
+      now_.x = best_;
+      now_.P = kept_.P;
       seek_motion(markers, fewest);
     }
-    unbelieved_s_ = 0.0;
-    held_ = false;
+    memory_.unbelieved_s = 0.0;
+    memory_.held = false;
     return Tracking::found;
   }
-  x_.head(n) = held;
-  P_ = wide;
+  now_ = kept_;
   for (std::size_t sensor = 0; sensor <= model_.markers().size(); ++sensor)
     measurement_.leave_out(static_cast<int>(sensor));
   return Tracking::lost;
 }
 
 // Turns and shifts the posture as a whole, as the markers would have it if they were a rigid body (Kabsch 1976), in
-// steps that a tangent can follow. False where that is hardly a turn.
-bool Filter::turn_towards(const MarkerRef& markers) {
+// steps that a tangent can follow; P stays. False where that is hardly a turn.
+bool Recovery::turn_towards(const MarkerRef& markers) {
   constexpr double step = 0.5;  // rad
   constexpr int most_iterations = 8;
   const int n = model_.n_free(), count = static_cast<int>(model_.markers().size());
-  const Vector6 no_wrench = Vector6::Constant(std::nan(""));
-  const Eigen::MatrixXd wide = P_;
-  measurement_.evaluate(x_);
-  MarkerMatrix from(3, count), to = markers;
+  measurement_.evaluate(now_.x);
+  to_ = markers;
   Vector3 from_centre = Vector3::Zero(), to_centre = Vector3::Zero();
   for (int m = 0; m < count; ++m) {
-    from.col(m) = measurement_.kinematics().markers[m];
+    from_.col(m) = measurement_.kinematics().markers[m];
     for (int k = 0; k < 3; ++k)
-      if (!model_.markers()[m].measured[k]) to(k, m) = from(k, m);
+      if (!model_.markers()[m].measured[k]) to_(k, m) = from_(k, m);
     if (gate_.verdicts()[m] == Verdict::missing) continue;
-    from_centre += from.col(m) / gate_.markers_measured();
-    to_centre += to.col(m) / gate_.markers_measured();
+    from_centre += from_.col(m) / gate_.markers_measured();
+    to_centre += to_.col(m) / gate_.markers_measured();
   }
   Matrix3 spread = Matrix3::Zero();
   for (int m = 0; m < count; ++m)
     if (gate_.verdicts()[m] != Verdict::missing)
-      spread += (to.col(m) - to_centre) * (from.col(m) - from_centre).transpose();
+      spread += (to_.col(m) - to_centre) * (from_.col(m) - from_centre).transpose();
   const Eigen::JacobiSVD<Matrix3> svd(spread, Eigen::ComputeFullU | Eigen::ComputeFullV);
   const double sign = (svd.matrixU() * svd.matrixV().transpose()).determinant();
   const Matrix3 R = svd.matrixU() * Vector3(1.0, 1.0, sign).asDiagonal() * svd.matrixV().transpose();
@@ -126,42 +156,38 @@ bool Filter::turn_towards(const MarkerRef& markers) {
     const Matrix3 R_part = Eigen::AngleAxisd(part * turn.angle(), turn.axis()).toRotationMatrix();
     for (int m = 0; m < count; ++m) {
       if (gate_.verdicts()[m] == Verdict::missing) continue;
-      to.col(m) = from_centre + part * (to_centre - from_centre) + R_part * (from.col(m) - from_centre);
+      to_.col(m) = from_centre + part * (to_centre - from_centre) + R_part * (from_.col(m) - from_centre);
     }
-    measurement_.linearise(x_, to, no_wrench);
-    if (!iterate(to, no_wrench, most_iterations).factored || !dx_.allFinite()) return false;
-    x_.head(n) += dx_.head(n);
-    P_ = wide;
+    measurement_.linearise(now_.x, to_, no_wrench_);
+    c_.iterate(to_, no_wrench_, most_iterations);
+    if (!c_.sums.factored || !c_.dx.allFinite()) return false;
+    now_.x.head(n) += c_.dx.head(n);
+    now_.P = kept_.P;
   }
   return true;
 }
 
 // Seeks a motion for a trial, of the coordinates that are held unseen or else of all: true, and found, where so many
 // markers at most are refused then; else nothing has changed.
-bool Filter::seek_better(const MarkerRef& markers, const Vector6& wrench, int refused) {
-  const Eigen::VectorXd x = x_;
-  const Eigen::MatrixXd P = P_;
-  const std::vector<std::uint8_t> forgotten = tape_ ? tape_->forgotten : std::vector<std::uint8_t>();
-  const bool any_forgotten = tape_ && tape_->any_forgotten;
+bool Recovery::seek_better(const MarkerRef& markers, const Vector6& wrench, int refused) {
+  if (c_.tape) forgotten_ = c_.tape->forgotten;
+  const bool any_forgotten = c_.tape && c_.tape->any_forgotten;
   if (2 * gate_.markers_measured() >= measurement_.markers_in_use()) {
     if (unseen_ && seek_motion(markers, refused)) return true;
     hold_motion();
     if (seek_motion(markers, refused)) return true;
   }
-  x_ = x;
-  P_ = P;
-  if (tape_) {
-    tape_->forgotten = forgotten;
-    tape_->any_forgotten = any_forgotten;
+  now_ = kept_;
+  if (c_.tape) {
+    c_.tape->forgotten = forgotten_;
+    c_.tape->any_forgotten = any_forgotten;
   }
-  measurement_.admit_all();
-  measurement_.linearise(x_, markers, wrench);
-  gate_.judge(settings_, measurement_.blocks(), P_);
+  c_.measure(markers, wrench);
   return false;
 }
 
 // Of a marker from where the last evaluation has it, m^2, on the axes that are measured.
-double Filter::squared_distance(const MarkerRef& markers, std::size_t m) const {
+double Recovery::squared_distance(const MarkerRef& markers, std::size_t m) const {
   double sum = 0.0;
   for (int k = 0; k < 3; ++k)
     if (model_.markers()[m].measured[k]) sum += std::pow(markers(k, m) - measurement_.kinematics().markers[m](k), 2);
@@ -169,7 +195,7 @@ double Filter::squared_distance(const MarkerRef& markers, std::size_t m) const {
 }
 
 // RMS over the markers that are accepted, m; 0 without any.
-double Filter::distance(const MarkerRef& markers) const {
+double Recovery::distance(const MarkerRef& markers) const {
   double sum = 0.0;
   int count = 0;
   for (std::size_t m = 0; m < model_.markers().size(); ++m) {
@@ -180,34 +206,31 @@ double Filter::distance(const MarkerRef& markers) const {
   return count == 0 ? 0.0 : std::sqrt(sum / count);
 }
 
-// The same of x_ahead_, put within its bounds: a posture that no joint allows fits nothing.
-double Filter::distance_within_bounds(const MarkerRef& markers) {
-  if (settings_.constraint != ConstraintKind::none)
-    x_ahead_ = x_ahead_.cwiseMax(settings_.lower).cwiseMin(settings_.upper);
-  measurement_.evaluate(x_ahead_);
+// The same of ahead_, put within its bounds: a posture that no joint allows fits nothing.
+double Recovery::distance_within_bounds(const MarkerRef& markers) {
+  if (c_.settings.constraint != ConstraintKind::none)
+    ahead_ = ahead_.cwiseMax(c_.settings.lower).cwiseMin(c_.settings.upper);
+  measurement_.evaluate(ahead_);
   return distance(markers);
 }
 
 // Corrects so that the markers used lie within fit_m of the estimate; those that lie further off are refused, and the
-// rest is used without them. False, and nothing done, where most would have to be refused.
-bool Filter::correct_to_fit(const MarkerRef& markers, const Vector6& wrench) {
+// rest is used without them. False, and all as in kept_, where most would have to be refused.
+bool Recovery::correct_to_fit(const MarkerRef& markers, const Vector6& wrench) {
   constexpr int rounds = 3;
-  const double most = settings_.recovery.fit_m;
-  const Eigen::VectorXd x = x_;
-  const Eigen::MatrixXd P = P_;
+  const double most = settings_.fit_m;
   for (int round = 0; round < rounds; ++round) {
-    sums_ = correct(markers, wrench);
-    if (!sums_.factored) return true;  // broken down, which the step will say
-    x_ahead_ = x_;
-    retract(x_ahead_, dx_);
+    c_.correct(markers, wrench);
+    if (!c_.sums.factored) return true;  // broken down, which the step will say
+    ahead_ = now_.x;
+    retract(ahead_, c_.dx);
     if (distance_within_bounds(markers) <= most) return true;
     for (std::size_t m = 0; m < model_.markers().size(); ++m)
       if (gate_.verdicts()[m] == Verdict::accepted && !(squared_distance(markers, m) <= most * most))
         gate_.decide(static_cast<int>(m), Verdict::refused);
-    x_ = x;
-    P_ = P;
-    measurement_.linearise(x_, markers, wrench);
-    if (2 * gate_.markers_refused() > gate_.markers_measured()) return false;
+    now_ = kept_;
+    measurement_.linearise(now_.x, markers, wrench);
+    if (!believes_most()) return false;
   }
   return false;
 }
@@ -217,123 +240,97 @@ bool Filter::correct_to_fit(const MarkerRef& markers, const Vector6& wrench) {
 // refuse the markers of a segment that has turned too far. If some do not fit the corrected estimate either, or were
 // refused, as all those of a segment that went astray, then a motion that leaves half as many out is sought; that takes
 // long and costs all that is known of speeds, so it is not tried again before blind_s has passed.
-Tracking Filter::fit(const MarkerRef& markers, const Vector6& wrench) {
-  if (gate_.markers_measured() == 0) {
-    sums_ = correct(markers, wrench);
+Tracking Recovery::fit(const MarkerRef& markers, const Vector6& wrench) {
+  const int measured = gate_.markers_measured();
+  const bool astray = unseen_ && gate_.markers_refused() > 0;
+  if (measured == 0 || (distance(markers) <= settings_.fit_m && !astray)) {
+    c_.correct(markers, wrench);
+    if (measured > 0) memory_.unbelieved_s = 0.0;
     return Tracking::following;
   }
-  const bool astray = unseen_ && gate_.markers_refused() > 0;
-  if (distance(markers) <= settings_.recovery.fit_m && !astray) {
-    sums_ = correct(markers, wrench);
-  } else {
-    const Eigen::VectorXd x = x_;
-    const Eigen::MatrixXd P = P_;
-    bool fits = correct_to_fit(markers, wrench);
-    if ((!fits || gate_.markers_refused() > 0) && sought_s_ > settings_.recovery.blind_s) {
-      sought_s_ = 0.0;
-      x_ = x;
-      P_ = P;
-      if (seek_better(markers, wrench, (fits ? gate_.markers_refused() : gate_.markers_measured()) / 2)) {
-        unbelieved_s_ = 0.0;
-        return Tracking::found;
-      }
-      fits = correct_to_fit(markers, wrench);
-    }
-    if (!fits) {
-      const Tracking tracking = doubt();
-      sums_ = correct(markers, wrench);
-      return tracking;
-    }
+  kept_ = now_;
+  Tracking tracking = Tracking::following;
+  bool fits = correct_to_fit(markers, wrench);
+  if ((!fits || gate_.markers_refused() > 0) && memory_.sought_s > settings_.blind_s) {
+    memory_.sought_s = 0.0;
+    now_ = kept_;
+    if (seek_better(markers, wrench, (fits ? gate_.markers_refused() : measured) / 2)) tracking = Tracking::found;
+    fits = tracking == Tracking::found || correct_to_fit(markers, wrench);
   }
-  unbelieved_s_ = 0.0;
-  return Tracking::following;
-}
-
-void Filter::forget(int element, double variance) {
-  P_.row(element).setZero();
-  P_.col(element).setZero();
-  P_(element, element) = variance;
-  if (tape_) tape_->forget(element);
+  if (fits) {
+    memory_.unbelieved_s = 0.0;
+    return tracking;
+  }
+  tracking = doubt();
+  c_.correct(markers, wrench);
+  return tracking;
 }
 
 // The coordinate stays, at rest, and knows nothing of anything else.
-void Filter::hold_coordinate(int i) {
+void Recovery::hold_coordinate(int i) {
   const int n = model_.n_free();
-  const RecoverySettings& r = settings_.recovery;
-  x_(n + i) = x_(2 * n + i) = 0.0;
-  forget(i, r.coordinate_sd * r.coordinate_sd);
-  forget(n + i, r.speed_sd * r.speed_sd);
-  forget(2 * n + i, r.acceleration_sd * r.acceleration_sd);
-}
-
-// A joint whose markers have not been seen for long would be carried on with the speed it last had, to the end of its
-// range; it is held instead.
-void Filter::hold_unseen() {
-  const double most = settings_.recovery.unseen_sd * settings_.recovery.unseen_sd;
-  unseen_ = false;
-  for (int i = 0; i < model_.n_free(); ++i) {
-    if (!(P_(i, i) > most)) continue;
-    hold_coordinate(i);
-    unseen_ = true;
+  now_.x(n + i) = now_.x(2 * n + i) = 0.0;
+  for (const double sd : {settings_.coordinate_sd, settings_.speed_sd, settings_.acceleration_sd}) {
+    now_.P.row(i).setZero();
+    now_.P.col(i).setZero();
+    now_.P(i, i) = sd * sd;
+    if (c_.tape) c_.tape->forget(i);
+    i += n;
   }
 }
 
 // All coordinates. What is known of constants, soft tissue and plates stays, apart from what it had to do with the
 // motion.
-void Filter::hold_motion() {
+void Recovery::hold_motion() {
   for (int i = 0; i < model_.n_free(); ++i) hold_coordinate(i);
 }
 
 // Fits the motion to the markers, leaves out those that do not fit, and fits again, until the same ones fit: a marker
 // astray pulls others from their places at first, and these are taken back. On success, with so many misfits at most,
-// state and covariance are those before the fit, with its correction in dx_, and the misfits are refused; otherwise
+// state and covariance are those before the fit, with its correction in dx, and the misfits are refused; otherwise
 // nothing has changed.
-bool Filter::seek_motion(const MarkerRef& markers, int refused) {
+bool Recovery::seek_motion(const MarkerRef& markers, int refused) {
   constexpr int rounds = 6, most_iterations = 20;
-  const Vector6 no_wrench = Vector6::Constant(std::nan(""));
-  const Eigen::VectorXd held = x_;
-  const Eigen::MatrixXd wide = P_;
+  sought_ = now_;
   gate_.accept_measured();
   for (int round = 0; round < rounds; ++round) {
-    x_ = held;
-    P_ = wide;
+    now_ = sought_;
     measurement_.admit_all();
-    measurement_.linearise(x_, markers, no_wrench);
-    sums_ = iterate(markers, no_wrench, most_iterations);
-    retract(x_, dx_);
-    if (!sums_.factored || !x_.allFinite()) break;
+    measurement_.linearise(now_.x, markers, no_wrench_);
+    c_.iterate(markers, no_wrench_, most_iterations);
+    retract(now_.x, c_.dx);
+    if (!c_.sums.factored || !now_.x.allFinite()) break;
     const bool settled = !judge_by_distance(markers);
-    if (2 * gate_.markers_refused() > gate_.markers_measured()) break;
+    if (!believes_most()) break;
     if (!settled) continue;
-    x_ahead_ = x_;
-    if (gate_.markers_refused() > refused || !(distance_within_bounds(markers) <= settings_.recovery.fit_m)) break;
-    x_ = held;  // dx_ is still to be taken
+    ahead_ = now_.x;
+    if (gate_.markers_refused() > refused || !(distance_within_bounds(markers) <= settings_.fit_m)) break;
+    now_.x = sought_.x;  // dx is still to be taken
     return true;
   }
-  x_ = held;
-  P_ = wide;
-  measurement_.linearise(x_, markers, no_wrench);
+  now_ = sought_;
+  measurement_.linearise(now_.x, markers, no_wrench_);
   return false;
 }
 
 // Refuses the markers that lie further from where the fit has them, with the soft tissue that was expected before it,
 // than noise, place and soft tissue explain, and accepts the others. True where a verdict changed.
-bool Filter::judge_by_distance(const MarkerRef& markers) {
-  x_ahead_ = x_;
+bool Recovery::judge_by_distance(const MarkerRef& markers) {
+  ahead_ = now_.x;
   for (const Marker& marker : model_.markers())
     for (int c : marker.soft_tissue)
-      if (c != k_none) x_ahead_(c) = x_before_(c);
+      if (c != k_none) ahead_(c) = c_.before.x(c);
   bool changed = false;
-  measurement_.evaluate(x_ahead_);
+  measurement_.evaluate(ahead_);
   for (std::size_t m = 0; m < model_.markers().size(); ++m) {
     if (gate_.verdicts()[m] == Verdict::missing) continue;
     const Marker& marker = model_.markers()[m];
     double variance = 0.0;
     for (int k = 0; k < 3; ++k)
       for (int c : {marker.column[k], marker.soft_tissue[k]})
-        if (c != k_none) variance = std::max(variance, P_before_(c, c));
-    variance = 2.0 * variance + settings_.marker_variance(m);
-    const bool fits = squared_distance(markers, m) <= settings_.marker_gate[marker.n_measured - 1] * variance;
+        if (c != k_none) variance = std::max(variance, c_.before.P(c, c));
+    variance = 2.0 * variance + c_.settings.marker_variance(m);
+    const bool fits = squared_distance(markers, m) <= c_.settings.marker_gate[marker.n_measured - 1] * variance;
     const Verdict verdict = fits ? Verdict::accepted : Verdict::refused;
     changed = changed || verdict != gate_.verdicts()[m];
     gate_.decide(static_cast<int>(m), verdict);

@@ -20,35 +20,55 @@ StepReport step(Filter& filter, double dt, const Eigen::Map<const MarkerMatrix>&
 
 }  // namespace
 
-RunRecord::RunRecord(const Model& model, std::size_t frames, bool output_sd)
-    : state(frames * model.state_size()),
+StateRecord::StateRecord(const Model& of, std::size_t frames, bool output_sd)
+    : model(of),
+      state(frames * model.state_size()),
       state_sd(state.size()),
-      markers_predicted(frames * 3 * model.markers().size()),
-      markers_estimated(markers_predicted.size()),
-      wrench_predicted(frames * 6),
-      wrench_estimated(frames * 6),
+      markers(frames * 3 * model.markers().size()),
+      markers_sd(output_sd ? markers.size() : 0),
+      wrench(frames * 6),
+      wrench_sd(output_sd ? wrench.size() : 0),
       moments(frames * model.coordinates().size()),
-      markers_sd(output_sd ? markers_estimated.size() : 0),
-      wrench_sd(output_sd ? frames * 6 : 0),
-      moments_sd(output_sd ? moments.size() : 0),
+      moments_sd(output_sd ? moments.size() : 0) {
+  if (output_sd) deviation.emplace(model);
+}
+
+void StateRecord::report(std::size_t k, const Eigen::VectorXd& x, const Eigen::MatrixXd& P,
+                         const KinematicState& kinematics, const DynamicState& dynamics, ContactRecord* contacts) {
+  const std::size_t n = x.size(), m = kinematics.markers.size(), nc = model.coordinates().size();
+  Eigen::Map<Eigen::VectorXd>(state.data() + k * n, x.size()) = x;
+  Eigen::Map<Eigen::VectorXd>(state_sd.data() + k * n, x.size()) = P.diagonal().cwiseMax(0.0).cwiseSqrt();
+  for (std::size_t i = 0; i < m; ++i) Eigen::Map<Vector3>(markers.data() + 3 * (k * m + i)) = kinematics.markers[i];
+  Eigen::Map<Vector6>(wrench.data() + 6 * k) = dynamics.wrench.vector();
+  double* const moment = moments.data() + k * nc;
+  double* const moment_sd = deviation ? moments_sd.data() + k * nc : nullptr;
+  if (contacts)
+    contacts->report(k, x, kinematics, dynamics, deviation ? &P : nullptr, moment, moment_sd);
+  else
+    joint_moments(model, kinematics, dynamics, nullptr, Eigen::Map<Eigen::VectorXd>(moment, nc));
+  if (!deviation) return;
+  deviation->markers(kinematics, P, markers_sd.data() + 3 * k * m);
+  deviation->wrench(kinematics, dynamics, P, wrench_sd.data() + 6 * k);
+  if (!contacts) deviation->moments(x, kinematics, dynamics, P, moment_sd);
+}
+
+RunRecord::RunRecord(const Model& of, std::size_t frames, bool output_sd)
+    : StateRecord(of, frames, output_sd),
+      markers_predicted(markers.size()),
+      wrench_predicted(wrench.size()),
       nis(frames),
       log_likelihood(frames),
       step_us(frames),
       rows(frames),
       constrained(frames),
-      verdicts(frames * (model.markers().size() + 1)),
+      verdicts(frames * (of.markers().size() + 1)),
       tracking(frames),
-      constraints_met(frames) {
-  if (output_sd) deviation.emplace(model);
-}
+      constraints_met(frames) {}
 
 void run_frames(Filter& filter, const double* time, const double* markers, const double* wrench, std::size_t first,
                 std::size_t end, RunRecord& record, ContactRecord* contacts) {
   using clock = std::chrono::steady_clock;
-  const Model& model = filter.model();
-  const auto n = static_cast<std::size_t>(model.state_size());
-  const std::size_t m = 3 * model.markers().size();
-  const std::size_t nc = model.coordinates().size();
+  const std::size_t m = 3 * filter.model().markers().size();
   for (std::size_t k = first; k < end; ++k) {
     const Eigen::Map<const MarkerMatrix> z(markers + k * m, 3, m / 3);
     const Vector6 w = Eigen::Map<const Vector6>(wrench + 6 * k);
@@ -69,23 +89,8 @@ void run_frames(Filter& filter, const double* time, const double* markers, const
                    [](Verdict verdict) { return static_cast<std::uint8_t>(verdict); });
     std::copy_n(filter.predicted().data(), m, record.markers_predicted.data() + k * m);
     std::copy_n(filter.predicted().data() + m, 6, record.wrench_predicted.data() + 6 * k);
-    Eigen::Map<Eigen::VectorXd>(record.state.data() + k * n, n) = filter.state();
-    Eigen::Map<Eigen::VectorXd>(record.state_sd.data() + k * n, n) = filter.covariance().diagonal().cwiseSqrt();
     const Measurement& now = filter.evaluate();
-    std::copy_n(now.predicted().data(), m, record.markers_estimated.data() + k * m);
-    Eigen::Map<Vector6>(record.wrench_estimated.data() + 6 * k) = now.dynamics().wrench.vector();
-    const Eigen::MatrixXd& P = filter.covariance();
-    if (contacts)
-      contacts->report(k, filter.state(), now.kinematics(), now.dynamics(), record.deviation ? &P : nullptr,
-                       record.moments.data() + k * nc, record.moments_sd.data() + (record.deviation ? k * nc : 0));
-    else
-      joint_moments(model, now.kinematics(), now.dynamics(), nullptr,
-                    Eigen::Map<Eigen::VectorXd>(record.moments.data() + k * nc, nc));
-    if (!record.deviation) continue;
-    record.deviation->markers(now.kinematics(), P, record.markers_sd.data() + k * m);
-    record.deviation->wrench(now.kinematics(), now.dynamics(), P, record.wrench_sd.data() + 6 * k);
-    if (!contacts)
-      record.deviation->moments(filter.state(), now.kinematics(), now.dynamics(), P, record.moments_sd.data() + k * nc);
+    record.report(k, filter.state(), filter.covariance(), now.kinematics(), now.dynamics(), contacts);
   }
 }
 

@@ -30,12 +30,10 @@ void FilterSettings::check(const Model& model) const {
   check_size("lower", lower, n);
   check_size("upper", upper, n);
   for (int i = 0; i < n; ++i) {
-    if (!(process_variance(i) >= 0.0) || std::isinf(process_variance(i)))
-      fail("process_variance",
-           "of '" + names[i] + "' is " + std::to_string(process_variance(i)) + ", expected 0 or more");
-    if (!(process_density(i) >= 0.0) || std::isinf(process_density(i)))
-      fail("process_density",
-           "of '" + names[i] + "' is " + std::to_string(process_density(i)) + ", expected 0 or more");
+    for (const auto& [name, value] :
+         {std::pair{"process_variance", process_variance(i)}, {"process_density", process_density(i)}})
+      if (!(value >= 0.0) || std::isinf(value))
+        fail(name, "of '" + names[i] + "' is " + std::to_string(value) + ", expected 0 or more");
     const bool may_decay = holds(model.layout().block("soft_tissue"), i) || holds(model.layout().block("plates"), i);
     if (!(decay_rate(i) >= 0.0) || std::isinf(decay_rate(i)) || (decay_rate(i) > 0.0 && !may_decay))
       fail("decay_rate", "of '" + names[i] + "' is " + std::to_string(decay_rate(i)) +
@@ -79,8 +77,8 @@ void FilterSettings::check(const Model& model) const {
       if (!(limit > 0.0)) fail("gate", "is " + std::to_string(limit) + ", expected more than 0");
   if (!(iterate_beyond > 0.0))
     fail("iterate_beyond", "is " + std::to_string(iterate_beyond) + ", expected more than 0");
-  for (double value :
-       {recovery.blind_s, recovery.fit_m, recovery.coordinate_sd, recovery.speed_sd, recovery.acceleration_sd})
+  const RecoverySettings& r = recovery;
+  for (double value : {r.blind_s, r.fit_m, r.coordinate_sd, r.speed_sd, r.acceleration_sd})
     if (!(value > 0.0) || std::isinf(value))
       fail("recovery", "holds " + std::to_string(value) + ", expected more than 0");
   if (!(recovery.unseen_sd > 0.0))

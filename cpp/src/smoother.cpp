@@ -15,17 +15,6 @@ std::size_t stretch_of(std::size_t frames, std::size_t asked) {
 
 }  // namespace
 
-SmoothRecord::SmoothRecord(const Model& model, std::size_t frames)
-    : state(frames * model.state_size()),
-      state_sd(state.size()),
-      markers(frames * 3 * model.markers().size()),
-      markers_sd(markers.size()),
-      wrench(frames * 6),
-      wrench_sd(frames * 6),
-      moments(frames * model.coordinates().size()),
-      moments_sd(moments.size()),
-      backward_us(frames) {}
-
 Smoother::Smoother(Filter& filter, const double* time, const double* markers, const double* wrench, std::size_t frames,
                    std::size_t stretch)
     : filter_(filter),
@@ -37,7 +26,6 @@ Smoother::Smoother(Filter& filter, const double* time, const double* markers, co
       left_(frames),
       checkpoints_((frames + stretch_ - 1) / stretch_ + 1),
       pass_(filter.model(), filter.settings(), filter.tape_rows(), true),
-      deviation_(filter.model()),
       kinematics_(filter.model()),
       dynamics_(filter.model()) {
   pass_.start();
@@ -58,8 +46,7 @@ void Smoother::replay(std::size_t first, std::size_t end, const RunRecord& recor
   const Model& model = filter_.model();
   const auto n = static_cast<std::size_t>(model.state_size());
   const std::size_t m = model.markers().size();
-  while (replayed_.size() < end - first)
-    replayed_.push_back({{}, {}, FrameTape(model.state_size(), filter_.tape_rows())});
+  while (replayed_.size() < end - first) replayed_.push_back({{}, FrameTape(model.state_size(), filter_.tape_rows())});
   filter_.restore(checkpoints_[first / stretch_]);
   for (std::size_t k = first; k < end; ++k) {
     Frame& frame = replayed_[k - first];
@@ -67,9 +54,9 @@ void Smoother::replay(std::size_t first, std::size_t end, const RunRecord& recor
     if (k > 0) filter_.predict(time_[k] - time_[k - 1]);
     filter_.update(Eigen::Map<const MarkerMatrix>(markers_ + 3 * m * k, 3, m),
                    Eigen::Map<const Vector6>(wrench_ + 6 * k));
-    frame.x = filter_.state();
-    frame.P = filter_.covariance();
-    if (!std::equal(frame.x.begin(), frame.x.end(), record.state.begin() + static_cast<std::ptrdiff_t>(k * n)))
+    frame.filtered = filter_.belief();
+    const Eigen::VectorXd& x = frame.filtered.x;
+    if (!std::equal(x.begin(), x.end(), record.state.begin() + static_cast<std::ptrdiff_t>(k * n)))
       throw std::logic_error("smoothing: frame " + std::to_string(k) + " does not repeat itself from its checkpoint");
   }
   filter_.record_to(nullptr);
@@ -83,38 +70,18 @@ std::size_t Smoother::backward(const RunRecord& record, SmoothRecord& out, Conta
   for (std::size_t k = left_; k-- > first;) {
     const Frame& frame = replayed_[k - first];
     const auto start = clock::now();
-    report(k, frame, out, contacts);
+    pass_.smooth(frame.filtered.x, frame.filtered.P, smoothed_.x);
+    pass_.smooth(frame.filtered.P, smoothed_.P);
+    pass_.bound(smoothed_.x, smoothed_.P);
+    forward_kinematics(filter_.model(), smoothed_.x, kinematics_);
+    subtree_dynamics(filter_.model(), smoothed_.x, kinematics_, dynamics_);
+    out.report(k, smoothed_.x, smoothed_.P, kinematics_, dynamics_, contacts);
     pass_.undo(frame.tape, k > 0 ? time_[k] - time_[k - 1] : 0.0);
     out.backward_us[k] = std::chrono::duration<double, std::micro>(clock::now() - start).count();
   }
   left_ = first;
   if (left_ == 0) filter_.restore(checkpoints_.back());
   return left_;
-}
-
-void Smoother::report(std::size_t k, const Frame& frame, SmoothRecord& out, ContactRecord* contacts) {
-  const Model& model = filter_.model();
-  const auto n = static_cast<std::size_t>(model.state_size());
-  const std::size_t m = 3 * model.markers().size(), nc = model.coordinates().size();
-  pass_.smooth(frame.x, frame.P, x_);
-  pass_.smooth(frame.P, P_);
-  pass_.bound(x_, P_);
-  Eigen::Map<Eigen::VectorXd>(out.state.data() + k * n, n) = x_;
-  Eigen::Map<Eigen::VectorXd>(out.state_sd.data() + k * n, n) = P_.diagonal().cwiseMax(0.0).cwiseSqrt();
-  forward_kinematics(model, x_, kinematics_);
-  subtree_dynamics(model, x_, kinematics_, dynamics_);
-  for (std::size_t i = 0; i < m / 3; ++i)
-    Eigen::Map<Vector3>(out.markers.data() + k * m + 3 * i) = kinematics_.markers[i];
-  Eigen::Map<Vector6>(out.wrench.data() + 6 * k) = dynamics_.wrench.vector();
-  deviation_.markers(kinematics_, P_, out.markers_sd.data() + k * m);
-  deviation_.wrench(kinematics_, dynamics_, P_, out.wrench_sd.data() + 6 * k);
-  if (contacts) {
-    contacts->report(k, x_, kinematics_, dynamics_, &P_, out.moments.data() + k * nc, out.moments_sd.data() + k * nc);
-    return;
-  }
-  joint_moments(model, kinematics_, dynamics_, nullptr,
-                Eigen::Map<Eigen::VectorXd>(out.moments.data() + k * nc, static_cast<Eigen::Index>(nc)));
-  deviation_.moments(x_, kinematics_, dynamics_, P_, out.moments_sd.data() + k * nc);
 }
 
 }  // namespace dynakin

@@ -4,7 +4,6 @@
 #include <new>
 
 #include "check.hpp"
-#include "dynakin/body.hpp"
 #include "dynakin/contacts.hpp"
 #include "dynakin/filter.hpp"
 #include "dynakin/fixed_lag.hpp"
@@ -106,6 +105,42 @@ void check_no_allocation_with_everything_on(dynakin::ModelSpec spec) {
     for (Verdict verdict : filter.verdicts()) refused += verdict == Verdict::refused;
   }
   CHECK(refused > 10 && constrained > 10 && iterated > 0);
+}
+
+// A motion that is lost and found again, and a marker that goes astray, on tape.
+void check_recovery_allocates_nothing(const dynakin::ModelSpec& spec) {
+  using namespace dynakin;
+  const Model model(spec);
+  FilterSettings settings = settings_for(model);
+  settings.constraint = ConstraintKind::projection;
+  settings.marker_gate = {6.6, 9.2, 11.3, 13.3, 15.1, 16.8};
+  settings.recovery.enabled = true;
+  settings.iterate_beyond = 0.05;
+  const Eigen::VectorXd x = model.initial_state();
+  Eigen::VectorXd turned = x;
+  turned(0) += 1.5;
+  Eigen::MatrixXd P = prior_for(model) * 0.01;
+  auto markers = markers_at(model, x);
+  const Vector6 no_wrench = Vector6::Constant(std::nan(""));
+  Filter filter(model, settings, x, P);
+  FrameTape tape(model.state_size(), filter.tape_rows());
+  filter.record_to(&tape);
+  int doubtful = 0, lost = 0, found = 0;
+  for (int k = 0; k < 40; ++k) {
+    if (k == 10) markers = markers_at(model, turned);
+    if (k == 12)
+      for (Eigen::Index m = 0; m < markers.cols(); ++m) markers(1, m) += 3.0 * static_cast<double>(m % 3);
+    if (k == 20) markers = markers_at(model, turned);
+    if (k == 30) markers.col(1).array() += 0.5;
+    const long before = allocations;
+    const StepReport report = filter.step(0.05, markers, no_wrench);
+    CHECK(allocations == before);
+    CHECK(!report.broken());
+    doubtful += report.tracking == Tracking::doubtful;
+    lost += report.tracking == Tracking::lost;
+    found += report.tracking == Tracking::found;
+  }
+  CHECK(doubtful > 0 && lost > 0 && found > 0);
 }
 
 // An impossible body is cut back to a possible one in each frame.
@@ -221,6 +256,10 @@ TEST(a_planar_step_allocates_nothing) { check_no_allocation(planar_chain()); }
 TEST(a_spatial_step_allocates_nothing) { check_no_allocation(spatial_tree()); }
 TEST(a_planar_step_with_everything_on_allocates_nothing) { check_no_allocation_with_everything_on(planar_chain()); }
 TEST(a_spatial_step_with_everything_on_allocates_nothing) { check_no_allocation_with_everything_on(spatial_tree()); }
+TEST(recovery_allocates_nothing) {
+  check_recovery_allocates_nothing(planar_chain());
+  check_recovery_allocates_nothing(spatial_tree());
+}
 TEST(keeping_bodies_possible_allocates_nothing) {
   check_keeping_bodies_possible_allocates_nothing(planar_chain());
   check_keeping_bodies_possible_allocates_nothing(spatial_tree());

@@ -36,7 +36,6 @@ class Consistency {
     double margin;
   };
   Matrix4 pseudo_inertia(const Body& body, const InertiaVector& phi) const;
-  InertiaVector inertia(const Body& body, const Eigen::VectorXd& x) const;
 
   const Model& model_;
   std::vector<Body> bodies_;

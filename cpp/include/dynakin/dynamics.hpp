@@ -38,4 +38,27 @@ void joint_moments(const Model& model, const KinematicState& state, const Dynami
 void wrench_jacobian(const Model& model, const KinematicState& state, const DynamicState& dynamics,
                      Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>> out);
 
+// What an axis' (or length's) displacement, rate and second rate ask of the subtree behind it, and d f / d phi of one
+// segment (other columns of out (6, n) stay): the Jacobians share them (docs/derivations.md, section 4).
+Force by_position(const SubtreeState& t, const Motion& S, const Motion& Sd, const Motion& Sdd);
+void inertia_columns(const Segment& segment, const SegmentState& s,
+                     Eigen::Ref<Eigen::Matrix<double, 6, Eigen::Dynamic>> out);
+
+// A segment's ten numbers about its origin, its axes: those of x where they are estimated.
+InertiaVector inertia_of(const Segment& segment, const StateRef& x);
+
+struct MassCentre {
+  Vector3 position = Vector3::Zero();  // m, ground frame
+  Vector3 velocity = Vector3::Zero();  // m/s
+};
+
+// Of the whole body, from its first moment and its linear momentum. Needs subtree_dynamics.
+MassCentre mass_centre(const Model& model, const DynamicState& dynamics);
+
+// What each segment's parent does to it through the joint by which it hangs, ground axes, about the segment's origin:
+// the whole of it (muscles, ligaments and bones together), and for a floating root what nothing accounts for. external:
+// a wrench a segment about the ground origin, or nullptr; out: one a segment.
+void joint_loads(const Model& model, const KinematicState& state, const DynamicState& dynamics,
+                 const std::vector<Force>* external, std::vector<Force>& out);
+
 }  // namespace dynakin

@@ -6,23 +6,14 @@
 #include <string>
 
 #include "dynakin/constraints.hpp"
-#include "dynakin/gate.hpp"
-#include "dynakin/measurement.hpp"
 #include "dynakin/process.hpp"
 #include "dynakin/projection.hpp"
-#include "dynakin/update.hpp"
+#include "dynakin/recovery.hpp"
 
 namespace dynakin {
 
 enum class StepStatus { ok, no_measurement, innovation_not_definite, not_finite, variance_not_positive };
 const char* describe(StepStatus status);
-
-// What the filter makes of its own estimate. doubtful: most markers were refused, or would be further than
-// recovery.fit_m from the estimate that they gave, so nothing of the frame was used; lost: so, or unseen, for longer
-// than recovery.blind_s, the motion is held until it is found; found: sought anew in this frame, and the markers fit;
-// restarted: the numbers had broken down, everything starts again from x0, and the motion is to be found.
-enum class Tracking : std::uint8_t { following, doubtful, lost, found, restarted };
-const char* describe(Tracking tracking);
 
 struct StepReport {
   StepStatus status = StepStatus::ok;
@@ -55,8 +46,8 @@ class Filter {
   void predict(double dt);
   // markers (3, M) m and wrench (N, N m about the ground origin), NaN where missing. After a step that diverged the
   // state is not to be used; further updates report the same until reset().
-  StepReport update(const Eigen::Ref<const MarkerMatrix>& markers, const Vector6& wrench);
-  StepReport step(double dt, const Eigen::Ref<const MarkerMatrix>& markers, const Vector6& wrench) {
+  StepReport update(const MarkerRef& markers, const Vector6& wrench);
+  StepReport step(double dt, const MarkerRef& markers, const Vector6& wrench) {
     predict(dt);
     return update(markers, wrench);
   }
@@ -64,15 +55,13 @@ class Filter {
 
   // From now on each update also writes what it did, to a tape of tape_rows(); nullptr: no longer. One listener at a
   // time.
-  void record_to(FrameTape* tape);
-  int tape_rows() const { return measurement_.max_rows() + static_cast<int>(settings_.equality.rows()); }
+  void record_to(FrameTape* tape) { correction_.record_to(tape); }
+  int tape_rows() const { return correction_.measurement.max_rows() + static_cast<int>(settings_.equality.rows()); }
   // All that later steps depend on: restored, they give the same numbers to the last bit.
   struct Checkpoint {
-    Eigen::VectorXd x;
-    Eigen::MatrixXd P;
+    Belief belief;
     Projection::Memory projection;
-    double unbelieved_s = 0.0, sought_s = k_infinity, shortest_step_s = k_infinity;
-    bool held = false;
+    Recovery::Memory recovery;
     StepReport last;
   };
   void save(Checkpoint& out) const;
@@ -80,61 +69,31 @@ class Filter {
 
   const Model& model() const { return model_; }
   const FilterSettings& settings() const { return settings_; }
-  const Eigen::VectorXd& state() const { return x_; }
-  const Eigen::MatrixXd& covariance() const { return P_; }
+  const Belief& belief() const { return correction_.now; }
+  const Eigen::VectorXd& state() const { return correction_.now.x; }
+  const Eigen::MatrixXd& covariance() const { return correction_.now.P; }
   // z predicted before the last update, all channels.
   const Eigen::VectorXd& predicted() const { return predicted_; }
   // What became of each marker and, last, of the plates in the last update.
-  const std::vector<Verdict>& verdicts() const { return gate_.verdicts(); }
+  const std::vector<Verdict>& verdicts() const { return correction_.gate.verdicts(); }
   // Kinematics and dynamics at the present state, for what is reported of it.
   const Measurement& evaluate();
   // The same at the state that is expected in dt seconds; the filter stays where it is.
   const Measurement& foresee(double dt);
 
  private:
-  using MarkerRef = Eigen::Ref<const MarkerMatrix>;
-  double carried_on(double dt);
-  Tracking believe(const MarkerRef& markers);
-  Tracking doubt();
-  Tracking seek(const MarkerRef& markers);
-  double squared_distance(const MarkerRef& markers, std::size_t m) const;
-  double distance(const MarkerRef& markers) const;
-  double distance_within_bounds(const MarkerRef& markers);
-  bool correct_to_fit(const MarkerRef& markers, const Vector6& wrench);
-  Tracking fit(const MarkerRef& markers, const Vector6& wrench);
-  void leave_out_refused();
-  double uncertainty_seen() const;
-  UpdateSums correct(const MarkerRef& markers, const Vector6& wrench);
-  UpdateSums iterate(const MarkerRef& markers, const Vector6& wrench, int most);
-  void constrain(double nis, StepReport& report);
-  void forget(int element, double variance);
-  void hold_coordinate(int i);
-  void hold_unseen();
-  void hold_motion();
-  bool seek_motion(const MarkerRef& markers, int refused);
-  bool turn_towards(const MarkerRef& markers);
-  bool seek_better(const MarkerRef& markers, const Vector6& wrench, int refused);
-  bool judge_by_distance(const MarkerRef& markers);
+  void constrain(StepReport& report);
   StepStatus check() const;
 
   const Model model_;  // copies: a filter stands alone
   const FilterSettings settings_;
-  Eigen::VectorXd x_, dx_, step_, predicted_, x0_, x_before_, x_ahead_;
-  Eigen::MatrixXd P_, P0_, P_before_;
-  Measurement measurement_;
-  Gate gate_;
-  ChunkedUpdate update_;
+  Correction correction_;
+  Recovery recovery_;
   GainConstraint gain_{model_.state_size()};
   SigmoidBounds sigmoid_{model_.state_size()};
   Projection projection_;
-  UpdateSums sums_;
-  double unbelieved_s_ = 0.0;     // since a frame whose markers were believed
-  double sought_s_ = k_infinity;  // since a better motion was last sought than one that is followed
-  double shortest_step_s_ = k_infinity;
-  bool unseen_ = false;  // coordinates are held in this frame, because nothing is seen of them
-  bool held_ = false;    // the motion is lost, and to be found before anything is believed
+  Eigen::VectorXd predicted_;
   StepReport last_;
-  FrameTape* tape_ = nullptr;
 };
 
 }  // namespace dynakin

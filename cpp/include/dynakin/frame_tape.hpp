@@ -1,5 +1,4 @@
-// What one update did to mean and covariance, in the form that a backward pass undoes (docs/derivations.md, section
-// 11).
+// What one update did to mean and covariance, in the form that a backward pass undoes (docs/derivations.md, section 9).
 #pragma once
 
 #include <Eigen/Core>
@@ -14,8 +13,8 @@ namespace dynakin {
 struct FrameTape {
   FrameTape(int state_size, int max_rows);
 
-  void clear();         // a new frame
-  void clear_chunks();  // an update begins anew: only its last linearisation counts
+  void clear();                          // a new frame
+  void clear_chunks() { ends.clear(); }  // an update begins anew: only its last linearisation counts
   // After S = L L': Z = L^-1 H P and w = L^-1 v of the blocks from first to end - 1. A = L^-1 H is formed here.
   void add_chunk(const std::vector<RowBlock>& blocks, int first, int end, const Eigen::Ref<const Eigen::MatrixXd>& L,
                  const Eigen::Ref<const Eigen::MatrixXd>& Z, const Eigen::Ref<const Eigen::VectorXd>& w);

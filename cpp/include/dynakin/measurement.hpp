@@ -11,6 +11,7 @@
 namespace dynakin {
 
 using MarkerMatrix = Eigen::Matrix<double, 3, Eigen::Dynamic>;  // a column a marker, m, ground frame; NaN missing
+using MarkerRef = Eigen::Ref<const MarkerMatrix>;
 
 // One sensor's rows. `channel` numbers a row among all channels of the model: 3 a marker, 6 wrench components, total
 // mass.
@@ -50,7 +51,7 @@ class Measurement {
   // Kinematics, dynamics and h(x), no derivatives.
   void evaluate(const Eigen::VectorXd& x);
   // Fills the blocks for what this frame measures. wrench: ground on person, about the ground origin; NaN missing.
-  void linearise(const Eigen::VectorXd& x, const Eigen::Ref<const MarkerMatrix>& markers, const Vector6& wrench);
+  void linearise(const Eigen::VectorXd& x, const MarkerRef& markers, const Vector6& wrench);
 
  private:
   void marker_rows(int marker, const Vector3& measured);

@@ -9,15 +9,10 @@
 
 namespace dynakin {
 
-// As RunRecord, of the smoothed state.
-struct SmoothRecord {
-  SmoothRecord(const Model& model, std::size_t frames);
+struct SmoothRecord : StateRecord {
+  SmoothRecord(const Model& of, std::size_t frames) : StateRecord(of, frames, true), backward_us(frames) {}
 
-  std::vector<double> state, state_sd;
-  std::vector<double> markers, markers_sd;  // (frames, markers, 3)
-  std::vector<double> wrench, wrench_sd;    // (frames, 6) the body's own
-  std::vector<double> moments, moments_sd;  // (frames, coordinates)
-  std::vector<double> backward_us;          // without the second run forwards
+  std::vector<double> backward_us;  // without the second run forwards
 };
 
 // The forward run keeps a checkpoint every so many frames. The way back runs each stretch between two of them forwards
@@ -41,12 +36,10 @@ class Smoother {
 
  private:
   struct Frame {
-    Eigen::VectorXd x;
-    Eigen::MatrixXd P;
+    Belief filtered;
     FrameTape tape;
   };
   void replay(std::size_t first, std::size_t end, const RunRecord& record);
-  void report(std::size_t k, const Frame& frame, SmoothRecord& out, ContactRecord* contacts);
 
   Filter& filter_;
   const double *time_, *markers_, *wrench_;
@@ -54,11 +47,9 @@ class Smoother {
   std::vector<Filter::Checkpoint> checkpoints_;  // before each stretch and, last, after the run
   std::vector<Frame> replayed_;
   BackwardPass pass_;
-  OutputDeviation deviation_;
   KinematicState kinematics_;
   DynamicState dynamics_;
-  Eigen::VectorXd x_;
-  Eigen::MatrixXd P_;
+  Belief smoothed_;
 };
 
 }  // namespace dynakin

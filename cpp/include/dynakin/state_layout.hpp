@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <stdexcept>
 #include <string>
 #include <vector>
 
@@ -16,11 +17,18 @@ struct Block {
 class StateLayout {
  public:
   // Blocks are appended in their order of appearance; every element carries a unique name.
-  void append(const std::string& block, const std::vector<std::string>& element_names);
+  void append(const std::string& block, const std::vector<std::string>& element_names) {
+    blocks_.push_back({block, size(), static_cast<int>(element_names.size())});
+    names_.insert(names_.end(), element_names.begin(), element_names.end());
+  }
 
   int size() const { return static_cast<int>(names_.size()); }
   const std::vector<Block>& blocks() const { return blocks_; }
-  const Block& block(const std::string& name) const;
+  const Block& block(const std::string& name) const {
+    for (const Block& b : blocks_)
+      if (b.name == name) return b;
+    throw std::invalid_argument("state layout has no block '" + name + "'");
+  }
   const std::vector<std::string>& names() const { return names_; }
 
  private:

@@ -8,7 +8,6 @@
 #include <optional>
 
 #include "arrays.hpp"
-#include "dynakin/body.hpp"
 #include "feet.hpp"
 #include "module.hpp"
 

@@ -21,21 +21,29 @@ void look_up(const nb::object& progress, std::size_t done, std::size_t total) {
   if (PyErr_CheckSignals() != 0) throw nb::python_error();
 }
 
-nb::dict arrays_of(RunRecord&& record, const Model& model, std::size_t frames) {
+// Names are prefix, what it is, and of markers and wrench the suffix.
+void add_arrays_of(StateRecord&& record, std::size_t frames, const std::string& prefix, const char* suffix,
+                   nb::dict& out) {
+  const Model& model = record.model;
   const std::size_t n = model.state_size(), nc = model.coordinates().size(), n_markers = model.markers().size();
+  const auto key = [&](const char* name, const char* end = "") { return nb::str((prefix + name + end).c_str()); };
+  out[key("state")] = owned(std::move(record.state), {frames, n});
+  out[key("state_sd")] = owned(std::move(record.state_sd), {frames, n});
+  out[key("markers", suffix)] = owned(std::move(record.markers), {frames, n_markers, 3});
+  out[key("wrench", suffix)] = owned(std::move(record.wrench), {frames, 6});
+  out[key("moments")] = owned(std::move(record.moments), {frames, nc});
+  if (!record.deviation) return;
+  out[key("markers_sd")] = owned(std::move(record.markers_sd), {frames, n_markers, 3});
+  out[key("wrench_sd")] = owned(std::move(record.wrench_sd), {frames, 6});
+  out[key("moments_sd")] = owned(std::move(record.moments_sd), {frames, nc});
+}
+
+nb::dict arrays_of(RunRecord&& record, std::size_t frames) {
+  const std::size_t n_markers = record.model.markers().size();
   nb::dict out;
-  out["state"] = owned(std::move(record.state), {frames, n});
-  out["state_sd"] = owned(std::move(record.state_sd), {frames, n});
+  add_arrays_of(std::move(record), frames, "", "_estimated", out);
   out["markers_predicted"] = owned(std::move(record.markers_predicted), {frames, n_markers, 3});
-  out["markers_estimated"] = owned(std::move(record.markers_estimated), {frames, n_markers, 3});
   out["wrench_predicted"] = owned(std::move(record.wrench_predicted), {frames, 6});
-  out["wrench_estimated"] = owned(std::move(record.wrench_estimated), {frames, 6});
-  out["moments"] = owned(std::move(record.moments), {frames, nc});
-  if (record.deviation) {
-    out["markers_sd"] = owned(std::move(record.markers_sd), {frames, n_markers, 3});
-    out["wrench_sd"] = owned(std::move(record.wrench_sd), {frames, 6});
-    out["moments_sd"] = owned(std::move(record.moments_sd), {frames, nc});
-  }
   out["nis"] = owned(std::move(record.nis), {frames});
   out["log_likelihood"] = owned(std::move(record.log_likelihood), {frames});
   out["step_us"] = owned(std::move(record.step_us), {frames});
@@ -45,19 +53,6 @@ nb::dict arrays_of(RunRecord&& record, const Model& model, std::size_t frames) {
   out["tracking"] = owned(std::move(record.tracking), {frames});
   out["constraints_met"] = owned(std::move(record.constraints_met), {frames});
   return out;
-}
-
-void add_arrays_of(SmoothRecord&& record, const Model& model, std::size_t frames, nb::dict& out) {
-  const std::size_t n = model.state_size(), nc = model.coordinates().size(), n_markers = model.markers().size();
-  out["smoothed_state"] = owned(std::move(record.state), {frames, n});
-  out["smoothed_state_sd"] = owned(std::move(record.state_sd), {frames, n});
-  out["smoothed_markers"] = owned(std::move(record.markers), {frames, n_markers, 3});
-  out["smoothed_markers_sd"] = owned(std::move(record.markers_sd), {frames, n_markers, 3});
-  out["smoothed_wrench"] = owned(std::move(record.wrench), {frames, 6});
-  out["smoothed_wrench_sd"] = owned(std::move(record.wrench_sd), {frames, 6});
-  out["smoothed_moments"] = owned(std::move(record.moments), {frames, nc});
-  out["smoothed_moments_sd"] = owned(std::move(record.moments_sd), {frames, nc});
-  out["backward_us"] = owned(std::move(record.backward_us), {frames});
 }
 
 // What a run needs of the feet, where there are any.
@@ -101,7 +96,7 @@ nb::dict run(Filter& filter, const Array1& time, const Array3& markers, const Ar
     }
     look_up(progress, end, trial.frames);
   }
-  nb::dict out = arrays_of(std::move(record), filter.model(), trial.frames);
+  nb::dict out = arrays_of(std::move(record), trial.frames);
   feet.add_arrays(filter.model(), "", output_sd, out);
   return out;
 }
@@ -129,8 +124,9 @@ nb::dict run_smoothed(Filter& filter, const Array1& time, const Array3& markers,
     }
     look_up(progress, 2 * frames - left, 2 * frames);
   }
-  nb::dict out = arrays_of(std::move(record), filter.model(), frames);
-  add_arrays_of(std::move(smoothed), filter.model(), frames, out);
+  nb::dict out = arrays_of(std::move(record), frames);
+  add_arrays_of(std::move(smoothed), frames, "smoothed_", "", out);
+  out["backward_us"] = owned(std::move(smoothed.backward_us), {frames});
   feet.add_arrays(filter.model(), "", output_sd, out);
   smoothed_feet.add_arrays(filter.model(), "smoothed_", true, out);
   return out;
