@@ -13,7 +13,7 @@ unexport PYTHONDONTWRITEBYTECODE  # tests start many processes; each would compi
 # A file's tests stay in one process, so that what they share is made once.
 PYTEST := $(BIN)/python -m pytest -n logical --maxprocesses 8 --dist loadfile
 
-.PHONY: all demo live check test test-python test-cpp test-cpp-sanitize lint stubs bench peers nightly clean prerequisites
+.PHONY: all demo live check test test-python test-cpp test-cpp-install test-cpp-sanitize lint stubs bench peers nightly clean prerequisites
 all: $(VENV)/.built
 
 prerequisites:
@@ -57,7 +57,7 @@ check: $(VENV)/.dev
 	$(PYTEST) tests/core tests/oracle tests/recordings
 
 test: $(VENV)/.dev
-	+@$(MAKE) --no-print-directory -j2 --output-sync=target lint test-cpp
+	+@$(MAKE) --no-print-directory -j2 --output-sync=target lint test-cpp-install
 	+@$(MAKE) --no-print-directory test-python
 
 test-python: $(VENV)/.dev
@@ -77,6 +77,14 @@ test-cpp test-cpp-sanitize: $(VENV)/.dev
 	@$(BIN)/cmake --build $(BUILD) >$(BUILD)/build.log || { cat $(BUILD)/build.log; exit 1; }
 	@$(BIN)/ctest --test-dir $(BUILD) --output-on-failure
 
+# The core as others take it: installed, and examples/cpp built against that.
+test-cpp-install: test-cpp
+	@rm -rf build/cpp-example && $(BIN)/cmake --install build/cpp-release --prefix build/cpp-example/prefix >/dev/null
+	@$(BIN)/cmake -S examples/cpp -B build/cpp-example -G Ninja -DCMAKE_BUILD_TYPE=Release \
+	  -DCMAKE_PREFIX_PATH="$(CURDIR)/build/cpp-example/prefix;$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" >/dev/null
+	@$(BIN)/cmake --build build/cpp-example >/dev/null
+	@$(BIN)/ctest --test-dir build/cpp-example --output-on-failure
+
 # What editors and mypy know of the compiled module; committed, so lint checks that it is up to date.
 stubs: $(VENV)/.dev
 	$(BIN)/python -m nanobind.stubgen -q -m dynakin._core -o src/dynakin/_core.pyi
@@ -90,7 +98,7 @@ lint: $(VENV)/.dev
 	$(BIN)/ruff format --check src tests benchmarks examples
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
-	$(BIN)/clang-format --dry-run --Werror $$(find cpp src/dynakin/bindings -name '*.cpp' -o -name '*.hpp')
+	$(BIN)/clang-format --dry-run --Werror $$(find cpp examples/cpp src/dynakin/bindings -name '*.cpp' -o -name '*.hpp')
 
 bench: $(VENV)/.dev
 	$(BIN)/cmake -S . -B build/bench -G Ninja -DDYNAKIN_BENCH=ON -DPython_EXECUTABLE=$(CURDIR)/$(BIN)/python \
