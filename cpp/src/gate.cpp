@@ -30,12 +30,16 @@ Gate::Gate(const Model& model)
     : n_markers_(static_cast<int>(model.markers().size())), verdicts_(n_markers_ + 1, Verdict::missing) {
   HP_.setZero(model.state_size(), 6);
   gathered_.setZero(model.state_size());
+  sensors_.innovation = sensors_.innovation_sd = Eigen::VectorXd::Constant(3 * n_markers_ + 6, std::nan(""));
+  sensors_.test_ratio = Eigen::VectorXd::Constant(n_markers_ + 1, std::nan(""));
 }
 
 void Gate::judge(const FilterSettings& settings, const std::vector<RowBlock>& blocks, const Eigen::MatrixXd& P) {
   measured_ = refused_ = 0;
+  for (auto* numbers : {&sensors_.innovation, &sensors_.innovation_sd, &sensors_.test_ratio})
+    if (reports_) numbers->setConstant(std::nan(""));
   for (int b = 0; b <= n_markers_; ++b) {
-    verdicts_[b] = judge(blocks[b], b < n_markers_ ? settings.marker_gate : settings.wrench_gate, P);
+    verdicts_[b] = judge(b, blocks[b], b < n_markers_ ? settings.marker_gate : settings.wrench_gate, P);
     if (b == n_markers_ || verdicts_[b] == Verdict::missing) continue;
     ++measured_;
     refused_ += verdicts_[b] == Verdict::refused;
@@ -53,12 +57,13 @@ void Gate::decide(int marker, Verdict verdict) {
   verdicts_[marker] = verdict;
 }
 
-Verdict Gate::judge(const RowBlock& block, const GateLimits& limits, const Eigen::MatrixXd& P) {
+Verdict Gate::judge(int sensor, const RowBlock& block, const GateLimits& limits, const Eigen::MatrixXd& P) {
   const int rows = block.rows;
   if (rows == 0) return Verdict::missing;
-  if (std::isinf(limits[rows - 1])) return Verdict::accepted;
+  const double limit = limits[rows - 1];
   // S = H P H' + R is no smaller than R: what R alone explains needs no more, and that is nearly every frame.
-  if (normalised_square(block.R, block.v, rows) <= limits[rows - 1]) return Verdict::accepted;
+  const bool explained = std::isinf(limit) || normalised_square(block.R, block.v, rows) <= limit;
+  if (explained && !reports_) return Verdict::accepted;
   const std::vector<int>& columns = *block.columns;
   const int n = static_cast<int>(columns.size());
   // H P H' over the block's own columns of P, gathered one at a time.
@@ -75,7 +80,12 @@ Verdict Gate::judge(const RowBlock& block, const GateLimits& limits, const Eigen
     for (int r = 0; r < rows; ++r)
       for (int s = 0; s <= r; ++s) S(r, s) += HP(c, r) * block.H(s, c);
   const double square = normalised_square(S, block.v, rows);
-  return square <= limits[rows - 1] ? Verdict::accepted : Verdict::refused;
+  for (int r = 0; reports_ && r < rows; ++r) {
+    sensors_.innovation(block.channel[r]) = block.v(r);
+    sensors_.innovation_sd(block.channel[r]) = std::sqrt(S(r, r));
+  }
+  if (reports_) sensors_.test_ratio(sensor) = square / limit;
+  return explained || square <= limit ? Verdict::accepted : Verdict::refused;
 }
 
 }  // namespace dynakin

@@ -56,12 +56,15 @@ RunRecord::RunRecord(const Model& of, std::size_t frames, bool output_sd)
     : StateRecord(of, frames, output_sd),
       markers_predicted(markers.size()),
       wrench_predicted(wrench.size()),
+      innovation(markers.size() + wrench.size()),
+      innovation_sd(innovation.size()),
+      test_ratio(frames * (of.markers().size() + 1)),
       nis(frames),
       log_likelihood(frames),
       step_us(frames),
       rows(frames),
       constrained(frames),
-      verdicts(frames * (of.markers().size() + 1)),
+      verdicts(test_ratio.size()),
       tracking(frames),
       constraints_met(frames) {}
 
@@ -69,6 +72,7 @@ void run_frames(Filter& filter, const double* time, const double* markers, const
                 std::size_t end, RunRecord& record, ContactRecord* contacts) {
   using clock = std::chrono::steady_clock;
   const std::size_t m = 3 * filter.model().markers().size();
+  filter.report_sensors(true);
   for (std::size_t k = first; k < end; ++k) {
     const Eigen::Map<const MarkerMatrix> z(markers + k * m, 3, m / 3);
     const Vector6 w = Eigen::Map<const Vector6>(wrench + 6 * k);
@@ -89,6 +93,12 @@ void run_frames(Filter& filter, const double* time, const double* markers, const
                    [](Verdict verdict) { return static_cast<std::uint8_t>(verdict); });
     std::copy_n(filter.predicted().data(), m, record.markers_predicted.data() + k * m);
     std::copy_n(filter.predicted().data() + m, 6, record.wrench_predicted.data() + 6 * k);
+    const auto keep = [k](const Eigen::VectorXd& numbers, std::vector<double>& all) {
+      std::copy(numbers.begin(), numbers.end(), all.begin() + static_cast<std::ptrdiff_t>(k) * numbers.size());
+    };
+    keep(filter.sensors().innovation, record.innovation);
+    keep(filter.sensors().innovation_sd, record.innovation_sd);
+    keep(filter.sensors().test_ratio, record.test_ratio);
     const Measurement& now = filter.evaluate();
     record.report(k, filter.state(), filter.covariance(), now.kinematics(), now.dynamics(), contacts);
   }

@@ -48,6 +48,7 @@ void Smoother::replay(std::size_t first, std::size_t end, const RunRecord& recor
   const std::size_t m = model.markers().size();
   while (replayed_.size() < end - first) replayed_.push_back({{}, FrameTape(model.state_size(), filter_.tape_rows())});
   filter_.restore(checkpoints_[first / stretch_]);
+  filter_.report_sensors(false);
   for (std::size_t k = first; k < end; ++k) {
     Frame& frame = replayed_[k - first];
     filter_.record_to(&frame.tape);
@@ -60,6 +61,7 @@ void Smoother::replay(std::size_t first, std::size_t end, const RunRecord& recor
       throw std::logic_error("smoothing: frame " + std::to_string(k) + " does not repeat itself from its checkpoint");
   }
   filter_.record_to(nullptr);
+  filter_.report_sensors(true);
 }
 
 std::size_t Smoother::backward(const RunRecord& record, SmoothRecord& out, ContactRecord* contacts) {

@@ -513,6 +513,17 @@ class Filter:
         missing, accepted or refused: each marker in the last update and, last, the plates
         """
 
+    def report_sensors(self, on: bool) -> None:
+        """
+        From now on, or no longer, each update also works out what `sensors` gives.
+        """
+
+    @property
+    def sensors(self) -> dict:
+        """
+        What each sensor said in the last update, if `report_sensors` is on: innovation (measured less predicted) and innovation_sd (3 M + 6,), 3 a marker, then the plates'; test_ratio (M + 1,): normalised innovation squared over the gate's limit, 0 without a gate. NaN: not measured.
+        """
+
     def reset(self, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], P: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='F')]) -> None: ...
 
     def predict(self, dt: float) -> None:

@@ -118,6 +118,11 @@ def test_run_equals_the_oracle(name, chunk_rows):
     near(f.state, expected["state"][-1])
     words = np.array(["missing", "accepted", "refused"])
     np.testing.assert_array_equal(words[out["verdicts"]], expected["verdicts"])
+    for key in ("innovation", "innovation_sd", "test_ratio"):
+        assert np.isfinite(expected[key]).any()
+        np.testing.assert_array_equal(np.isnan(out[key]), np.isnan(expected[key]))
+        seen = ~np.isnan(expected[key])
+        near(out[key][seen], expected[key][seen], tolerance=1e-7, name=key)
     assert not out["tracking"].any()
     assert out["constraints_met"].all()
     assert out["step_us"].shape == (len(data.time),)
@@ -138,11 +143,16 @@ def test_single_steps_equal_the_oracle(name):
                 core.predict(0.004 + 0.0003 * k)
                 oracle.predict(0.004 + 0.0003 * k)
             else:
+                core.report_sensors(k % 2 == 0)
                 report = core.update(data.markers[k], data.wrench[k])
                 expected = oracle.update(data.markers[k], data.wrench[k])
                 assert (report.n_rows, report.constrained) == (expected.n_rows, expected.constrained)
                 assert report.nis == pytest.approx(expected.nis, rel=1e-9, abs=1e-9)
                 assert report.log_likelihood == pytest.approx(expected.log_likelihood, rel=1e-9, abs=1e-9)
+                if k % 2 == 0:  # on demand, and the estimate is the same with and without
+                    sensors = core.sensors
+                    for key in sensors:
+                        np.testing.assert_allclose(sensors[key], getattr(expected, key), rtol=1e-8, atol=1e-8)
             near(core.state, oracle.state)
             sd = np.sqrt(np.diag(oracle.covariance))
             near(core.covariance, oracle.covariance, scale=np.outer(sd, sd))

@@ -20,6 +20,7 @@ each_spec = pytest.mark.parametrize("spec", SPECS, ids=lambda s: s.name)
 FOLLOWING, DOUBTFUL, LOST, FOUND, RESTARTED = range(5)
 REFUSED = 2
 FRAMES, BEGIN, END = 600, 200, 300  # 6 s at 100 Hz, the fault in the third
+SENSORS = {"innovation", "innovation_sd", "test_ratio"}  # NaN where a sensor measures nothing, but never infinite
 BLIND = 20  # frames, blind_s of 0.2 s
 
 
@@ -77,7 +78,7 @@ def check_rode_through(spec, out, end=END, settle=20, parameters_within=1.0):
     """No NaN, every body possible, the motion as good as undisturbed soon after, the constants hardly moved."""
     clean = undisturbed(spec.name)
     for key, value in out.items():
-        assert np.isfinite(value).all(), key
+        assert np.isfinite(value[~np.isnan(value)] if key in SENSORS else value).all(), key
     assert all(all_possible(Layout(spec), x) for x in out["state"][::5])
     assert out["constraints_met"].all()
     assert motion_error(spec, out)[end + settle :].max() < 1.2 * motion_error(spec, clean)[end:].max() + 0.01
@@ -201,7 +202,7 @@ def test_given_a_posture_that_changed_at_once_then_it_is_doubted_lost_and_found(
     assert found <= END + BLIND + 2
     assert (tracking[found + 1 :] == FOLLOWING).all()
     for key, value in out.items():
-        assert np.isfinite(value).all(), key
+        assert np.isfinite(value[~np.isnan(value)] if key in SENSORS else value).all(), key
     clean = undisturbed(spec.name)
     assert motion_error(spec, out, truth)[found + 20 :].max() < 0.1
     # Another posture tells other things of the constants, so they are compared with the truth.
@@ -241,7 +242,7 @@ def test_given_a_recording_with_hardly_any_markers_then_they_are_enough_to_follo
     out = run(spec, markers, wrench)
     assert not out["tracking"].any()
     for key, value in out.items():
-        assert np.isfinite(value).all(), key
+        assert np.isfinite(value[~np.isnan(value)] if key in SENSORS else value).all(), key
 
 
 BREAKDOWNS = ["a number beyond all numbers", "a time step beyond all times"]

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import dataclasses
 import pickle
+from pathlib import Path
 
 import numpy as np
 import pytest
+import xarray as xr
 
 import dynakin
 from dynakin.errors import ConfigError, DivergenceError, RecordingError
@@ -127,6 +129,41 @@ def test_by_default_a_frame_without_any_marker_is_ridden_through(trial: Simulate
     difference = through.data["coordinates"].values - whole.data["coordinates"].values
     assert (np.abs(difference[400:]) < whole.data["coordinates_sd"].values[400:]).all()
     assert (through.data["coordinates_sd"].values[254] > whole.data["coordinates_sd"].values[254]).all()
+
+
+def test_what_each_sensor_said_is_in_steps_run_and_file(trial: SimulatedTrial, tmp_path: Path) -> None:
+    """Innovation, its deviation, test ratio and verdict: of a marker that jumps, of the others and of the plates."""
+    knee = trial.recording.marker_names.index("r_knee")
+
+    def broken(markers: np.ndarray) -> None:
+        markers[50, knee] += 0.3
+
+    recording = with_markers(trial.recording, broken)
+    result = estimator().run(recording)
+    data = result.data
+    axes = result.modelled_axes()
+    for name in ("markers", "wrench"):
+        expected = (data[f"{name}_measured"] - data[f"{name}_predicted"]).values
+        np.testing.assert_allclose(data[f"{name}_innovation"].values, expected, rtol=0, atol=1e-9)
+        assert (data[f"{name}_innovation_sd"].values[np.isfinite(expected)] > 0.0).all()
+    assert np.isfinite(data["markers_innovation_sd"].values[..., axes]).all()
+    ratio, verdict = data["test_ratio"].values, data["verdict"].values
+    jumped = [str(name) for name in data["sensor"].values].index("r_knee")
+    assert ratio[50, jumped] > 1.0 and verdict[50, jumped] == 2
+    assert (ratio[verdict == 1] <= 1.0).all() and (ratio[verdict == 2] > 1.0).all()
+    live = estimator()
+    live.start(recording)
+    for k, sample in enumerate(samples(recording)[:60]):
+        live.step(sample)
+        sensors = live.sensors
+        np.testing.assert_allclose(sensors["test_ratio"], ratio[k], rtol=1e-9)
+        for name in ("innovation", "innovation_sd"):
+            both = [data[f"{of}_{name}"].values[k].ravel() for of in ("markers", "wrench")]
+            np.testing.assert_allclose(sensors[name], np.concatenate(both), rtol=1e-9, atol=1e-12)
+    with xr.open_dataset(result.save(tmp_path / "out") / "estimate.nc") as stored:
+        np.testing.assert_allclose(stored["test_ratio"].values, ratio, rtol=1e-6)
+        np.testing.assert_allclose(stored["markers_innovation_sd"].values, data["markers_innovation_sd"].values, 1e-6)
+        assert stored["verdict"].attrs["flag_meanings"] == "missing accepted refused"
 
 
 def test_a_marker_far_beyond_all_numbers_is_divergence_at_its_frame(trial: SimulatedTrial) -> None:

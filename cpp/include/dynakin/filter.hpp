@@ -76,6 +76,9 @@ class Filter {
   const Eigen::VectorXd& predicted() const { return predicted_; }
   // What became of each marker and, last, of the plates in the last update.
   const std::vector<Verdict>& verdicts() const { return correction_.gate.verdicts(); }
+  // From now on, or no longer, each update also fills sensors().
+  void report_sensors(bool on) { correction_.gate.report_sensors(on); }
+  const SensorReport& sensors() const { return correction_.gate.sensors(); }
   // Kinematics and dynamics at the present state, for what is reported of it.
   const Measurement& evaluate();
   // The same at the state that is expected in dt seconds; the filter stays where it is.

@@ -34,13 +34,14 @@ struct RunRecord : StateRecord {
   RunRecord(const Model& model, std::size_t frames, bool output_sd = false);
 
   std::vector<double> markers_predicted, wrench_predicted;    // before the frame is used
+  std::vector<double> innovation, innovation_sd, test_ratio;  // SensorReport's
   std::vector<double> nis, log_likelihood, step_us;
   std::vector<int> rows, constrained;
   std::vector<std::uint8_t> verdicts;  // (frames, markers + 1), of each marker and, last, of the plates
   std::vector<std::uint8_t> tracking, constraints_met;
 };
 
-// Frames first to end - 1; frame 0 is an update only, the others step by the difference
+// Frames first to end - 1, with a report on the sensors; frame 0 is an update only, the others step by the difference
 // of their times. With contacts, moments (and their deviations) are those that the feet's wrenches leave. Throws
 // DivergenceError naming the frame and its time.
 void run_frames(Filter& filter, const double* time, const double* markers, const double* wrench, std::size_t first,

@@ -117,6 +117,20 @@ void bind_filter(nb::module_& m) {
             return words;
           },
           "missing, accepted or refused: each marker in the last update and, last, the plates")
+      .def("report_sensors", &Filter::report_sensors, nb::arg("on"),
+           "From now on, or no longer, each update also works out what `sensors` gives.")
+      .def_prop_ro(
+          "sensors",
+          [](const Filter& f) {
+            nb::dict out;
+            out["innovation"] = f.sensors().innovation;
+            out["innovation_sd"] = f.sensors().innovation_sd;
+            out["test_ratio"] = f.sensors().test_ratio;
+            return out;
+          },
+          "What each sensor said in the last update, if `report_sensors` is on: innovation (measured less predicted) "
+          "and innovation_sd (3 M + 6,), 3 a marker, then the plates'; test_ratio (M + 1,): normalised innovation "
+          "squared over the gate's limit, 0 without a gate. NaN: not measured.")
       .def("reset", &Filter::reset, nb::arg("x"), nb::arg("P"))
       .def("predict", &Filter::predict, nb::arg("dt"), "Moves the state by dt seconds.")
       .def(

@@ -39,11 +39,14 @@ void add_arrays_of(StateRecord&& record, std::size_t frames, const std::string& 
 }
 
 nb::dict arrays_of(RunRecord&& record, std::size_t frames) {
-  const std::size_t n_markers = record.model.markers().size();
+  const std::size_t n_markers = record.model.markers().size(), channels = 3 * n_markers + 6;
   nb::dict out;
   add_arrays_of(std::move(record), frames, "", "_estimated", out);
   out["markers_predicted"] = owned(std::move(record.markers_predicted), {frames, n_markers, 3});
   out["wrench_predicted"] = owned(std::move(record.wrench_predicted), {frames, 6});
+  out["innovation"] = owned(std::move(record.innovation), {frames, channels});
+  out["innovation_sd"] = owned(std::move(record.innovation_sd), {frames, channels});
+  out["test_ratio"] = owned(std::move(record.test_ratio), {frames, n_markers + 1});
   out["nis"] = owned(std::move(record.nis), {frames});
   out["log_likelihood"] = owned(std::move(record.log_likelihood), {frames});
   out["step_us"] = owned(std::move(record.step_us), {frames});

@@ -132,7 +132,7 @@ def _dataset(
     data["state_sd"] = (("time", "element"), arrays["state_sd"])
     for name in ("nis", "n_rows", "log_likelihood", "constrained", "constraints_met", "tracking", "step_us"):
         data[name] = ("time", arrays[name])
-    data["verdict"] = (("time", "sensor"), arrays["verdicts"])
+    data |= _sensors(arrays)
     if initial.feet or any(any(marker.soft_tissue) for marker in spec.markers):
         data["soft_tissue_amplitude"] = ("marker", initial.soft_tissue_m, {"units": "m"})
     data |= _body(arrays, model, axes, modelled, feet)
@@ -158,6 +158,17 @@ def _dataset(
         coords |= {"foot": list(feet.names), "foot_segment": ("foot", list(feet.segments))}
         data |= _feet(arrays, feet)
     return xr.Dataset(data, coords=coords)
+
+
+def _sensors(arrays: Mapping[str, Array]) -> dict[str, Any]:
+    """What each sensor said against what was expected of it; the core numbers 3 channels a marker, then the plates'."""
+    data: dict[str, Any] = {"verdict": (("time", "sensor"), arrays["verdicts"])}
+    data["test_ratio"] = (("time", "sensor"), arrays["test_ratio"])
+    for name in ("innovation", "innovation_sd"):
+        markers = arrays[name][:, :-6]
+        data[f"markers_{name}"] = (("time", "marker", "axis"), markers.reshape(len(markers), -1, 3))
+        data[f"wrench_{name}"] = (("time", "component"), arrays[name][:, -6:])
+    return data
 
 
 def _feet(arrays: Mapping[str, Array], feet: FootWrenches) -> dict[str, Any]:

@@ -266,6 +266,7 @@ class Estimator:
         if self.lag:
             check_can_smooth(self.noise)
         self._lag = _core.FixedLag(self._filter, self.lag) if self.lag else None
+        self._filter.report_sensors(True)
         self.initial, self._time = initial, None
         self._stepped = deque(maxlen=self.lag + 1)
         return initial
@@ -393,6 +394,12 @@ class Estimator:
     def verdicts(self) -> list[str]:
         """missing, accepted or refused: each marker in the last step and, last, the plates."""
         return self._started_filter("verdicts").verdicts
+
+    @property
+    def sensors(self) -> dict[str, Array]:
+        """What each sensor said in the last step: innovation and innovation_sd (3 M + 6,), 3 a marker, then the
+        plates'; test_ratio (M + 1,) as in `Estimate`. NaN: not measured."""
+        return self._started_filter("sensors").sensors
 
     def _started_filter(self, what: str) -> _core.Filter:
         if self._filter is None:

@@ -32,6 +32,9 @@ class Estimate:
     moments                                                       (time, coordinate)          N m or N
     markers_measured, markers_estimated, markers_predicted        (time, marker, axis)        m
     wrench_measured, wrench_estimated, wrench_predicted           (time, component)           N or N m
+    markers_innovation, markers_innovation_sd                     (time, marker, axis)        m
+    wrench_innovation, wrench_innovation_sd                       (time, component)           N or N m
+    test_ratio, verdict                                           (time, sensor)              1, codes
     state, state_sd                                               (time, element)             as the element's own
     initial_covariance, final_covariance                          (element, element_)         as the elements' own
     joint_centres                                                 (time, joint, axis)         m
@@ -47,15 +50,17 @@ class Estimate:
     ============================================================  ==========================  =====================
 
     ``*_predicted`` is what the model expects before the frame is used, ``*_estimated`` after it. What is not measured
-    or not modelled is NaN. The coordinate variable ``coordinate_type`` says "rotation" or "translation" for each
-    coordinate, ``marker_axes_modelled`` says for each axis whether the model explains it. The wrench is what the
-    ground does to the person, about the model's ground origin. ``joint_loads`` is what a segment's parent does to it
-    through the joint by which it hangs, muscles and all, ground axes, about the joint's centre; ``joint_orientations``
-    turns a segment's axes into the ground's. The feet's variables are there if the moments were made with the feet's
-    wrenches: ``foot_contact`` is 0 in the air, 1 measured, 2 not measured. ``moment_source`` and ``joint_source`` are 0
-    where a moment or a joint's load is measured (with all the ground's reactions behind it), 1 where it is derived from
-    the motion, because one of them is not, and 2 where it is absent (NaN); where they are missing all is measured
-    (`dynakin.results.measures.sources`).
+    or not modelled is NaN. ``*_innovation`` is what was measured less what was predicted, and ``test_ratio`` its
+    square, normalised by its covariance, over the gate's limit (0 without a gate); ``verdict`` is 0 where a sensor is
+    missing, 1 accepted, 2 refused, by the gate or because recovery found that it fits nothing. The coordinate variable
+    ``coordinate_type`` says "rotation" or "translation" for each coordinate, ``marker_axes_modelled`` says for each
+    axis whether the model explains it. The wrench is what the ground does to the person, about the model's ground
+    origin. ``joint_loads`` is what a segment's parent does to it through the joint by which it hangs, muscles and all,
+    ground axes, about the joint's centre; ``joint_orientations`` turns a segment's axes into the ground's. The feet's
+    variables are there if the moments were made with the feet's wrenches: ``foot_contact`` is 0 in the air, 1 measured,
+    2 not measured. ``moment_source`` and ``joint_source`` are 0 where a moment or a joint's load is measured (with all
+    the ground's reactions behind it), 1 where it is derived from the motion, because one of them is not, and 2 where it
+    is absent (NaN); where they are missing all is measured (`dynakin.results.measures.sources`).
 
     ``lost`` (time,) is true in frames in which the filter lost the person: everything that was estimated there is NaN,
     but for ``state`` and ``state_sd``, which keep what the filter held.

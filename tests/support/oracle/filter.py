@@ -44,6 +44,9 @@ class Report:
     log_likelihood: float
     constrained: int
     verdicts: list[str]
+    innovation: NDArray  # (3 M + 6,), 3 a marker, then the plates'; NaN: not measured
+    innovation_sd: NDArray
+    test_ratio: NDArray  # (M + 1,) 0: no gate
 
 
 class Filter:
@@ -72,8 +75,8 @@ class Filter:
         z, R, present = self.measurement_rows(markers, wrench)
         h, H = measurement.value_and_jacobian(self.layout, self.state)
         x, P, v = self.state, self.covariance, z - h
-        verdicts = sensors.verdicts(self.settings, v, H, P, R, present)
-        use = sensors.believed(self.settings, verdicts, present)
+        judged = sensors.reports(self.settings, v, H, P, R, present)
+        use = sensors.believed(self.settings, judged["verdicts"], present)
         v, H, R = v[use], H[use], R[np.ix_(use, use)]
         S = H @ P @ H.T + R
         K = np.linalg.solve(S, H @ P).T
@@ -84,7 +87,7 @@ class Filter:
         if self.settings.constraint == "sigmoid":
             bounds = sigmoid.Map(*self.bounds())
             self.state, self.covariance = sigmoid.update(bounds, x, P, v, H, R)
-            return Report(m, nis, log_likelihood, int(bounds.at_edge(self.state).sum()), verdicts)
+            return Report(m, nis, log_likelihood, int(bounds.at_edge(self.state).sum()), **judged)
         updated = x + K @ v
         beyond, limit = self.beyond_bounds(updated)
         if len(beyond) and nis > 0:
@@ -98,7 +101,7 @@ class Filter:
         P = I_KH @ P @ I_KH.T + K @ R @ K.T  # Joseph: right for every gain
         self.state, self.covariance = updated, (P + P.T) / 2
         constrained = self.project() if self.settings.constraint == "projection" else len(beyond)
-        return Report(m, nis, log_likelihood, constrained, verdicts)
+        return Report(m, nis, log_likelihood, constrained, **judged)
 
     def project(self) -> int:
         """Equalities condition mean and covariance, inequalities move the mean; how many of the latter bind."""

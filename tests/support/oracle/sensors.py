@@ -53,21 +53,24 @@ def wrench_noise(s: Any) -> tuple[NDArray, NDArray]:
     return carried_to_origin(block, s.reference_point), np.diag(reached) == 0
 
 
-def verdicts(s: Any, v: NDArray, H: NDArray, P: NDArray, R: NDArray, present: NDArray) -> list[str]:
-    """Of each marker and, last, of the plates: missing, accepted or refused."""
-    found = []
+def reports(s: Any, v: NDArray, H: NDArray, P: NDArray, R: NDArray, present: NDArray) -> dict[str, Any]:
+    """Keys as the core's ``sensors``, with verdicts: of each marker and, last, of the plates, each judged alone."""
+    sd = np.sqrt(np.diag(H @ P @ H.T + R))
+    ratios, verdicts = [], []
     for first in range(0, len(v) - 7 + 1, 3):
         plates = first == len(v) - 7
         here = np.arange(first, first + (6 if plates else 3))
         here = here[present[here]]
         limit = s.wrench_gate if plates else s.marker_gate
-        if len(here) == 0:
-            found.append("missing")
-        elif limit is None or gate.ratio(v[here], H[here], P, R[np.ix_(here, here)], limit) <= 1:
-            found.append("accepted")
-        else:
-            found.append("refused")
-    return found
+        gated = len(here) > 0 and limit is not None
+        ratios.append(gate.ratio(v[here], H[here], P, R[np.ix_(here, here)], limit) if gated else 0.0)
+        verdicts.append("missing" if len(here) == 0 else "accepted" if ratios[-1] <= 1 else "refused")
+    return {
+        "innovation": np.where(present, v, np.nan)[:-1],
+        "innovation_sd": np.where(present, sd, np.nan)[:-1],
+        "test_ratio": np.where(np.array(verdicts) == "missing", np.nan, ratios),
+        "verdicts": verdicts,
+    }
 
 
 def believed(s: Any, verdicts: list[str], present: NDArray) -> NDArray:

@@ -27,6 +27,7 @@ _UNITS = {
     "foot_adjustment": "N for fx fy fz, N m for mx my mz",
     "wrench": "N for fx fy fz, N m for mx my mz",
     "nis": "1",
+    "test_ratio": "1",
     "n_rows": "1",
     "log_likelihood": "1",
 }
@@ -34,6 +35,7 @@ _FLAGS = {
     "moment_source": (MEANINGS, "where each moment comes from; derived: from the motion"),
     "joint_source": (MEANINGS, "where each joint's load comes from; derived: from the motion"),
     "foot_contact": (("in_the_air", "measured", "not_measured"), "contact of each foot"),
+    "verdict": (("missing", "accepted", "refused"), "what became of each sensor"),
 }
 """Codes by CF's conventions for flags: what 0, 1 and 2 mean, and of what."""
 _FLAGGED = {"moments": "moment_source", "moments_sd": "moment_source", "joint_loads": "joint_source"} | dict.fromkeys(
@@ -98,10 +100,11 @@ def full_dataset(estimate: Estimate) -> xr.Dataset:
 
 
 def write_netcdf(estimate: Estimate, path: Path) -> None:
-    """Write `full_dataset`, arrays compressed without loss."""
+    """Write `full_dataset`, arrays compressed without loss, but for the sensors' report, which is kept to 7 digits."""
     data = full_dataset(estimate)
     encoding = {
         name: {"zlib": True, "complevel": 4, "shuffle": True}
+        | ({"dtype": "float32"} if "innovation" in str(name) or name == "test_ratio" else {})
         for name, variable in data.data_vars.items()
         if variable.dtype.kind == "f" and variable.size > 1000
     }
