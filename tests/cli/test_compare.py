@@ -51,6 +51,7 @@ def test_one_trial_gives_table_ii_on_screen_and_as_files(trial: list[str], tmp_p
     assert "Held out" not in page and "http://" not in page.replace("http://www.w3.org", "")
 
 
+@pytest.mark.nightly
 def test_many_trials_give_mean_and_deviation(trial: list[str], tmp_path: Path, capsys: Said) -> None:
     markers, _, forces = trial
     out = tmp_path / "comparison"

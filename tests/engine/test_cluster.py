@@ -33,7 +33,7 @@ def test_a_worker_that_is_killed_on_the_way_changes_nothing(cluster):
     assert address.startswith("tcp://127.0.0.1:")
     pids = [worker.process.pid for worker in cluster.workers.values()]
     assert len(pids) == 2
-    killed = []
+    killed: list[int] = []
 
     def kill_one(done: int, total: int) -> None:
         if done == 10 and not killed:

@@ -33,7 +33,10 @@ def test_soon_after_a_gap_all_is_as_it_was_and_no_frame_claims_too_much(kind: st
     assert found.following_m < 0.005
 
 
-@pytest.mark.parametrize(("kind", "gap_s"), [("sagittal7", 0.5), ("sagittal7", 60.0), ("fullbody", 10.0)])
+@pytest.mark.parametrize(
+    ("kind", "gap_s"),
+    [("sagittal7", 0.5), ("sagittal7", 60.0), pytest.param("fullbody", 10.0, marks=pytest.mark.nightly)],
+)
 def test_a_live_session_says_that_the_motion_is_found_again(kind: str, gap_s: float) -> None:
     recording, _ = with_gap(person(kind, LENGTH_S), STOP_S, gap_s)
     frames: list[LiveFrame] = []

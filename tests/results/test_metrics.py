@@ -87,8 +87,13 @@ def test_a_recording_is_judged_by_the_practical_band(estimate: Estimate) -> None
 
 
 def test_metrics_are_computed_once_and_given_as_copies(monkeypatch: pytest.MonkeyPatch) -> None:
-    calls = []
-    monkeypatch.setattr("dynakin.results.measures.metrics.adaptation", lambda _: calls.append(1) or {})
+    calls: list[object] = []
+
+    def counted(estimate: object) -> dict[str, object]:
+        calls.append(estimate)
+        return {}
+
+    monkeypatch.setattr("dynakin.results.measures.metrics.adaptation", counted)
     made = Result(make_estimate(2.0))
     first = made.metrics()
     first["window"]["start_s"] = -1.0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -73,7 +74,7 @@ def test_a_block_of_soft_tissue_is_added_and_its_amplitude_is_the_declared_one(e
 
 
 @pytest.mark.parametrize(("markers", "names"), [(OPENCAP, "opencap-all"), (PLUG_IN_GAIT, "plug-in-gait")])
-def test_a_marker_has_the_size_that_the_simulator_draws_from(markers: type, names: str) -> None:
+def test_a_marker_has_the_size_that_the_simulator_draws_from(markers: Any, names: str) -> None:
     for row in markers.rows:
         found = published_amplitude_mm(markers.name(row, "right"), row.part)
         assert found is not None and found[0] == pytest.approx(1000.0 * regions()[row.region].amplitude_m), row.stem

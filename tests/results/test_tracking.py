@@ -127,7 +127,7 @@ def test_known_truth_what_is_flagged_is_what_is_wrong(squat: SimulatedTrial, smo
     found = dynakin.Estimator(model).run(mislabelled, smooth=smooth)
     assert found.lost[310:450].all() and why_lost(found) is not None
     truth = squat.truth.data["coordinates"].sel(coordinate=found.coordinate_names)
-    error = np.abs(found.data["coordinates"] - truth.transpose("time", "coordinate").values).values
+    error = np.abs(found.data["coordinates"].values - truth.transpose("time", "coordinate").values)
     assert np.nanmax(np.degrees(error)) < 25.0  # what is left is right
     with pytest.raises(LostError, match=r"EKF \(default\): the person was lost.*3\.00 to 4\.49 s"):
         compare_trial(mislabelled, Setup(model, smooth=smooth))

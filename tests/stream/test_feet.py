@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import dynakin
+from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.recordings.feet.loads import foot_loads
 from dynakin.results.measures.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
 from dynakin.settings import presets
@@ -137,7 +138,7 @@ class Standing:
             places[[s == self.initial.feet[foot] for s in segments]].mean(axis=0) for foot in self.initial.feet
         ]
 
-    def look(self, push: float, point: np.ndarray) -> tuple[dynakin.FootWrenches, bool]:
+    def look(self, push: float, point: np.ndarray) -> tuple[FootWrenches, bool]:
         """A vertical force in N at a point of the ground frame."""
         force, ground = np.array([0.0, push, 0.0]), self.initial.ground
         wrench = np.concatenate([force, np.cross(point * [1.0, 0.0, 1.0], force)])

@@ -9,6 +9,7 @@ import sys
 import time
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -57,9 +58,8 @@ def record(recording: Recording, folder: Path) -> None:
     recorder.opened(streams.markers, streams.plates)
     while (packets := source.read(0.0)) is not None:
         for packet in packets:
-            recorder.packet(
-                type(packet)(packet.time_s, *list(vars(packet).values())[1:2], float(np.max(packet.time_s)))
-            )  # type: ignore[call-arg,arg-type]
+            kind: Any = type(packet)
+            recorder.packet(kind(packet.time_s, list(vars(packet).values())[1], float(np.max(packet.time_s))))
     recorder.close()
 
 

@@ -183,7 +183,7 @@ def test_names_are_shown_as_they_are() -> None:
 def test_without_viser_it_is_said_how_to_get_it(monkeypatch: pytest.MonkeyPatch) -> None:
     from dynakin.stream.viewer import sink as viewer
 
-    monkeypatch.setattr(viewer.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(ConfigError, match=r"needs viser, which is not installed; pip install 'dynakin\[live\]'"):
         viewer.Viewer()
 

@@ -30,7 +30,8 @@ def inverse_dynamics(
     pin: ModuleType, tree: tuple[Segment, ...], motion: Motion, outside: Mapping[str, Array] | None = None
 ) -> Array:
     """Pinocchio's moments (T, n) in the order of the motion; ``outside``: wrenches (T, 6) about the ground origin."""
-    model, joint_of = pin.Model(), {}
+    model = pin.Model()
+    joint_of: dict[str, int] = {}
     model.gravity.linear = np.array([0.0, -9.80665, 0.0])
     for segment in tree:
         joint = 0 if segment.parent is None else joint_of[segment.parent]
@@ -91,7 +92,7 @@ def spatial_body(seed: int = 0) -> SimulatedBody:
     sites = [_site("pelvis", "pelvis", "hip_flexion_r", [0.10, 0.08, z]) for z in (-0.12, 0.12)] + [
         _site("trunk", "trunk", "lumbar_extension", [0.08, 0.30, 0.02])
     ]
-    feet = []
+    feet: list[Contact] = []
     for side, sign in (("r", 1.0), ("l", -1.0)):
         tree += _limbs(subject, side, sign)
         drivers = {"thigh": "knee", "shank": "knee", "foot": "ankle", "upper_arm": "elbow", "forearm": "elbow"}

@@ -48,7 +48,7 @@ def test_a_cluster_that_loses_a_worker_on_the_way_gives_the_same_table(paper: Sh
     options = {"n_workers": 2, "threads_per_worker": 1, "processes": True, "host": "127.0.0.1"}
     with distributed.LocalCluster(**options, dashboard_address=None) as cluster:
         pids = [worker.process.pid for worker in cluster.workers.values()]
-        killed = []
+        killed: list[int] = []
 
         def kill_one(done: int, total: int) -> None:
             if done == 5 and not killed:

@@ -112,7 +112,8 @@ def planar_model(seed: int, n_segments: int = 0) -> Spec:
     coordinates = [Coordinate(f"q{k}", rng.uniform(-0.3, 0.3)) for k in range(n)]
     for coordinate in coordinates[1:]:
         coordinate.locked = bool(not chain and rng.random() < 0.15)
-    segments, markers = [], []
+    segments: list[Segment] = []
+    markers: list[Marker] = []
     for k in range(n):
         parent = "ground" if k == 0 else f"s{k - 1 if chain else rng.integers(k)}"
         upward = np.array([0.0, 1.0, 0.0])

@@ -81,7 +81,8 @@ def walk(case: Case, **changes: Any) -> Walk:
         frames.append(linearised(case, f.state, k, dt))
         reports.append(f.update(d.markers[k], d.wrench[k]))
         after.append((f.state, f.covariance))
-    return Walk(*(np.array(a) for pairs in (before, after) for a in zip(*pairs, strict=True)), frames, reports)
+    (x_predicted, P_predicted), (x, P) = (map(np.array, zip(*pairs, strict=True)) for pairs in (before, after))
+    return Walk(x_predicted, P_predicted, x, P, frames, reports)
 
 
 def linearised(case: Case, x: NDArray, k: int, dt: float) -> Frame:
