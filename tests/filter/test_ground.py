@@ -141,9 +141,10 @@ def on_a_belt(walk: Recording) -> Recording:
     return replace(walk, markers=walk.markers + shift[:, None], plates=plates)
 
 
-def test_a_foot_beside_the_plates_alone_is_derived() -> None:
+@pytest.mark.parametrize("smooth", [False, pytest.param(True, marks=pytest.mark.nightly)])
+def test_a_foot_beside_the_plates_alone_is_derived(smooth: bool) -> None:
     walk = simulate("fullbody", "gait", 3, 4.0, 50.0).recording
-    found = person("fullbody").run(walk.with_plates(walk.plates[1:]))
+    found = person("fullbody").run(walk.with_plates(walk.plates[1:]), smooth=smooth)
     codes = sources(found, "ankle_angle_r"), sources(found, "ankle_angle_l")
     assert any((code == DERIVED).any() for code in codes)
     moments = found.data["moments"].sel(coordinate=["ankle_angle_r", "ankle_angle_l"]).values

@@ -90,6 +90,21 @@ def files(case: Case, tmp_path_factory: pytest.TempPathFactory) -> list[str]:
 
 
 def test_command_line(files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    command_line(files, tmp_path, capsys)
+
+
+@pytest.mark.nightly
+def test_command_line_and_a_run_with_what_it_wrote(
+    files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, out = command_line(files, tmp_path, capsys), tmp_path / "out"
+    assert main(["run", files[0], "--forces", files[0].replace("markers.trc", "forces.mot"), *OPTIONS,
+                 "--parameters", str(file), "-o", str(out)]) == 0  # fmt: skip
+    assert 'use = "' in file.read_text() and 'identified = "' in (out / "config.toml").read_text()
+    assert main(["run", str(out / "config.toml")]) == 0  # that record is no key that a run trips over
+
+
+def command_line(files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> Path:
     file = tmp_path / "subject.toml"
     assert main(["identify", *files, *OPTIONS, "-o", str(file)]) == 0
     said = " ".join(capsys.readouterr().out.split())
@@ -98,11 +113,7 @@ def test_command_line(files: list[str], tmp_path: Path, capsys: pytest.CaptureFi
     assert [path.name for path in tmp_path.iterdir()] == ["subject.toml"]
     assert main(["identify", "--compare", str(file), str(file)]) == 0
     assert "None of 22 base parameters changed" in " ".join(capsys.readouterr().out.split())
-    out = tmp_path / "out"
-    assert main(["run", files[0], "--forces", files[0].replace("markers.trc", "forces.mot"), *OPTIONS,
-                 "--parameters", str(file), "-o", str(out)]) == 0  # fmt: skip
-    assert 'use = "' in file.read_text() and 'identified = "' in (out / "config.toml").read_text()
-    assert main(["run", str(out / "config.toml")]) == 0  # that record is no key that a run trips over
+    return file
 
 
 def test_what_is_wrong_with_the_input_is_one_line_and_nothing_is_written(

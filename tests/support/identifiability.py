@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -28,6 +29,7 @@ class Told:
     found: Identifiability
 
 
+@cache
 def estimated_squat(coordinate: str = "", size_deg: float = 0.0) -> tuple[Estimator, Estimate]:
     """A squat of `squat7` with the simulator's default errors, one coordinate swinging once a second on top."""
 

@@ -120,6 +120,7 @@ def test_a_command_that_is_killed_and_started_again_gives_the_same_files(files: 
         assert (killed / name).read_bytes() == (whole / name).read_bytes(), name
 
 
+@pytest.mark.nightly
 def test_the_optimum_is_a_preset_that_run_takes(
     files: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
