@@ -13,6 +13,7 @@ import dynakin
 from dynakin.cli.app import main
 from dynakin.errors import ConfigError, OutputError
 from dynakin.pipeline import stages
+from dynakin.report.paper_figures.figures import FIGURES
 from dynakin.results.files.folder import OUTPUT_FILES
 from dynakin.settings.settings import Settings
 from dynakin.simulation.output import SimulatedTrial
@@ -124,7 +125,7 @@ def test_figures_that_fail_in_python_are_named_in_the_files(
         raise ValueError("zero-size array")
 
     result = dynakin.Result(from_python.estimate, settings=from_python.settings)
-    monkeypatch.setitem(dynakin.report.paper_figures.figures.FIGURES, "figure5_angles", broken)
+    monkeypatch.setitem(FIGURES, "figure5_angles", broken)
     with pytest.raises(OutputError, match=r"the results are saved .*Failed: figure figure5_angles"):
         result.save(tmp_path / "out", figures=tmp_path / "figures")
     assert json.loads((tmp_path / "out" / "metrics.json").read_text())["failures"] == ["figure figure5_angles"]

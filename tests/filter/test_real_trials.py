@@ -9,6 +9,7 @@ import pytest
 
 import dynakin
 from dynakin.errors import ModelError
+from dynakin.recordings.formats.mot import read_table
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.sources import ABSENT
 
@@ -31,7 +32,7 @@ def test_squats1_follows_markers_and_plates_as_the_paper_does(squats1: dynakin.E
 
 def test_squats1_knee_moves_as_another_system_says(squats1: dynakin.Estimate, data_dir: Path) -> None:
     # The other system's angles are three-dimensional and of the right leg; only the movement is compared, not the zero.
-    table = dynakin.recordings.read_table(data_dir / "opencap_subject4" / "squats1_ik.mot")
+    table = read_table(data_dir / "opencap_subject4" / "squats1_ik.mot")
     other = table.column("knee_angle_r")
     ours = squats1.data["coordinates"].sel(coordinate="knee").values
     difference = np.degrees((ours - ours.mean()) - (other - other.mean()))

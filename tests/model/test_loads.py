@@ -13,6 +13,7 @@ from dynakin import _core
 from dynakin.errors import ConfigError, ModelError, RecordingError
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.loads import with_loads
+from dynakin.model.definition import ModelDefinition
 from dynakin.pipeline.stages import configure
 from dynakin.recordings.plates.loads import without_plate_loads
 from dynakin.results.measures.metrics import compute_metrics
@@ -33,12 +34,12 @@ def trial() -> SimulatedTrial:
 
 
 @pytest.fixture(scope="module")
-def definition() -> dynakin.model.ModelDefinition:
+def definition() -> ModelDefinition:
     return dynakin.load_model("sagittal7", subject=SUBJECT, markers="opencap")
 
 
 @pytest.fixture(scope="module")
-def initial(trial: SimulatedTrial, definition: dynakin.model.ModelDefinition) -> CalibratedModel:
+def initial(trial: SimulatedTrial, definition: ModelDefinition) -> CalibratedModel:
     return definition.calibrate(trial.recording)
 
 
@@ -71,9 +72,7 @@ def test_a_load_adds_its_own_wrench_and_nothing_else(initial: CalibratedModel) -
     assert initial.spec.segments[-1].name != "bar"  # what was measured stays as it is
 
 
-def test_the_filter_finds_the_person_beside_the_load(
-    trial: SimulatedTrial, definition: dynakin.model.ModelDefinition
-) -> None:
+def test_the_filter_finds_the_person_beside_the_load(trial: SimulatedTrial, definition: ModelDefinition) -> None:
     """A part of the trunk declared as a load: the same body, so the same movement and the same plates."""
     part = CarriedLoad(segment="trunk", mass_kg=7.0, place_m=(0.0, 0.2, 0.0), inertia_kg_m2=(0.1, 0.1, 0.1))
     lighter = replace(definition, subject=SUBJECT.changed(mass_kg=63.0))
@@ -89,7 +88,7 @@ def test_the_filter_finds_the_person_beside_the_load(
     assert unknown.mass_kg == 63.0 and any("plates carry" in m or "plates read" in m for m in unknown.messages)
 
 
-def test_loads_that_do_not_fit_are_told(initial: CalibratedModel, definition: dynakin.model.ModelDefinition) -> None:
+def test_loads_that_do_not_fit_are_told(initial: CalibratedModel, definition: ModelDefinition) -> None:
     with pytest.raises(ModelError, match=r"load 'bar': segment 'trunck' is not .* \(did you mean 'trunk'\?\)"):
         with_loads(initial, [BARBELL.model_copy(update={"segment": "trunck"})])
     with pytest.raises(ModelError, match="load 'trunk': the name is taken"):

@@ -10,6 +10,7 @@ import pytest
 
 import dynakin
 from dynakin.errors import ConfigError
+from dynakin.recordings.formats.mot import read_table
 from dynakin.results.measures.fit import signal_fit, truth_error
 from dynakin.simulation.trial import simulate_squat
 from dynakin.validation.reference.least_squares import identify, predicted_wrench
@@ -114,7 +115,7 @@ def test_squats1_classical_knee_moves_as_another_system_says(
     recording, estimator, _ = squats1
     assert estimator.initial is not None
     knee = reference_methods(recording, estimator.initial, estimator.model).data["coordinates"].sel(coordinate="knee")
-    table = dynakin.recordings.read_table(data_dir / "opencap_subject4" / "squats1_ik.mot")
+    table = read_table(data_dir / "opencap_subject4" / "squats1_ik.mot")
     error = truth_error(table.column("knee_angle_r"), knee.values)
     assert error.rms_about_mean is not None and np.degrees(error.rms_about_mean) < 5.0
 

@@ -16,6 +16,7 @@ from dynakin.report.page import render_report
 from dynakin.report.playback import playback
 from dynakin.report.styles import segment_colours
 from dynakin.results.estimate import Estimate
+from dynakin.results.measures.pressure import floor_height
 from support.estimates.synthetic import make_estimate
 
 
@@ -63,7 +64,7 @@ def test_force_acts_where_its_moment_vanishes(jointed: Estimate) -> None:
     found = json.loads(str(playback(replace(jointed, data=data)).data))
     point, force = (unpacked(found["arrays"][f"measured_{name}"]) for name in ("points", "forces"))
     x, y, z = 1e-3 * point[0]
-    assert y == pytest.approx(jointed.floor_height_m, abs=1e-4) and z == 0.0
+    assert y == pytest.approx(floor_height(jointed), abs=1e-4) and z == 0.0
     assert x * 600.0 - y * 30.0 == pytest.approx(-72.0, abs=0.05)
     np.testing.assert_allclose(force[0], [30.0, 600.0, 0.0], atol=0.02)
     assert np.isnan(point[20:, :2]).all()  # hardly loaded, not known

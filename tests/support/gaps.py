@@ -8,6 +8,7 @@ from functools import cache
 import numpy as np
 
 import dynakin
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.recording import Recording
 from dynakin.simulation.trial import simulate
 
@@ -47,7 +48,7 @@ class Followed:
         return float(np.sqrt(np.mean(self.off**2)))
 
 
-def distance(initial: dynakin.model.CalibratedModel, estimated: np.ndarray, measured: dict[str, np.ndarray]) -> float:
+def distance(initial: CalibratedModel, estimated: np.ndarray, measured: dict[str, np.ndarray]) -> float:
     """RMS over the markers, m, on the axes that the model measures."""
     places = initial.ground.points_to_ground(np.stack([measured[name] for name in initial.recorded_markers]))
     axes = np.array([marker.measured for marker in initial.spec.markers])
