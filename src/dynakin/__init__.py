@@ -15,6 +15,7 @@ from dynakin.filter import presets
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.noise import Noise
 from dynakin.filter.samples import Sample
+from dynakin.filter.tracker import Tracker
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import ModelDefinition, load_model
 from dynakin.model.opensim.definition import load_opensim
@@ -40,6 +41,7 @@ __all__ = [
     "Recording",
     "Sample",
     "Subject",
+    "Tracker",
     "load_model",
     "load_opensim",
     "presets",

@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 from dynakin import Estimate, Estimator, Subject, load_model
+from dynakin.filter.estimator import Tracked
+from dynakin.filter.tracker import Tracker
 from dynakin.identification.observability.measured import MeasuredModel
-from dynakin.identification.observability.person import estimator_of
+from dynakin.identification.observability.person import tracker_of
 from dynakin.identification.observability.trial import Identifiability, identifiability
 from dynakin.model.definition import _FOLDER
 from dynakin.simulation.bodies.registry import choose_body
@@ -26,23 +28,23 @@ SEED, DURATION_S, MASS_KG, HEIGHT_M = 3, 12.0, 70.0, 1.75
 
 @dataclass(frozen=True)
 class Told:
-    estimator: Estimator
+    tracker: Tracker
     estimate: Estimate
     found: Identifiability
 
 
 @pytest.fixture(scope="session", params=["sagittal7", "squat7"])
 def measured(request: pytest.FixtureRequest) -> MeasuredModel:
-    return MeasuredModel.of(estimator_of(load_model(request.param)))
+    return MeasuredModel.of(tracker_of(load_model(request.param)))
 
 
 @pytest.fixture(scope="session")
 def squat() -> Told:
-    estimator, estimate = estimated_squat()
-    return Told(estimator, estimate, identifiability(estimator, estimate))
+    estimate, tracker = estimated_squat()
+    return Told(tracker, estimate, identifiability(tracker, estimate))
 
 
-def estimated_squat(coordinate: str = "", size_deg: float = 0.0) -> tuple[Estimator, Estimate]:
+def estimated_squat(coordinate: str = "", size_deg: float = 0.0) -> Tracked:
     """A squat of `squat7` with the simulator's default errors, one coordinate swinging once a second on top."""
 
     def at(time: np.ndarray) -> Motion:
@@ -61,7 +63,7 @@ def estimated_squat(coordinate: str = "", size_deg: float = 0.0) -> tuple[Estima
 
     trial = simulate("squat7", at, SEED, DURATION_S, mass_kg=MASS_KG, height_m=HEIGHT_M)
     estimator = Estimator(load_model("squat7", Subject(mass_kg=MASS_KG, height_m=HEIGHT_M, sex="male")))
-    return estimator, estimator.run(trial.recording)
+    return estimator.track(trial.recording)
 
 
 def changed_model(folder: Path, *changes: tuple[str, str]) -> Path:

@@ -171,18 +171,17 @@ def estimate_from(
     )
     recording = without_plate_loads(recording, config.plate_loads, config.vertical)
     static = None if config.static is None else read(config.static)
-    estimate = estimator.run(recording, static=static, smooth=config.smooth, progress=progress)
+    estimate, tracker = estimator.track(recording, static=static, smooth=config.smooth, progress=progress)
     estimate = replace(estimate, config=config.as_used() | estimate.config)
     if not keep_lost:
         refuse_lost(estimate, "--keep-lost")
     with failures.stage("joint angles of angles.sto"):
         estimate = asked_angles(estimator, estimate, static, config.zero, config.signs)
-    assert estimator.initial is not None
-    n_states = len(estimator.initial.names)
+    n_states = len(tracker.calibrated.names)
     comparison = None
     with failures.stage("comparison with the reference methods"):
         comparison = trial_of(
-            {presets.title(config.preset): estimate}, estimator.initial, estimator.model, whatever=True
+            {presets.title(config.preset): estimate}, tracker.calibrated, estimator.model, whatever=True
         )
     if n_states > LARGEST_BENCH:
         note = (
@@ -193,7 +192,7 @@ def estimate_from(
     told = None
     with failures.stage("what the recording tells of the constants"):
         try:
-            told = identifiability(estimator, estimate)
+            told = identifiability(tracker, estimate)
         except DynakinError as error:  # a trial of a few frames, say: no failure
             note = f"What the recording tells of the constants is left out: {error.message}"
             estimate = replace(estimate, messages=[*estimate.messages, note])

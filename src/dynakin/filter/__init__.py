@@ -1,10 +1,11 @@
-"""The filter as users meet it: noise settings, the estimator, live samples."""
+"""The filter as users meet it: noise settings, the estimator and its tracker, live samples."""
 
 from dynakin.filter import presets
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.foot_wrenches import FootWrenches
-from dynakin.filter.live import StepEstimate
 from dynakin.filter.noise import Noise
 from dynakin.filter.samples import Sample
+from dynakin.filter.step import StepEstimate
+from dynakin.filter.tracker import Tracker
 
-__all__ = ["Estimator", "FootWrenches", "Noise", "Sample", "StepEstimate", "presets"]
+__all__ = ["Estimator", "FootWrenches", "Noise", "Sample", "StepEstimate", "Tracker", "presets"]

@@ -137,17 +137,16 @@ def estimate_each(
     lost: dict[str, str] = {}
     for preset in setup.noise:
         estimator = setup.estimator(preset)
-        estimate = estimator.run(recording, static=static, smooth=setup.smooth, progress=progress)
+        estimate, tracker = estimator.track(recording, static=static, smooth=setup.smooth, progress=progress)
         reason = estimate.why_lost
         if reason is None:
             estimates[preset] = asked_angles(estimator, estimate, static, setup.zero, setup.signs)
         else:
             lost[preset] = reason
-    assert estimator.initial is not None
     if not estimates:
         where = recording.path or recording.name
         raise LostError(f"{where}: {'; '.join(f'EKF ({preset}): {reason}' for preset, reason in lost.items())}")
-    return estimates, lost, estimator.initial
+    return estimates, lost, tracker.calibrated
 
 
 def trial_of(
