@@ -101,14 +101,14 @@ def one_trial(model: str, seed: int, duration: float, changes: dict[str, float])
     settings = {"default": presets.default().model_dump() | changes, "paper": presets.paper().model_dump()}
     for name, values in settings.items():
         estimator = dynakin.Estimator(definition, Noise(**values))
-        initial = estimator.start_from(off_by(estimator.start(trial.recording), seed))
+        tracker = estimator.start(off_by(estimator.start(trial.recording).calibrated, seed))
+        initial = tracker.calibrated
         names = tuple(c.name for c in initial.spec.coordinates if not c.locked)
         measured = recording_arrays(trial.recording, initial)
-        arrays = estimator.run_arrays(trial.recording.time, *measured)
+        arrays = tracker.run_arrays(trial.recording.time, *measured)
         found.append(figures(name, blocks(arrays, initial), trial, names))
         if name == "default":
-            estimator.start_from(initial)
-            arrays = estimator.run_smoothed_arrays(trial.recording.time, *measured)
+            arrays = tracker.fresh().run_smoothed_arrays(trial.recording.time, *measured)
             found.append(figures("default, smoothed", blocks(arrays, initial), trial, names))
     at = reference_methods(trial.recording, initial, definition).data.sel(coordinate=list(names))
     given = {

@@ -98,7 +98,7 @@ def measure(name: str, seconds: float, view: bool) -> None:
     share = 100.0 * others / ((after[2] - before[2]) * cores)
     row = (
         name,
-        f"{len(estimator.state)}",
+        f"{len(live.tracker.state)}",
         "yes" if view else "no",
         f"{len(ms)}",
         f"{np.median(ms):.2f}",

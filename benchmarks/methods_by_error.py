@@ -28,9 +28,8 @@ def one_trial(seed: int) -> dict[str, tuple[float, ...]]:
     recording = trial.recording
     window = recording.time >= START_S
     estimator = dynakin.Estimator(dynakin.load_model("sagittal7", subject=SUBJECT, markers="opencap"))
-    data = {"EKF, `paper`": estimator.run(recording, smooth=False).data}
-    initial = estimator.initial
-    assert initial is not None
+    estimate, tracker = estimator.track(recording, smooth=False)
+    data, initial = {"EKF, `paper`": estimate.data}, tracker.calibrated
     at = reference_methods(recording, initial, estimator.model)
     data["AT, 6 Hz"] = at.data
     fit = identify(at.chain, initial.plan, at.kinematics, plane_wrench(recording, initial), mass_kg=initial.mass_kg)

@@ -71,9 +71,10 @@ def filtered(estimate: tuple[str, ...], *, smooth: bool = False) -> tuple[float,
     recording = recorded("squats1")
     definition = load_opensim(FILE, Subject(mass_kg=MASS["squats1"]))
     estimator = dynakin.Estimator(definition, without_plates(), estimate=estimate)
-    markers, wrench = recording_arrays(recording, estimator.start(recording), gaps=True)
+    tracker = estimator.start(recording)
+    markers, wrench = recording_arrays(recording, tracker.calibrated, gaps=True)
     wrench[:] = np.nan
-    run = estimator.run_smoothed_arrays if smooth else estimator.run_arrays
+    run = tracker.run_smoothed_arrays if smooth else tracker.run_arrays
     return distance_mm(markers, run(recording.time, markers, wrench)["markers_estimated"]), markers
 
 

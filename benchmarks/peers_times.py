@@ -26,20 +26,20 @@ def steps(file: Path, data: Path, mass: float, kinds: tuple[str, ...], plates: b
     if not plates:
         noise = noise.changed(plate_force=0.0, plate_moment=0.0, plate_delay_s=0.0)
     estimator = dynakin.Estimator(load_opensim(file, Subject(mass_kg=mass)), noise, estimate=kinds)
-    initial = estimator.start(recording)
+    tracker = estimator.start(recording)
+    initial = tracker.calibrated
     markers, wrench = recording_arrays(recording, initial, gaps=True)
     if not plates:
         wrench[:] = np.nan
     found = []
     for _ in range(2):
-        estimator.start_from(initial)
-        found.append(estimator.run_arrays(recording.time, markers, wrench)["step_us"])
+        found.append(tracker.fresh().run_arrays(recording.time, markers, wrench)["step_us"])
     return f"{len(initial.names)} states", np.concatenate(found)
 
 
 def biorbd_frames(file: Path, data: Path, mass: float) -> tuple[str, Array]:
     recording = dynakin.read(data / "squats1.trc").window(0.0, 10.0)
-    initial = dynakin.Estimator(load_opensim(file, Subject(mass_kg=mass)), estimate=()).start(recording)
+    initial = dynakin.Estimator(load_opensim(file, Subject(mass_kg=mass)), estimate=()).start(recording).calibrated
     markers = np.stack([recording.marker(name) for name in initial.recorded_markers], axis=1)
     n, spent, places = kalman(initial.spec, markers, 100.0)
     gap = 1000.0 * np.sqrt(np.nanmean(((places - markers) ** 2).sum(axis=2)))

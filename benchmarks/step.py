@@ -14,8 +14,8 @@ import dynakin_bench
 import numpy as np
 
 import dynakin
-from dynakin import _core
 from dynakin.filter.augment import initial_covariance
+from dynakin.filter.core_filter import filter_settings
 from dynakin.filter.samples import recording_arrays
 from dynakin.simulation.trial import simulate_squat
 
@@ -47,12 +47,12 @@ def main() -> None:
         for preset in ("paper", "default"):
             noise = dynakin.presets.preset(preset)
             estimator = dynakin.Estimator(dynakin.load_model(name, subject=subject, markers="opencap"), noise)
-            initial = estimator.start(recording)
-            model = _core.Model(initial.spec)
+            tracker = estimator.start(recording)
+            initial, model = tracker.calibrated, tracker.core_model
             markers, wrench = recording_arrays(recording, initial)
             rows = int(sum(sum(m.measured) for m in initial.spec.markers) + sum(initial.spec.wrench_measured))
             rows += noise.total_mass_use == "frame"
-            settings, P0 = estimator.filter_settings(initial), initial_covariance(initial, noise)
+            settings, P0 = filter_settings(initial, noise, model.layout), initial_covariance(initial, noise)
             step, dense = [], []
             while len(step) < STEPS:
                 result = dynakin_bench.interleaved(

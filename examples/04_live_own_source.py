@@ -66,8 +66,8 @@ def mylab_source(address: str, options: dict[str, str]) -> MyLab:
 
 def show(frame: LiveFrame) -> None:
     if round(frame.estimate.time_s * 100) % 50 == 0:
-        knee = np.rad2deg(frame.estimate.coordinates[3])
-        print(f"{frame.estimate.time_s:5.2f} s  knee {knee:6.1f} deg  moment {frame.estimate.moments[3]:7.1f} N m")
+        knee = np.rad2deg(frame.estimate.coordinates["knee"])
+        print(f"{frame.estimate.time_s:5.2f} s  knee {knee:6.1f} deg  moment {frame.estimate.moments['knee']:7.1f} N m")
 
 
 if __name__ == "__main__":

@@ -44,7 +44,7 @@ def main() -> None:
         unknowns = Unknowns.of(common, geometry=False)
         bodies, start = unknowns.bodies, np.zeros(len(unknowns.bodies.sd))
         true = np.array([sims[0].truth.parameters[name] for name in bodies.names])
-        K = base_of(MeasuredModel.of(common.estimator)).K
+        K = base_of(MeasuredModel.of(common.tracker())).K
         P = bodies.covariance(start, np.diag(bodies.sd**2))
         prior = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", K, P, K), 0.0))
         told = prior > 1e-9 * prior.max()

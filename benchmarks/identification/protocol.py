@@ -106,7 +106,7 @@ def shares(common: Common, H: Array, unknowns: Unknowns) -> tuple[Array, Array]:
     bodies, start = unknowns.bodies, np.zeros(len(unknowns.bodies.sd))
     after = bodies.covariance(start, posterior(H, unknowns))
     before = bodies.covariance(start, np.diag(bodies.sd**2))
-    K = base_of(MeasuredModel.of(common.estimator)).K
+    K = base_of(MeasuredModel.of(common.tracker())).K
     told, known = (np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", K, P, K), 0.0)) for P in (after, before))
     keep = known > 1e-9 * known.max()
     return np.sqrt(np.diag(after)), told[keep] / known[keep]
@@ -153,7 +153,7 @@ def verify(
         "squat, 10 s": identify_batch(common, [squat], unknowns).phi,
         "true bodies": np.array([walking.truth.parameters[name] for name in bodies.names]),
     }
-    K = base_of(MeasuredModel.of(common.estimator)).K
+    K = base_of(MeasuredModel.of(common.tracker())).K
     after, before = (
         np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", K, P, K), 0.0))
         for P in (protocol.phi_covariance(), bodies.covariance(start, np.diag(bodies.sd**2)))

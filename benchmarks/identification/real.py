@@ -42,9 +42,10 @@ def product(
     """(T, 6) smoothed wrench of a trial without plates."""
     estimator = Estimator(model, parameters=subject)
     recording = replace(recording, plates=())
-    initial = estimator.start(recording, static=static)
+    tracker = estimator.start(recording, static=static)
+    initial = tracker.calibrated
     markers = marker_paths(recording, initial, initial.ground)
-    arrays = estimator.run_smoothed_arrays(recording.time, markers, np.full((recording.n_frames, 6), np.nan))
+    arrays = tracker.run_smoothed_arrays(recording.time, markers, np.full((recording.n_frames, 6), np.nan))
     return arrays["wrench_estimated"]
 
 

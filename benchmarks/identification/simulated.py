@@ -72,8 +72,8 @@ def one(model: str, seed: int, duration_s: float, filters: tuple[str, ...]) -> d
             found[task, name] = judged(common, raw, wrench, SKIPPED_S.get(task, SKIPPED_ELSE_S))
             found[task + ", from truth", name] = np.sqrt(np.mean(((phi - true) / spread) ** 2, keepdims=True))
     every = batch(common, trials, inertia=True, geometry=False)
-    K = base_of(MeasuredModel.of(common.estimator)).K
-    order = [MeasuredModel.of(common.estimator).names.index(name) for name in bodies.names]
+    K = base_of(MeasuredModel.of(common.tracker())).K
+    order = [MeasuredModel.of(common.tracker()).names.index(name) for name in bodies.names]
     assert order == sorted(order)  # K is over the inertial numbers in the state's order
     sd, before = (np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", K, P, K), 0.0)) for P in (every.phi_covariance(), prior))
     told = (before > 0.0) & (sd > 1e-6 * before)  # all but the total mass, which is known

@@ -13,6 +13,7 @@ if not _cpu.supported():
 from dynakin.errors import DynakinError
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.samples import Sample
+from dynakin.filter.tracker import Tracker
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import ModelDefinition, load_model
 from dynakin.model.opensim.definition import load_opensim
@@ -43,6 +44,7 @@ __all__ = [
     "Result",
     "Sample",
     "Subject",
+    "Tracker",
     "load_model",
     "load_opensim",
     "presets",

@@ -34,7 +34,7 @@ def estimator() -> Estimator:
 
 @pytest.fixture(scope="module")
 def initial(walk: Recording, estimator: Estimator) -> CalibratedModel:
-    return estimator.start(walk)
+    return estimator.start(walk).calibrated
 
 
 @pytest.fixture(scope="module")

@@ -23,10 +23,8 @@ from dynakin.validation.setup import Setup
 
 
 @pytest.fixture(scope="module")
-def estimator(simulated: SimulatedTrial, setup: Setup) -> dynakin.Estimator:
-    made = setup.estimator("default")
-    made.start(simulated.recording)
-    return made
+def initial(simulated: SimulatedTrial, setup: Setup) -> dynakin.CalibratedModel:
+    return setup.estimator("default").start(simulated.recording).calibrated
 
 
 def test_a_comparison_starts_from_the_identified_subject(setup: Setup) -> None:
@@ -34,9 +32,8 @@ def test_a_comparison_starts_from_the_identified_subject(setup: Setup) -> None:
     assert replace(setup, parameters=subject).estimator("default").parameters is subject
 
 
-def test_nothing_is_filtered_again(compared: Trial, estimator: dynakin.Estimator) -> None:
-    assert estimator.initial is not None
-    again = trial_of(compared.estimates, estimator.initial, estimator.model)
+def test_nothing_is_filtered_again(compared: Trial, initial: dynakin.CalibratedModel, setup: Setup) -> None:
+    again = trial_of(compared.estimates, initial, setup.definition)
     for one, other in zip(compared.methods, again.methods, strict=True):
         assert one.name == other.name
         np.testing.assert_array_equal(one.wrench, other.wrench)
@@ -59,25 +56,23 @@ def test_repetitions_lie_after_the_adaptation_and_every_method_has_their_curves(
 
 
 def test_a_reference_that_cannot_be_had_is_a_note_where_the_run_asks_for_whatever_there_is(
-    compared: Trial, estimator: dynakin.Estimator
+    compared: Trial, initial: dynakin.CalibratedModel, setup: Setup
 ) -> None:
-    assert estimator.initial is not None
     with pytest.raises(RecordingError, match="80 Hz is not possible at 100 Hz"):
-        trial_of(compared.estimates, estimator.initial, estimator.model, 80.0)
-    alone = trial_of(compared.estimates, estimator.initial, estimator.model, 80.0, whatever=True)
+        trial_of(compared.estimates, initial, setup.definition, 80.0)
+    alone = trial_of(compared.estimates, initial, setup.definition, 80.0, whatever=True)
     assert [method.name for method in alone.methods] == ["EKF (default)"]
     (note,) = alone.notes
     assert note.startswith("AT and the classical method are left out: ") and "\n" not in note
 
 
 def test_a_landmark_that_the_recording_does_not_give_is_named(
-    simulated: SimulatedTrial, estimator: dynakin.Estimator
+    simulated: SimulatedTrial, initial: dynakin.CalibratedModel, setup: Setup
 ) -> None:
-    assert estimator.initial is not None
-    landmarks = landmark_paths(simulated.recording, estimator.initial, estimator.model)
+    landmarks = landmark_paths(simulated.recording, initial, setup.definition)
     del landmarks["hip"]
     with pytest.raises(ModelError, match=r"of thigh needs the landmarks .* do not give hip"):
-        classical_angles(PlanarChain.of(estimator.initial.plan), estimator.initial.plan, landmarks)
+        classical_angles(PlanarChain.of(initial.plan), initial.plan, landmarks)
 
 
 def test_a_walk_has_curves_of_each_foot(data_dir: Path, compared: Trial) -> None:

@@ -89,7 +89,7 @@ def test_a_recording_is_smoothed_unless_the_settings_have_no_smoother(
     np.testing.assert_array_equal(by_default.data["state"].values, smoothed.data["state"].values)
     assert not any(message.startswith("Not smoothed") for message in by_default.messages)
     paper = estimator(noise=dynakin.presets.paper())
-    refused, live = paper.run(trial.recording), paper.again().run(trial.recording, smooth=False)
+    refused, live = paper.run(trial.recording), paper.run(trial.recording, smooth=False)
     np.testing.assert_array_equal(refused.data["state"].values, live.data["state"].values)
     assert refused.config["smooth"] is False
     (said,) = [message for message in refused.messages if message.startswith("Not smoothed")]
@@ -110,16 +110,15 @@ def test_what_only_describes_live_estimates_is_no_headline_of_a_smoothed_one(
 
 
 def test_the_delayed_frame_is_the_smoothers_of_what_was_seen(trial: SimulatedTrial) -> None:
-    live = estimator(lag=15)
-    live.start(trial.recording)
+    live = estimator(lag=15).start(trial.recording)
+    assert live.delayed() is None
     for sample in samples(trial.recording)[:120]:
         now = live.step(sample)
         delayed = live.delayed()
         assert (delayed is None) == (sample.time_s < 0.15 - 1e-9)
     assert delayed is not None and delayed.time_s == pytest.approx(now.time_s - 0.15)
-    offline = estimator()
-    initial = offline.start(trial.recording)
-    markers, wrench = recording_arrays(trial.recording, initial)
+    offline = estimator().start(trial.recording)
+    markers, wrench = recording_arrays(trial.recording, offline.calibrated)
     arrays = offline.run_smoothed_arrays(trial.recording.time[:120], markers[:120], wrench[:120])
     np.testing.assert_allclose(delayed.speeds, arrays["state"][104, 7:14], atol=1e-8)
     with pytest.raises(ConfigError, match=r"expected Estimator\(\.\.\., lag=frames\)"):
@@ -127,8 +126,7 @@ def test_the_delayed_frame_is_the_smoothers_of_what_was_seen(trial: SimulatedTri
 
 
 def test_deviations_on_demand_are_those_of_the_run(trial: SimulatedTrial, plain: Estimate) -> None:
-    live = estimator()
-    live.start(trial.recording)
+    live = estimator().start(trial.recording)
     for sample in samples(trial.recording)[:50]:
         live.step(sample)
     found = live.deviations()
@@ -152,7 +150,7 @@ def test_plates_that_lag_are_brought_into_step() -> None:
 def test_an_offset_of_the_plates_is_found(trial: SimulatedTrial) -> None:
     def pushed(recording: dynakin.Recording, newtons: float) -> dynakin.Recording:
         first, *others = recording.plates
-        forward = estimator().start(recording).ground.forward
+        forward = estimator().calibrate(recording).ground.forward
         return recording.with_plates((dataclasses.replace(first, force=first.force + newtons * forward), *others))
 
     result = estimator().run(pushed(trial.recording, 8.0))

@@ -29,8 +29,7 @@ def trial() -> SimulatedTrial:
 def test_live_steps_equal_the_run(trial: SimulatedTrial, preset: str, rows: int) -> None:
     noise = dynakin.presets.preset(preset)
     offline = estimator(noise=noise).run(trial.recording, smooth=False)
-    live = estimator(noise=noise)
-    live.start(trial.recording)
+    live = estimator(noise=noise).start(trial.recording)
     for k, sample in enumerate(samples(trial.recording)[:200]):
         step = live.step(sample)
         np.testing.assert_allclose(step.coordinates, offline.data["coordinates"].values[k], rtol=0, atol=1e-12)
@@ -39,8 +38,7 @@ def test_live_steps_equal_the_run(trial: SimulatedTrial, preset: str, rows: int)
 
 
 def test_a_sample_without_plates_or_markers_is_ridden_through(trial: SimulatedTrial) -> None:
-    live = estimator(noise=dynakin.presets.paper())
-    live.start(trial.recording)
+    live = estimator(noise=dynakin.presets.paper()).start(trial.recording)
     first, second, third, *_ = samples(trial.recording)
     live.step(first)
     assert live.step(dataclasses.replace(second, plates={})).report.n_rows == 35
@@ -48,8 +46,7 @@ def test_a_sample_without_plates_or_markers_is_ridden_through(trial: SimulatedTr
 
 
 def test_by_default_plates_alone_do_not_move_the_estimate(trial: SimulatedTrial) -> None:
-    live = estimator()
-    live.start(trial.recording)
+    live = estimator().start(trial.recording)
     first, second, third, *_ = samples(trial.recording)
     live.step(first)
     assert live.step(dataclasses.replace(second, plates={})).report.n_rows == 34
@@ -90,8 +87,8 @@ def test_noise_settings_reach_the_filter(trial: SimulatedTrial) -> None:
 def test_bounds_are_kept_at_every_frame(trial: SimulatedTrial, preset: str) -> None:
     bounds = dynakin.Bounds(marker_threshold_m=0.002, length_fraction=0.01)
     tight = estimator(noise=dynakin.presets.preset(preset), bounds=bounds)
-    result = tight.run(trial.recording, smooth=False)
-    initial = tight.initial
+    result, tracker = tight.track(trial.recording, smooth=False)
+    initial = tracker.calibrated
     state = result.data["state"].values
     assert (state >= initial.lower).all() and (state <= initial.upper).all()
     assert result.data["constrained"].values.sum() > 0
@@ -101,7 +98,7 @@ def test_bounds_are_kept_at_every_frame(trial: SimulatedTrial, preset: str) -> N
 
 
 def test_a_model_survives_pickling(trial: SimulatedTrial) -> None:
-    spec = estimator().start(trial.recording).spec
+    spec = estimator().start(trial.recording).calibrated.spec
     model = dynakin._core.Model(spec)
     again = pickle.loads(pickle.dumps(model))
     assert again.layout.names == model.layout.names
@@ -152,8 +149,7 @@ def test_what_each_sensor_said_is_in_steps_run_and_file(trial: SimulatedTrial, t
     jumped = [str(name) for name in data["sensor"].values].index("r_knee")
     assert ratio[50, jumped] > 1.0 and verdict[50, jumped] == 2
     assert (ratio[verdict == 1] <= 1.0).all() and (ratio[verdict == 2] > 1.0).all()
-    live = estimator()
-    live.start(recording)
+    live = estimator().start(recording)
     for k, sample in enumerate(samples(recording)[:60]):
         live.step(sample)
         sensors = live.sensors
@@ -174,11 +170,11 @@ def test_a_marker_far_beyond_all_numbers_is_divergence_at_its_frame(trial: Simul
         markers[250, knee] = 9e3  # a recording holds nothing that is further away
 
     filtering = estimator(noise=dynakin.presets.paper())
-    initial = filtering.start(trial.recording)
-    markers, wrench, _ = filtering.measured(trial.recording, initial)
-    markers[250, initial.recorded_markers.index("r_knee")] = 1e200
+    tracker = filtering.start(trial.recording)
+    markers, wrench, _ = filtering.measured(trial.recording, tracker.calibrated)
+    markers[250, tracker.calibrated.recorded_markers.index("r_knee")] = 1e200
     with pytest.raises(DivergenceError, match=r"diverged at frame 250 \(2\.500000 s\)"):
-        filtering.run_arrays(trial.recording.time, markers, wrench)
+        tracker.run_arrays(trial.recording.time, markers, wrench)
     gated = estimator().run(with_markers(trial.recording, broken))
     assert [(e.kind, e.frame) for e in gated.events if e.subject == "r_knee"] == [("gated", 250)]
 
@@ -199,12 +195,9 @@ def test_an_unknown_preset_lists_the_known_ones() -> None:
         dynakin.presets.preset("papr")
 
 
-def test_steps_need_a_start_and_go_forward_in_time(trial: SimulatedTrial) -> None:
-    live = estimator()
+def test_steps_go_forward_in_time(trial: SimulatedTrial) -> None:
+    live = estimator().start(trial.recording)
     first, second, *_ = samples(trial.recording)
-    with pytest.raises(ConfigError, match="has not been started"):
-        live.step(first)
-    live.start(trial.recording)
     live.step(second)
     with pytest.raises(RecordingError, match="older than the one before"):
         live.step(first)

@@ -10,6 +10,7 @@ import pytest
 
 from dynakin import _core, read
 from dynakin.filter.estimator import Estimator
+from dynakin.filter.tracker import Tracker
 from dynakin.model.definition import load_model
 from dynakin.recordings.formats.mot import read_table
 from dynakin.recordings.recording import Recording
@@ -28,17 +29,16 @@ OTHERS = ["pelvis_tilt", "pelvis_list", "pelvis_rotation"]
 OTHERS += [f"{name}_{side}" for name in ("hip_adduction", "hip_rotation") for side in "rl"]
 
 
-def run(folder: Path, trial: tuple[str, str | None, float, float]) -> tuple[Recording, Estimator, Estimate]:
+def run(folder: Path, trial: tuple[str, str | None, float, float]) -> tuple[Recording, Estimate, Tracker]:
     name, forces, mass, height = trial
     recording = read(folder / name, None if forces is None else folder / forces)
     estimator = Estimator(load_model("fullbody", Subject(mass_kg=mass, height_m=height)))
-    return recording, estimator, estimator.run(recording)
+    return recording, *estimator.track(recording)
 
 
-def rigid_mm(estimator: Estimator, estimate: Estimate, frames: npt.NDArray[np.bool_]) -> float:
+def rigid_mm(tracker: Tracker, estimate: Estimate, frames: npt.NDArray[np.bool_]) -> float:
     """Root mean square of 3-D marker distances, skin and flesh taken as standing still."""
-    assert estimator.initial is not None
-    core = _core.Model(estimator.initial.spec)
+    core = tracker.core_model
     states = estimate.data["state"].values.copy()
     states[:, [name.startswith("soft_tissue/") for name in core.layout.names]] = 0.0
     places = np.stack([_core.marker_positions(core, x) for x in states])
@@ -46,11 +46,11 @@ def rigid_mm(estimator: Estimator, estimate: Estimate, frames: npt.NDArray[np.bo
     return 1000.0 * float(np.sqrt(np.nanmean((away[frames] ** 2).sum(axis=2))))
 
 
-def plausible(estimator: Estimator, estimate: Estimate, frames: npt.NDArray[np.bool_]) -> None:
+def plausible(tracker: Tracker, estimate: Estimate, frames: npt.NDArray[np.bool_]) -> None:
     data = estimate.data
     assert np.isfinite(data["state"].values).all()
     assert not [event for event in estimate.events if event.kind == "reset"]
-    assert rigid_mm(estimator, estimate, frames) < RIGID_MM
+    assert rigid_mm(tracker, estimate, frames) < RIGID_MM
     names = [str(name) for name in data["coordinate"].values]
     q = np.rad2deg(data["coordinates"].values)
     for side in "rl":
@@ -78,8 +78,8 @@ def from_opensim(folder: Path, name: str, recording: Recording, estimate: Estima
 
 @pytest.mark.nightly
 def test_squats(data_dir: Path) -> None:
-    recording, estimator, estimate = run(data_dir, SQUATS)
-    plausible(estimator, estimate, np.ones(recording.n_frames, dtype=bool))
+    recording, estimate, tracker = run(data_dir, SQUATS)
+    plausible(tracker, estimate, np.ones(recording.n_frames, dtype=bool))
     away = from_opensim(data_dir, "opencap_subject4/squats1_ik.mot", recording, estimate)
     assert max(away[name].std() for name in LEGS) < 4.5  # measured: hip 3.8, knee 3.3, ankle 4.2; goal 4
     assert max(away[name].std() for name in OTHERS) < 6.0
@@ -87,9 +87,9 @@ def test_squats(data_dir: Path) -> None:
 
 
 def test_walking(data_dir: Path) -> None:
-    recording, estimator, estimate = run(data_dir, WALK)
+    recording, estimate, tracker = run(data_dir, WALK)
     judged = (recording.time >= 0.15) & (recording.time <= 1.20)
-    plausible(estimator, estimate, judged)
+    plausible(tracker, estimate, judged)
     away = from_opensim(data_dir, "opencap_subject4/walking1_ik.mot", recording, estimate)
     assert max(away[name][judged].std() for name in LEGS) < 4.5  # measured: hip 1.4, knee 1.8, ankle 4.0; goal 4
     assert max(away[name][judged].std() for name in OTHERS) < 6.0
@@ -99,8 +99,8 @@ def test_walking(data_dir: Path) -> None:
 
 
 def test_gait_with_plug_in_gait(data_dir: Path) -> None:
-    recording, estimator, estimate = run(data_dir, GAIT)
-    plausible(estimator, estimate, np.ones(recording.n_frames, dtype=bool))
+    recording, estimate, tracker = run(data_dir, GAIT)
+    plausible(tracker, estimate, np.ones(recording.n_frames, dtype=bool))
     events = [event for event in estimate.events if event.subject == "plates"]
     assert events and all(event.kind == "missing" for event in events)
 
@@ -112,7 +112,7 @@ def test_a_standing_trial_may_wear_more_markers(data_dir: Path) -> None:
     recording = read(data_dir / name, data_dir / str(forces))
     static = read(data_dir / "opencap_subject4" / "static1.trc")
     estimator = Estimator(load_model("fullbody", Subject(mass_kg=mass, height_m=height)))
-    estimate = estimator.run(recording, static=static)
+    estimate, tracker = estimator.track(recording, static=static)
     judged = (recording.time >= 0.15) & (recording.time <= 1.20)
-    plausible(estimator, estimate, judged)
+    plausible(tracker, estimate, judged)
     assert any("standing from 0.00 to 5.16 s of static1" in text for text in estimate.messages)

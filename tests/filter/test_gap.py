@@ -44,7 +44,7 @@ def test_a_live_session_says_that_the_motion_is_found_again(kind: str, gap_s: fl
     live = Live(estimator(kind), [Replay(recording, speed=0.0)], [Callback(frames.append)], say=said.append)
     live.run()
     time = np.array([frame.estimate.time_s for frame in frames])
-    initial = live.estimator.initial
+    initial = live.tracker.calibrated
     assert initial is not None and len(time) > 400
     off = [distance(initial, frame.estimate.markers, dict(frame.fused.sample.markers)) for frame in frames]
     run = Run(np.array(off), np.array([frame.status.tracking for frame in frames]))
@@ -77,7 +77,7 @@ def test_a_jump_of_the_posture_within_the_carried_time_leaves_no_segment_behind(
 @pytest.mark.parametrize("turn_deg", [pytest.param(90.0, marks=pytest.mark.nightly), 180.0])
 def test_a_person_who_comes_back_facing_elsewhere_is_found(turn_deg: float) -> None:
     recording, _ = with_gap(person("fullbody", LENGTH_S), STOP_S, 10.0)
-    up = estimator("fullbody").start(recording.window(0.0, 2.0)).ground.rotation[1]
+    up = estimator("fullbody").calibrate(recording.window(0.0, 2.0)).ground.rotation[1]
     R = Rotation.from_rotvec(np.radians(turn_deg) * up).as_matrix()
     after = recording.time > STOP_S
     markers = recording.markers.copy()
@@ -98,9 +98,8 @@ def test_the_seam_of_a_replayed_recording_is_a_gap() -> None:
         frames += [packet for packet in packets if hasattr(packet, "positions")]
     steps = np.diff([frame.time_s for frame in frames])
     assert (steps > 0.5).sum() == 2 and np.median(steps) == pytest.approx(0.01)
-    live = estimator("sagittal7")
     recording = source.recording
-    live.start(recording)
+    live = estimator("sagittal7").start(recording)
     words = []
     for frame in frames:
         markers = dict(zip(recording.marker_names, frame.positions, strict=True))

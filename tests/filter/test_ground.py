@@ -33,7 +33,7 @@ def person(model: str) -> Estimator:
 
 
 def ground_of(recording: Recording, estimator: Estimator) -> Ground:
-    return estimator._measured(recording, estimator.start(recording))[2]
+    return estimator._measured(recording, estimator.start(recording).calibrated)[2]
 
 
 def with_loads(recording: Recording, factor: np.ndarray) -> Recording:
@@ -57,7 +57,7 @@ def test_plates_that_carry_the_person_are_found_to(model: str, motion: str, seed
     """The seat has its own plate here."""
     recording = simulate(model, motion, seed, 12.0).recording
     estimator = person(model)
-    initial = estimator.start(recording)
+    initial = estimator.start(recording).calibrated
     markers, wrench, ground = estimator._measured(recording, initial)
     found = closure(initial, recording.time, markers, wrench, np.ones(len(wrench), dtype=bool))
     assert found is not None and not found.undeclared.any() and not ground.undeclared.any()

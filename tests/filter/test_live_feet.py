@@ -19,19 +19,17 @@ from dynakin.simulation.trial import simulate
 def test_step_by_step_moments_bands_and_the_delayed_are_those_of_the_run() -> None:
     recording = simulate("fullbody", "squat", 1, 5.0).recording.window(2.0, 2.4)
     model = load_model("fullbody", Subject(mass_kg=70.0, height_m=1.75, sex="male"))
-    live, offline = Estimator(model, lag=4), Estimator(model)
-    initial = live.start(recording)
+    live = Estimator(model, lag=4).start(recording)
+    initial = live.calibrated
     feet = foot_wrenches(foot_loads(recording, initial.ground), initial, live.noise)
     for k, sample in enumerate(_samples(recording)):
         part = replace(feet, **{name: getattr(feet, name)[k : k + 1] for name in ("wrench", "covariance", "contact")})
         now = live.step(sample, part)
-    offline.start_from(initial)
     markers, wrench = recording_arrays(recording, initial)
-    arrays = offline.run_arrays(recording.time, markers, wrench, feet=feet)
+    arrays = Estimator(model).start(initial).run_arrays(recording.time, markers, wrench, feet=feet)
     np.testing.assert_allclose(now.moments, arrays["moments"][-1], atol=1e-6)
     np.testing.assert_allclose(live.deviations()["moments"], arrays["moments_sd"][-1], rtol=1e-6, atol=1e-9)
-    offline.start_from(initial)
-    smoothed = offline.run_smoothed_arrays(recording.time, markers, wrench, feet=feet)
+    smoothed = Estimator(model).start(initial).run_smoothed_arrays(recording.time, markers, wrench, feet=feet)
     delayed = live.delayed()
     assert delayed is not None and np.abs(delayed.moments[6:]).max() > 30.0
     np.testing.assert_allclose(delayed.moments, smoothed["moments"][-5], atol=1e-5)

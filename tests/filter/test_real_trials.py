@@ -79,7 +79,7 @@ def test_what_weighs_nobody_is_no_mass(data_dir: Path) -> None:
 
     def mass_of(trial: Path, forces: Path | None, model: str, markers: str = "auto") -> float:
         recording = dynakin.read(trial, forces)
-        return dynakin.Estimator(dynakin.load_model(model, dynakin.Subject(), markers)).measure(recording).mass_kg
+        return dynakin.Estimator(dynakin.load_model(model, dynakin.Subject(), markers)).calibrate(recording).mass_kg
 
     def of_subject4(name: str) -> float:
         return mass_of(opencap / f"{name}.trc", opencap / f"{name}_grf.mot", "fullbody", "opencap")

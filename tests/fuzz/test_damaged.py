@@ -14,6 +14,7 @@ from dynakin.errors import ConfigError, DynakinError, ModelError, OutputError, R
 from dynakin.filter.build import definition_of
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.samples import Sample
+from dynakin.filter.tracker import Tracker
 from dynakin.model.definition import load_model
 from dynakin.model.markers.marker_set import load_marker_set
 from dynakin.model.table import load_table
@@ -292,10 +293,9 @@ def trial() -> SimulatedTrial:
 
 
 @pytest.fixture(scope="module")
-def started(trial: SimulatedTrial) -> Estimator:
+def started(trial: SimulatedTrial) -> Tracker:
     estimator = Estimator(load_model("sagittal7", Subject(mass_kg=70.0), markers="opencap"), lag=2)
-    estimator.start(trial.recording)
-    return estimator
+    return estimator.start(trial.recording)
 
 
 @pytest.mark.parametrize("lag", [-1, 1001, 10**6, 10**9, 1.5, float("nan")])
@@ -317,7 +317,7 @@ def test_lags_that_nothing_can_hold(lag: Any) -> None:
         (0.0, np.ones(3), np.full(6, 1e200), "plate 1 is [1.e+200"),
     ],
 )
-def test_samples_of_another_shape(started: Estimator, time: Any, marker: Any, plate: Any, expected: str) -> None:
+def test_samples_of_another_shape(started: Tracker, time: Any, marker: Any, plate: Any, expected: str) -> None:
     sample = Sample(time, {"r_knee": marker}, {"plate 1": plate})
     refused(lambda: started.step(sample), RecordingError, expected)
 

@@ -6,17 +6,17 @@ import pytest
 
 from dynakin import load_model
 from dynakin.identification.observability.measured import MeasuredModel
-from dynakin.identification.observability.person import estimator_of
+from dynakin.identification.observability.person import tracker_of
 from dynakin.identification.observability.trial import identifiability
 from support.identifiability import Told, estimated_squat
 
 
 @pytest.fixture(scope="session", params=["sagittal7", "squat7"])
 def measured(request: pytest.FixtureRequest) -> MeasuredModel:
-    return MeasuredModel.of(estimator_of(load_model(request.param)))
+    return MeasuredModel.of(tracker_of(load_model(request.param)))
 
 
 @pytest.fixture(scope="session")
 def squat() -> Told:
-    estimator, estimate = estimated_squat()
-    return Told(estimator, estimate, identifiability(estimator, estimate))
+    estimate, tracker = estimated_squat()
+    return Told(tracker, estimate, identifiability(tracker, estimate))

@@ -11,7 +11,7 @@ from dynakin import _core, load_model
 from dynakin.identification.observability.gauge_words import gauge_in_words, gauges_in_words
 from dynakin.identification.observability.gauges import ZERO, Gauge, gauges_of, sparse_basis
 from dynakin.identification.observability.measured import MeasuredModel
-from dynakin.identification.observability.person import estimator_of
+from dynakin.identification.observability.person import tracker_of
 from support.identifiability import changed_model
 
 
@@ -84,7 +84,7 @@ def test_a_slide_along_a_segment_hides_its_length(tmp_path: Path) -> None:
             '{ coordinate = "hip", coefficients = [0.0, -1.0] }]',
         ),
     )  # fmt: skip
-    measured = MeasuredModel.of(estimator_of(load_model(path)))
+    measured = MeasuredModel.of(tracker_of(load_model(path)))
     found = gauges_of(measured).found
     lengths = [gauge for gauge in found if "length/thigh" in gauge.direction]
     assert [set(gauge.direction) for gauge in lengths] == [{"length/thigh", "zero/hip_slide"}]

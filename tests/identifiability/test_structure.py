@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 
 from dynakin import _core, load_model
-from dynakin.errors import ConfigError, DynakinError, ModelError
-from dynakin.filter.estimator import Estimator
+from dynakin.errors import DynakinError, ModelError
 from dynakin.identification.observability.base import base_of, in_no_base_parameter, told_alone
 from dynakin.identification.observability.element_words import base_words
 from dynakin.identification.observability.measured import MeasuredModel
-from dynakin.identification.observability.person import estimator_of
+from dynakin.identification.observability.person import tracker_of
 from dynakin.identification.observability.structure import structure_of
 from support.identifiability import changed_model
 
@@ -38,7 +37,7 @@ def test_seven_hinges_in_the_plane_show_22_of_28(measured: MeasuredModel) -> Non
 
 def test_a_whole_body_in_space_is_told_too() -> None:
     """Neighbours share what a hinge lets move; gauges that are said alike are one sentence."""
-    structure = structure_of(estimator_of(load_model("fullbody")))
+    structure = structure_of(tracker_of(load_model("fullbody")))
     assert structure.base.rank == 105 and len(structure.base.over) == 150
     said = structure.gauges_in_words
     assert len(set(said)) == len(said) < len(structure.gauges.found)
@@ -81,7 +80,7 @@ def test_each_base_parameter_in_words(measured: MeasuredModel) -> None:
 
 def test_a_foot_that_is_fixed_hides_its_height_and_its_moment_of_inertia(tmp_path: Path) -> None:
     path = changed_model(tmp_path, FIXED_FOOT, NO_TOE)
-    structure = structure_of(estimator_of(load_model(path)))
+    structure = structure_of(tracker_of(load_model(path)))
     assert set(structure.in_none) == {"inertia/foot/my", "inertia/foot/izz"}
     told = " ".join(structure.in_words())
     assert "without any effect on the ground reaction: foot first moment (up) and foot moment of inertia" in told
@@ -100,20 +99,15 @@ def test_a_motion_with_a_joint_at_rest_shows_less(measured: MeasuredModel) -> No
     assert set(in_no_base_parameter(base, measured)) == {"inertia/foot/my", "inertia/foot/izz"}
 
 
-def test_an_estimator_that_was_not_started_is_refused() -> None:
-    with pytest.raises(ConfigError, match="has not been started"):
-        structure_of(Estimator(load_model("sagittal7")))
-
-
 def test_a_model_that_fits_no_simulated_person_asks_for_a_recording(tmp_path: Path) -> None:
     definition = load_model("sagittal7")
     lost = replace(definition, model=definition.model.model_copy(deep=True))
     lost.model.segments[1].__dict__["origin"] = "nowhere"
     with pytest.raises(DynakinError, match=r"expected --trial FILE"):
-        estimator_of(lost)
+        tracker_of(lost)
 
 
 def test_a_model_that_estimates_no_inertia_is_refused(tmp_path: Path) -> None:
     path = changed_model(tmp_path, ('\nparts = ["', '\ninertia_estimated = false\nparts = ["'))
     with pytest.raises(ModelError, match="estimates no inertial number"):
-        structure_of(estimator_of(load_model(path)))
+        structure_of(tracker_of(load_model(path)))

@@ -16,7 +16,7 @@ from support.identifiability import Told, estimated_squat
 
 def test_an_exact_replay_of_the_trial_ends_as_sure_as_the_trial(squat: Told) -> None:
     """So what other motions give on the same bench can be held against it."""
-    bench = Bench(squat.estimator, squat.estimate)
+    bench = Bench(squat.tracker, squat.estimate)
     now = np.sqrt(np.diag(bench.covariance(bench.trial)))
     at = bench.measured.block("inertia")
     np.testing.assert_allclose(now[at], squat.estimate.data["state_sd"].values[-1, at], rtol=0.03)
@@ -28,14 +28,14 @@ def test_the_advised_motion_shrinks_the_deviations_as_it_was_said(squat: Told) -
     words = {e.name: e.words for e in squat.found.tried}["shoulder"]
     assert words == "moving the shoulder by ± 30 deg once a second"
     assert max(gains.values()) > 2.0
-    _, moved = estimated_squat("shoulder", 30.0)
+    moved, _ = estimated_squat("shoulder", 30.0)
     before, after = (e.data["state_sd"].isel(time=-1) for e in (squat.estimate, moved))
     for name, factor in gains.items():
         assert float(before.sel(element=name) / after.sel(element=name)) == pytest.approx(factor, rel=0.15), name
 
 
 def test_what_no_motion_tells_is_not_told_by_one(squat: Told) -> None:
-    _, moved = estimated_squat("shoulder", 30.0)
+    moved, _ = estimated_squat("shoulder", 30.0)
     said = next(text for text in squat.found.advice if "foot's" in text)
     assert "it does not move" in said
     before, after = (e.data["state_sd"].isel(time=-1) for e in (squat.estimate, moved))
@@ -45,7 +45,7 @@ def test_what_no_motion_tells_is_not_told_by_one(squat: Told) -> None:
 
 
 def test_tried_motions_keep_the_feet_loaded_and_the_person_in_balance(squat: Told) -> None:
-    bench = Bench(squat.estimator, squat.estimate)
+    bench = Bench(squat.tracker, squat.estimate)
     ankle, shoulder = (bench.coordinates.index(name) for name in ("ankle", "shoulder"))
     assert bench.possible(bench.trial)
     assert bench.possible(bench.with_added(shoulder, np.radians(30.0), 1.0))

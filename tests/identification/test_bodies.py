@@ -59,4 +59,4 @@ def test_a_model_that_estimates_no_inertia_is_refused_in_one_line() -> None:
     subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
     estimator = dynakin.Estimator(dynakin.load_model("sagittal7", subject=subject), estimate=["lengths"])
     with pytest.raises(ModelError, match=r"model sagittal7: identification needs .* this one estimates no inertia"):
-        Bodies.of(estimator.start(sim.recording))
+        Bodies.of(estimator.start(sim.recording).calibrated)

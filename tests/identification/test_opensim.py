@@ -31,6 +31,6 @@ def test_squats_and_standing(data_dir: Path) -> None:
     assert found.decision.rms["bodies"].shape == (4, 6)
     # The filter takes them, as `run --parameters` does, whatever was decided.
     used = dynakin.Estimator(definition, parameters=found.subject.model_copy(update={"use": "bodies"}))
-    initial = used.start(replace(squats, plates=()), static=standing)
+    initial = used.start(replace(squats, plates=()), static=standing).calibrated
     at = {name: k for k, name in enumerate(initial.names)}
     assert initial.x0[[at[name] for name in batch.names]] == pytest.approx(batch.values, rel=1e-9)

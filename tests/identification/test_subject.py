@@ -41,9 +41,9 @@ def test_the_table_is_kept_where_bodies_do_not_predict_better(identified: Identi
 
 def test_the_filter_starts_from_an_identified_subject(identified: Identification, case: Case) -> None:
     subject = identified.subject.model_copy(update={"use": "bodies"})
-    plain, other = estimator(), estimator()
-    other.parameters = subject
-    before, after = (e.start(case.sims[0].recording, static=case.common.static) for e in (plain, other))
+    plain = estimator()
+    other = replace(plain, parameters=subject)
+    before, after = (e.start(case.sims[0].recording, static=case.common.static).calibrated for e in (plain, other))
     at = [after.names.index(name) for name in subject.batch.names]
     np.testing.assert_allclose(after.x0[at], subject.batch.values, rtol=1e-9)
     P = initial_covariance(after, other.noise)

@@ -67,9 +67,8 @@ def test_jacobian_of_the_wrench_is_the_central_difference(identified: Identifica
 
 
 def test_the_filter_starts_from_it(identified: Identification) -> None:
-    other = estimator()
-    other.parameters = identified.subject.model_copy(update={"use": "bodies"})
-    after = other.start(identified.trials[0].movement.recording, static=identified.common.static)
+    other = replace(estimator(), parameters=identified.subject.model_copy(update={"use": "bodies"}))
+    after = other.start(identified.trials[0].movement.recording, static=identified.common.static).calibrated
     at = [after.names.index(name) for name in identified.subject.batch.names]
     np.testing.assert_allclose(after.x0[at], identified.subject.batch.values, rtol=1e-9)
     P = initial_covariance(after, other.noise)

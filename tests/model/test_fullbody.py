@@ -142,7 +142,7 @@ def test_without_plates_it_still_moves_and_says_so() -> None:
 @pytest.mark.parametrize("kept", [("lengths",), ("markers", "inertia"), ()])
 def test_what_is_not_estimated_is_no_state(kept: tuple[str, ...]) -> None:
     estimator = Estimator(definition(), estimate=kept)  # type: ignore[arg-type]
-    initial = estimator.start_from(measured())
+    initial = estimator.start(measured()).calibrated
     blocks = {name.split("/")[0] for name in initial.names}
     for block, kind in {
         "length": "lengths",

@@ -11,7 +11,8 @@ import pytest
 
 from dynakin import read
 from dynakin.filter.estimator import Estimator
-from dynakin.model.definition import load_model
+from dynakin.filter.tracker import Tracker
+from dynakin.model.definition import Definition, load_model
 from dynakin.model.opensim.definition import OpenSimDefinition
 from dynakin.model.opensim.export import of_definition, of_initial
 from dynakin.model.opensim.write import write_osim
@@ -33,7 +34,7 @@ TRIALS = [
 ]
 
 
-def estimated(folder: Path, name: str, model: str, mass: float, out: Path) -> tuple[Estimator, Estimate]:
+def estimated(folder: Path, name: str, model: str, mass: float, out: Path) -> tuple[Definition, Estimate, Tracker]:
     """Half a second, saved into ``out``; lengths as they end, for all frames, and no skin on top of them."""
     trial = folder / f"{name}.trc"
     recording = read(trial, folder / f"{name}_grf.mot") if trial.exists() else read(folder / f"{name}.c3d")
@@ -41,19 +42,18 @@ def estimated(folder: Path, name: str, model: str, mass: float, out: Path) -> tu
     definition = load_model(folder / model if model.endswith(".osim") else model, Subject(mass_kg=mass, height_m=1.74))
     noise = presets.default().changed(length_drift=0.0)
     estimator = Estimator(definition, noise, estimate=("lengths", "markers", "inertia"))
-    estimate = estimator.run(recording, smooth=True)
+    estimate, tracker = estimator.track(recording, smooth=True)
     Result(estimate).save(out)
-    return estimator, estimate
+    return definition, estimate, tracker
 
 
-def exported(estimator: Estimator, estimate: Estimate, path: Path) -> Any:
+def exported(definition: Definition, estimate: Estimate, tracker: Tracker, path: Path) -> Any:
     """The model that the run ended with, as OpenSim loads it."""
     values = {parameter.name: parameter.value for parameter in estimate.parameters}
-    assert estimator.initial is not None
-    if isinstance(estimator.model, OpenSimDefinition):
-        write_osim(of_definition(estimator.model, values, estimate.mass_kg), path)
+    if isinstance(definition, OpenSimDefinition):
+        write_osim(of_definition(definition, values, estimate.mass_kg), path)
     else:
-        write_osim(of_initial(estimator.initial, values), path)
+        write_osim(of_initial(tracker.calibrated, values), path)
     return opensim.Model(str(path))
 
 
@@ -79,10 +79,11 @@ def posed(model: Any, motion: Path, names: list[str]) -> Array:
 def test_markers_of_the_posed_model_are_those_of_the_file(
     name: str, model: str, mass: float, data_dir: Path, tmp_path: Path
 ) -> None:
-    estimator, estimate = estimated(data_dir, name, model, mass, tmp_path / "out")
-    assert estimator.initial is not None
-    own = [marker.name for marker in estimator.initial.spec.markers]
-    places = posed(exported(estimator, estimate, tmp_path / "m.osim"), tmp_path / "out" / "coordinates.mot", own)
+    definition, estimate, tracker = estimated(data_dir, name, model, mass, tmp_path / "out")
+    own = [marker.name for marker in tracker.calibrated.spec.markers]
+    places = posed(
+        exported(definition, estimate, tracker, tmp_path / "m.osim"), tmp_path / "out" / "coordinates.mot", own
+    )
     table = opensim.TimeSeriesTableVec3(str(tmp_path / "out" / "markers.trc"))
     flat = table.flatten()  # kept: what it gives out is a view of it
     written = flat.getMatrix().to_numpy().reshape(places.shape)
@@ -92,7 +93,7 @@ def test_markers_of_the_posed_model_are_those_of_the_file(
 
 
 def test_a_laboratory_with_y_up_is_the_frame_of_all_files(data_dir: Path, tmp_path: Path) -> None:
-    _, estimate = estimated(data_dir, "opencap_subject4/walking1", SCALED, 63.0, tmp_path / "out")
+    _, estimate, _ = estimated(data_dir, "opencap_subject4/walking1", SCALED, 63.0, tmp_path / "out")
     recording = estimate.recording
     measured = np.stack([recording.marker(name) for name in estimate.marker_names], axis=1)
     written = estimate.data["markers_estimated"].values

@@ -17,25 +17,24 @@ from dynakin.validation.reference.least_squares import identify, predicted_wrenc
 from dynakin.validation.reference.methods import reference_methods
 from support.perfect import MASS_KG, Perfect
 
+Squats = tuple[dynakin.Recording, dynakin.ModelDefinition, dynakin.CalibratedModel, dynakin.Estimate]
 PLANE = ["fx", "fy", "mz"]
 
 
 @pytest.fixture(scope="module")
-def squats1(data_dir: Path) -> tuple[dynakin.Recording, dynakin.Estimator, dynakin.Estimate]:
+def squats1(data_dir: Path) -> Squats:
     folder = data_dir / "opencap_subject4"
     recording = dynakin.read(folder / "squats1.trc", forces=folder / "squats1_grf.mot")
     model = dynakin.load_model("sagittal7", subject=dynakin.Subject(mass_kg=60.05), markers="opencap")
-    estimator = dynakin.Estimator(model)
-    return recording, estimator, estimator.run(recording)
+    estimate, tracker = dynakin.Estimator(model).track(recording)
+    return recording, model, tracker.calibrated, estimate
 
 
 def test_arrays_line_up_with_an_estimates() -> None:
     trial = simulate_squat(seed=1, duration_s=6.0)
     model = dynakin.load_model("sagittal7", dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male"), markers="opencap")
-    estimator = dynakin.Estimator(model)
-    estimate = estimator.run(trial.recording)
-    assert estimator.initial is not None
-    reference = reference_methods(trial.recording, estimator.initial, model)
+    estimate, tracker = dynakin.Estimator(model).track(trial.recording)
+    reference = reference_methods(trial.recording, tracker.calibrated, model)
     for name in ("coordinates", "speeds", "accelerations", "moments", "wrench_estimated", "wrench_measured"):
         ours, theirs = reference.data[name], estimate.data[name]
         assert ours.dims == theirs.dims, name
@@ -91,16 +90,15 @@ def test_an_unknown_way_to_take_lengths_is_refused(perfect: Perfect) -> None:
 
 
 def test_squats1_table_wrench_errs_as_classical_pipelines_do_and_the_filters_does_not(
-    squats1: tuple[dynakin.Recording, dynakin.Estimator, dynakin.Estimate],
+    squats1: Squats,
 ) -> None:
     """Measured: constant lengths 22, 31 N, 22 N m; lengths of each frame 10, 11 N, 17 N m (a prototype: 17, 21, 19;
     the paper's Figure 6: 11, 10, 16). The thigh's projection shortens by up to 8 cm, which constant lengths deny."""
-    recording, estimator, estimate = squats1
-    assert estimator.initial is not None
+    recording, model, initial, estimate = squats1
     late = recording.time >= recording.time[0] + 2.0
     rms: dict[str, list[float]] = {}
     for lengths in ("constant", "frame"):
-        data = reference_methods(recording, estimator.initial, estimator.model, lengths=lengths).data  # type: ignore[arg-type]
+        data = reference_methods(recording, initial, model, lengths=lengths).data  # type: ignore[arg-type]
         error = (data["wrench_estimated"] - data["wrench_measured"]).sel(component=PLANE).values[late]
         rms[lengths] = np.sqrt(np.mean(error**2, axis=0)).tolist()
     np.testing.assert_allclose(rms["constant"], [21.8, 30.9, 22.0], rtol=0.05)
@@ -109,26 +107,22 @@ def test_squats1_table_wrench_errs_as_classical_pipelines_do_and_the_filters_doe
     assert (np.sqrt(np.mean(filtered**2, axis=0)) < 0.5 * np.array(rms["constant"])).all()
 
 
-def test_squats1_classical_knee_moves_as_another_system_says(
-    squats1: tuple[dynakin.Recording, dynakin.Estimator, dynakin.Estimate], data_dir: Path
-) -> None:
-    recording, estimator, _ = squats1
-    assert estimator.initial is not None
-    knee = reference_methods(recording, estimator.initial, estimator.model).data["coordinates"].sel(coordinate="knee")
+def test_squats1_classical_knee_moves_as_another_system_says(squats1: Squats, data_dir: Path) -> None:
+    recording, model, initial, _ = squats1
+    knee = reference_methods(recording, initial, model).data["coordinates"].sel(coordinate="knee")
     table = read_table(data_dir / "opencap_subject4" / "squats1_ik.mot")
     error = truth_error(table.column("knee_angle_r"), knee.values)
     assert error.rms_about_mean is not None and np.degrees(error.rms_about_mean) < 5.0
 
 
 def test_squats1_parameters_of_one_half_predict_the_other(
-    squats1: tuple[dynakin.Recording, dynakin.Estimator, dynakin.Estimate],
+    squats1: Squats,
 ) -> None:
     """Free least squares fits what it has not seen better than the table, with bodies that cannot exist."""
-    recording, estimator, _ = squats1
-    assert estimator.initial is not None
+    recording, model, initial, _ = squats1
     middle = recording.time[recording.n_frames // 2]
     first, second = (
-        reference_methods(part, estimator.initial, estimator.model)
+        reference_methods(part, initial, model)
         for part in (
             recording.window(recording.time[0], middle),
             recording.window(middle, recording.time[-1]),
@@ -136,10 +130,10 @@ def test_squats1_parameters_of_one_half_predict_the_other(
     )
     found = identify(
         first.chain,
-        estimator.initial.plan,
+        initial.plan,
         first.kinematics,
         first.data["wrench_measured"].values,
-        mass_kg=estimator.initial.mass_kg,
+        mass_kg=initial.mass_kg,
     )
     assert found.base.rank == 22
     assert len(found.at_bound) > 5 and len(found.impossible) > 0

@@ -74,7 +74,7 @@ def test_a_standing_trial_gives_the_zero() -> None:
     assert window is not None
     still = trial.recording.window(float(trial.recording.time[0]), float(trial.recording.time[window.stop - 1]))
     own, other = standing_zero(estimator, estimate, None), standing_zero(estimator, estimate, still)
-    whole = estimator.again().run(trial.recording, smooth=True)  # its places are those of the end in every frame
+    whole = estimator.run(trial.recording, smooth=True)  # its places are those of the end in every frame
     for name in ("ankle", "knee", "hip", "lumbar"):
         mean = float(whole.data["coordinates"].sel(coordinate=name).values[window].mean())
         assert standing_zero(estimator, whole, None)[name] == pytest.approx(mean, abs=1e-12)

@@ -156,7 +156,7 @@ def test_fullbody_measured_on_exact_markers_is_the_true_body() -> None:
     recording, data = trial.recording, trial.truth.data
     subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
     estimator = dynakin.Estimator(dynakin.load_model("fullbody", subject=subject, markers="opencap"))
-    initial = estimator.start(recording)
+    initial = estimator.start(recording).calibrated
     for name in ("pelvis", "thigh", "shank"):
         assert initial.x0[initial.names.index(f"length/{name}")] == pytest.approx(
             trial.truth.parameters[f"length/{name}"], abs=1e-4

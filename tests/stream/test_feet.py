@@ -57,7 +57,7 @@ def test_moments_of_a_whole_body_agree_with_the_offline_run(data_dir: Path) -> N
     source = Replay(recording, speed=0.0)
     live = Live(estimator, [source], [Callback(frames.append)], say=lambda text: None, standing_wait_s=2.0)
     live.run()
-    offline = estimator.again().run(recording, smooth=False)
+    offline = estimator.run(recording, smooth=False)
     names = [str(name) for name in offline.data["coordinate"].values]
     t0 = frames[0].estimate.time_s
     at = [k for k, t in enumerate(recording.time) if t >= t0 - 1e-6][: len(frames)]
@@ -89,7 +89,7 @@ def test_live_equals_offline_in_space(trial: SimulatedTrial, squat: tuple[Live, 
 
 def test_smoothed_moments_and_bands_are_those_with_the_feet(squat: tuple[Live, list[LiveFrame], list[str]]) -> None:
     live, frames, _ = squat
-    initial = live.estimator.initial
+    initial = live.tracker.calibrated
     assert initial is not None
     names = [coordinate.name for coordinate in initial.spec.coordinates]
     knees = [names.index("knee_angle_r"), names.index("knee_angle_l")]
@@ -99,9 +99,9 @@ def test_smoothed_moments_and_bands_are_those_with_the_feet(squat: tuple[Live, l
     assert np.sqrt(np.mean((now - smoothed)[50:] ** 2)) < 5.0
     told = [f.deviations["moments"][knees] for f in frames if f.deviations is not None]
     assert told and np.all(np.array(told) > 0.0)
-    plain = dynakin._core.moment_jacobian(live.estimator.core_model, live.estimator.state)
-    without = np.sqrt(np.einsum("ij,jk,ik->i", plain, live.estimator.covariance, plain))
-    assert (np.abs(live.estimator.deviations()["moments"] - without)[knees] > 0.02 * without[knees]).all()
+    plain = dynakin._core.moment_jacobian(live.tracker.core_model, live.tracker.state)
+    without = np.sqrt(np.einsum("ij,jk,ik->i", plain, live.tracker.covariance, plain))
+    assert (np.abs(live.tracker.deviations()["moments"] - without)[knees] > 0.02 * without[knees]).all()
 
 
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.nightly)])
@@ -111,9 +111,8 @@ def test_walking_leaves_out_what_offline_leaves_out(seed: int) -> None:
     that is not loaded yet."""
     walk = simulate("fullbody", "gait", seed)
     live, frames, said = session(Replay(walk.recording, speed=0.0), standing_s=0.3)
-    assert live.estimator.initial is not None
     begin = int(np.searchsorted(walk.recording.time, frames[0].estimate.time_s - 1e-6))
-    offline = foot_loads(walk.recording, live.estimator.initial.ground).total_known[begin:]
+    offline = foot_loads(walk.recording, live.tracker.calibrated.ground).total_known[begin:]
     now = np.array([f.status.plates == "used" for f in frames])
     assert {f.status.plates for f in frames} == {"used", "incomplete"} and np.count_nonzero(offline) > 100
     assert np.count_nonzero(now & ~offline) <= 6 and np.count_nonzero(offline & ~now) <= 14
@@ -128,8 +127,8 @@ class Standing:
     def __init__(self, trial: SimulatedTrial) -> None:
         model = dynakin.load_model("fullbody", dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male"))
         estimator = dynakin.Estimator(model)
-        self.initial = estimator.start(trial.recording.window(0.0, 1.0))
-        self.model, self.state = estimator.core_model, estimator.state
+        tracker = estimator.start(trial.recording.window(0.0, 1.0))
+        self.initial, self.model, self.state = tracker.calibrated, tracker.core_model, tracker.state
         self.feet = LiveFeet(self.initial, presets.default(), ("one",), {})
         self.frame = 0
         places = dynakin._core.marker_positions(self.model, self.state)

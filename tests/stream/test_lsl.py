@@ -120,7 +120,7 @@ def test_markers_and_plates_come_in_and_estimates_go_out() -> None:
             received.append(sample[0][3])
 
     def recorded_names() -> list[str]:
-        return list(estimator.core_model.coordinate_names)
+        return list(live.tracker.core_model.coordinate_names)
 
     director = begin_when_open(live, laboratory, listen)
     live.run()

@@ -69,7 +69,7 @@ def test_every_channel_has_its_label_unit_and_value() -> None:
             if kind == "parameters":
                 expected = [frame.state[begun.last.initial.names.index(label)] for label in labels]
             else:
-                assert labels == list(estimator.core_model.coordinate_names)
+                assert labels == list(begun.last.model.coordinate_names)
                 expected = getattr(frame.estimate, kind)
             np.testing.assert_array_equal(values, expected)
     finally:

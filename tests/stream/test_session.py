@@ -47,8 +47,8 @@ def test_live_equals_offline_on_the_same_samples(squat: Recording) -> None:
     frames, said, _ = run(Replay(squat, speed=0.0))
     assert "Ready: move." in said and any(text.startswith("Stand still") for text in said)
     first = frames[0].estimate.time_s
-    offline = estimator()
-    initial = offline.start(squat.window(first - 2.01 - 1e-6, first - 0.005))
+    offline = estimator().start(squat.window(first - 2.01 - 1e-6, first - 0.005))
+    initial = offline.calibrated
     begin = int(np.searchsorted(squat.time, first - 1e-6))
     assert len(frames) == squat.n_frames - begin  # no frame is lost
     time_, markers = (
@@ -238,13 +238,12 @@ def test_buttons_record_restart_and_recalibrate(squat: Recording, tmp_path: Path
 
 def test_constants_go_on_from_an_earlier_session(squat: Recording) -> None:
     frames, _, live = run(Replay(squat, speed=0.0, duration_s=4.0))
-    initial = live.estimator.initial
-    assert initial is not None
+    initial = live.tracker.calibrated
     known = {name: (float(frames[-1].state[k]), 0.001) for k, name in enumerate(initial.names)}
     again, said, other = run(Replay(squat, speed=0.0, duration_s=4.0), known=known)
-    assert any("go on from" in text for text in said) and other.estimator.initial is not None
+    assert any("go on from" in text for text in said)
     k = initial.names.index(next(name for name in initial.names if name.startswith("length/")))
-    assert other.estimator.initial.x0[k] == pytest.approx(frames[-1].state[k])
+    assert other.tracker.calibrated.x0[k] == pytest.approx(frames[-1].state[k])
     assert len(again) == len(frames)
 
 
@@ -257,7 +256,7 @@ def test_silent_markers_are_told_with_what_happens_then(squat: Recording) -> Non
     assert "The markers are back." in said
     _, said, live = run(Replay(squat.window(0.0, 3.0), speed=0.0))
     for holds, what in ((True, "the motion is held until they are back"), (False, "the estimate waits for them")):
-        monitor = Monitor(live.estimator.initial, 100.0, plates=False, used=False, holds=holds)  # type: ignore[arg-type]
+        monitor = Monitor(live.tracker.calibrated, 100.0, plates=False, used=False, holds=holds)  # type: ignore[arg-type]
         monitor.last = replace(monitor.last, tracking="following")
         told = monitor.changes(Fusion(live.fusion.markers, None), 1e9)
         assert told == [f"The markers are silent; {what}."]

@@ -59,9 +59,8 @@ def test_the_picture_holds_what_is_estimated_and_measured(squat: Recording) -> N
     frames: list[LiveFrame] = []
     live = session(squat, [Callback(frames.append)])
     live.run()
-    assert live.estimator.initial is not None
-    picture = Picture(Started(live.estimator.initial, live.estimator.core_model, 100.0), plates=len(squat.plates))
-    part = split(picture.numbers(frames[-1], live.estimator.deviations()), picture.sizes)
+    picture = Picture(Started(live.tracker.calibrated, live.tracker.core_model, 100.0), plates=len(squat.plates))
+    part = split(picture.numbers(frames[-1], live.tracker.deviations()), picture.sizes)
     np.testing.assert_allclose(part["angles"], frames[-1].estimate.coordinates)
     measured, estimated = part["measured"].reshape(-1, 3), part["estimated"].reshape(-1, 3)
     assert np.nanmax(np.abs(measured - estimated)[:, :2]) < 0.05

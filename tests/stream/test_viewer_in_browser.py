@@ -99,11 +99,10 @@ def test_names_from_files_are_text_on_the_page(browser: Browser, tmp_path: Path)
         say=lambda text: None,
     )
     live.run()
-    assert live.estimator.initial is not None
     viewer = Viewer(port=free_port())
     try:
         viewer.opened(live.fusion.markers, live.fusion.plates)
-        viewer.started(Started(live.estimator.initial, live.estimator.core_model, 100.0))
+        viewer.started(Started(live.tracker.calibrated, live.tracker.core_model, 100.0))
         status = replace(frames[-1].status, refused=(MARKER,))
         viewer.said(SENTENCE, status)
         browser.call("Page.enable")

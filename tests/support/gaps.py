@@ -56,15 +56,14 @@ def distance(initial: CalibratedModel, estimated: np.ndarray, measured: dict[str
 
 
 def follow(kind: str, recording: Recording) -> Followed:
-    """By `Estimator.step`, from a model measured on the first two seconds."""
-    live = estimator(kind)
-    initial = live.start(recording.window(0.0, 2.0))
+    """By `Tracker.step`, from a model measured on the first two seconds."""
+    live = estimator(kind).start(recording.window(0.0, 2.0))
     off, tracking = [], []
     for k, t in enumerate(recording.time):
         markers = dict(zip(recording.marker_names, recording.markers[k], strict=True))
         plates = {p.name: np.hstack([p.force[k], p.moment[k]]) for p in recording.plates}
         step = live.step(dynakin.Sample(float(t), markers, plates))
-        off.append(distance(initial, step.markers, markers))
+        off.append(distance(live.calibrated, step.markers, markers))
         tracking.append(step.report.tracking)
     return Followed(np.array(off), np.array(tracking))
 

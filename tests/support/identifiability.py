@@ -9,6 +9,8 @@ from pathlib import Path
 import numpy as np
 
 from dynakin import Estimate, Estimator, Subject, load_model
+from dynakin.filter.estimator import Tracked
+from dynakin.filter.tracker import Tracker
 from dynakin.identification.observability.trial import Identifiability
 from dynakin.model.definition import _FOLDER
 from dynakin.simulation.bodies.registry import choose_body
@@ -24,13 +26,13 @@ SEED, DURATION_S, MASS_KG, HEIGHT_M = 3, 12.0, 70.0, 1.75
 
 @dataclass(frozen=True)
 class Told:
-    estimator: Estimator
+    tracker: Tracker
     estimate: Estimate
     found: Identifiability
 
 
 @cache
-def estimated_squat(coordinate: str = "", size_deg: float = 0.0) -> tuple[Estimator, Estimate]:
+def estimated_squat(coordinate: str = "", size_deg: float = 0.0) -> Tracked:
     """A squat of `squat7` with the simulator's default errors, one coordinate swinging once a second on top."""
 
     def at(time: np.ndarray) -> Motion:
@@ -49,7 +51,7 @@ def estimated_squat(coordinate: str = "", size_deg: float = 0.0) -> tuple[Estima
 
     trial = simulate("squat7", at, SEED, DURATION_S, mass_kg=MASS_KG, height_m=HEIGHT_M)
     estimator = Estimator(load_model("squat7", Subject(mass_kg=MASS_KG, height_m=HEIGHT_M, sex="male")))
-    return estimator, estimator.run(trial.recording)
+    return estimator.track(trial.recording)
 
 
 def changed_model(folder: Path, *changes: tuple[str, str]) -> Path:

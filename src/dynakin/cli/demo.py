@@ -45,17 +45,15 @@ def demo(
     subject = Subject(mass_kg=who.mass_kg, height_m=who.height_m, sex=who.sex)
     model = load_model("sagittal7", subject, markers="opencap")
     with progress_bar("estimating") as progress:
-        estimator = Estimator(model)
-        estimate = estimator.run(trial.recording, progress=progress)
+        estimate, tracker = Estimator(model).track(trial.recording, progress=progress)
     with busy("and with the paper's settings, for comparison"):
         paper = Estimator(model, presets.paper()).run(trial.recording)
-    assert estimator.initial is not None
     demo_config = {"trial": trial.recording.name, "preset": "default", "seed": seed, "duration_s": duration}
     estimate = replace(estimate, config=demo_config | estimate.config)
-    comparison = trial_of({"default": estimate, "paper": paper}, estimator.initial, model)
+    comparison = trial_of({"default": estimate, "paper": paper}, tracker.calibrated, model)
     methods = {method.name: method.data for method in comparison.methods}
     with busy("writing results and report"):
-        result = Result(estimate, estimator.initial, comparison, identifiability(estimator, estimate))
+        result = Result(estimate, tracker.calibrated, comparison, identifiability(tracker, estimate))
         folder = result.save(output, check=False)
     console = out()
     console.print(methods_by_error(methods, estimate, trial.truth))

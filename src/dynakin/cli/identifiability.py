@@ -8,7 +8,7 @@ from rich.table import Table
 
 from dynakin.cli.console import out, progress_bar, table
 from dynakin.filter.estimator import Estimator
-from dynakin.identification.observability.person import estimator_of
+from dynakin.identification.observability.person import tracker_of
 from dynakin.identification.observability.structure import Structure, structure_of
 from dynakin.identification.observability.trial import Identifiability, identifiability
 from dynakin.model.definition import ModelDefinition
@@ -24,13 +24,12 @@ def print_identifiability(definition: ModelDefinition, trial: Path | None, force
         DynakinError: model and trial do not fit.
     """
     if trial is None:
-        _print_structure(structure_of(estimator_of(definition)))
+        _print_structure(structure_of(tracker_of(definition)))
         return
-    estimator = Estimator(definition)
     with progress_bar("estimating") as progress:
-        estimate = estimator.run(read(trial, forces), progress=progress)
+        estimate, tracker = Estimator(definition).track(read(trial, forces), progress=progress)
     with progress_bar("trying motions") as progress:
-        found = identifiability(estimator, estimate, progress)
+        found = identifiability(tracker, estimate, progress)
     _print_structure(found.structure, found)
     console = out()
     console.print("\nWhat this trial tells", style="bold")

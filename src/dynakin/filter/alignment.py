@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.filter.closure import plates_misfit
+from dynakin.filter.foot_wrenches import FootWrenches
+from dynakin.filter.samples import in_step
+from dynakin.filter.tracker import Progress, Tracker
 from dynakin.model.calibration.calibrated import CalibratedModel
 
 Array = npt.NDArray[np.float64]
@@ -14,6 +20,55 @@ LEAST_S = 0.003
 SIGMAS = 3.0
 PASSES = 3
 """The state extrapolates motion back over the delay and tells a long one a sixth too long; further passes mend that."""
+
+
+class InStep(NamedTuple):
+    """A run over a recording whose plates are in step.
+
+    Attributes:
+        tracker: as the last run left it. arrays: of that run, as `Tracker.run_arrays` gives them.
+        shift_s: by which it took the plates earlier. notes: what there is to say of the plates' clock.
+    """
+
+    tracker: Tracker
+    arrays: dict[str, Array]
+    shift_s: float
+    notes: list[str]
+
+
+def run_in_step(
+    tracker: Tracker,
+    time: Array,
+    markers: Array,
+    wrench: Array,
+    progress: Progress | None = None,
+    feet: FootWrenches | None = None,
+    passes: int = PASSES,
+) -> InStep:
+    """`Tracker.run_arrays`, again (``passes`` times at most) with the plates brought into step where they turn out to
+    lag.
+
+    Args:
+        tracker: at its start.
+    """
+    calibrated = tracker.calibrated
+    arrays, shift = tracker.run_arrays(time, markers, wrench, progress, feet), 0.0
+    misfit = None
+    for done in range(passes):
+        delay = delay_of(calibrated, arrays["state"][-1], arrays["state_sd"][-1])
+        if delay is None or not is_late(delay):
+            break
+        if not done:  # of nearly every run nobody asks
+            misfit = plates_misfit(calibrated, time, markers, wrench)
+        taken = in_step(time, wrench, shift + delay[0])
+        fits = plates_misfit(calibrated, time, markers, taken)
+        if misfit is not None and fits is not None and fits > misfit:
+            return InStep(tracker, arrays, shift, [contradicted(shift + delay[0], misfit, fits)])
+        shift, misfit = shift + delay[0], fits
+        tracker = tracker.fresh()
+        arrays = tracker.run_arrays(time, markers, taken, progress, feet and feet.in_step(time, shift))
+    delay = delay_of(calibrated, arrays["state"][-1], arrays["state_sd"][-1])
+    return InStep(tracker, arrays, shift, in_words(shift, delay))
 
 
 def delay_of(initial: CalibratedModel, state: Array, sd: Array) -> tuple[float, float] | None:
@@ -27,14 +82,6 @@ def delay_of(initial: CalibratedModel, state: Array, sd: Array) -> tuple[float, 
 def is_late(delay: tuple[float, float] | None) -> bool:
     """Whether a delay is worth bringing the plates into step for."""
     return delay is not None and abs(delay[0]) > max(LEAST_S, SIGMAS * delay[1])
-
-
-def in_step(time: Array, wrench: Array, delay_s: float) -> Array:
-    """The wrench (T, 6) that belongs to each time (T,) s: what plates that lag by ``delay_s`` say that much later.
-
-    Linear between samples, NaN where one of them is, the last (or first) one held where the recording ends.
-    """
-    return np.stack([np.interp(time + delay_s, time, column) for column in wrench.T], axis=1)
 
 
 def in_words(shift_s: float, delay: tuple[float, float] | None) -> list[str]:

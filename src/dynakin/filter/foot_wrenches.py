@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 import dynakin._core as _core
 from dynakin.errors import ModelError
-from dynakin.filter.alignment import in_step
+from dynakin.filter.samples import in_step
 from dynakin.results.measures.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
 
 Array = npt.NDArray[np.float64]

@@ -74,6 +74,14 @@ def recording_arrays(recording: Recording, initial: CalibratedModel, *, gaps: bo
     return np.ascontiguousarray(markers), np.ascontiguousarray(wrench)
 
 
+def in_step(time: Array, wrench: Array, delay_s: float) -> Array:
+    """The wrench (T, 6) that belongs to each time (T,) s: what plates that lag by ``delay_s`` say that much later.
+
+    Linear between samples, NaN where one of them is, the last (or first) one held where the recording ends.
+    """
+    return np.stack([np.interp(time + delay_s, time, column) for column in wrench.T], axis=1)
+
+
 def sample_arrays(sample: Sample, initial: CalibratedModel) -> tuple[Array, Array]:
     """Markers (M, 3) and total wrench (6,) of one live sample; what it lacks is NaN.
 

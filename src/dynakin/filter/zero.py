@@ -66,14 +66,14 @@ def standing_zero(estimator: Estimator, estimate: Estimate, static: Recording | 
 
 def _estimated_anew(estimator: Estimator, estimate: Estimate, standing: Recording, window: slice) -> dict[str, float]:
     start = with_loads(_standing_model(estimator, standing), estimator.loads)
-    other = estimator.again()
-    initial = other.start_from(_as_identified(start, estimate))
+    tracker = estimator.start(_as_identified(start, estimate))
+    initial = tracker.calibrated
     still = standing.window(float(standing.time[window.start]), float(standing.time[window.stop - 1]))
     markers = initial.ground.points_to_ground(
         np.stack([still.marker(name) for name in initial.recorded_markers], axis=1)
     )
     wrench = recording_arrays(still, initial, gaps=True)[1] if still.plates else np.full((still.n_frames, 6), np.nan)
-    run = other.run_smoothed_arrays if can_smooth(other.noise) else other.run_arrays
+    run = tracker.run_smoothed_arrays if can_smooth(estimator.noise) else tracker.run_arrays
     state = run(still.time, markers, wrench)["state"]
     free = [c.name for c in initial.spec.coordinates if not c.locked]
     kinds = {axis.coordinate: axis.kind for segment in initial.spec.segments for axis in segment.axes}

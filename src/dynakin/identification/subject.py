@@ -68,7 +68,7 @@ def identify_subject(
     )
     decision = decide(common, trials, lambda done, of: report(round(_SEEING + (_WORK - _SEEING) * done / of), _WORK))
     bodies = estimate(common, trials, "bodies")
-    batch = _batch(estimator, bodies)
+    batch = _batch(common, bodies)
     subject = IdentifiedSubject(
         model=common.initial.spec.name,
         mass_kg=common.initial.mass_kg,
@@ -97,8 +97,8 @@ def _followed(
     return common, trials, said
 
 
-def _batch(estimator: Estimator, bodies: Posterior) -> Batch:
-    measured = MeasuredModel.of(estimator)
+def _batch(common: Common, bodies: Posterior) -> Batch:
+    measured = MeasuredModel.of(common.tracker())
     base = base_of(measured)
     names = bodies.unknowns.bodies.names
     order = [base.over.index(name) for name in names]

@@ -11,6 +11,7 @@ import numpy.typing as npt
 import dynakin._core as _core
 from dynakin.errors import LostError, ModelError, RecordingError
 from dynakin.filter.estimator import Estimator
+from dynakin.filter.tracker import Tracker
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.loads import LOADED_N
 from dynakin.recordings.frame import GroundFrame
@@ -103,8 +104,12 @@ class Common:
                 "identification: the body mass is not known; expected it (--mass), or a standing trial with plates "
                 "(--static): the plates of a trial that is left out and foretold must not tell it"
             )
-        initial = estimator.start(replace(first, plates=()), static=static)
+        initial = estimator.start(replace(first, plates=()), static=static).calibrated
         return cls(estimator, initial, static or first, _core.Model(initial.spec))
+
+    def tracker(self) -> Tracker:
+        """A filter that starts from the model as it was measured."""
+        return self.estimator.start(self.initial)
 
     @property
     def rows(self) -> npt.NDArray[np.intp]:
@@ -138,14 +143,13 @@ class Common:
         recording = replace(recording, plates=())
         start = self._start(recording, ground)
         markers = marker_paths(recording, self.initial, start.ground)
-        other = self.estimator.again()
         coordinates = {c.name: float(c.value) for c in start.spec.coordinates}
         frozen = freeze(self.initial, initial_values(self.initial), coordinates)
-        other.start_from(frozen)
-        arrays = other.run_smoothed_arrays(
+        tracker = self.estimator.start(frozen)
+        arrays = tracker.run_smoothed_arrays(
             recording.time, markers, np.full((recording.n_frames, 6), np.nan), progress
         )  # fmt: skip
-        judged = as_estimate(other, arrays, recording, markers)
+        judged = as_estimate(self.estimator, tracker, arrays, recording, markers)
         if (reason := why_lost(judged)) is not None:
             raise LostError(f"{recording.path or recording.name}: {reason}")
         every = max(1, round(1.0 / (RATE_HZ * float(np.median(np.diff(recording.time))))))

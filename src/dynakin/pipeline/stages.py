@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from dynakin.errors import ConfigError, DynakinError
-from dynakin.filter.estimator import Estimator
+from dynakin.filter.tracker import Tracker
 from dynakin.identification.observability.trial import Identifiability, identifiability
 from dynakin.pipeline.result import Result
 from dynakin.recordings.recording import Recording
@@ -122,20 +122,20 @@ def run_case(
         DynakinError, LostError: as `run`.
     """
     failures = Failures()
-    estimates, _, estimators = estimate_each(
+    estimates, _, trackers = estimate_each(
         case.recording, case.setup, static=case.static, progress=progress, keep_lost=True, failures=failures
     )
     if not keep_lost:
         for estimate in estimates.values():
             refuse_lost(estimate, keep)
-    return judged(case, estimates, {}, estimators, failures, observability=observability)
+    return judged(case, estimates, {}, trackers, failures, observability=observability)
 
 
 def judged(
     case: Case,
     estimates: Mapping[str, Estimate],
     lost: Mapping[str, str],
-    estimators: Mapping[str, Estimator],
+    trackers: Mapping[str, Tracker],
     failures: Failures,
     *,
     whatever: bool = True,
@@ -149,8 +149,7 @@ def judged(
     """
     estimates = {title: case.with_config(title, estimate) for title, estimate in estimates.items()}
     title, first = next(iter(estimates.items()))
-    initial = list(estimators.values())[-1].initial
-    assert initial is not None
+    initial = list(trackers.values())[-1].calibrated
     comparison: Trial | None = None
     with failures.stage("comparison with the reference methods"):
         setup = case.setup
@@ -159,7 +158,7 @@ def judged(
     observed: Identifiability | None = None
     if observability:
         with failures.stage("what the recording tells of the constants"):
-            observed, note = _observability(estimators[title], first)
+            observed, note = _observability(trackers[title], first)
             if note:
                 first = replace(first, messages=[*first.messages, f"{_LEFT_OUT}: {note}"])
     return Result(first, initial, comparison, observed, case.config, failures)
@@ -168,13 +167,12 @@ def judged(
 _LEFT_OUT = "What the recording tells of the constants is left out"
 
 
-def _observability(estimator: Estimator, estimate: Estimate) -> tuple[Identifiability | None, str]:
+def _observability(tracker: Tracker, estimate: Estimate) -> tuple[Identifiability | None, str]:
     """What the recording tells of the constants, or why that cannot be said, which is no failure."""
-    assert estimator.initial is not None
-    n_states = len(estimator.initial.names)
+    n_states = len(tracker.calibrated.names)
     if n_states > LARGEST_BENCH:
         return None, f"with {n_states} states it takes many minutes; dynakin model --identifiability tells."
     try:
-        return identifiability(estimator, estimate), ""
+        return identifiability(tracker, estimate), ""
     except DynakinError as error:  # a trial of a few frames, say
         return None, error.message

@@ -9,8 +9,8 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.filter.estimator import Estimator
-from dynakin.filter.live import StepEstimate
+from dynakin.filter.step import StepEstimate
+from dynakin.filter.tracker import Tracker
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.stream.fusion import Fused, Fusion
 from dynakin.stream.sinks.base import Status
@@ -125,7 +125,7 @@ class Monitor:
         while time_s - self._recent[0][0] > _SOON_S:
             self._recent.popleft()
 
-    def settling(self, time_s: float, state: Array, estimator: Estimator) -> list[str]:
+    def settling(self, time_s: float, state: Array, tracker: Tracker) -> list[str]:
         """A sentence once lengths and masses have come to rest."""
         if self.last.settled or not len(self._constants):
             return []
@@ -135,7 +135,7 @@ class Monitor:
             return []
         if time_s - self._since[0] < _SETTLE_S:
             return []
-        sd = np.sqrt(np.diagonal(estimator.covariance)[self._constants])
+        sd = np.sqrt(np.diagonal(tracker.covariance)[self._constants])
         moved = np.abs(values - self._since[1]) > sd
         self._since = (time_s, values)
         if moved.any():

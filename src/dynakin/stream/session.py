@@ -11,6 +11,7 @@ import numpy as np
 from dynakin.errors import DivergenceError, DynakinError, ModelError, StreamError
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.samples import Sample
+from dynakin.filter.tracker import Tracker
 from dynakin.recordings.recording import Recording
 from dynakin.stream.feet import LiveFeet
 from dynakin.stream.fusion import DELAY_S, Fused, Fusion
@@ -32,7 +33,7 @@ class Live:
     """Estimates while it is measured.
 
     Args:
-        estimator: not started; its ``lag`` gives smoothed frames too.
+        estimator: its ``lag`` gives smoothed frames too.
         sources: one with markers; plates from the same or another one.
         sinks: where the estimates go.
         delay_s: longest wait for what is missing (`Fusion`).
@@ -73,6 +74,7 @@ class Live:
         self._standing_since: float | None = None
         self._came_s = self._ready_s = 0.0
         self._looked = self._asked = self._told_sd = -np.inf
+        self._tracker: Tracker | None = None
         self._monitor: Monitor | None = None
         self._use_plates = True
         self._feet: LiveFeet | None = None
@@ -94,6 +96,17 @@ class Live:
         return self._fusion
 
     @property
+    def tracker(self) -> Tracker:
+        """The filter of the person who was measured last.
+
+        Raises:
+            StreamError: nobody was measured yet.
+        """
+        if self._tracker is None:
+            raise StreamError("nobody has been measured yet, expected somebody who stands still first")
+        return self._tracker
+
+    @property
     def status(self) -> Status:
         """How it goes, as of the last step."""
         return Status() if self._monitor is None else self._monitor.last
@@ -110,7 +123,7 @@ class Live:
             while not self._stopped and not self._reader.over:
                 self._turn()
             self._take(np.inf)
-            if self._reader.over and self.estimator.initial is None:
+            if self._reader.over and self._tracker is None:
                 raise StreamError(
                     f"the streams ended before the model was measured: {self._came_s:.1f} s came, expected "
                     f"{self.standing_s:g} s of standing"
@@ -127,9 +140,9 @@ class Live:
 
     def restart(self) -> None:
         """Begin the estimate anew from the model as it was measured, without standing."""
-        if self.estimator.initial is None:
+        if self._tracker is None:
             return
-        self.estimator.start_from(self.estimator.initial)
+        self._tracker = self._tracker.fresh()
         self._begin_running("The estimate begins anew.")
 
     def recalibrate(self) -> None:
@@ -275,7 +288,7 @@ class Live:
             static = static or quiet
             self.say(f"Nobody stood still for {self.standing_s:g} s: {text}")
         try:
-            _, said, self._use_plates = begin(self.estimator, recording, static=static, known=self.known)
+            self._tracker, said, self._use_plates = begin(self.estimator, recording, static=static, known=self.known)
         except ModelError as error:
             if waited:
                 raise
@@ -287,8 +300,7 @@ class Live:
         self._begin_running("Ready: move.")
 
     def _begin_running(self, text: str) -> None:
-        initial, model = self.estimator.initial, self.estimator.core_model
-        assert initial is not None
+        initial = self.tracker.calibrated
         plates = self.fusion.plates is not None
         rate, holds = self.fusion.markers.rate_hz, self.estimator.noise.recover
         self._monitor = Monitor(initial, rate, plates, plates and self._use_plates, holds)
@@ -299,40 +311,40 @@ class Live:
         self._running = True
         self._ready_s = time.monotonic()
         self._window.clear()
-        started = Started(initial, model, self.fusion.markers.rate_hz)
+        started = Started(initial, self.tracker.core_model, self.fusion.markers.rate_hz)
         for sink in self.sinks:
             sink.started(started)
         self.say(text)
 
     def _step(self, fused: Fused) -> None:
-        monitor = self._monitor
+        monitor, tracker = self._monitor, self.tracker
         assert monitor is not None
         sample, feet, whole = fused.sample, None, True
         if self._feet is not None:
             wrenches = fused.wrenches if self._use_plates else None
-            feet, whole = self._feet.look(self.estimator.core_model, self.estimator.state, sample.time_s, wrenches)
+            feet, whole = self._feet.look(tracker.core_model, tracker.state, sample.time_s, wrenches)
         if not (whole and self._use_plates):
             sample = Sample(sample.time_s, sample.markers)
         try:
-            estimate = self.estimator.step(sample, feet)
+            estimate = tracker.step(sample, feet)
         except DivergenceError as error:
             self.say(f"{error.message}; the estimate begins anew.")
             self.restart()
             return
-        smoothed = self.estimator.delayed() if self.estimator.lag else None
-        state = self.estimator.state
+        smoothed = tracker.delayed() if tracker.lag else None
+        state = tracker.state
         deviations = None
         if not 0.0 <= sample.time_s - self._told_sd < _DEVIATIONS_S and self._reader.backlog < 4:
             self._told_sd = sample.time_s
-            deviations = self.estimator.deviations()
-        status = monitor.status(self.fusion, fused, whole, estimate, smoothed, state, self.estimator.verdicts)
+            deviations = tracker.deviations()
+        status = monitor.status(self.fusion, fused, whole, estimate, smoothed, state, tracker.verdicts)
         frame = LiveFrame(estimate, smoothed, fused, state, deviations, status)
         for sink in self.sinks:
             sink.frame(frame)
         monitor.published(sample.time_s, time.monotonic() - fused.arrived_s)
         news = self._feet.news() if self._feet is not None else []
         motion = monitor.motion(estimate, fused)
-        for text in [*news, *motion, *monitor.settling(sample.time_s, state, self.estimator)]:
+        for text in [*news, *motion, *monitor.settling(sample.time_s, state, tracker)]:
             self.say(text)
 
     def say(self, text: str) -> None:

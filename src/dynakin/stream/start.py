@@ -12,6 +12,7 @@ import numpy as np
 from dynakin.errors import ModelError, RecordingError
 from dynakin.files import LARGEST_TEXT, read_bytes
 from dynakin.filter.estimator import Estimator
+from dynakin.filter.tracker import Tracker
 from dynakin.model.calibration.body import steady_load
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition
@@ -134,28 +135,29 @@ def begin(
     *,
     static: Recording | None = None,
     known: Mapping[str, tuple[float, float]] | None = None,
-) -> tuple[CalibratedModel, list[str], bool]:
-    """Measure the model on the standing person and make the estimator ready.
+) -> tuple[Tracker, list[str], bool]:
+    """Calibrate the model on the standing person.
 
     Args:
         static: another recording of the person standing: lengths and places come from it.
         known: value and standard deviation of constants from an earlier session, by their names.
 
     Returns:
-        the model, what there is to say, and whether the plates can be used.
+        what is ready to step, what there is to say, and whether the plates can be used.
 
     Raises:
         ModelError, RecordingError: model, markers and plates do not fit.
     """
-    initial = estimator.start(standing, static=static)
+    tracker = estimator.start(standing, static=static)
+    initial = tracker.calibrated
     said = [message for message in initial.messages if message.startswith("Warning")]
     if known:
-        initial = estimator.start_from(_continued(initial, known))
+        tracker = estimator.start(_continued(initial, known))
         said.append(f"Lengths, marker places and masses go on from {len(known)} saved values.")
     usable = True
     if standing.plates:
         if max(np.nan_to_num(np.abs(plate.force)).max() for plate in standing.plates) < LOADED_N:
-            return initial, [*said, "Nobody stands on the plates yet; they are not checked."], usable
+            return tracker, [*said, "Nobody stands on the plates yet; they are not checked."], usable
         check = check_plates(
             static if static is not None and static.plates else standing,
             initial.ground,
@@ -172,7 +174,7 @@ def begin(
                 f"Warning: the plates carry {mass:.1f} kg where the person weighs {initial.weighed_kg:.1f} kg; the "
                 "plates are not used."
             )
-    return initial, said, usable
+    return tracker, said, usable
 
 
 def _continued(initial: CalibratedModel, known: Mapping[str, tuple[float, float]]) -> CalibratedModel:

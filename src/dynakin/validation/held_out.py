@@ -13,6 +13,7 @@ from dynakin.filter.assemble import assemble
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.smoothing import can_smooth
 from dynakin.filter.total_wrench import known_ground
+from dynakin.filter.tracker import Tracker
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition
 from dynakin.recordings.frame import GroundFrame
@@ -96,12 +97,12 @@ def identify_on(
     for preset in setup.noise:
         estimator = setup.estimator(preset)
         # only what it ends with is used, which smoothing does not change
-        estimates[preset] = estimator.run(recording, static=static, smooth=False)
+        estimates[preset], tracker = estimator.track(recording, static=static, smooth=False)
         _refuse_lost(estimates[preset], f"EKF ({preset})")
-    assert estimator.initial is not None
-    wrench = measured_wrench(recording, estimator.initial, setup.plates)
-    ground = estimator.initial.ground if same_recording else None
-    return IdentifyingTrial(recording, static, setup, estimator.initial, estimates, wrench, ground)
+    initial = tracker.calibrated
+    wrench = measured_wrench(recording, initial, setup.plates)
+    ground = initial.ground if same_recording else None
+    return IdentifyingTrial(recording, static, setup, initial, estimates, wrench, ground)
 
 
 def predict_blind(identified: IdentifyingTrial, recording: Recording) -> Blind:
@@ -126,14 +127,15 @@ def predict_blind(identified: IdentifyingTrial, recording: Recording) -> Blind:
     for preset, estimate in identified.estimates.items():
         for label, values in (("identified", final_values(estimate)), ("table", initial_values(measured))):
             estimator = setup.estimator(preset)
-            estimator.start_from(freeze(measured, values, coordinates))
-            arrays = estimator.run_arrays(recording.time, markers, blank)
-            _refuse_lost(as_estimate(estimator, arrays, recording, markers), f"EKF ({preset}), {label}")
+            frozen = freeze(measured, values, coordinates)
+            tracker = estimator.start(frozen)
+            arrays = tracker.run_arrays(recording.time, markers, blank)
+            _refuse_lost(as_estimate(estimator, tracker, arrays, recording, markers), f"EKF ({preset}), {label}")
             found[f"EKF ({preset}), {label}"] = arrays["wrench_estimated"]
             if label == "identified" and can_smooth(setup.noise[preset]):
-                estimator.start_from(freeze(measured, values, coordinates))
-                arrays = estimator.run_smoothed_arrays(recording.time, markers, blank)
-                _refuse_lost(as_estimate(estimator, arrays, recording, markers), f"EKF ({preset}), smoothed")
+                tracker = estimator.start(frozen)
+                arrays = tracker.run_smoothed_arrays(recording.time, markers, blank)
+                _refuse_lost(as_estimate(estimator, tracker, arrays, recording, markers), f"EKF ({preset}), smoothed")
                 found[f"EKF ({preset}), smoothed"] = arrays["wrench_estimated"]
     notes: list[str] = []
     try:
@@ -193,15 +195,16 @@ def marker_paths(recording: Recording, initial: CalibratedModel, ground: GroundF
     return ground.points_to_ground(np.stack(paths, axis=1))
 
 
-def as_estimate(estimator: Estimator, arrays: Mapping[str, Array], recording: Recording, markers: Array) -> Estimate:
-    """What an estimator that was started by hand made of a recording's markers (T, M, 3) m alone, judged frame by frame
+def as_estimate(
+    estimator: Estimator, tracker: Tracker, arrays: Mapping[str, Array], recording: Recording, markers: Array
+) -> Estimate:
+    """What a tracker that an estimator started made of a recording's markers (T, M, 3) m alone, judged frame by frame
     like any other estimate."""
-    assert estimator.initial is not None
     measured = (markers, np.full((recording.n_frames, 6), np.nan))
-    covariances = (estimator.covariance, estimator.covariance)
+    covariances = (tracker.covariance, tracker.covariance)
     return without_lost(
         assemble(
-            arrays, estimator.core_model, estimator.initial, recording, measured, estimator.settings(), [], covariances
+            arrays, tracker.core_model, tracker.calibrated, recording, measured, estimator.settings(), [], covariances
         )
     )
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from dynakin.errors import DynakinError, LostError, ModelError
-from dynakin.filter.estimator import Estimator
+from dynakin.filter.tracker import Tracker
 from dynakin.filter.zero import asked_angles
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition
@@ -118,9 +118,8 @@ def compare_trial(
     Raises:
         LostError: no filter followed the person. DynakinError: as `Estimator.run`.
     """
-    estimates, lost, estimators = estimate_each(recording, setup, static=static, progress=progress)
-    initial = list(estimators.values())[-1].initial
-    assert initial is not None
+    estimates, lost, trackers = estimate_each(recording, setup, static=static, progress=progress)
+    initial = list(trackers.values())[-1].calibrated
     trial = trial_of(estimates, initial, setup.definition, setup.cutoff_hz)
     return with_lost(trial, lost)
 
@@ -139,7 +138,7 @@ def estimate_each(
     progress: Progress | None = None,
     keep_lost: bool = False,
     failures: Failures | None = None,
-) -> tuple[dict[str, Estimate], dict[str, str], dict[str, Estimator]]:
+) -> tuple[dict[str, Estimate], dict[str, str], dict[str, Tracker]]:
     """Run every preset.
 
     Args:
@@ -147,17 +146,17 @@ def estimate_each(
             estimate is there (the angles that were asked for); not given: it is raised.
 
     Returns:
-        By preset: the estimates, why others lost the person, and the estimators of all as they ran.
+        By preset: the estimates, why others lost the person, and the trackers of all as they ended.
 
     Raises:
         LostError: no filter followed the person. DynakinError: as `Estimator.run`.
     """
     estimates: dict[str, Estimate] = {}
     lost: dict[str, str] = {}
-    estimators: dict[str, Estimator] = {}
+    trackers: dict[str, Tracker] = {}
     for preset in setup.noise:
-        estimator = estimators[preset] = setup.estimator(preset)
-        estimate = estimator.run(recording, static=static, smooth=setup.smooth, progress=progress)
+        estimator = setup.estimator(preset)
+        estimate, trackers[preset] = estimator.track(recording, static=static, smooth=setup.smooth, progress=progress)
         reason = None if keep_lost else why_lost(estimate)
         if reason is not None:
             lost[preset] = reason
@@ -168,7 +167,7 @@ def estimate_each(
     if not estimates:
         where = recording.path or recording.name
         raise LostError(f"{where}: {'; '.join(f'EKF ({preset}): {reason}' for preset, reason in lost.items())}")
-    return estimates, lost, estimators
+    return estimates, lost, trackers
 
 
 def trial_of(

@@ -11,6 +11,7 @@ import numpy.typing as npt
 
 import dynakin._core as _core
 from dynakin.errors import ConfigError, RecordingError
+from dynakin.filter.core_filter import filter_settings
 from dynakin.filter.estimator import Estimator
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.recording import Recording
@@ -83,7 +84,7 @@ def unseen_figures(
     figures = plates_withheld(recording, setup, static=static)
     for preset in setup.noise:
         estimator = setup.estimator(preset)
-        initial = estimator.start(recording, static=static)
+        initial = estimator.start(recording, static=static).calibrated
         markers, wrench, _ = estimator.measured(recording, initial)
         trial = _Trial(recording, initial, markers, wrench)
         figures |= _left_out(estimator, preset, trial, progress)
@@ -147,8 +148,7 @@ def _left_out(estimator: Estimator, preset: str, trial: _Trial, progress: Progre
     for k in range(count):
         hidden = trial.markers.copy()
         hidden[first:, k] = np.nan
-        estimator.start_from(trial.initial)
-        arrays = estimator.run_arrays(time, hidden, trial.wrench)
+        arrays = estimator.start(trial.initial).run_arrays(time, hidden, trial.wrench)
         single |= trial.marker_errors(LEFT_OUT, f"EKF ({preset})", arrays["markers_estimated"], [k])
         if progress is not None:
             progress(k + 1, count)
@@ -166,11 +166,11 @@ def _ahead(estimator: Estimator, preset: str, trial: _Trial, horizon_s: float) -
         raise ConfigError(f"the horizon is {horizon_s:g} s, expected more than 0 and less than half of the trial")
     yardstick = f"{1000.0 * horizon_s:g} ms ahead"
     frames = span_frames(time, horizon_s)
-    estimator.start_from(initial)
-    states = estimator.run_arrays(time, trial.markers, trial.wrench)["state"]
+    states = estimator.start(initial).run_arrays(time, trial.markers, trial.wrench)["state"]
     model = _core.Model(initial.spec)
+    settings = filter_settings(initial, estimator.noise, model.layout, estimator.estimate)
     covariance = np.diag(initial.sd0**2)  # the mean's prediction does not depend on it
-    probe = _core.Filter(model, estimator.filter_settings(initial), initial.x0, covariance)
+    probe = _core.Filter(model, settings, initial.x0, covariance)
     markers, wrench = np.full_like(trial.markers, np.nan), np.full_like(trial.wrench, np.nan)
     for k in range(len(time) - frames):
         probe.reset(states[k], covariance)

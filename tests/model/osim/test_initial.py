@@ -12,7 +12,7 @@ import dynakin
 from dynakin import _core
 from dynakin.errors import ModelError
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.model.definition import load_model
+from dynakin.model.definition import Definition, load_model
 from dynakin.model.opensim.calibrate import feet_of, limits_of
 from dynakin.model.opensim.definition import load_opensim
 from dynakin.model.opensim.read import read_osim
@@ -60,7 +60,7 @@ def test_what_is_estimated_is_a_choice(folder: Path, squats: Recording) -> None:
 
     def started(estimate: tuple[str, ...], **options: object) -> CalibratedModel:
         noise = presets.default().changed(plate_force=0.0, plate_moment=0.0, plate_delay_s=0.0)
-        return dynakin.Estimator(load_opensim(path, **options), noise, estimate=estimate).start(squats)
+        return dynakin.Estimator(load_opensim(path, **options), noise, estimate=estimate).start(squats).calibrated
 
     nothing = started(())
     assert len(nothing.names) == 3 * 31  # toes have no markers
@@ -80,6 +80,24 @@ def test_what_is_estimated_is_a_choice(folder: Path, squats: Recording) -> None:
     assert "femur_r" in bodies and "patella_r" not in bodies
 
 
+def test_every_model_answers_to_the_same_questions(folder: Path, squats: Recording) -> None:
+    """So that nobody asks which kind a model is."""
+    names, seen = squats.marker_names, [True] * len(squats.marker_names)
+    for name, planar, has_mass in (
+        (folder / FILE, False, True),
+        ("sagittal7", True, False),
+        ("fullbody", False, False),
+    ):
+        definition: Definition = load_model(name)
+        assert (definition.planar, definition.has_mass) == (planar, has_mass)
+        heavier = definition.with_subject(Subject(mass_kg=75.0))
+        assert heavier.has_mass and heavier.subject.mass_kg == 75.0 and definition.subject.mass_kg is None
+        whose, expected, found = definition.markers_among(names, seen, "squats1")
+        assert whose and set(found) <= set(names) and len(expected) >= len(found) > 0.8 * len(expected)
+        calibrated = heavier.calibrate(squats)
+        assert isinstance(calibrated, CalibratedModel) and calibrated.mass_kg == pytest.approx(75.0)
+
+
 def test_file_mass_where_nothing_tells(folder: Path) -> None:
     recording = dynakin.read(folder / "squats1.trc")
     assert load_model(folder / FILE).calibrate(recording).mass_kg == pytest.approx(62.6)
@@ -90,11 +108,11 @@ def test_file_mass_where_nothing_tells(folder: Path) -> None:
 def test_the_filter_runs_on_it(folder: Path, squats: Recording) -> None:
     """Half a second: finite, and nearer to the markers than the file's places are."""
     estimator = dynakin.Estimator(load_model(folder / FILE, Subject(mass_kg=60.05)))
-    initial = estimator.start(squats)
+    tracker = estimator.start(squats)
     from dynakin.filter.samples import recording_arrays
 
-    markers, wrench = (values[:50] for values in recording_arrays(squats, initial, gaps=True))
-    arrays = estimator.run_arrays(squats.time[:50], markers, wrench)
+    markers, wrench = (values[:50] for values in recording_arrays(squats, tracker.calibrated, gaps=True))
+    arrays = tracker.run_arrays(squats.time[:50], markers, wrench)
     gap = arrays["markers_estimated"] - markers
     assert np.isfinite(arrays["state"]).all()
     assert np.sqrt(np.nanmean((gap**2).sum(axis=2))) < 0.0085

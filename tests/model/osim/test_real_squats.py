@@ -28,9 +28,10 @@ def marker_rms_mm(folder: Path, estimate: tuple[Quantity, ...]) -> float:
     noise = dynakin.presets.default().changed(plate_force=0.0, plate_moment=0.0, plate_delay_s=0.0)
     recording = dynakin.read(folder / "squats1.trc", folder / "squats1_grf.mot")
     estimator = estimator_of(folder, estimate, noise)
-    markers, wrench = recording_arrays(recording, estimator.start(recording), gaps=True)
+    tracker = estimator.start(recording)
+    markers, wrench = recording_arrays(recording, tracker.calibrated, gaps=True)
     assert markers.shape[1] == 45
-    found = estimator.run_arrays(recording.time, markers, np.full_like(wrench, np.nan))["markers_estimated"]
+    found = tracker.run_arrays(recording.time, markers, np.full_like(wrench, np.nan))["markers_estimated"]
     return 1000.0 * float(np.sqrt(np.nanmean(((found - markers) ** 2).sum(axis=2))))
 
 

@@ -15,9 +15,8 @@ def offline_states(
     Args:
         markers: (T, M, 3) m. wrench: (T, 6), all plates together; both laboratory frame.
     """
-    initial, offline = live.estimator.initial, live.estimator.again()
-    assert initial is not None
-    offline.start_from(initial)
+    offline = live.tracker.fresh()
+    initial = offline.calibrated
     order = [names.index(name) for name in initial.recorded_markers]
     arrays = offline.run_arrays(
         time, initial.ground.points_to_ground(markers[:, order]), initial.ground.wrench_to_ground(wrench)

@@ -1,15 +1,15 @@
 """What can be told and what was: base parameters, gauges, posterior against prior, and what motion would tell more.
 
     estimator = dynakin.Estimator(model)
-    estimate = estimator.run(recording)
-    print("\\n".join(identifiability(estimator, estimate).advice))
+    estimate, tracker = estimator.track(recording)
+    print("\\n".join(identifiability(tracker, estimate).advice))
 
 It stands beside the chain, as `comparison` does: it needs the core, the filter and the reference's base parameters.
 """
 
 from dynakin.identification.observability.advice import GAIN
 from dynakin.identification.observability.gauges import Gauge, Gauges
-from dynakin.identification.observability.person import estimator_of
+from dynakin.identification.observability.person import tracker_of
 from dynakin.identification.observability.structure import Structure, structure_of
 from dynakin.identification.observability.trial import BaseParameterTold, Identifiability, identifiability
 
@@ -20,7 +20,7 @@ __all__ = [
     "Gauges",
     "Identifiability",
     "Structure",
-    "estimator_of",
     "identifiability",
     "structure_of",
+    "tracker_of",
 ]

@@ -16,7 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 import dynakin._core as _core
-from dynakin.filter.estimator import Estimator
+from dynakin.filter.core_filter import filter_settings
+from dynakin.filter.tracker import Tracker
 from dynakin.identification.observability.measured import MeasuredModel
 from dynakin.results.estimate import Estimate
 from dynakin.results.naming import words
@@ -58,34 +59,25 @@ class Excitation:
     sd: Array
 
 
-def _trusting(estimator: Estimator) -> Estimator:
+def _trusting(tracker: Tracker) -> _core.FilterSettings:
     """The same filter without gates, bounds and recovery: what it is shown is exact, and no verdict on a single frame
     shall decide between two motions."""
-    assert estimator.initial is not None
-    made = Estimator(
-        estimator.model,
-        estimator.noise.changed(
-            marker_gate=0.0, wrench_gate=0.0, recover=False, constraint="none", iterate_beyond=None
-        ),
-        priors=estimator.priors,
-        bounds=estimator.bounds,
-        estimate=estimator.estimate,
-    )
-    made.start_from(estimator.initial)
-    return made
+    free = {"marker_gate": 0.0, "wrench_gate": 0.0, "recover": False, "constraint": "none", "iterate_beyond": None}
+    noise = tracker.noise.changed(**free)
+    return filter_settings(tracker.calibrated, noise, tracker.core_model.layout, tracker.estimate)
 
 
 class Bench:
     """The trial's motion and its filter, to try other motions on.
 
     Args:
-        estimator: after its `run`. estimate: what it gave.
+        tracker, estimate: as `Estimator.track` gave them.
     """
 
-    def __init__(self, estimator: Estimator, estimate: Estimate) -> None:
-        self.measured = MeasuredModel.of(estimator)
-        assert estimator.initial is not None
-        self.settings = _trusting(estimator).filter_settings(estimator.initial)
+    def __init__(self, tracker: Tracker, estimate: Estimate) -> None:
+        self.measured = MeasuredModel.of(tracker)
+        self.settings = _trusting(tracker)
+        initial = tracker.calibrated
         self.coordinates = self.measured.names[self.measured.block("coordinates")]
         time = estimate.time
         frames = int(np.searchsorted(time, time[0] + LONGEST_S)) if time[-1] - time[0] > LONGEST_S else len(time)
@@ -94,7 +86,7 @@ class Bench:
         self.missing = np.isnan(estimate.data["markers_measured"].values[stretch][:, :, estimate.modelled_axes()]).any(
             axis=2
         )
-        modelled = np.array(estimator.initial.spec.wrench_measured)
+        modelled = np.array(initial.spec.wrench_measured)
         self.blind = np.isnan(estimate.data["wrench_measured"].values[stretch][:, modelled]).any(axis=1)
         state = estimate.data["state"].values
         self.constants = state[-1].copy()
@@ -102,10 +94,10 @@ class Bench:
             self.constants[self.measured.block(block)] = 0.0
         at = [self.measured.block(block) for block in ("coordinates", "speeds", "accelerations")]
         self.trial = Motion(time[stretch] - time[first], *(state[stretch, block] for block in at))
-        self.limits = (estimator.initial.lower[at[0]], estimator.initial.upper[at[0]])
+        self.limits = (initial.lower[at[0]], initial.upper[at[0]])
         rotations = {name for name, kind in zip(estimate.coordinate_names, estimate.is_rotation(), strict=True) if kind}
         self.rotation = [name in rotations for name in self.coordinates]
-        spec = estimator.initial.spec
+        spec = initial.spec
         self.grounded = {a.coordinate for s in spec.segments if s.parent == "ground" for a in s.axes}
         self.support = self._support()
         self.least_load = _LIGHTEST * abs(float(self.loads(self.trial)[0].mean()))

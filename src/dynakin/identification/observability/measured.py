@@ -8,10 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 import dynakin._core as _core
-from dynakin.errors import ConfigError
 from dynakin.filter.augment import initial_covariance
-from dynakin.filter.estimator import Estimator
 from dynakin.filter.noise import marker_variance, wrench_covariance
+from dynakin.filter.tracker import Tracker
 from dynakin.model.calibration.calibrated import CalibratedModel
 
 Array = npt.NDArray[np.float64]
@@ -24,7 +23,7 @@ _FREE = 1.0  # rad or m: half width of the postures of a coordinate without limi
 
 @dataclass(frozen=True, eq=False)
 class MeasuredModel:
-    """A started estimator's model.
+    """A tracker's model.
 
     Attributes:
         core: the compiled model. initial: as the filter starts, soft tissue and plate errors among its states.
@@ -39,18 +38,12 @@ class MeasuredModel:
     wrench_sd: Array
 
     @classmethod
-    def of(cls, estimator: Estimator) -> MeasuredModel:
-        """The model of an estimator after `run` or `start`.
-
-        Raises:
-            ConfigError: it was not started.
-        """
-        initial, noise = estimator.initial, estimator.noise
-        if initial is None:
-            raise ConfigError("identifiability: the estimator has not been started; call run or start first")
-        variance = marker_variance(initial, noise, estimator.estimate)
+    def of(cls, tracker: Tracker) -> MeasuredModel:
+        """The model that a tracker has."""
+        initial, noise = tracker.calibrated, tracker.noise
+        variance = marker_variance(initial, noise, tracker.estimate)
         return cls(
-            _core.Model(initial.spec),
+            tracker.core_model,
             initial,
             initial_covariance(initial, noise),
             np.sqrt(variance),

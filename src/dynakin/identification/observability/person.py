@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from dynakin.errors import DynakinError, ModelError
 from dynakin.filter.estimator import Estimator
-from dynakin.model.definition import ModelDefinition
+from dynakin.filter.tracker import Tracker
+from dynakin.model.definition import Definition
 from dynakin.simulation.bodies.registry import BODIES
 from dynakin.simulation.bodies.subject import Spread
 from dynakin.simulation.sensors.sizes import SensorNoise
@@ -13,8 +14,8 @@ from dynakin.simulation.trial import simulate
 MASS_KG, HEIGHT_M = 70.0, 1.75
 
 
-def estimator_of(definition: ModelDefinition) -> Estimator:
-    """An estimator of the model, started on a simulated recording of somebody of that mass, height and sex.
+def tracker_of(definition: Definition) -> Tracker:
+    """A tracker of the model, calibrated on a simulated recording of somebody of that mass, height and sex.
 
     Which lengths and places the markers have does not matter to ranks and gauges; the simulated bodies carry the
     built-in marker sets.
@@ -23,7 +24,7 @@ def estimator_of(definition: ModelDefinition) -> Estimator:
         ModelError: none of the simulated recordings has the markers that the model needs.
     """
     who, why = definition.subject, ""
-    started: list[Estimator] = []
+    started: list[Tracker] = []
     for body in sorted(BODIES, key=lambda name: name != definition.name):
         trial = simulate(
             body,
@@ -34,13 +35,10 @@ def estimator_of(definition: ModelDefinition) -> Estimator:
             noise=SensorNoise.none(),
             spread=Spread().times(0.0),
         )
-        estimator = Estimator(definition)
         try:
-            estimator.start(trial.recording)
+            started.append(Estimator(definition).start(trial.recording))
         except DynakinError as error:
             why = why or error.message
-        else:
-            started.append(estimator)
     if not started:
         raise ModelError(
             f"model {definition.name}: cannot be measured on a simulated person ({why}); expected --trial FILE"
@@ -48,6 +46,5 @@ def estimator_of(definition: ModelDefinition) -> Estimator:
     return max(started, key=_free)  # a joint without markers beyond it is locked; of equals the first
 
 
-def _free(estimator: Estimator) -> int:
-    assert estimator.initial is not None
-    return sum(not coordinate.locked for coordinate in estimator.initial.spec.coordinates)
+def _free(tracker: Tracker) -> int:
+    return sum(not coordinate.locked for coordinate in tracker.calibrated.spec.coordinates)

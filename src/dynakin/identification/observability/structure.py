@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from dynakin.filter.estimator import Estimator
+from dynakin.filter.tracker import Tracker
 from dynakin.identification.observability.base import base_of, in_no_base_parameter, told_alone
 from dynakin.identification.observability.element_words import base_words, inertia_words, is_planar
 from dynakin.identification.observability.gauge_words import gauges_in_words
@@ -62,13 +62,9 @@ class Structure:
         }
 
 
-def structure_of(estimator: Estimator) -> Structure:
-    """Base parameters and gauges of an estimator's model, after `start` or `run`.
-
-    Raises:
-        ConfigError: the estimator was not started.
-    """
-    measured = MeasuredModel.of(estimator)
+def structure_of(tracker: Tracker) -> Structure:
+    """Base parameters and gauges of a tracker's model."""
+    measured = MeasuredModel.of(tracker)
     spec, base, gauges = measured.initial.spec, base_of(measured), gauges_of(measured)
     return Structure(
         base,

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.filter.estimator import Estimator
+from dynakin.filter.tracker import Tracker
 from dynakin.identification.observability.advice import advice_in_words, gains_of
 from dynakin.identification.observability.base import base_of, base_spread
 from dynakin.identification.observability.excitation import Bench, Excitation
@@ -105,18 +105,15 @@ class Identifiability:
 
 
 def identifiability(
-    estimator: Estimator, estimate: Estimate, progress: Callable[[int, int], None] | None = None
+    tracker: Tracker, estimate: Estimate, progress: Callable[[int, int], None] | None = None
 ) -> Identifiability:
     """What a trial told of the constants, and what would tell more.
 
     Args:
-        estimator: after its `run`. estimate: what it gave.
+        tracker, estimate: as `Estimator.track` gave them.
         progress: called with (motions tried, in all).
-
-    Raises:
-        ConfigError: the estimator was not started.
     """
-    structure, bench = structure_of(estimator), Bench(estimator, estimate)
+    structure, bench = structure_of(tracker), Bench(tracker, estimate)
     shares = {p.name: share for p in estimate.parameters if (share := share_of(p)) is not None}
     now, tried = bench.try_all(progress)
     ended = estimate.data["state_sd"].isel(time=-1).values

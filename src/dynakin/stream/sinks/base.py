@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 import dynakin._core as _core
-from dynakin.filter.live import StepEstimate
+from dynakin.filter.step import Labelled, StepEstimate
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.stream.fusion import Fused
 from dynakin.stream.sources.packets import Packet, StreamInfo
@@ -59,7 +59,7 @@ class LiveFrame:
         estimate: of this sample. smoothed: of an earlier one, where a lag was asked for.
         fused: what was measured.
         state: (n,) as ``Started.initial.names`` name it.
-        deviations: as `Estimator.deviations`, a few times a second; None in between.
+        deviations: as `Tracker.deviations`, a few times a second; None in between.
         status: how it goes.
     """
 
@@ -67,7 +67,7 @@ class LiveFrame:
     smoothed: StepEstimate | None
     fused: Fused
     state: np.ndarray
-    deviations: dict[str, np.ndarray] | None
+    deviations: Mapping[str, Labelled] | None
     status: Status
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 import dynakin._core as _core
+from dynakin.filter.step import Labelled
 from dynakin.stream.sinks.base import LiveFrame, Started, Status
 
 Array = npt.NDArray[np.float64]
@@ -52,7 +53,7 @@ class Picture:
             "markers": list(self.initial.recorded_markers),
         }
 
-    def numbers(self, frame: LiveFrame, deviations: Mapping[str, Array] | None) -> Array:
+    def numbers(self, frame: LiveFrame, deviations: Mapping[str, Labelled] | None) -> Array:
         """The frame's numbers, all blocks after one another; deviations keep their last values where None."""
         ground, estimate = self.initial.ground, frame.estimate
         body = _core.whole_body(self.model, np.ascontiguousarray(frame.state[None]))
@@ -61,9 +62,9 @@ class Picture:
         arrows = np.full((self.sizes["arrows"] // 6, 6), np.nan)
         if frame.fused.wrenches is not None:
             arrows[:-1] = [arrow(w) for w in ground.wrench_to_ground(frame.fused.wrenches)]
-        arrows[-1] = arrow(estimate.wrench)
+        arrows[-1] = arrow(estimate.values["wrench"])
         if deviations is not None:
-            self._moment_sd = deviations["moments"]
+            self._moment_sd = deviations["moments"].values
         parts = (
             [estimate.time_s],
             body["joint_centres"][0],

@@ -10,10 +10,12 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Mapping
 
 import numpy as np
 
 from dynakin.errors import ConfigError
+from dynakin.filter.step import Labelled
 from dynakin.stream.sinks.base import LiveFrame, Sink, Started, Status
 from dynakin.stream.sinks.picture import Picture, status_text
 from dynakin.stream.sources.packets import StreamInfo
@@ -43,7 +45,7 @@ class Viewer(Sink):
         self._picture: Picture | None = None
         self._latest: Latest | None = None
         self._drawn = -np.inf
-        self._deviations: dict[str, np.ndarray] | None = None
+        self._deviations: Mapping[str, Labelled] | None = None
         self._plates = 0
         self._wishes: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._lines: queue.SimpleQueue[str | None] = queue.SimpleQueue()

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.filter.alignment import in_step
+from dynakin.filter.alignment import run_in_step
 from dynakin.filter.estimator import Estimator
+from dynakin.filter.samples import in_step
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.recording import Recording
 from dynakin.results.measures.metrics import evaluation_window
@@ -88,12 +89,12 @@ def prepare(
     Raises:
         DynakinError: as `Estimator.run`.
     """
-    initial = estimator.measure(recording, static=static)
-    extended = estimator.start_from(initial)
-    markers, wrench, _ = estimator.measured(recording, extended)
+    initial = estimator.calibrate(recording, static=static)
+    tracker = estimator.start(initial)
+    markers, wrench, _ = estimator.measured(recording, tracker.calibrated)
     taken_out = 0
     if _doubts(estimator.noise):
-        arrays, shift, _ = estimator.run_in_step(initial, recording.time, markers, wrench)
+        _, arrays, shift, _ = run_in_step(tracker, recording.time, markers, wrench)
         wrench = in_step(recording.time, wrench, shift) if shift else wrench
         refused = arrays["verdicts"] == REFUSED
         refused[arrays["tracking"] != FOLLOWING] = True

@@ -57,7 +57,7 @@ def reference_methods(
     """Classical joint angles, low-passed and differentiated, then the table's wrench and joint moments.
 
     Args:
-        initial, definition: the model as measured, and what it was measured from (`Estimator.initial`, `.model`).
+        initial, definition: the calibrated model, and what it was calibrated from (`Estimator.model`).
         cutoff_hz: of the zero-lag low-pass of the angles; None: none.
         lengths: "constant": the chain of (1) with its lengths as measured while standing and its root at rest, as in
             the paper. "frame": each hinge follows its landmarks, so that angles and lengths err together and partly

@@ -1,0 +1,201 @@
+"""A filter at work: the state of one calibrated model, from sample to sample or over the arrays of a recording."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Collection
+
+import numpy as np
+import numpy.typing as npt
+
+import dynakin._core as _core
+from dynakin.errors import ConfigError, DivergenceError, RecordingError
+from dynakin.filter.core_filter import core_filter
+from dynakin.filter.foot_wrenches import FootWrenches
+from dynakin.filter.samples import Sample, sample_arrays
+from dynakin.filter.smoothing import check_can_smooth, smoothed
+from dynakin.filter.step import Labelled, Labels, StepEstimate, deviations_of, step_estimate
+from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.settings.model import QUANTITIES, Quantity
+from dynakin.settings.noise import Noise
+
+Array = npt.NDArray[np.float64]
+Progress = Callable[[int, int], None]
+
+
+class Tracker:
+    """Follows one person: what `Estimator.start` gives.
+
+    Args:
+        calibrated: the model and where it starts.
+        noise, estimate, lag: as of `Estimator`.
+
+    Attributes:
+        calibrated: the same with the states that the noise asks for, as the filter has them.
+        core_model: it, compiled.
+
+    Raises:
+        ConfigError: the noise names a marker that the model does not use, or has no smoother for a lag.
+    """
+
+    def __init__(
+        self, calibrated: CalibratedModel, noise: Noise, estimate: Collection[Quantity] = QUANTITIES, lag: int = 0
+    ) -> None:
+        self.calibrated, self.core_model, self._filter = core_filter(calibrated, noise, estimate)
+        self.noise, self.estimate, self.lag = noise, tuple(estimate), lag
+        if lag:
+            check_can_smooth(noise)
+        self._lag = _core.FixedLag(self._filter, lag) if lag else None
+        self._filter.report_sensors(True)
+        self._labels = Labels.of(self.core_model)
+        self._time: float | None = None
+        self._latest: StepEstimate | None = None
+        self._stepped: deque[tuple[float, _core.FootLoads | None]] = deque(maxlen=lag + 1)
+
+    def fresh(self) -> Tracker:
+        """Another one, at the start of the same model."""
+        return Tracker(self.calibrated, self.noise, self.estimate, self.lag)
+
+    @property
+    def state(self) -> Array:
+        """The present state (n,), named by ``calibrated.names``."""
+        return self._filter.state
+
+    @property
+    def covariance(self) -> Array:
+        """Its covariance (n, n)."""
+        return self._filter.covariance
+
+    @property
+    def verdicts(self) -> list[str]:
+        """missing, accepted or refused: each marker in the last step and, last, the plates."""
+        return self._filter.verdicts
+
+    @property
+    def sensors(self) -> dict[str, Array]:
+        """What each sensor said in the last step: innovation and innovation_sd (3 M + 6,), 3 a marker, then the
+        plates'; test_ratio (M + 1,) as in `Estimate`. NaN: not measured."""
+        return self._filter.sensors
+
+    @property
+    def latest(self) -> StepEstimate:
+        """What the last step gave; before the first one the start, whose time is NaN."""
+        if self._latest is None:
+            time = np.nan if self._time is None else self._time
+            self._latest = step_estimate(self.core_model, self._labels, time, self.state, None)
+        return self._latest
+
+    def step(self, sample: Sample, feet: FootWrenches | None = None) -> StepEstimate:
+        """Take one sample; samples come in the order of their times.
+
+        The six rows of the wrench are the sum of the sample's plates. For a model with a floating root give plates
+        only where they carry all that the ground does to the person, as `dynakin.stream.Live` decides in each step.
+
+        Args:
+            feet: for models with a floating root: the feet's wrenches in this frame (T = 1). Moments, deviations and
+                those of `delayed` are then what these leave, as in `Estimator.run`. Without them the moments of a
+                floating model have no ground reaction in them, and are no joint moments of a person on the ground: use
+                `Estimator.run`, or `dynakin.stream.Live`, which finds the feet's wrenches. The state does not depend
+                on it.
+
+        Raises:
+            RecordingError: the sample is older than the one before, or holds something else than numbers in the shapes
+                of `Sample`. ModelError: feet that do not fit the model.
+            DivergenceError: the filter lost its estimate.
+        """
+        markers, wrench = sample_arrays(sample, self.calibrated)
+        dt = 0.0 if self._time is None else sample.time_s - self._time
+        if dt < 0.0:
+            raise RecordingError(f"sample at {sample.time_s} s: older than the one before, at {self._time} s")
+        loads = self._loads(feet)
+        if self._lag is not None:
+            report = self._lag.step(dt, markers, wrench)
+        else:
+            if self._time is not None:
+                self._filter.predict(dt)
+            report = self._filter.update(markers, wrench)
+        if report.diverged:
+            raise DivergenceError(f"the filter diverged at {sample.time_s} s: {report.status}")
+        self._time = sample.time_s
+        self._stepped.append((sample.time_s, loads))
+        self._latest = step_estimate(self.core_model, self._labels, sample.time_s, self.state, report, loads)
+        return self._latest
+
+    def delayed(self) -> StepEstimate | None:
+        """The frame that lies ``lag`` frames back, smoothed by all samples until now; None before there is one.
+
+        Its ``time_s`` is its own: the delay is the last sample's time less that. Moments come from the feet's wrenches
+        that `step` was given for that frame; without them, of a floating model, they have no ground reaction in them.
+
+        Raises:
+            ConfigError: the estimator was made without a lag.
+        """
+        if self._lag is None:
+            raise ConfigError("delayed: the estimator has no lag, expected Estimator(..., lag=frames)")
+        if self._time is None or not self._lag.ready:
+            return None
+        time = self._time - self._lag.delay_s
+        _, loads = min(self._stepped, key=lambda stepped: abs(stepped[0] - time))
+        return step_estimate(self.core_model, self._labels, time, self._lag.state, None, loads)
+
+    def deviations(self) -> dict[str, Labelled]:
+        """Standard deviations of the present estimate, as it was last stepped: propagated now, not in every step.
+
+        Returns:
+            coordinates, speeds, accelerations, moments (C,), of all coordinates of the model; wrench (6,). Moments as
+            `step` gave them: with the feet's wrenches where it had these.
+        """
+        loads = self._stepped[-1][1] if self._stepped else None
+        found = deviations_of(self.core_model, self.state, self.covariance, loads)
+        return {name: Labelled(values, self._labels.on(name)) for name, values in found.items()}
+
+    def run_arrays(
+        self,
+        time: Array,
+        markers: Array,
+        wrench: Array,
+        progress: Progress | None = None,
+        feet: FootWrenches | None = None,
+    ) -> dict[str, Array]:
+        """Go on over arrays, from the present state.
+
+        Args:
+            time: (T,) s. markers: (T, M, 3) m, ground frame, in the order of the model's markers. wrench: (T, 6) N and
+                N m, ground on person, about the ground origin. NaN: not measured.
+            progress, feet: as in `Estimator.run`.
+
+        Returns:
+            Arrays by name, as `_core.Filter.run` gives them.
+
+        Raises:
+            DivergenceError: the filter lost its estimate; the message names the frame.
+        """
+        time, markers, wrench = (np.ascontiguousarray(values) for values in (time, markers, wrench))
+        arrays = self._filter.run(time, markers, wrench, progress, output_sd=True, feet=self._loads(feet))
+        self._time, self._latest = float(time[-1]), None
+        return arrays
+
+    def run_smoothed_arrays(
+        self,
+        time: Array,
+        markers: Array,
+        wrench: Array,
+        progress: Progress | None = None,
+        feet: FootWrenches | None = None,
+    ) -> dict[str, Array]:
+        """`run_arrays`, then backwards over the same frames: the smoothed arrays take the places of the filtered.
+
+        Raises:
+            ConfigError: the bounds are kept in a way that has no smoother. DivergenceError: as `run_arrays`.
+        """
+        check_can_smooth(self.noise)
+        time, markers, wrench = (np.ascontiguousarray(values) for values in (time, markers, wrench))
+        arrays = self._filter.run_smoothed(time, markers, wrench, progress, feet=self._loads(feet))
+        self._time, self._latest = float(time[-1]), None
+        return smoothed(arrays)
+
+    def _loads(self, feet: FootWrenches | None) -> _core.FootLoads | None:
+        if feet is None:
+            return None
+        feet.check(self.core_model)
+        return feet.core()
