@@ -30,6 +30,7 @@ from dynakin.recordings.smoothing import CUTOFF_HZ
 from dynakin.report.paper_figures.figures import save_sensitivity_figures
 from dynakin.report.paper_figures.sensitivity import GAIN_NAMES, GAIN_UNITS, Sensitivity
 from dynakin.settings import presets
+from dynakin.settings.noise import SCALES
 from dynakin.studies.engine.folder import ROWS, open_folder
 from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import open_pool
@@ -38,7 +39,6 @@ from dynakin.studies.tuning.fit import Fitter, belongs_to_fit, usual_names
 from dynakin.studies.tuning.grid import Axis, Grid, axis, belongs_to, paper_axes, run_grid
 from dynakin.studies.tuning.output import write_fit, write_grid
 from dynakin.studies.tuning.score import CRITERIA, Shared
-from dynakin.studies.tuning.settings import UNITS
 from dynakin.studies.tuning.tables import criteria_text, figures_text, grid_text, settings_text
 from dynakin.studies.tuning.trial import prepare
 from dynakin.validation.case import Case
@@ -170,7 +170,7 @@ def figures_of(found: Grid) -> dict[str, Sensitivity]:
     """Figure 3 by each criterion."""
     exponents = tuple(np.log10(axis.values) for axis in found.axes)
     names = tuple(_label(axis.name) for axis in found.axes)
-    units = tuple(GAIN_UNITS[_GAINS.index(a.name)] if a.name in _GAINS else UNITS[a.name] for a in found.axes)
+    units = tuple(GAIN_UNITS[_GAINS.index(a.name)] if a.name in _GAINS else SCALES[a.name].unit for a in found.axes)
     return {
         f"figure3_{name}": Sensitivity(exponents, found.criterion(name), *CRITERIA[name], names, units)
         for name in found.criteria()

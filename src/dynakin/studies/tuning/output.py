@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Any
 
 from dynakin.results.files.versions import versions
+from dynakin.settings.noise import SCALES
 from dynakin.settings.presets import write_preset
 from dynakin.studies.engine.folder import write_csv, write_json
 from dynakin.studies.tuning.fit import Fit
 from dynakin.studies.tuning.grid import Grid
 from dynakin.studies.tuning.score import CRITERIA
-from dynakin.studies.tuning.settings import UNITS
 
 PAPER = "paper"
 
@@ -59,7 +59,7 @@ def write_fit(folder: Path, fit: Fit, base: str, advice: Sequence[str]) -> None:
     Raises:
         OutputError: a file cannot be written.
     """
-    rows = [asdict(s) | {"unit": UNITS[s.name], "known": s.known} for s in fit.settings]
+    rows = [asdict(s) | {"unit": SCALES[s.name].unit, "known": s.known} for s in fit.settings]
     write_csv(folder / "fit.csv", rows)
     names = [trial.name for trial in fit.shared.trials]
     write_json(

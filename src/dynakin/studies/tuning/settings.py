@@ -5,62 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 
 from dynakin.errors import ConfigError
-from dynakin.settings.noise import Noise
+from dynakin.settings.noise import SCALES, Noise
 from dynakin.settings.strict import nearest
-
-# Settings on a scale of their own kind, so that a logarithm makes sense: variances, deviations, times. -> unit
-UNITS = {
-    "coordinate": "rad² or m² a step",
-    "speed": "(rad/s)² or (m/s)² a step",
-    "acceleration": "(rad/s²)² or (m/s²)² a step",
-    "length": "m² a step",
-    "marker_place": "m² a step",
-    "inertia": "SI² a step",
-    "jerk": "rad²/s⁵",
-    "jerk_translation": "m²/s⁵",
-    "floating_jerk": "rad²/s⁵",
-    "floating_jerk_translation": "m²/s⁵",
-    "length_drift": "m²/s",
-    "soft_tissue": "of the declared size",
-    "soft_tissue_least_m": "m",
-    "soft_tissue_time_s": "s",
-    "floating_soft_tissue_time_s": "s",
-    "marker_sd_m": "m",
-    "marker_scale": "1",
-    "force": "N²",
-    "moment": "(N m)²",
-    "plate_force": "N",
-    "plate_moment": "N m",
-    "plate_time_s": "s",
-    "total_mass": "kg²",
-}
-
-# What each does, in words for the table of `tune fit`.
-MEANINGS = {
-    "coordinate": "how far coordinates may jump between frames",
-    "speed": "how far speeds may jump between frames",
-    "acceleration": "how far accelerations may jump between frames",
-    "length": "how fast lengths may change",
-    "marker_place": "how fast marker places may change",
-    "inertia": "how fast inertial parameters may change",
-    "jerk": "how abruptly joints accelerate",
-    "jerk_translation": "how abruptly the body accelerates",
-    "floating_jerk": "how abruptly joints accelerate",
-    "floating_jerk_translation": "how abruptly the body accelerates",
-    "length_drift": "how fast lengths may change",
-    "soft_tissue": "how far skin and flesh move",
-    "soft_tissue_least_m": "below which size soft tissue counts as noise",
-    "soft_tissue_time_s": "how long skin stays displaced",
-    "floating_soft_tissue_time_s": "how long skin stays displaced",
-    "marker_sd_m": "noise of the cameras",
-    "marker_scale": "noise of the markers",
-    "force": "noise of the forces",
-    "moment": "noise of the moments",
-    "plate_force": "slow error of the forces",
-    "plate_moment": "slow error of the moments",
-    "plate_time_s": "how long that error lasts",
-    "total_mass": "doubt about the total mass",
-}
 
 
 def check_setting(name: str) -> str:
@@ -69,16 +15,16 @@ def check_setting(name: str) -> str:
     Raises:
         ConfigError: it is not; the nearest that is, is suggested.
     """
-    if name not in UNITS:
+    if name not in SCALES:
         raise ConfigError(
-            f"setting {name!r} cannot be varied{nearest(name, UNITS)}; expected one of {', '.join(UNITS)}"
+            f"setting {name!r} cannot be varied{nearest(name, SCALES)}; expected one of {', '.join(SCALES)}"
         )
     return name
 
 
 def of_floating(name: str) -> str | None:
     """The setting that stands in for this one on a model that is fixed nowhere; None: there is none."""
-    return f"floating_{name}" if f"floating_{name}" in UNITS else None
+    return f"floating_{name}" if f"floating_{name}" in SCALES else None
 
 
 def without_effect(names: Sequence[str], noise: Noise, floating: Collection[bool]) -> dict[str, str]:

@@ -5,10 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from dynakin.report.text_tables import TextTable
+from dynakin.settings.noise import SCALES
 from dynakin.studies.tuning.fit import Fit
 from dynakin.studies.tuning.grid import Grid
 from dynakin.studies.tuning.score import CRITERIA
-from dynakin.studies.tuning.settings import MEANINGS, UNITS
 
 _SHOWN = {"markers_mm": "mm", "fy": "FY, N", "nll": "nll", "ahead": "ahead", "nis_per_row": "NIS"}
 
@@ -43,8 +43,8 @@ def settings_text(fit: Fit) -> TextTable:
         interval = "–" if s.low is None or s.high is None else f"{s.low:.3g} to {s.high:.3g}"
         value = f"{s.value:.3g}{'*' if s.at_limit else ''}"
         known = "yes" if s.known else "no"
-        words = (s.name, UNITS[s.name], _number(s.start), value, interval, known)
-        rows.append((*words, _signed(s.halved), _signed(s.doubled), MEANINGS[s.name]))
+        words = (s.name, SCALES[s.name].unit, _number(s.start), value, interval, known)
+        rows.append((*words, _signed(s.halved), _signed(s.doubled), SCALES[s.name].effect))
     unit = "nat" if fit.criterion == "nll" else fit.criterion
     headings = ("setting", "unit", "start", "fitted", "95 %", "known", f"half, {unit}", f"twice, {unit}", "")
     title = f"Fitted on {', '.join(t.name for t in fit.shared.trials)} (*: end of the range)"
