@@ -132,7 +132,7 @@ def test_run_on_real_data_and_again_from_its_own_configuration(data_dir: Path, t
     assert rms["fx"] <= 6.0 and rms["fy"] <= 10.0 and rms["mz"] <= 7.0
 
     used = tomllib.loads((out / "config.toml").read_text())
-    assert used["mass_kg"] == 60.05 and used["noise"]["coordinate"] == 1000.0
+    assert used["mass_kg"] == 60.05 and used["noise"]["coordinate_variance"] == 1000.0
     assert used["versions"]["dynakin"] == dynakin.__version__
     assert main(["run", str(out / "config.toml"), "-o", str(again)]) == 0
     repeated = json.loads((again / "metrics.json").read_text())
@@ -170,7 +170,9 @@ def test_run_replaces_its_own_output_and_draws_figures(data_dir: Path, tmp_path:
     options = ["--model", "squat7", "--mass", "78.6", "-o", str(tmp_path / "out")]
     assert main(["run", trial, *options]) == 0
     gains = tmp_path / "gains.csv"
-    gains.write_text("log10_coordinate,log10_speed,log10_acceleration,criterion\n3,2,3,5\n4,2,3,\n")
+    gains.write_text(
+        "log10_coordinate_variance,log10_speed_variance,log10_acceleration_variance,criterion\n3,2,3,5\n4,2,3,\n"
+    )
     figures = ["--figures", str(tmp_path / "figures"), "--sensitivity", str(gains)]
     assert main(["run", trial, *options, *figures]) == 0
     drawn = {entry.suffix for entry in (tmp_path / "figures").iterdir()}

@@ -23,7 +23,7 @@ def parameters_of(
 
     Args:
         state, sd: (n,) the last frame's. prior_sd: (n,) before the first.
-        length_skin: part of the skin's declared displacement that may look like a length (`Noise.length_skin`).
+        length_skin: part of the skin's declared displacement that may look like a length (`Noise.length_skin_fraction`).
     """
     segments = {marker.name: marker.segment for marker in initial.spec.markers}
     skin = length_skin_sd(initial, length_skin)

@@ -163,7 +163,7 @@ class OpenSimDefinition:
         }
         skin = np.array([skin_of(marker.name, marker.body) for marker, _ in chosen])
         known = priors or Priors()
-        known = known.changed(marker_m=float(np.hypot(known.marker_m, fit.rms_m / np.sqrt(3.0))))
+        known = known.changed(marker_sd_m=float(np.hypot(known.marker_sd_m, fit.rms_m / np.sqrt(3.0))))
         return CalibratedModel(
             spec=spec,
             names=tuple(names),
