@@ -63,7 +63,7 @@ def distance_mm(measured: Array, placed: Array) -> float:
 
 
 def without_plates() -> dynakin.Noise:
-    return dynakin.presets.default().changed(plate_force=0.0, plate_moment=0.0, plate_delay_s=0.0)
+    return dynakin.presets.default().changed(plate_force_sd_n=0.0, plate_moment_sd_nm=0.0, plate_delay_sd_s=0.0)
 
 
 def filtered(estimate: tuple[str, ...], *, smooth: bool = False) -> tuple[float, Array]:

@@ -24,7 +24,7 @@ def steps(file: Path, data: Path, mass: float, kinds: tuple[str, ...], plates: b
     recording = dynakin.read(data / "squats1.trc", data / "squats1_grf.mot")
     noise = dynakin.presets.default()
     if not plates:
-        noise = noise.changed(plate_force=0.0, plate_moment=0.0, plate_delay_s=0.0)
+        noise = noise.changed(plate_force_sd_n=0.0, plate_moment_sd_nm=0.0, plate_delay_sd_s=0.0)
     estimator = dynakin.Estimator(load_opensim(file, Subject(mass_kg=mass)), noise, estimate=kinds)
     initial = estimator.start(recording)
     markers, wrench = recording_arrays(recording, initial, gaps=True)

@@ -27,7 +27,13 @@ from dynakin.validation.setup import Setup
 from dynakin.validation.unseen import WITHHELD, plates_withheld
 
 ROOT = Path(__file__).resolve().parents[1]
-MOTION = ("jerk", "soft_tissue", "soft_tissue_time_s", "plate_force", "plate_moment")
+MOTION = (
+    "jerk_density_rad2_s5",
+    "soft_tissue_sd_fraction",
+    "soft_tissue_time_s",
+    "plate_force_sd_n",
+    "plate_moment_sd_nm",
+)
 """Without the sensors' own noise, of which the maker knows more than the innovations of a smooth recording."""
 
 
@@ -62,7 +68,7 @@ def main() -> None:
         }
     withheld = plates_withheld(recording, Setup(definition, noises), static=static)
     for name, noise in noises.items():
-        told = undoubting(noise.changed(total_mass_use="prior", total_mass=base.total_mass))
+        told = undoubting(noise.changed(total_mass_use="prior", total_mass_variance_kg2=base.total_mass_variance_kg2))
         row = figures_of(second, told, base)
         shown = {key: row[key] for key in ("nll", "nis_per_row", "ahead", "ahead_markers_mm", "ahead_fy", "fx", "fy")}
         shown["left_out_mm"] = left_out_mm(replace(second), told)

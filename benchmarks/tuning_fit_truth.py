@@ -18,7 +18,13 @@ from dynakin.studies.tuning.fit import Fitter, usual_names
 from dynakin.studies.tuning.score import Shared
 from dynakin.studies.tuning.settings import together
 
-MOTION = ("jerk", "soft_tissue", "soft_tissue_time_s", "plate_force", "plate_moment")
+MOTION = (
+    "jerk_density_rad2_s5",
+    "soft_tissue_sd_fraction",
+    "soft_tissue_time_s",
+    "plate_force_sd_n",
+    "plate_moment_sd_nm",
+)
 
 
 def main() -> None:

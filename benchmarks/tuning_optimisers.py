@@ -26,7 +26,14 @@ from dynakin.studies.tuning.optimise import minimise
 from dynakin.studies.tuning.score import Shared
 from dynakin.studies.tuning.trial import prepare
 
-NAMES = ("jerk", "soft_tissue", "soft_tissue_time_s", "force", "plate_force", "plate_moment")
+NAMES = (
+    "jerk_density_rad2_s5",
+    "soft_tissue_sd_fraction",
+    "soft_tissue_time_s",
+    "force_variance_n2",
+    "plate_force_sd_n",
+    "plate_moment_sd_nm",
+)
 Array = np.ndarray
 
 

@@ -91,9 +91,12 @@ def main() -> None:
     parser.add_argument("--backend", default="threads")
     asked = parser.parse_args()
     folder = open_folder(asked.output, ("cells", "figure3_"))
-    axes = [axis(name, 1e-6, 1e6, asked.steps) for name in ("coordinate", "speed", "acceleration")]
+    axes = [
+        axis(name, 1e-6, 1e6, asked.steps)
+        for name in ("coordinate_variance", "speed_variance", "acceleration_variance")
+    ]
     cells = combinations(axes)
-    gains = [{"coordinate": 1e3, "speed": 1e2, "acceleration": 1e3}]
+    gains = [{"coordinate_variance": 1e3, "speed_variance": 1e2, "acceleration_variance": 1e3}]
     settings = [(cell, "paper") for cell in [*cells, *gains]] + [({}, "default")]
     trials = [trial_of(seed, asked.duration) for seed in SEEDS]
     tasks = [

@@ -9,7 +9,7 @@ recording = simulate_squat(seed=1).recording
 subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
 model = dynakin.load_model(Path(__file__).with_suffix(".toml"), subject=subject, markers="opencap")
 # This upper body is rigid and its arms hang, the person's do not: declare the plates 20 N and 20 N m uncertain.
-noise = dynakin.presets.default().changed(force=20.0**2, moment=20.0**2)
+noise = dynakin.presets.default().changed(force_variance_n2=20.0**2, moment_variance_n2_m2=20.0**2)
 result = dynakin.Estimator(model, noise=noise).run(recording)
 
 for p in result.parameters:

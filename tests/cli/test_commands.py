@@ -131,7 +131,7 @@ def test_run_on_real_data_and_again_from_its_own_configuration(data_dir: Path, t
     assert rms["fx"] <= 6.0 and rms["fy"] <= 10.0 and rms["mz"] <= 7.0
 
     used = tomllib.loads((out / "config.toml").read_text())
-    assert used["mass_kg"] == 60.05 and used["noise"]["coordinate"] == 1000.0
+    assert used["mass_kg"] == 60.05 and used["noise"]["coordinate_variance"] == 1000.0
     assert used["versions"]["dynakin"] == dynakin.__version__
     assert main(["run", str(out / "config.toml"), "-o", str(again)]) == 0
     repeated = json.loads((again / "metrics.json").read_text())

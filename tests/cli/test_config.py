@@ -52,10 +52,10 @@ def test_every_key_is_printed_with_its_default_and_a_comment() -> None:
     ("keys", "words"),
     [
         ({"masskg": 70.0}, ["'masskg'", "did you mean 'mass_kg'"]),
-        ({"noise": {"foce": 1.0}}, ["noise", "'foce'", "did you mean 'force'"]),
-        ({"priors": {"marker": 0.01}}, ["priors", "'marker'", "did you mean 'marker_m'"]),
+        ({"noise": {"foce_variance_n2": 1.0}}, ["noise", "'foce_variance_n2'", "did you mean 'force_variance_n2'"]),
+        ({"priors": {"marker_sd": 0.01}}, ["priors", "'marker_sd'", "did you mean 'marker_sd_m'"]),
         ({"bounds": {"mass_fraction": -1.0}}, ["bounds", "mass_fraction"]),
-        ({"noise": {"force": -1.0}}, ["noise", "force"]),
+        ({"noise": {"force_variance_n2": -1.0}}, ["noise", "force_variance_n2"]),
         ({"preset": "papers"}, ["papers", "paper"]),
         ({"side": "middle"}, ["side", "middle"]),
         ({"sex": "other"}, ["sex", "other"]),
@@ -73,9 +73,9 @@ def test_wrong_keys_and_values_are_named_with_the_file(keys: dict[str, Any], wor
 
 
 def test_noise_changes_single_values_of_the_preset() -> None:
-    noise = _config(noise={"force": 25.0, "marker": {"RKNE": 1e-4}}).noise_settings()
-    assert noise.force == 25.0 and noise.marker == {"RKNE": 1e-4}
-    assert noise.moment == presets.default().moment
+    noise = _config(noise={"force_variance_n2": 25.0, "marker_variance_m2": {"RKNE": 1e-4}}).noise_settings()
+    assert noise.force_variance_n2 == 25.0 and noise.marker_variance_m2 == {"RKNE": 1e-4}
+    assert noise.moment_variance_n2_m2 == presets.default().moment_variance_n2_m2
 
 
 def test_the_papers_settings_are_printed_too() -> None:
@@ -111,7 +111,7 @@ def test_what_is_not_toml_is_refused_with_its_line(tmp_path: Path) -> None:
 
 
 def test_configuration_as_used_can_be_read_again() -> None:
-    used = _config(mass_kg=70.0, forward=[0.0, 1.0, 0.0], noise={"force": 4.0}).as_used()
+    used = _config(mass_kg=70.0, forward=[0.0, 1.0, 0.0], noise={"force_variance_n2": 4.0}).as_used()
     assert Path(used["trial"]).is_absolute()
     again = Settings.of({key: value for key, value in used.items() if value is not None}, "config.toml")
     assert again.as_used() == used

@@ -142,7 +142,7 @@ def test_plates_that_lag_are_brought_into_step() -> None:
     assert len(told) == 1 and told[0].endswith("they were brought into step.")
     lag_ms = float(told[0].split()[3])
     assert lag_ms == pytest.approx(40.0, abs=4.0) and "behind" in told[0]
-    aside = estimator(noise=dynakin.presets.default().changed(plate_delay_s=0.0)).run(late.recording)
+    aside = estimator(noise=dynakin.presets.default().changed(plate_delay_sd_s=0.0)).run(late.recording)
     assert rms(result, late, "moments").mean() < 0.6 * rms(aside, late, "moments").mean()
 
 

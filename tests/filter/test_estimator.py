@@ -87,7 +87,7 @@ def test_without_sensor_noise_the_posture_comes_out(trial: SimulatedTrial) -> No
 
 
 def test_deviations_of_parameters_never_grow_and_coordinates_stay_finite(trial: SimulatedTrial) -> None:
-    noise = dynakin.presets.default().changed(length_drift=0.0)
+    noise = dynakin.presets.default().changed(length_drift_density_m2_s=0.0)
     result = estimator(noise=noise).run(trial.recording, smooth=False)
     sd = result.data["state_sd"].values
     constants = [k for k, name in enumerate(result.data["element"].values) if str(name).startswith("length/")]
@@ -98,7 +98,9 @@ def test_deviations_of_parameters_never_grow_and_coordinates_stay_finite(trial: 
 
 def test_noise_settings_reach_the_filter(trial: SimulatedTrial) -> None:
     plain = estimator().run(trial.recording)
-    trusting = estimator(noise=dynakin.presets.paper().changed(marker={"r_knee": 1e-6})).run(trial.recording)
+    trusting = estimator(noise=dynakin.presets.paper().changed(marker_variance_m2={"r_knee": 1e-6})).run(
+        trial.recording
+    )
     rms = [r.metrics()["markers"]["rms_mm"]["r_knee"] for r in (plain, trusting)]
     assert rms[1] < 0.5 * rms[0]
 
@@ -173,7 +175,7 @@ def test_plates_upside_down_are_refused_with_the_number(trial: SimulatedTrial) -
 
 def test_noise_for_a_marker_that_is_not_used_is_refused(trial: SimulatedTrial) -> None:
     with pytest.raises(ConfigError, match=r"noise\.marker: r_nose not among the markers used"):
-        estimator(noise=dynakin.presets.paper().changed(marker={"r_nose": 1e-3})).run(trial.recording)
+        estimator(noise=dynakin.presets.paper().changed(marker_variance_m2={"r_nose": 1e-3})).run(trial.recording)
 
 
 def test_an_unknown_preset_lists_the_known_ones() -> None:

@@ -84,10 +84,13 @@ def make(folder: Path) -> None:
                 (folder / f"{kind}_{entry.name}").write_text(entry.read_text())
     (folder / "osim_4.osim").write_text(OSIM_4)
     (folder / "osim_3.osim").write_text(OSIM_3)
-    (folder / "preset_own.toml").write_text('base = "default"\n[noise]\njerk = 30.0\nmarker_gate = 1e-6\n')
+    (folder / "preset_own.toml").write_text(
+        'base = "default"\n[noise]\njerk_density_rad2_s5 = 30.0\nmarker_gate = 1e-6\n'
+    )
     (folder / "config_run.toml").write_text(
         'trial = "squat.trc"\nmodel = "squat7"\noutput = "out"\nmass_kg = 70.0\nside = "right"\nforward = [1, 0, 0]\n'
-        'estimate = ["lengths", "markers"]\nplate_filter_hz = 20.0\n[noise]\njerk = 30.0\n[priors]\nmarker_m = 0.02\n'
+        'estimate = ["lengths", "markers"]\nplate_filter_hz = 20.0\n'
+        "[noise]\njerk_density_rad2_s5 = 30.0\n[priors]\nmarker_sd_m = 0.02\n"
         '[[plate_loads]]\nplate = "plate 1"\nforce_n = [0, 5, 0]\npoint_m = [0, 0, 0]\n'
     )
     (folder / "study_two.toml").write_text(

@@ -38,7 +38,7 @@ def estimated(folder: Path, name: str, model: str, mass: float, out: Path) -> tu
     recording = read(trial, folder / f"{name}_grf.mot") if trial.exists() else read(folder / f"{name}.c3d")
     recording = recording.window(recording.time[0], recording.time[0] + 0.5)
     definition = load_model(folder / model if model.endswith(".osim") else model, Subject(mass_kg=mass, height_m=1.74))
-    noise = presets.default().changed(length_drift=0.0)
+    noise = presets.default().changed(length_drift_density_m2_s=0.0)
     estimator = Estimator(definition, noise, estimate=("lengths", "markers", "inertia"))
     estimate = estimator.run(recording, smooth=True)
     estimate.save(out)

@@ -19,7 +19,7 @@ from dynakin.validation.statistics import Spread
 from dynakin.validation.table2 import table2
 from dynakin.validation.unseen import UnseenRow
 
-SETTINGS = [{"model": "sagittal7", "presets": {"paper": {"force": 0.1}}, "forces": None}]
+SETTINGS = [{"model": "sagittal7", "presets": {"paper": {"force_variance_n2": 0.1}}, "forces": None}]
 
 
 @pytest.fixture(scope="module")
@@ -88,7 +88,7 @@ def test_repetitions_are_shown_by_method_and_their_absence_is_said(run_page: str
 def test_comparison_page_holds_its_tables_and_settings(page: str) -> None:
     assert "20.0 N m" in part(page, "table2") and "knee EKF (paper) 10.0 N m" in part(page, "moments")
     assert "knee EKF (paper) 5.0 deg −5.0 deg 0.0 deg" in part(page, "angles")
-    assert "force = 0.1" in part(page, "details") and "AT: a sentence on AT." in part(page, "details")
+    assert "force_variance_n2 = 0.1" in part(page, "details") and "AT: a sentence on AT." in part(page, "details")
     assert "20 N by AT (6 Hz)" in part(page, "summary")
 
 

@@ -195,7 +195,7 @@ def test_a_marker_that_stands_out_and_an_overconfident_filter_get_advice(estimat
     metrics["consistency"]["mean_nis_per_dof"] = 9.0
     found = {insight.title: insight for insight in insights(estimate, metrics)}
     assert found["Markers"].advice.startswith("RKNE stands out")
-    assert "larger noise.marker_scale" in found["Uncertainty"].advice
+    assert "larger noise.marker_variance_scale" in found["Uncertainty"].advice
 
 
 def test_one_sentence_says_what_to_look_at(estimate: Estimate) -> None:

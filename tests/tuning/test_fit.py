@@ -21,7 +21,13 @@ from dynakin.studies.tuning.optimise import curvature, deviations, minimise
 from dynakin.studies.tuning.score import Shared
 from tuning.own_data import own_noise, own_trial
 
-WRONG = {"jerk": 5.0, "soft_tissue": 0.3, "marker_sd_m": 3.0, "force": 0.2, "plate_force": 4.0}
+WRONG = {
+    "jerk_density_rad2_s5": 5.0,
+    "soft_tissue_sd_fraction": 0.3,
+    "marker_sd_m": 3.0,
+    "force_variance_n2": 0.2,
+    "plate_force_sd_n": 4.0,
+}
 """Settings to be found, and the factor by which the fit starts off."""
 
 
@@ -75,13 +81,15 @@ def test_a_fit_that_is_run_again_takes_its_rows_from_the_journal(own: Shared, tm
     path, whose = tmp_path / "rows.jsonl", belongs_to_fit(own)
     points = [np.zeros(1), np.array([0.5])]
     with open_pool("threads", 1) as pool:
-        first = Likelihood(own, ("force",), pool, Journal(path, whose)).costs(points)
+        first = Likelihood(own, ("force_variance_n2",), pool, Journal(path, whose)).costs(points)
 
         def refuse(*_: object) -> None:
             raise AssertionError("worked again")
 
         pool.run = lambda function, shared, tasks: iter(()) if not tasks else refuse()  # type: ignore[method-assign]
-        np.testing.assert_array_equal(Likelihood(own, ("force",), pool, Journal(path, whose)).costs(points), first)
+        np.testing.assert_array_equal(
+            Likelihood(own, ("force_variance_n2",), pool, Journal(path, whose)).costs(points), first
+        )
 
 
 def test_the_optimiser_finds_a_valley_and_its_curvature() -> None:
@@ -109,7 +117,7 @@ def test_one_trial_is_held_out_by_halves_and_written_as_a_preset(tmp_path: Path,
     files, folder = tmp_path / "squat", tmp_path / "fit"
     simulate("sagittal7", "squat", 3, 5.0, 50.0).save(files)
     trial = [str(files / "markers.trc"), "--forces", str(files / "forces.mot"), "--model", "sagittal7", "--mass", "70"]
-    code = main(["tune", "fit", *trial, "--vary", "force", "--backend", "threads", "-o", str(folder)])
+    code = main(["tune", "fit", *trial, "--vary", "force_variance_n2", "--backend", "threads", "-o", str(folder)])
     assert code == 0
     told = json.loads((folder / "fit.json").read_text())
     assert [fold["held_out"].split(", ")[1] for fold in told["held_out"]] == ["first half", "second half"]
@@ -122,10 +130,10 @@ def test_one_trial_is_held_out_by_halves_and_written_as_a_preset(tmp_path: Path,
     ("names", "criterion", "expected"),
     [
         ((), "nll", "expected at least one"),
-        (("jerk", "jerk"), "nll", "each once"),
-        (("coordinate",), "nll", "'coordinate' is 0 in these settings"),
-        (("jerks",), "nll", "did you mean 'jerk'"),
-        (("jerk",), "nlll", "criterion 'nlll'"),
+        (("jerk_density_rad2_s5", "jerk_density_rad2_s5"), "nll", "each once"),
+        (("coordinate_variance",), "nll", "'coordinate_variance' is 0 in these settings"),
+        (("jerk_density",), "nll", "did you mean 'jerk_density_rad2_s5'"),
+        (("jerk_density_rad2_s5",), "nlll", "criterion 'nlll'"),
     ],
 )
 def test_what_cannot_be_fitted_is_refused(own: Shared, names: tuple, criterion: str, expected: str) -> None:
@@ -134,6 +142,6 @@ def test_what_cannot_be_fitted_is_refused(own: Shared, names: tuple, criterion: 
 
 
 def test_what_is_usually_fitted_is_what_the_settings_use() -> None:
-    assert usual_names(presets.paper())[:3] == ("coordinate", "speed", "acceleration")
-    assert {"jerk", "marker_sd_m", "plate_force"} < set(usual_names(presets.default()))
-    assert "marker_scale" not in usual_names(presets.default())
+    assert usual_names(presets.paper())[:3] == ("coordinate_variance", "speed_variance", "acceleration_variance")
+    assert {"jerk_density_rad2_s5", "marker_sd_m", "plate_force_sd_n"} < set(usual_names(presets.default()))
+    assert "marker_variance_scale" not in usual_names(presets.default())

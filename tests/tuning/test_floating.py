@@ -16,8 +16,8 @@ from dynakin.studies.tuning.score import Shared
 from dynakin.studies.tuning.settings import value_of
 from dynakin.studies.tuning.trial import prepare
 
-FLOATING = ("floating_jerk", "floating_jerk_translation", "floating_soft_tissue_time_s")
-FIXED = ("jerk", "jerk_translation", "soft_tissue_time_s")
+FLOATING = ("floating_jerk_density_rad2_s5", "floating_translation_jerk_density_m2_s5", "floating_soft_tissue_time_s")
+FIXED = ("jerk_density_rad2_s5", "translation_jerk_density_m2_s5", "soft_tissue_time_s")
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +52,10 @@ def test_each_kind_of_model_is_fitted_by_what_has_an_effect_on_it(default: Share
 
 def test_a_setting_that_is_not_given_starts_as_the_usual_one() -> None:
     noise = presets.default()
-    assert value_of(noise.changed(floating_jerk=None), "floating_jerk") == noise.jerk
+    assert (
+        value_of(noise.changed(floating_jerk_density_rad2_s5=None), "floating_jerk_density_rad2_s5")
+        == noise.jerk_density_rad2_s5
+    )
 
 
 @pytest.mark.parametrize("pair", zip(FIXED, FLOATING, strict=True))

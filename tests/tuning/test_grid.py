@@ -25,7 +25,7 @@ from dynakin.studies.engine.pools import open_pool
 from dynakin.studies.tuning.grid import axis, belongs_to, combinations, paper_axes, run_grid
 from dynakin.studies.tuning.score import Shared
 
-AXES = tuple(axis(name, 1e-4, 1e4, 3) for name in ("coordinate", "speed", "acceleration"))
+AXES = tuple(axis(name, 1e-4, 1e4, 3) for name in ("coordinate_variance", "speed_variance", "acceleration_variance"))
 
 
 def table(shared: Shared, backend: str, **options) -> tuple:
@@ -93,7 +93,7 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def arguments(files: Path, output: Path) -> list[str]:
-    varied = [part for name in ("speed", "acceleration") for part in ("--vary", f"{name}=1e-2:1e4:4")]
+    varied = [part for name in ("speed_variance", "acceleration_variance") for part in ("--vary", f"{name}=1e-2:1e4:4")]
     trial = [str(files / "markers.trc"), "--forces", str(files / "forces.mot"), "--model", "sagittal7"]
     return ["tune", "grid", *trial, "--mass", "70", "--preset", "paper", *varied, "-o", str(output)]
 
@@ -125,11 +125,16 @@ def test_the_optimum_is_a_preset_that_run_takes(
     assert main([*arguments(files, folder), "--backend", "threads"]) == 0
     optimum = json.loads((folder / "grid.json").read_text())["optimum"]["nll"]
     noise = presets.preset(str(folder / "preset_nll.toml"))
-    assert (noise.speed, noise.acceleration) == (optimum["speed"], optimum["acceleration"])
-    assert noise.changed(speed=1e2, acceleration=1e3) == presets.paper()
+    assert (noise.speed_variance, noise.acceleration_variance) == (
+        optimum["speed_variance"],
+        optimum["acceleration_variance"],
+    )
+    assert noise.changed(speed_variance=1e2, acceleration_variance=1e3) == presets.paper()
     with (folder / "grid.csv").open(newline="") as file:
         cells = list(csv.DictReader(file))
-    assert min((c for c in cells if c["nll"]), key=lambda c: float(c["nll"]))["speed"] == repr(optimum["speed"])
+    assert min((c for c in cells if c["nll"]), key=lambda c: float(c["nll"]))["speed_variance"] == repr(
+        optimum["speed_variance"]
+    )
     trial = [str(files / "markers.trc"), "--forces", str(files / "forces.mot"), "--model", "sagittal7"]
     out = tmp_path / "out"
     run = ["run", *trial, "--mass", "70", "-o", str(out), "--preset"]
@@ -157,7 +162,7 @@ def test_the_table_of_the_papers_gains_is_figure_3s_file(paper: Shared, tmp_path
 
 def test_the_papers_grid_is_13_values_of_three_gains() -> None:
     axes = paper_axes()
-    assert [axis.name for axis in axes] == ["coordinate", "speed", "acceleration"]
+    assert [axis.name for axis in axes] == ["coordinate_variance", "speed_variance", "acceleration_variance"]
     assert all(axis.values == tuple(float(f"1e{k}") for k in range(-6, 7)) for axis in axes)
     assert len(combinations(axes)) == 2197
 
@@ -165,10 +170,10 @@ def test_the_papers_grid_is_13_values_of_three_gains() -> None:
 @pytest.mark.parametrize(
     ("name", "span", "expected"),
     [
-        ("jerks", (1.0, 10.0, 2), "did you mean 'jerk'"),
-        ("jerk", (0.0, 10.0, 2), "expected 0 < from < to"),
-        ("jerk", (10.0, 1.0, 2), "expected 0 < from < to"),
-        ("jerk", (1.0, 10.0, 1), "2 steps or more"),
+        ("jerk_density", (1.0, 10.0, 2), "did you mean 'jerk_density_rad2_s5'"),
+        ("jerk_density_rad2_s5", (0.0, 10.0, 2), "expected 0 < from < to"),
+        ("jerk_density_rad2_s5", (10.0, 1.0, 2), "expected 0 < from < to"),
+        ("jerk_density_rad2_s5", (1.0, 10.0, 1), "2 steps or more"),
     ],
 )
 def test_a_range_that_is_none_is_refused(name: str, span: tuple, expected: str) -> None:
@@ -179,7 +184,7 @@ def test_a_range_that_is_none_is_refused(name: str, span: tuple, expected: str) 
 @pytest.mark.parametrize(
     ("options", "expected"),
     [
-        (["--vary", "jerk"], "--vary: found 'jerk', expected NAME=FROM:TO:STEPS"),
+        (["--vary", "jerk_density_rad2_s5"], "--vary: found 'jerk_density_rad2_s5', expected NAME=FROM:TO:STEPS"),
         (["--vary", "speed=1:10:2"], "each once"),
         (["--backend", "dask"], "--scheduler ADDRESS"),
         (["--preset", "papr"], "preset 'papr' is unknown"),
@@ -201,8 +206,8 @@ def test_a_folder_of_something_else_is_left_alone(files: Path, tmp_path: Path) -
 
 def test_all_diverged_is_said(paper: Shared) -> None:
     """Gains of nothing on a start that stands still, and a person who moves."""
-    axes = [axis(name, 1e-30, 1e-29, 2) for name in ("coordinate", "speed", "acceleration")]
-    still = replace(paper, base=paper.base.changed(marker_place=0.0))
+    axes = [axis(name, 1e-30, 1e-29, 2) for name in ("coordinate_variance", "speed_variance", "acceleration_variance")]
+    still = replace(paper, base=paper.base.changed(marker_place_variance_m2=0.0))
     with open_pool("threads", 2) as pool:
         grid = run_grid(still, axes, pool)
     with pytest.raises(DynakinError, match="diverged in all of the 8 combinations"):

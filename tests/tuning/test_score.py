@@ -32,7 +32,7 @@ def test_tasks_and_trials_pickle_and_leave_each_other_alone(default: Shared) -> 
     """A setting that adds or takes states must not change the model that the next one starts from."""
     alone = score_task(default, (0, {}))
     copy = pickle.loads(pickle.dumps(default))
-    score_task(default, (0, {"soft_tissue": 0.01, "plate_force": 1e-3, "plate_delay_s": 0.0}))
+    score_task(default, (0, {"soft_tissue_sd_fraction": 0.01, "plate_force_sd_n": 1e-3, "plate_delay_sd_s": 0.0}))
     assert score_task(default, (0, {})) == alone == score_task(copy, (0, {}))
 
 
@@ -49,7 +49,11 @@ def test_ahead_is_one_for_a_filter_that_only_holds_the_last_value(default: Share
 
 
 def test_a_declared_sigma_is_not_the_one_that_is_tried(paper: Shared) -> None:
-    louder = {"marker_scale": 100.0, "force": 100.0 * paper.base.force, "moment": 100.0 * paper.base.moment}
+    louder = {
+        "marker_variance_scale": 100.0,
+        "force_variance_n2": 100.0 * paper.base.force_variance_n2,
+        "moment_variance_n2_m2": 100.0 * paper.base.moment_variance_n2_m2,
+    }
     trial, tried = paper.trials[0], paper.base.changed(**louder)
     found = score_task(paper, (0, louder))["sigma"]
     assert found == figures_of(trial, undoubting(tried), paper.base)["sigma"]
@@ -89,9 +93,9 @@ def test_the_marker_that_is_left_out_is_worse_than_all_that_are_seen(default: Sh
 
 
 def test_settings_are_checked() -> None:
-    with pytest.raises(ConfigError, match=r"'jerks' cannot be varied \(did you mean 'jerk'\?\)"):
-        check_setting("jerks")
-    with pytest.raises(ConfigError, match="'jerk' is 0 in these settings"):
-        value_of(presets.paper(), "jerk")
-    with pytest.raises(ConfigError, match="force"):
-        presets.paper().changed(force=-1.0)
+    with pytest.raises(ConfigError, match=r"'jerk_density' cannot be varied \(did you mean 'jerk_density_rad2_s5'\?\)"):
+        check_setting("jerk_density")
+    with pytest.raises(ConfigError, match="'jerk_density_rad2_s5' is 0 in these settings"):
+        value_of(presets.paper(), "jerk_density_rad2_s5")
+    with pytest.raises(ConfigError, match="force_variance_n2"):
+        presets.paper().changed(force_variance_n2=-1.0)

@@ -48,7 +48,7 @@ tune = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Choose noi
 Output = Annotated[Path, typer.Option("-o", "--output", help="Folder for table, figures and presets.")]
 
 _of_trials = with_settings(*OF_A_MODEL, "preset", *OF_THE_LABORATORY, *OF_THE_PLATES)
-_GAINS = ("coordinate", "speed", "acceleration")
+_GAINS = ("coordinate_variance", "speed_variance", "acceleration_variance")
 
 
 @tune.command()
@@ -152,7 +152,9 @@ def _axis(text: str) -> Axis:
         low, high, steps = span.split(":")
         return axis(name.strip(), float(low), float(high), int(steps))
     except ValueError:
-        raise ConfigError(f"--vary: found {text!r}, expected NAME=FROM:TO:STEPS such as jerk=1:1e4:5") from None
+        raise ConfigError(
+            f"--vary: found {text!r}, expected NAME=FROM:TO:STEPS such as jerk_density_rad2_s5=1:1e4:5"
+        ) from None
 
 
 def shared_of(cases: Sequence[Case], base: str, left_out: bool = False) -> Shared:

@@ -58,7 +58,7 @@ def assemble(
     prior_sd = np.sqrt(np.diag(covariances[0]))
     noise = config.get("noise", {})
     parameters = parameters_of(
-        initial, arrays["state"][-1], arrays["state_sd"][-1], prior_sd, noise.get("length_skin", 0.0)
+        initial, arrays["state"][-1], arrays["state_sd"][-1], prior_sd, noise.get("length_skin_fraction", 0.0)
     )
     config = {key: value for key, value in config.items() if key != "ground_reasons"} | {
         "mass_kg": initial.mass_kg,

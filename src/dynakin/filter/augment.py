@@ -39,7 +39,7 @@ def extended(initial: InitialModel, noise: Noise, estimate: Collection[Quantity]
     spec.wrench_offset = [
         bool(seen and value > 0.0) for seen, value in zip(spec.wrench_measured, plate_sd(noise), strict=True)
     ]
-    spec.wrench_delay = noise.plate_delay_s > 0.0
+    spec.wrench_delay = noise.plate_delay_sd_s > 0.0
     names = list(_core.Model(spec).layout.names)
     first = dict(zip(initial.names, range(len(initial.names)), strict=True))
     added = _added_sd(spec, noise, sd)
@@ -94,7 +94,7 @@ def _added_sd(spec: _core.ModelSpec, noise: Noise, soft_tissue: Array) -> dict[s
         f"plates/{name}": float(value)
         for name, value in zip(("fx", "fy", "fz", "mx", "my", "mz"), plate_sd(noise), strict=True)
     }
-    return sd | {"plates/delay": noise.plate_delay_s}
+    return sd | {"plates/delay": noise.plate_delay_sd_s}
 
 
 def initial_covariance(initial: InitialModel, noise: Noise) -> Array:
@@ -111,7 +111,7 @@ def initial_covariance(initial: InitialModel, noise: Noise) -> Array:
     spread = covariance @ masses
     variance = float(masses @ spread)
     if variance > 0.0:
-        covariance -= np.outer(spread, spread) / (variance + noise.total_mass)
+        covariance -= np.outer(spread, spread) / (variance + noise.total_mass_variance_kg2)
     return covariance
 
 
@@ -125,7 +125,7 @@ def continuous_noise(initial: InitialModel, noise: Noise, layout: _core.StateLay
         coordinate = layout.names[k].removesuffix("/acceleration")
         density[k] = jerk[kinds[coordinate]]
     offset, size = layout.blocks["lengths"]
-    density[offset : offset + size] = noise.length_drift
+    density[offset : offset + size] = noise.length_drift_density_m2_s
     skin_s = noise.soft_tissue_time_s
     if initial.feet and noise.floating_soft_tissue_time_s is not None:
         skin_s = noise.floating_soft_tissue_time_s

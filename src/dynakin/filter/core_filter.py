@@ -40,10 +40,10 @@ def filter_settings(
     Raises:
         ConfigError: as `core_filter`.
     """
-    unknown = set(noise.marker) - set(initial.recorded_markers)
+    unknown = set(noise.marker_variance_m2) - set(initial.recorded_markers)
     if unknown:
         raise ConfigError(
-            f"noise.marker: {', '.join(sorted(unknown))} not among the markers used; expected some of "
+            f"noise.marker_variance_m2: {', '.join(sorted(unknown))} not among the markers used; expected some of "
             f"{', '.join(initial.recorded_markers)}"
         )
     point = noise.reference_point_m
@@ -58,13 +58,13 @@ def filter_settings(
         wrench_covariance=wrench_covariance(noise),
         reference_point=initial.plate_centre if point == "auto" else np.array(point, dtype=float),
         total_mass=initial.weighed_kg if noise.total_mass_use == "frame" else None,
-        total_mass_variance=noise.total_mass,
+        total_mass_variance=noise.total_mass_variance_kg2,
         lower=initial.lower,
         upper=initial.upper,
         constraint=noise.constraint,
         marker_gate=gate_limits(noise.marker_gate),
         wrench_gate=gate_limits(noise.wrench_gate),
         wrench_needs_markers=noise.recover,
-        iterate_beyond=np.inf if noise.iterate_beyond is None else noise.iterate_beyond,
+        iterate_beyond=np.inf if noise.iterate_beyond_sd is None else noise.iterate_beyond_sd,
         recovery=recovery,
     )

@@ -19,32 +19,36 @@ Array = npt.NDArray[np.float64]
 def process_variance(noise: Noise, layout: _core.StateLayout) -> Array:
     """Diagonal of Q (n,) a step, in the order of the state."""
     values = {
-        "coordinates": noise.coordinate,
-        "speeds": noise.speed,
-        "accelerations": noise.acceleration,
-        "lengths": noise.length,
-        "markers": noise.marker_place,
-        "inertia": noise.inertia,
+        "coordinates": noise.coordinate_variance,
+        "speeds": noise.speed_variance,
+        "accelerations": noise.acceleration_variance,
+        "lengths": noise.length_variance,
+        "markers": noise.marker_place_variance_m2,
+        "inertia": noise.inertia_variance,
     }
     return np.concatenate([np.full(size, values.get(name, 0.0)) for name, (_, size) in layout.blocks.items()])
 
 
 def wrench_covariance(noise: Noise) -> Array:
     """R (6, 6) of the total wrench about the reference point."""
-    return np.diag([noise.force] * 3 + [noise.moment] * 3)
+    return np.diag([noise.force_variance_n2] * 3 + [noise.moment_variance_n2_m2] * 3)
 
 
 def plate_sd(noise: Noise) -> Array:
     """Standard deviations (6,) of the plates' slow error, N and N m."""
-    return np.array([noise.plate_force] * 3 + [noise.plate_moment] * 3)
+    return np.array([noise.plate_force_sd_n] * 3 + [noise.plate_moment_sd_nm] * 3)
 
 
 def jerk_densities(noise: Noise, floating: bool) -> dict[str, float]:
     """Density by kind of axis, of a model that is fixed in the ground or of a floating one."""
-    rotation, translation = noise.jerk, noise.jerk_translation
+    rotation, translation = noise.jerk_density_rad2_s5, noise.translation_jerk_density_m2_s5
     if floating:
-        rotation = rotation if noise.floating_jerk is None else noise.floating_jerk
-        translation = translation if noise.floating_jerk_translation is None else noise.floating_jerk_translation
+        rotation = rotation if noise.floating_jerk_density_rad2_s5 is None else noise.floating_jerk_density_rad2_s5
+        translation = (
+            translation
+            if noise.floating_translation_jerk_density_m2_s5 is None
+            else noise.floating_translation_jerk_density_m2_s5
+        )
     return {"rotation": rotation, "translation": translation}
 
 
@@ -54,22 +58,22 @@ def soft_tissue_sd(noise: Noise, declared_m: Array) -> Array:
     Args:
         declared_m: (M,) m, size of the displacement as the marker set has it.
     """
-    sd = noise.soft_tissue * declared_m
-    return np.where(sd < noise.soft_tissue_least_m, 0.0, sd)
+    sd = noise.soft_tissue_sd_fraction * declared_m
+    return np.where(sd < noise.soft_tissue_least_sd_m, 0.0, sd)
 
 
 def marker_variance(initial: InitialModel, noise: Noise, estimate: Collection[Quantity] = QUANTITIES) -> Array:
     """R (M,) m^2 of the markers of a model that has the states these settings ask for; without soft tissue among them,
     all of its displacement is noise."""
-    variance = noise.marker_scale * initial.marker_variance
+    variance = noise.marker_variance_scale * initial.marker_variance
     if noise.marker_sd_m is not None:  # the marker set's R holds all of what follows already
         declared = initial.soft_tissue_m
-        unmodelled = np.where(soft_tissue_sd(noise, declared) == 0.0, noise.soft_tissue_least_m, 0.0)
+        unmodelled = np.where(soft_tissue_sd(noise, declared) == 0.0, noise.soft_tissue_least_sd_m, 0.0)
         if "soft_tissue" not in estimate:
-            unmodelled = np.maximum(noise.soft_tissue * declared, noise.soft_tissue_least_m)
+            unmodelled = np.maximum(noise.soft_tissue_sd_fraction * declared, noise.soft_tissue_least_sd_m)
         variance = noise.marker_sd_m**2 + unmodelled**2 + initial.unmodelled_m**2
     names = initial.recorded_markers
-    return np.array([noise.marker.get(name, value) for name, value in zip(names, variance, strict=True)])
+    return np.array([noise.marker_variance_m2.get(name, value) for name, value in zip(names, variance, strict=True)])
 
 
 def gate_limits(probability: float) -> list[float] | None:

@@ -64,8 +64,10 @@ def foot_wrenches(loads: FootLoads, initial: InitialModel, noise: Noise) -> Foot
     push = np.maximum(known[..., 1], LOADED_N)
     pressure = np.stack([known[..., 5] / push, np.zeros_like(push), -known[..., 3] / push], axis=-1)
     shared = np.pad(loads.reason == on_plates.SHARED, ((0, 0), (0, 1))) * _SHARED_PART * push
-    force = np.hypot(np.sqrt(noise.force / 2.0), shared[..., None])  # the noise declared is that of both together
-    moment = np.hypot(np.sqrt(noise.moment / 2.0), _SHARED_REACH_M * shared[..., None])
+    force = np.hypot(
+        np.sqrt(noise.force_variance_n2 / 2.0), shared[..., None]
+    )  # the noise declared is that of both together
+    moment = np.hypot(np.sqrt(noise.moment_variance_n2_m2 / 2.0), _SHARED_REACH_M * shared[..., None])
     root = next(s.name for s in initial.spec.segments if s.parent == "ground")
     names, segments = (*loads.feet, ELSEWHERE), [*(initial.feet[foot] for foot in loads.feet), root]
     return FootWrenches.of(names, segments, wrench, contact, force, moment, pressure)

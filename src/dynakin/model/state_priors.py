@@ -31,15 +31,15 @@ def state_prior(
     sd: dict[str, float] = {}
     for name, kind in kinds.items():
         turn = kind == "rotation"
-        sd[name] = np.deg2rad(priors.rotation_deg) if turn else priors.translation_m
-        sd[f"{name}/speed"] = np.deg2rad(priors.rotation_speed_deg_s) if turn else priors.speed_m_s
+        sd[name] = np.deg2rad(priors.rotation_sd_deg) if turn else priors.translation_sd_m
+        sd[f"{name}/speed"] = np.deg2rad(priors.rotation_speed_sd_deg_s) if turn else priors.translation_speed_sd_m_s
         sd[f"{name}/acceleration"] = (
-            np.deg2rad(priors.rotation_acceleration_deg_s2) if turn else priors.acceleration_m_s2
+            np.deg2rad(priors.rotation_acceleration_sd_deg_s2) if turn else priors.translation_acceleration_sd_m_s2
         )
     for name, value in lengths.items():
-        sd[f"length/{name}"] = priors.length_fraction * value
+        sd[f"length/{name}"] = priors.length_sd_fraction * value
     for marker in markers:
-        sd |= {f"marker/{marker}/{axis}": priors.marker_m for axis in "xyz"}
+        sd |= {f"marker/{marker}/{axis}": priors.marker_sd_m for axis in "xyz"}
     for segment, body in bodies.items():
         entry = inertia_prior(body, reach[segment], priors)
         sd |= {f"inertia/{segment}/{name}": value for name, value in entry.items()}
@@ -77,11 +77,11 @@ def state_bounds(
 
 def inertia_prior(body: RigidBody, length: float, priors: Priors) -> dict[str, float]:
     """Standard deviation of each of the ten numbers."""
-    moment = priors.inertia_fraction * max(float(np.trace(body.inertia)) / 2.0, 1e-12)
-    planar = priors.inertia_fraction * max(float(body.inertia[2, 2]), 1e-12)
+    moment = priors.inertia_sd_fraction * max(float(np.trace(body.inertia)) / 2.0, 1e-12)
+    planar = priors.inertia_sd_fraction * max(float(body.inertia[2, 2]), 1e-12)
     sd = dict.fromkeys(INERTIA_NAMES, moment)
-    sd |= dict.fromkeys(("mx", "my", "mz"), priors.first_moment_fraction * body.mass * length)
-    return sd | {"mass": priors.mass_fraction * body.mass, "izz": planar}
+    sd |= dict.fromkeys(("mx", "my", "mz"), priors.first_moment_sd_fraction * body.mass * length)
+    return sd | {"mass": priors.mass_sd_fraction * body.mass, "izz": planar}
 
 
 def inertia_bounds(body: RigidBody, length: float, bounds: Bounds) -> dict[str, Interval]:

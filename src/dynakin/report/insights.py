@@ -37,19 +37,23 @@ PLATE_WORDS = ("The plates are ", "Warning: the plates carry ")
 # What to try: with the paper's process noise, with white jerk.
 ADVICE = {
     "follows": (
-        "Smaller process noise (noise.coordinate, noise.speed, noise.acceleration) lets the model carry more.",
-        "A smaller noise.jerk lets the model carry more.",
+        "Smaller process noise (noise.coordinate_variance, noise.speed_variance, noise.acceleration_variance) lets the "
+        "model carry more.",
+        "A smaller noise.jerk_density_rad2_s5 lets the model carry more.",
     ),
     "cautious": (
-        "Smaller noise.coordinate, noise.speed and noise.acceleration; then a smaller noise.marker_scale.",
-        "A smaller noise.marker_sd_m and noise.jerk; then a smaller noise.soft_tissue.",
+        "Smaller noise.coordinate_variance, noise.speed_variance and noise.acceleration_variance; then a smaller "
+        "noise.marker_variance_scale.",
+        "A smaller noise.marker_sd_m and noise.jerk_density_rad2_s5; then a smaller noise.soft_tissue_sd_fraction.",
     ),
     "overconfident": (
-        "A larger noise.marker_scale, noise.force and noise.moment; look for markers that fit badly first.",
-        "A larger noise.soft_tissue, noise.force and noise.moment; look for markers that fit badly first.",
+        "A larger noise.marker_variance_scale, noise.force_variance_n2 and noise.moment_variance_n2_m2; look for "
+        "markers that fit badly first.",
+        "A larger noise.soft_tissue_sd_fraction, noise.force_variance_n2 and noise.moment_variance_n2_m2; look for "
+        "markers that fit badly first.",
     ),
     "speeds": (
-        "Smaller noise.coordinate and noise.speed tie each speed to its coordinate.",
+        "Smaller noise.coordinate_variance and noise.speed_variance tie each speed to its coordinate.",
         "A live estimate steps where a measurement corrects it; a smoothed one (without --live-like) does not.",
     ),
 }
@@ -169,7 +173,8 @@ def _markers(estimate: Estimate, metrics: dict[str, Any]) -> Insight | None:
     if apart:
         advice = (
             f"{listed(apart)} {stand} out: look at the film whether swapped, on another segment than the marker set "
-            "says, or moving with the skin; a larger variance under noise.marker makes the filter trust it less."
+            "says, or moving with the skin; a larger variance under noise.marker_variance_m2 makes the filter trust "
+            "it less."
         )
     return Insight(
         "good" if mean < 15.0 else "warning",  # the paper's own figure: below 15 mm
@@ -257,7 +262,7 @@ def _speeds(estimate: Estimate) -> Insight | None:
 
 def _advice(estimate: Estimate, finding: str) -> str:
     """What to try, for the process model of this run: the paper's, or white jerk."""
-    white_jerk = float(estimate.config.get("noise", {}).get("jerk", 0.0)) > 0.0
+    white_jerk = float(estimate.config.get("noise", {}).get("jerk_density_rad2_s5", 0.0)) > 0.0
     return ADVICE[finding][int(white_jerk)]
 
 

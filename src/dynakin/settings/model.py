@@ -24,32 +24,32 @@ Positive = Annotated[float, Field(gt=0.0)]
 class Priors(Strict):
     """Standard deviations of the state at the first frame."""
 
-    rotation_deg: Positive = 5.0
+    rotation_sd_deg: Positive = 5.0
     """Angles come from skin markers and regressed joint centres: soft tissue and regressions err by a few
     degrees."""
-    translation_m: Positive = 0.05
+    translation_sd_m: Positive = 0.05
     """Joint translations (free-floating models), from the same landmarks."""
-    rotation_speed_deg_s: Positive = 60.0
+    rotation_speed_sd_deg_s: Positive = 60.0
     """Taken as 0 at the start; a trial may start in motion, and a squat's joints reach 100 to 150 deg/s at
     their fastest."""
-    speed_m_s: Positive = 0.5
+    translation_speed_sd_m_s: Positive = 0.5
     """The same for translations."""
-    rotation_acceleration_deg_s2: Positive = 600.0
+    rotation_acceleration_sd_deg_s2: Positive = 600.0
     """Taken as 0 at the start; a speed of 60 deg/s built up within 0.1 s."""
-    acceleration_m_s2: Positive = 5.0
+    translation_acceleration_sd_m_s2: Positive = 5.0
     """The same for translations."""
-    length_fraction: Positive = 0.05
+    length_sd_fraction: Positive = 0.05
     """Lengths, of their value: joint centres are known to 1 or 2 cm, 3 to 5 % of a leg segment."""
-    marker_m: Positive = 0.005
+    marker_sd_m: Positive = 0.005
     """Local marker positions, measured while standing: the segment's frame hangs on the same landmarks, so one that is
     put elsewhere moves frame and places alike; what is left is the skin's shape at rest. Tried on simulated landmarks
     7 mm off: 4 to 10 mm do, the smaller the better. What skin and flesh do later is not part of it."""
-    mass_fraction: Positive = 0.10
+    mass_sd_fraction: Positive = 0.10
     """Segment masses, of the table's value: half of the +-20 % of (9), so that the bound lies at two
     sigma."""
-    first_moment_fraction: Positive = 0.05
+    first_moment_sd_fraction: Positive = 0.05
     """First moments, of mass times length: the centre of mass known to 5 % of the length."""
-    inertia_fraction: Positive = 0.10
+    inertia_sd_fraction: Positive = 0.10
     """Inertia entries, of the moment izz about the joint: mostly m c^2, so as the mass."""
 
 

@@ -32,42 +32,44 @@ class Noise(Strict):
     tissue as a process of its own, bounds by projection, gates, recovery; how each number was found stands in
     docs/validation.md."""
 
-    coordinate: NotNegative = scale(0.0, "rad² or m² a step", "how far coordinates may jump between frames")
+    coordinate_variance: NotNegative = scale(0.0, "rad² or m² a step", "how far coordinates may jump between frames")
     """Q of each coordinate, rad^2 or m^2 a step."""
-    speed: NotNegative = scale(0.0, "(rad/s)² or (m/s)² a step", "how far speeds may jump between frames")
+    speed_variance: NotNegative = scale(0.0, "(rad/s)² or (m/s)² a step", "how far speeds may jump between frames")
     """Q of each speed, (rad/s)^2 a step."""
-    acceleration: NotNegative = scale(
+    acceleration_variance: NotNegative = scale(
         0.0, "(rad/s²)² or (m/s²)² a step", "how far accelerations may jump between frames"
     )
     """Q of each acceleration, (rad/s^2)^2 a step."""
-    length: NotNegative = scale(0.0, "m² a step", "how fast lengths may change")
+    length_variance: NotNegative = scale(0.0, "m² a step", "how fast lengths may change")
     """Q of each segment length: constants."""
-    marker_place: NotNegative = scale(0.0, "m² a step", "how fast marker places may change")
+    marker_place_variance_m2: NotNegative = scale(0.0, "m² a step", "how fast marker places may change")
     """Q of each local marker coordinate, m^2 a step."""
-    inertia: NotNegative = scale(0.0, "SI² a step", "how fast inertial parameters may change")
+    inertia_variance: NotNegative = scale(0.0, "SI² a step", "how fast inertial parameters may change")
     """Q of each inertial parameter: constants."""
-    jerk: NotNegative = scale(60.0, "rad²/s⁵", "how abruptly joints accelerate")
+    jerk_density_rad2_s5: NotNegative = scale(60.0, "rad²/s⁵", "how abruptly joints accelerate")
     """Spectral density of the jerk of each rotation, rad^2/s^5: white jerk keeps angles, speeds and accelerations
     derivatives of each other at any time step."""
-    jerk_translation: NotNegative = scale(10.0, "m²/s⁵", "how abruptly the body accelerates")
+    translation_jerk_density_m2_s5: NotNegative = scale(10.0, "m²/s⁵", "how abruptly the body accelerates")
     """The same of each translation, m^2/s^5."""
 
-    floating_jerk: NotNegative | None = scale(3e4, "rad²/s⁵", "how abruptly joints accelerate")
+    floating_jerk_density_rad2_s5: NotNegative | None = scale(3e4, "rad²/s⁵", "how abruptly joints accelerate")
     """The jerk's density of each rotation of a model that is fixed nowhere: it walks, and its limbs swing. Not given:
-    as ``jerk``."""
-    floating_jerk_translation: NotNegative | None = scale(1e3, "m²/s⁵", "how abruptly the body accelerates")
+    as ``jerk_density_rad2_s5``."""
+    floating_translation_jerk_density_m2_s5: NotNegative | None = scale(
+        1e3, "m²/s⁵", "how abruptly the body accelerates"
+    )
     """The same of each translation."""
 
-    length_drift: NotNegative = scale(3e-6, "m²/s", "how fast lengths may change")
+    length_drift_density_m2_s: NotNegative = scale(3e-6, "m²/s", "how fast lengths may change")
     """Spectral density of a random walk of each length, m^2/s: skin that follows an angle and joints that are no hinges
     look like lengths, and do not average out; without it a length is thought to be known the better the longer."""
-    length_skin: NotNegative = 0.6
+    length_skin_fraction: NotNegative = 0.6
     """Part of the skin's declared displacement that is added to the standard deviation of the lengths about it when
     they are told, not in the filter: skin that follows an angle never averages out."""
-    soft_tissue: NotNegative = scale(0.5, "of the declared size", "how far skin and flesh move")
+    soft_tissue_sd_fraction: NotNegative = scale(0.5, "of the declared size", "how far skin and flesh move")
     """Standard deviation of the displacement of skin and flesh under each marker, as a fraction of the size that its
     marker set declares; 0: none is estimated."""
-    soft_tissue_least_m: NotNegative = scale(0.002, "m", "below which size soft tissue counts as noise")
+    soft_tissue_least_sd_m: NotNegative = scale(0.002, "m", "below which size soft tissue counts as noise")
     """Where the standard deviation is below this, this much is taken for noise of the marker instead, without a state
     of its own: a foot is not as rigid, nor its toe as fixed in the ground, as a model has it."""
     soft_tissue_time_s: Seconds = scale(6.0, "s", "how long skin stays displaced")
@@ -78,29 +80,29 @@ class Noise(Strict):
 
     marker_sd_m: Positive | None = scale(0.0007, "m", "noise of the cameras")
     """Noise of the cameras, m, for all markers; not given: R of the marker set, which holds soft tissue too."""
-    marker_scale: Positive = scale(1.0, "1", "noise of the markers")
+    marker_variance_scale: Positive = scale(1.0, "1", "noise of the markers")
     """Factor on the R of all markers that the marker set gives."""
-    marker: dict[str, Positive] = Field(default_factory=dict)
+    marker_variance_m2: dict[str, Positive] = Field(default_factory=dict)
     """R of single markers, m^2, by their name in the recording, instead of the marker set's."""
-    force: Positive = scale(36.0, "N²", "noise of the forces")
+    force_variance_n2: Positive = scale(36.0, "N²", "noise of the forces")
     """R of each force component of the total wrench, N^2."""
-    moment: Positive = scale(4.0, "(N m)²", "noise of the moments")
+    moment_variance_n2_m2: Positive = scale(4.0, "(N m)²", "noise of the moments")
     """R of each moment component about the reference point, (N m)^2."""
     reference_point_m: tuple[float, float, float] | Literal["auto"] = "auto"
     """Where the wrench's noise is declared, in the ground frame; auto: the mean centre of pressure of the first
     second."""
-    plate_force: NotNegative = scale(5.0, "N", "slow error of the forces")
+    plate_force_sd_n: NotNegative = scale(5.0, "N", "slow error of the forces")
     """Standard deviation of a slow error of each force (plates and model alike), N; 0: none is estimated."""
-    plate_moment: NotNegative = scale(2.0, "N m", "slow error of the moments")
+    plate_moment_sd_nm: NotNegative = scale(2.0, "N m", "slow error of the moments")
     """The same of each moment about the ground origin, N m."""
     plate_time_s: Seconds = scale(30.0, "s", "how long that error lasts")
     """Time constant of that slow error."""
     plate_load_tolerance: Positive | None = 0.15
     """Plates whose load is further from the person's weight than this part of it are not used: something that the model
     does not have bears on them. Not given: they always are."""
-    plate_delay_s: NotNegative = 0.02
+    plate_delay_sd_s: NotNegative = 0.02
     """Prior standard deviation of the plates' delay behind the markers, s; 0: none is estimated."""
-    total_mass: Positive = scale(0.25, "kg²", "doubt about the total mass")
+    total_mass_variance_kg2: Positive = scale(0.25, "kg²", "doubt about the total mass")
     """Variance of the declared total mass, kg^2."""
     total_mass_use: Literal["frame", "prior"] = "prior"
     """Whether the total mass is measured at each frame (5), or known once, at the start."""
@@ -116,7 +118,7 @@ class Noise(Strict):
     unseen_sd: Positive | None = 0.5
     """Standard deviation of a coordinate (rad or m) from which on it is held where it is, because no marker tells of it
     any more; not given: it is carried on with the speed it last had. Needs ``recover``."""
-    iterate_beyond: Positive | None = 0.2
+    iterate_beyond_sd: Positive | None = 0.2
     """Standard deviation of a coordinate (rad or m) beyond which an update is linearised anew; not given: never."""
 
     constraint: Literal["projection", "gain", "sigmoid", "none"] = "projection"

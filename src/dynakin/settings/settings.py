@@ -105,7 +105,9 @@ class Settings(Strict):
     """Half widths of the bounds of equation (9)."""
     opensim: OpenSimOptions = OpenSimOptions()
     """What of an OpenSim model can be estimated; other models do not read it."""
-    grid: dict[str, tuple[float, float, int]] | None = Field(default=None, examples=[{"jerk": [1.0, 1e4, 5]}])
+    grid: dict[str, tuple[float, float, int]] | None = Field(
+        default=None, examples=[{"jerk_density_rad2_s5": [1.0, 1e4, 5]}]
+    )
     """Settings that `tune grid` varies: NAME = [from, to, steps], logarithmic. `run` does not read it."""
 
     ground: dict[str, Any] = Field(default_factory=dict)

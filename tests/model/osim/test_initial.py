@@ -61,7 +61,7 @@ def test_what_is_estimated_is_a_choice(folder: Path, squats: Recording) -> None:
     path = folder / FILE
 
     def started(estimate: tuple[str, ...], **options: object) -> InitialModel:
-        noise = presets.default().changed(plate_force=0.0, plate_moment=0.0, plate_delay_s=0.0)
+        noise = presets.default().changed(plate_force_sd_n=0.0, plate_moment_sd_nm=0.0, plate_delay_sd_s=0.0)
         return dynakin.Estimator(load_opensim(path, **options), noise, estimate=estimate).start(squats)
 
     nothing = started(())

@@ -25,7 +25,7 @@ def estimator_of(folder: Path, estimate: tuple[Quantity, ...], noise: dynakin.No
 
 def marker_rms_mm(folder: Path, estimate: tuple[Quantity, ...]) -> float:
     """From markers alone."""
-    noise = dynakin.presets.default().changed(plate_force=0.0, plate_moment=0.0, plate_delay_s=0.0)
+    noise = dynakin.presets.default().changed(plate_force_sd_n=0.0, plate_moment_sd_nm=0.0, plate_delay_sd_s=0.0)
     recording = dynakin.read(folder / "squats1.trc", folder / "squats1_grf.mot")
     estimator = estimator_of(folder, estimate, noise)
     markers, wrench = recording_arrays(recording, estimator.start(recording), gaps=True)

@@ -65,7 +65,7 @@ def _trusting(estimator: Estimator) -> Estimator:
     made = Estimator(
         estimator.model,
         estimator.noise.changed(
-            marker_gate=0.0, wrench_gate=0.0, recover=False, constraint="none", iterate_beyond=None
+            marker_gate=0.0, wrench_gate=0.0, recover=False, constraint="none", iterate_beyond_sd=None
         ),
         priors=estimator.priors,
         bounds=estimator.bounds,

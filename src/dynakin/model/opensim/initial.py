@@ -107,7 +107,7 @@ def lay_on(
     table = {f"inertia/{s.name}/{k}": v for s in spec.segments for k, v in zip(INERTIA_NAMES, s.inertia, strict=True)}
     skin = np.array([skin_of(marker.name, marker.body) for marker, _ in chosen])
     known = priors or Priors()
-    known = known.changed(marker_m=float(np.hypot(known.marker_m, fit.rms_m / np.sqrt(3.0))))
+    known = known.changed(marker_sd_m=float(np.hypot(known.marker_sd_m, fit.rms_m / np.sqrt(3.0))))
     return InitialModel(
         spec=spec,
         names=tuple(names),

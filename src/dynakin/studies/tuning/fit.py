@@ -24,23 +24,23 @@ Array = npt.NDArray[np.float64]
 
 # What is fitted where nothing is named, as far as the settings have it.
 USUAL = (
-    "coordinate",
-    "speed",
-    "acceleration",
-    "marker_place",
-    "jerk",
-    "jerk_translation",
-    "floating_jerk",
-    "floating_jerk_translation",
-    "soft_tissue",
+    "coordinate_variance",
+    "speed_variance",
+    "acceleration_variance",
+    "marker_place_variance_m2",
+    "jerk_density_rad2_s5",
+    "translation_jerk_density_m2_s5",
+    "floating_jerk_density_rad2_s5",
+    "floating_translation_jerk_density_m2_s5",
+    "soft_tissue_sd_fraction",
     "soft_tissue_time_s",
     "floating_soft_tissue_time_s",
     "marker_sd_m",
-    "marker_scale",
-    "force",
-    "moment",
-    "plate_force",
-    "plate_moment",
+    "marker_variance_scale",
+    "force_variance_n2",
+    "moment_variance_n2_m2",
+    "plate_force_sd_n",
+    "plate_moment_sd_nm",
 )
 SETTLED_RELATIVE = 1e-5
 """Relative change of another criterion than the likelihood at which the search ends."""
@@ -108,10 +108,12 @@ def usual_names(noise: Noise, floating: Collection[bool] = (False,)) -> tuple[st
     Args:
         floating: whether the model is fixed nowhere, of each trial.
     """
-    unused = "marker_scale" if noise.marker_sd_m is not None else "marker_sd_m"
+    unused = "marker_variance_scale" if noise.marker_sd_m is not None else "marker_sd_m"
     names = [name for name in USUAL if name != unused and (getattr(noise, name) or 0.0) > 0.0]
     idle = without_effect(names, noise, floating)
-    return tuple(n for n in names if n not in idle and not (n.endswith("tissue_time_s") and noise.soft_tissue == 0.0))
+    return tuple(
+        n for n in names if n not in idle and not (n.endswith("tissue_time_s") and noise.soft_tissue_sd_fraction == 0.0)
+    )
 
 
 def belongs_to_fit(shared: Shared) -> dict[str, Any]:
@@ -211,7 +213,10 @@ class Fitter:
     def _figures(self, where: Likelihood, fitted: Mapping[str, float]) -> dict[str, dict[str, Any]]:
         asked: dict[str, dict[str, Any]] = {"fitted": together(self.shared.base, fitted), "start": {}}
         # the total mass as a row at each frame would count as likelihood: all are judged on the recordings alone
-        mass = {"total_mass_use": where.shared.base.total_mass_use, "total_mass": where.shared.base.total_mass}
+        mass = {
+            "total_mass_use": where.shared.base.total_mass_use,
+            "total_mass_variance_kg2": where.shared.base.total_mass_variance_kg2,
+        }
         asked |= {name: noise.model_dump(mode="json") | mass for name, noise in self.others.items()}
         return dict(zip(asked, where.rows(list(asked.values())), strict=True))
 

@@ -53,7 +53,9 @@ def axis(name: str, low: float, high: float, steps: int) -> Axis:
 
 def paper_axes() -> tuple[Axis, ...]:
     """The paper's three gains, 13 values each."""
-    return tuple(axis(name, *PAPER_RANGE) for name in ("coordinate", "speed", "acceleration"))
+    return tuple(
+        axis(name, *PAPER_RANGE) for name in ("coordinate_variance", "speed_variance", "acceleration_variance")
+    )
 
 
 @dataclass(frozen=True, eq=False)

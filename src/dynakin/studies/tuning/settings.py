@@ -75,7 +75,11 @@ def together(base: Noise, settings: Mapping[str, float]) -> dict[str, float]:
     way: the likelihood would jump there.
     """
     found = dict(settings)
-    if "soft_tissue" in found and "soft_tissue_least_m" not in found and base.soft_tissue > 0.0:
-        least = base.soft_tissue_least_m * found["soft_tissue"] / base.soft_tissue
-        found["soft_tissue_least_m"] = least * (1.0 - 1e-9)  # a size that lies on the limit stays on its side
+    if (
+        "soft_tissue_sd_fraction" in found
+        and "soft_tissue_least_sd_m" not in found
+        and base.soft_tissue_sd_fraction > 0.0
+    ):
+        least = base.soft_tissue_least_sd_m * found["soft_tissue_sd_fraction"] / base.soft_tissue_sd_fraction
+        found["soft_tissue_least_sd_m"] = least * (1.0 - 1e-9)  # a size that lies on the limit stays on its side
     return found

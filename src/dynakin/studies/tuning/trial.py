@@ -124,4 +124,4 @@ def undoubting(noise: Noise) -> Noise:
 
 
 def _doubts(noise: Noise) -> bool:
-    return noise.marker_gate > 0.0 or noise.wrench_gate > 0.0 or noise.recover or noise.plate_delay_s > 0.0
+    return noise.marker_gate > 0.0 or noise.wrench_gate > 0.0 or noise.recover or noise.plate_delay_sd_s > 0.0
