@@ -10,7 +10,11 @@ import pytest
 import dynakin
 from dynakin.errors import ConfigError
 from dynakin.settings import presets
+from dynakin.settings.model import Priors
 from dynakin.settings.noise import Noise
+from dynakin.settings.settings import Settings
+from dynakin.settings.strict import Strict
+from dynakin.studies.tuning.settings import check_setting
 
 # Every number that a preset had before it became, or ceased to be, the default.
 DEFAULT: dict[str, Any] = {
@@ -128,3 +132,26 @@ def test_a_written_preset_is_read_back(tmp_path: Path) -> None:
     (tmp_path / "wrong.toml").write_text("[noise]\nself = 1.0\n")
     with pytest.raises(ConfigError, match=r"wrong\.toml: noise: unknown key 'self'"):
         presets.preset(str(tmp_path / "wrong.toml"))
+
+
+@pytest.mark.parametrize("schema", [Noise, Priors])
+def test_an_old_name_is_refused_by_the_new_one(schema: type[Strict], tmp_path: Path) -> None:
+    assert set(schema.renamed.values()) <= set(schema.model_fields)
+    assert not set(schema.renamed) & set(schema.model_fields)
+    for old, new in schema.renamed.items():
+        with pytest.raises(ConfigError) as error:
+            schema().changed(**{old: 1.0})
+        assert f"{old!r} is now called {new!r}" in error.value.message and "\n" not in error.value.message
+
+
+def test_an_old_name_is_refused_in_files_and_by_tune(tmp_path: Path) -> None:
+    keys = {"trial": "a.trc", "model": "squat7", "output": "out"}
+    for table, old, new in (("noise", "force", "force_variance_n2"), ("priors", "marker_m", "marker_sd_m")):
+        with pytest.raises(ConfigError) as error:
+            Settings.of(keys | {table: {old: 1.0}}, "run.toml")
+        assert error.value.message == f"run.toml: {table}: {old!r} is now called {new!r}"
+    (tmp_path / "old.toml").write_text("[noise]\njerk = 1.0\n")
+    with pytest.raises(ConfigError, match=r"old\.toml: noise: 'jerk' is now called 'jerk_density_rad2_s5'"):
+        presets.preset(str(tmp_path / "old.toml"))
+    with pytest.raises(ConfigError, match="setting 'plate_force' is now called 'plate_force_sd_n'"):
+        check_setting("plate_force")

@@ -8,7 +8,7 @@ here.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, get_args
+from typing import Annotated, ClassVar, Literal, get_args
 
 from pydantic import Field
 
@@ -23,6 +23,20 @@ Positive = Annotated[float, Field(gt=0.0)]
 
 class Priors(Strict):
     """Standard deviations of the state at the first frame."""
+
+    renamed: ClassVar = {
+        "rotation_deg": "rotation_sd_deg",
+        "translation_m": "translation_sd_m",
+        "rotation_speed_deg_s": "rotation_speed_sd_deg_s",
+        "speed_m_s": "translation_speed_sd_m_s",
+        "rotation_acceleration_deg_s2": "rotation_acceleration_sd_deg_s2",
+        "acceleration_m_s2": "translation_acceleration_sd_m_s2",
+        "length_fraction": "length_sd_fraction",
+        "marker_m": "marker_sd_m",
+        "mass_fraction": "mass_sd_fraction",
+        "first_moment_fraction": "first_moment_sd_fraction",
+        "inertia_fraction": "inertia_sd_fraction",
+    }
 
     rotation_sd_deg: Positive = 5.0
     """Angles come from skin markers and regressed joint centres: soft tissue and regressions err by a few

@@ -8,7 +8,7 @@ import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Self, TypeVar
+from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, model_validator
 
@@ -62,11 +62,16 @@ class Strict(BaseModel):
         use_attribute_docstrings=True,
     )
 
+    renamed: ClassVar[Mapping[str, str]] = {}
+    """New names of keys that were called otherwise: the old ones are refused by naming the new."""
+
     @model_validator(mode="before")
     @classmethod
     def _refuse_unknown_keys(cls, data: Any) -> Any:
         if isinstance(data, dict):
             for key in data:
+                if key in cls.renamed:
+                    raise ValueError(f"{key!r} is now called {cls.renamed[key]!r}")
                 if key not in cls.model_fields:
                     raise ValueError(
                         f"unknown key {key!r}{nearest(str(key), cls.model_fields)}; "
