@@ -98,7 +98,8 @@ class Settings(Strict):
     moment_nm, laboratory frame."""
 
     noise: dict[str, Any] = Field(default_factory=dict)
-    """Standard deviations, variances, densities and times, each as told beside it. Defaults: those of the preset."""
+    """What the filter assumes of noise; names say which are variances, standard deviations and densities. Defaults:
+    those of the preset."""
     priors: Priors = Priors()
     """Standard deviations at the first frame."""
     bounds: Bounds = Bounds()
