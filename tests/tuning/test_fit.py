@@ -122,7 +122,7 @@ def test_one_trial_is_held_out_by_halves_and_written_as_a_preset(tmp_path: Path,
     told = json.loads((folder / "fit.json").read_text())
     assert [fold["held_out"].split(", ")[1] for fold in told["held_out"]] == ["first half", "second half"]
     assert set(told["figures"]) == {"fitted", "start", "paper"}
-    assert presets.preset(str(folder / "preset_fit.toml")).force == told["settings"][0]["value"]
+    assert presets.preset(str(folder / "preset_fit.toml")).force_variance_n2 == told["settings"][0]["value"]
     assert told["recommendation"][0] in " ".join(capsys.readouterr().out.split())
 
 

@@ -21,7 +21,7 @@ QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
 Positive = Annotated[float, Field(gt=0.0)]
 
 
-class Priors(Strict):
+class Priors(Strict, use_attribute_docstrings=True):
     """Standard deviations of the state at the first frame."""
 
     renamed: ClassVar = {
@@ -67,7 +67,7 @@ class Priors(Strict):
     """Inertia entries, of the moment izz about the joint: mostly m c^2, so as the mass."""
 
 
-class Bounds(Strict):
+class Bounds(Strict, use_attribute_docstrings=True):
     """Half widths of the bounds of (9)."""
 
     length_fraction: Positive = 0.20
@@ -84,7 +84,7 @@ class Bounds(Strict):
     """Of the absolute value, as in (9)."""
 
 
-class OpenSimOptions(Strict):
+class OpenSimOptions(Strict, use_attribute_docstrings=True):
     """What of an OpenSim model can be estimated, and what is taken as the file has it."""
 
     scale: Literal["all"] | tuple[str, ...] | None = "all"

@@ -27,7 +27,7 @@ def scale(default: float, unit: str, effect: str) -> Any:
     return Field(default=default, json_schema_extra={"unit": unit, "effect": effect})
 
 
-class Noise(Strict):
+class Noise(Strict, use_attribute_docstrings=True):
     """SI units; what is called a variance is squared. The defaults are those that anyone should use: white jerk, soft
     tissue as a process of its own, bounds by projection, gates, recovery; how each number was found stands in
     docs/validation.md."""

@@ -34,7 +34,7 @@ NEEDED = {
 }
 
 
-class Settings(Strict):
+class Settings(Strict, use_attribute_docstrings=True):
     """What a run needs to know; the keys of a configuration file are the options of the command line."""
 
     trial: Path = Field(default=Path(), examples=["squat.c3d"])

@@ -51,15 +51,14 @@ def nearest(word: str, known: Iterable[str]) -> str:
 
 
 class Strict(BaseModel):
-    """Base of everything read from a file: unknown keys are refused, instances cannot be changed. The docstring below a
-    field is its meaning, wherever it is shown."""
+    """Base of everything read from a file: unknown keys are refused, instances cannot be changed. With
+    ``use_attribute_docstrings`` (a class argument) the text below a field is its meaning, wherever that is shown."""
 
     model_config = ConfigDict(
         extra="forbid",
         frozen=True,
         str_strip_whitespace=True,
         allow_inf_nan=False,
-        use_attribute_docstrings=True,
     )
 
     renamed: ClassVar[Mapping[str, str]] = {}
