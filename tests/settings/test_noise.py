@@ -10,83 +10,87 @@ import pytest
 import dynakin
 from dynakin.errors import ConfigError
 from dynakin.settings import presets
+from dynakin.settings.model import Priors
 from dynakin.settings.noise import Noise
+from dynakin.settings.settings import Settings
+from dynakin.settings.strict import Strict
+from dynakin.studies.tuning.settings import check_setting
 
 # Every number that a preset had before it became, or ceased to be, the default.
 DEFAULT: dict[str, Any] = {
-    "coordinate": 0.0,
-    "speed": 0.0,
-    "acceleration": 0.0,
-    "length": 0.0,
-    "marker_place": 0.0,
-    "inertia": 0.0,
-    "jerk": 60.0,
-    "jerk_translation": 10.0,
-    "floating_jerk": 30000.0,
-    "floating_jerk_translation": 1000.0,
-    "length_drift": 3e-06,
-    "length_skin": 0.6,
-    "soft_tissue": 0.5,
-    "soft_tissue_least_m": 0.002,
+    "coordinate_variance": 0.0,
+    "speed_variance": 0.0,
+    "acceleration_variance": 0.0,
+    "length_variance": 0.0,
+    "marker_place_variance_m2": 0.0,
+    "inertia_variance": 0.0,
+    "jerk_density_rad2_s5": 60.0,
+    "translation_jerk_density_m2_s5": 10.0,
+    "floating_jerk_density_rad2_s5": 30000.0,
+    "floating_translation_jerk_density_m2_s5": 1000.0,
+    "length_drift_density_m2_s": 3e-06,
+    "length_skin_fraction": 0.6,
+    "soft_tissue_sd_fraction": 0.5,
+    "soft_tissue_least_sd_m": 0.002,
     "soft_tissue_time_s": 6.0,
     "floating_soft_tissue_time_s": 0.5,
     "marker_sd_m": 0.0007,
-    "marker_scale": 1.0,
-    "marker": {},
-    "force": 36.0,
-    "moment": 4.0,
+    "marker_variance_scale": 1.0,
+    "marker_variance_m2": {},
+    "force_variance_n2": 36.0,
+    "moment_variance_n2_m2": 4.0,
     "reference_point_m": "auto",
-    "plate_force": 5.0,
-    "plate_moment": 2.0,
+    "plate_force_sd_n": 5.0,
+    "plate_moment_sd_nm": 2.0,
     "plate_time_s": 30.0,
     "plate_load_tolerance": 0.15,
-    "plate_delay_s": 0.02,
-    "total_mass": 0.25,
+    "plate_delay_sd_s": 0.02,
+    "total_mass_variance_kg2": 0.25,
     "total_mass_use": "prior",
     "marker_gate": 1e-09,
     "wrench_gate": 1e-09,
     "recover": True,
     "blind_s": 0.2,
     "unseen_sd": 0.5,
-    "iterate_beyond": 0.2,
+    "iterate_beyond_sd": 0.2,
     "constraint": "projection",
 }
 PAPER: dict[str, Any] = {
-    "coordinate": 1000.0,
-    "speed": 100.0,
-    "acceleration": 1000.0,
-    "length": 0.0,
-    "marker_place": 0.0001,
-    "inertia": 0.0,
-    "jerk": 0.0,
-    "jerk_translation": 0.0,
-    "floating_jerk": None,
-    "floating_jerk_translation": None,
-    "length_drift": 0.0,
-    "length_skin": 0.0,
-    "soft_tissue": 0.0,
-    "soft_tissue_least_m": 0.0,
+    "coordinate_variance": 1000.0,
+    "speed_variance": 100.0,
+    "acceleration_variance": 1000.0,
+    "length_variance": 0.0,
+    "marker_place_variance_m2": 0.0001,
+    "inertia_variance": 0.0,
+    "jerk_density_rad2_s5": 0.0,
+    "translation_jerk_density_m2_s5": 0.0,
+    "floating_jerk_density_rad2_s5": None,
+    "floating_translation_jerk_density_m2_s5": None,
+    "length_drift_density_m2_s": 0.0,
+    "length_skin_fraction": 0.0,
+    "soft_tissue_sd_fraction": 0.0,
+    "soft_tissue_least_sd_m": 0.0,
     "soft_tissue_time_s": 1.0,
     "floating_soft_tissue_time_s": None,
     "marker_sd_m": None,
-    "marker_scale": 1.0,
-    "marker": {},
-    "force": 0.1,
-    "moment": 0.1,
+    "marker_variance_scale": 1.0,
+    "marker_variance_m2": {},
+    "force_variance_n2": 0.1,
+    "moment_variance_n2_m2": 0.1,
     "reference_point_m": [0.0, 0.0, 0.0],
-    "plate_force": 0.0,
-    "plate_moment": 0.0,
+    "plate_force_sd_n": 0.0,
+    "plate_moment_sd_nm": 0.0,
     "plate_time_s": 1.0,
     "plate_load_tolerance": None,
-    "plate_delay_s": 0.0,
-    "total_mass": 0.0001,
+    "plate_delay_sd_s": 0.0,
+    "total_mass_variance_kg2": 0.0001,
     "total_mass_use": "frame",
     "marker_gate": 0.0,
     "wrench_gate": 0.0,
     "recover": False,
     "blind_s": 0.2,
     "unseen_sd": None,
-    "iterate_beyond": None,
+    "iterate_beyond_sd": None,
     "constraint": "gain",
 }
 
@@ -99,11 +103,17 @@ def test_presets_have_the_numbers_that_they_had() -> None:
 
 def test_a_copy_with_changes_is_checked() -> None:
     noise = Noise()
-    assert noise.changed(jerk=1.0).jerk == 1.0 and noise.changed(jerk=1.0).length_drift == noise.length_drift
+    assert (
+        noise.changed(jerk_density_rad2_s5=1.0).jerk_density_rad2_s5 == 1.0
+        and noise.changed(jerk_density_rad2_s5=1.0).length_drift_density_m2_s == noise.length_drift_density_m2_s
+    )
     assert noise.changed() == noise
     for changes, words in (
-        ({"jerk": -1.0}, ["noise", "jerk", "-1.0"]),
-        ({"jrek": 1.0}, ["noise", "'jrek'", "did you mean 'jerk'"]),
+        ({"jerk_density_rad2_s5": -1.0}, ["noise", "jerk_density_rad2_s5", "-1.0"]),
+        (
+            {"jrek_density_rad2_s5": 1.0},
+            ["noise", "'jrek_density_rad2_s5'", "did you mean 'jerk_density_rad2_s5'"],
+        ),
         ({"constraint": "projected"}, ["noise", "constraint", "projection"]),
     ):
         with pytest.raises(ConfigError) as error:
@@ -113,7 +123,7 @@ def test_a_copy_with_changes_is_checked() -> None:
 
 def test_a_written_preset_is_read_back(tmp_path: Path) -> None:
     for base, make in presets.PRESETS.items():
-        noise = make().changed(speed=12.5, marker={"RKNE": 1e-4})
+        noise = make().changed(speed_variance=12.5, marker_variance_m2={"RKNE": 1e-4})
         presets.write_preset(tmp_path / "own.toml", noise, base, ["mine"])
         assert presets.preset(str(tmp_path / "own.toml")) == noise
     (tmp_path / "wrong.toml").write_text('base = "papers"\n')
@@ -122,3 +132,28 @@ def test_a_written_preset_is_read_back(tmp_path: Path) -> None:
     (tmp_path / "wrong.toml").write_text("[noise]\nself = 1.0\n")
     with pytest.raises(ConfigError, match=r"wrong\.toml: noise: unknown key 'self'"):
         presets.preset(str(tmp_path / "wrong.toml"))
+
+
+@pytest.mark.parametrize("schema", [Noise, Priors])
+def test_an_old_name_is_refused_by_the_new_one(schema: type[Strict], tmp_path: Path) -> None:
+    assert set(schema.renamed.values()) <= set(schema.model_fields)
+    assert not set(schema.renamed) & set(schema.model_fields)
+    for old, new in schema.renamed.items():
+        with pytest.raises(ConfigError) as error:
+            schema().changed(**{old: 1.0})
+        assert f"{old!r} is now called {new!r}" in error.value.message and "\n" not in error.value.message
+
+
+def test_an_old_name_is_refused_in_files_and_by_tune(tmp_path: Path) -> None:
+    keys = {"trial": "a.trc", "model": "squat7", "output": "out"}
+    for table, old, new in (("noise", "force_variance_n2", "force_variance_n2"), ("priors", "marker_m", "marker_sd_m")):
+        with pytest.raises(ConfigError) as error:
+            Settings.of(keys | {table: {old: 1.0}}, "run.toml")
+        assert error.value.message == f"run.toml: {table}: {old!r} is now called {new!r}"
+    (tmp_path / "old.toml").write_text("[noise]\njerk = 1.0\n")
+    with pytest.raises(
+        ConfigError, match=r"old\.toml: noise: 'jerk_density_rad2_s5' is now called 'jerk_density_rad2_s5'"
+    ):
+        presets.preset(str(tmp_path / "old.toml"))
+    with pytest.raises(ConfigError, match="setting 'plate_force_sd_n' is now called 'plate_force_sd_n'"):
+        check_setting("plate_force_sd_n")

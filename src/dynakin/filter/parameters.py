@@ -17,16 +17,17 @@ _PLATE_UNITS = {"delay": "s", "fx": "N", "fy": "N", "fz": "N"}
 
 
 def parameters_of(
-    initial: CalibratedModel, state: Array, sd: Array, prior_sd: Array, length_skin: float = 0.0
+    initial: CalibratedModel, state: Array, sd: Array, prior_sd: Array, length_skin_fraction: float = 0.0
 ) -> list[Parameter]:
     """Every length, marker place and inertial parameter in the state, and the lengths that were held fixed.
 
     Args:
         state, sd: (n,) the last frame's. prior_sd: (n,) before the first.
-        length_skin: part of the skin's declared displacement that may look like a length (`Noise.length_skin_fraction`).
+        length_skin_fraction: part of the skin's declared displacement that may look like a length (the noise setting of
+            the same name).
     """
     segments = {marker.name: marker.segment for marker in initial.spec.markers}
-    skin = length_skin_sd(initial, length_skin)
+    skin = length_skin_sd(initial, length_skin_fraction)
     found = []
     for k, name in enumerate(initial.names):
         word, owner, last = element(name)

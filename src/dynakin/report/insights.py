@@ -31,16 +31,20 @@ PLATE_WORDS = ("The plates are ", "Warning: the plates carry ")
 # What to try: with the paper's process noise, with white jerk.
 ADVICE = {
     "follows": (
-        "Smaller process noise (noise.coordinate_variance, noise.speed_variance, noise.acceleration_variance) lets the model carry more.",
+        "Smaller process noise (noise.coordinate_variance, noise.speed_variance, noise.acceleration_variance) lets the "
+        "model carry more.",
         "A smaller noise.jerk_density_rad2_s5 lets the model carry more.",
     ),
     "cautious": (
-        "Smaller noise.coordinate_variance, noise.speed_variance and noise.acceleration_variance; then a smaller noise.marker_variance_scale.",
+        "Smaller noise.coordinate_variance, noise.speed_variance and noise.acceleration_variance; then a smaller "
+        "noise.marker_variance_scale.",
         "A smaller noise.marker_sd_m and noise.jerk_density_rad2_s5; then a smaller noise.soft_tissue_sd_fraction.",
     ),
     "overconfident": (
-        "A larger noise.marker_variance_scale, noise.force_variance_n2 and noise.moment_variance_n2_m2; look for markers that fit badly first.",
-        "A larger noise.soft_tissue_sd_fraction, noise.force_variance_n2 and noise.moment_variance_n2_m2; look for markers that fit badly first.",
+        "A larger noise.marker_variance_scale, noise.force_variance_n2 and noise.moment_variance_n2_m2; look for "
+        "markers that fit badly first.",
+        "A larger noise.soft_tissue_sd_fraction, noise.force_variance_n2 and noise.moment_variance_n2_m2; look for "
+        "markers that fit badly first.",
     ),
     "speeds": (
         "Smaller noise.coordinate_variance and noise.speed_variance tie each speed to its coordinate.",
@@ -146,7 +150,8 @@ def _markers(estimate: Estimate, metrics: Metrics) -> Insight | None:
     if apart:
         advice = (
             f"{listed(apart)} {stand} out: look at the film whether swapped, on another segment than the marker set "
-            "says, or moving with the skin; a larger variance under noise.marker_variance_m2 makes the filter trust it less."
+            "says, or moving with the skin; a larger variance under noise.marker_variance_m2 makes the filter trust "
+            "it less."
         )
     return Insight(
         "good" if mean < 15.0 else "warning",  # the paper's own figure: below 15 mm

@@ -8,7 +8,7 @@ here.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, get_args
+from typing import Annotated, ClassVar, Literal, get_args
 
 from pydantic import Field
 
@@ -21,8 +21,22 @@ QUANTITIES: tuple[Quantity, ...] = get_args(Quantity)
 Positive = Annotated[float, Field(gt=0.0)]
 
 
-class Priors(Strict):
+class Priors(Strict, use_attribute_docstrings=True):
     """Standard deviations of the state at the first frame."""
+
+    renamed: ClassVar = {
+        "rotation_deg": "rotation_sd_deg",
+        "translation_m": "translation_sd_m",
+        "rotation_speed_deg_s": "rotation_speed_sd_deg_s",
+        "speed_m_s": "translation_speed_sd_m_s",
+        "rotation_acceleration_deg_s2": "rotation_acceleration_sd_deg_s2",
+        "acceleration_m_s2": "translation_acceleration_sd_m_s2",
+        "length_fraction": "length_sd_fraction",
+        "marker_m": "marker_sd_m",
+        "mass_fraction": "mass_sd_fraction",
+        "first_moment_fraction": "first_moment_sd_fraction",
+        "inertia_fraction": "inertia_sd_fraction",
+    }
 
     rotation_sd_deg: Positive = 5.0
     """Angles come from skin markers and regressed joint centres: soft tissue and regressions err by a few
@@ -53,7 +67,7 @@ class Priors(Strict):
     """Inertia entries, of the moment izz about the joint: mostly m c^2, so as the mass."""
 
 
-class Bounds(Strict):
+class Bounds(Strict, use_attribute_docstrings=True):
     """Half widths of the bounds of (9)."""
 
     length_fraction: Positive = 0.20
@@ -70,7 +84,7 @@ class Bounds(Strict):
     """Of the absolute value, as in (9)."""
 
 
-class OpenSimOptions(Strict):
+class OpenSimOptions(Strict, use_attribute_docstrings=True):
     """What of an OpenSim model can be estimated, and what is taken as the file has it."""
 
     scale: Literal["all"] | tuple[str, ...] | None = "all"

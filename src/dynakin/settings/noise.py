@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 from pydantic import Field
 
@@ -27,10 +27,36 @@ def scale(default: float, unit: str, effect: str) -> Any:
     return Field(default=default, json_schema_extra={"unit": unit, "effect": effect})
 
 
-class Noise(Strict):
+class Noise(Strict, use_attribute_docstrings=True):
     """SI units; what is called a variance is squared. The defaults are those that anyone should use: white jerk, soft
     tissue as a process of its own, bounds by projection, gates, recovery; how each number was found stands in
     docs/validation.md."""
+
+    renamed: ClassVar = {
+        "coordinate": "coordinate_variance",
+        "speed": "speed_variance",
+        "acceleration": "acceleration_variance",
+        "length": "length_variance",
+        "marker_place": "marker_place_variance_m2",
+        "inertia": "inertia_variance",
+        "jerk": "jerk_density_rad2_s5",
+        "jerk_translation": "translation_jerk_density_m2_s5",
+        "floating_jerk": "floating_jerk_density_rad2_s5",
+        "floating_jerk_translation": "floating_translation_jerk_density_m2_s5",
+        "length_drift": "length_drift_density_m2_s",
+        "length_skin": "length_skin_fraction",
+        "soft_tissue": "soft_tissue_sd_fraction",
+        "soft_tissue_least_m": "soft_tissue_least_sd_m",
+        "marker_scale": "marker_variance_scale",
+        "marker": "marker_variance_m2",
+        "force": "force_variance_n2",
+        "moment": "moment_variance_n2_m2",
+        "plate_force": "plate_force_sd_n",
+        "plate_moment": "plate_moment_sd_nm",
+        "plate_delay_s": "plate_delay_sd_s",
+        "total_mass": "total_mass_variance_kg2",
+        "iterate_beyond": "iterate_beyond_sd",
+    }
 
     coordinate_variance: NotNegative = scale(0.0, "rad² or m² a step", "how far coordinates may jump between frames")
     """Q of each coordinate, rad^2 or m^2 a step."""

@@ -34,7 +34,7 @@ NEEDED = {
 }
 
 
-class Settings(Strict):
+class Settings(Strict, use_attribute_docstrings=True):
     """What a run needs to know; the keys of a configuration file are the options of the command line."""
 
     trial: Path = Field(default=Path(), examples=["squat.c3d"])
@@ -98,7 +98,8 @@ class Settings(Strict):
     moment_nm, laboratory frame."""
 
     noise: dict[str, Any] = Field(default_factory=dict)
-    """Standard deviations, variances, densities and times, each as told beside it. Defaults: those of the preset."""
+    """What the filter assumes of noise; names say which are variances, standard deviations and densities. Defaults:
+    those of the preset."""
     priors: Priors = Priors()
     """Standard deviations at the first frame."""
     bounds: Bounds = Bounds()

@@ -8,7 +8,7 @@ import re
 import tomllib
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Annotated, Any, Self, TypeVar
+from typing import Annotated, Any, ClassVar, Self, TypeVar
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, ValidationError, model_validator
 
@@ -51,22 +51,26 @@ def nearest(word: str, known: Iterable[str]) -> str:
 
 
 class Strict(BaseModel):
-    """Base of everything read from a file: unknown keys are refused, instances cannot be changed. The docstring below a
-    field is its meaning, wherever it is shown."""
+    """Base of everything read from a file: unknown keys are refused, instances cannot be changed. With
+    ``use_attribute_docstrings`` (a class argument) the text below a field is its meaning, wherever that is shown."""
 
     model_config = ConfigDict(
         extra="forbid",
         frozen=True,
         str_strip_whitespace=True,
         allow_inf_nan=False,
-        use_attribute_docstrings=True,
     )
+
+    renamed: ClassVar[Mapping[str, str]] = {}
+    """New names of keys that were called otherwise: the old ones are refused by naming the new."""
 
     @model_validator(mode="before")
     @classmethod
     def _refuse_unknown_keys(cls, data: Any) -> Any:
         if isinstance(data, dict):
             for key in data:
+                if key in cls.renamed:
+                    raise ValueError(f"{key!r} is now called {cls.renamed[key]!r}")
                 if key not in cls.model_fields:
                     raise ValueError(
                         f"unknown key {key!r}{nearest(str(key), cls.model_fields)}; "

@@ -85,7 +85,8 @@ def make(folder: Path) -> None:
     )
     (folder / "config_run.toml").write_text(
         'trial = "squat.trc"\nmodel = "squat7"\noutput = "out"\nmass_kg = 70.0\nside = "right"\nforward = [1, 0, 0]\n'
-        'estimate = ["lengths", "markers"]\nplate_filter_hz = 20.0\n[noise]\njerk_density_rad2_s5 = 30.0\n[priors]\nmarker_sd_m = 0.02\n'
+        'estimate = ["lengths", "markers"]\nplate_filter_hz = 20.0\n'
+        "[noise]\njerk_density_rad2_s5 = 30.0\n[priors]\nmarker_sd_m = 0.02\n"
         '[[plate_loads]]\nplate = "plate 1"\nforce_n = [0, 5, 0]\npoint_m = [0, 0, 0]\n'
     )
     (folder / "study_two.toml").write_text(

@@ -62,7 +62,7 @@ class Excitation:
 def _trusting(tracker: Tracker) -> _core.FilterSettings:
     """The same filter without gates, bounds and recovery: what it is shown is exact, and no verdict on a single frame
     shall decide between two motions."""
-    free = {"marker_gate": 0.0, "wrench_gate": 0.0, "recover": False, "constraint": "none", "iterate_beyond": None}
+    free = {"marker_gate": 0.0, "wrench_gate": 0.0, "recover": False, "constraint": "none", "iterate_beyond_sd": None}
     noise = tracker.noise.changed(**free)
     return filter_settings(tracker.calibrated, noise, tracker.core_model.layout, tracker.estimate)
 

@@ -15,6 +15,8 @@ def check_setting(name: str) -> str:
     Raises:
         ConfigError: it is not; the nearest that is, is suggested.
     """
+    if name in Noise.renamed:
+        raise ConfigError(f"setting {name!r} is now called {Noise.renamed[name]!r}")
     if name not in SCALES:
         raise ConfigError(
             f"setting {name!r} cannot be varied{nearest(name, SCALES)}; expected one of {', '.join(SCALES)}"
