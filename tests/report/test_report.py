@@ -12,13 +12,14 @@ import pytest
 from synthetic_estimate import make_estimate
 
 from dynakin.report.insights import in_short, insights
-from dynakin.report.labels import listed, moment_note, number, short_marker_names
+from dynakin.report.labels import moment_note, short_marker_names
 from dynakin.report.page import SECTIONS, render_report
 from dynakin.report.plot import new_axes, thin, to_svg
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.metrics import compute_metrics
+from dynakin.results.naming import listed, number
 
 
 @pytest.fixture(scope="module")

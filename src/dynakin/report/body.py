@@ -7,10 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynakin.elements import element
-from dynakin.report.labels import is_planar, words
+from dynakin.report.labels import is_planar
 from dynakin.report.sides import values_of
 from dynakin.report.styles import SIDE_COLOURS, segment_colours, side_of
 from dynakin.results.estimate import Estimate
+from dynakin.results.naming import words
 
 
 @dataclass(frozen=True)

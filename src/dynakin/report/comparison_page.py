@@ -9,7 +9,6 @@ import numpy as np
 import tomli_w
 
 from dynakin.report.insights import Insight
-from dynakin.report.labels import listed, number, plural, sentence
 from dynakin.report.page import render_page
 from dynakin.report.sections.methods import ABOUT_METHODS, ABOUT_TABLE2, angle_part, moment_part, wrench_part
 from dynakin.report.sections.repetitions import method_repetitions
@@ -18,6 +17,7 @@ from dynakin.report.text_tables import angle_text, moment_text, name_of, table2_
 from dynakin.results.estimate import COMPONENTS
 from dynakin.results.files.config import plain
 from dynakin.results.files.versions import versions
+from dynakin.results.naming import listed, number, plural, sentence
 from dynakin.validation.methods import Trial
 from dynakin.validation.table2 import MARKERS, Row
 from dynakin.validation.unseen import UnseenRow

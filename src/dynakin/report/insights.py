@@ -6,23 +6,15 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from dynakin.report.convergence import convergence
-from dynakin.report.labels import (
-    COMPONENT_LABELS,
-    listed,
-    number,
-    parameter_label,
-    plural,
-    sentence,
-    short_marker_names,
-    words,
-)
+from dynakin.report.labels import COMPONENT_LABELS, parameter_label, short_marker_names
 from dynakin.results.estimate import Estimate
 from dynakin.results.failures import FAILED, LOG
 from dynakin.results.measures.bounds import counts_in_words
 from dynakin.results.measures.consistency import CONSISTENT
+from dynakin.results.measures.convergence import convergence
 from dynakin.results.measures.metrics import ADAPTATION_S, evaluation_window, speed_consistency, window_consistency
 from dynakin.results.measures.soft_tissue import excess_in_words
+from dynakin.results.naming import listed, number, plural, sentence, words
 from dynakin.results.records import doubts_mass
 
 # Expected one frame ahead against seen: further apart than this, the estimate follows the measurements.

@@ -10,7 +10,7 @@ import jinja2
 import tomli_w
 
 from dynakin.report.insights import in_short, insights, what_was_run
-from dynakin.report.labels import is_planar, listed, number, parameter_label, short_marker_names
+from dynakin.report.labels import is_planar, parameter_label, short_marker_names
 from dynakin.report.playback import playback
 from dynakin.report.sections.constants import length_section, mass_section, observability_section
 from dynakin.report.sections.forces import foot_section, mass_centre_section, wrench_section
@@ -26,6 +26,7 @@ from dynakin.results.files.versions import versions
 from dynakin.results.measures.facing import facing
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.sources import UNKNOWN
+from dynakin.results.naming import listed, number
 from dynakin.validation.methods import Trial
 
 _BOTH = (repetition_section, methods_section, length_section, mass_section, observability_section)
@@ -115,20 +116,14 @@ def write_report(
 
 def _headline(estimate: Estimate, metrics: dict[str, Any]) -> list[dict[str, str]]:
     rms = metrics["wrench"]["rms"] if metrics["wrench"] else {}
-    forces = [value for name, value in rms.items() if name.startswith("f")]
-    moments = [value for name, value in rms.items() if name.startswith("m")]
     stuck = [p for p in estimate.parameters if p.at_bound]
     free = [p for p in estimate.parameters if p.estimated and p.lower is not None]
     mean = metrics["markers"]["mean_rms_mm"] if metrics["markers"] else None
     tiles = [{"value": number(mean, digits=2), "unit": "mm", "label": "markers, mean RMS"}]
-    if forces:
-        names = listed([name for name in rms if name.startswith("f")])
-        value = " / ".join(number(force, digits=2) for force in forces)
-        tiles.append({"value": value, "unit": "N", "label": f"ground forces {names}, RMS"})
-    if moments:
-        names = listed([name for name in rms if name.startswith("m")])
-        value = " / ".join(number(moment, digits=2) for moment in moments)
-        tiles.append({"value": value, "unit": "N m", "label": f"ground moment {names}, RMS"})
+    for letter, what, unit in (("f", "ground forces", "N"), ("m", "ground moment", "N m")):
+        if names := [name for name in rms if name.startswith(letter)]:
+            value = " / ".join(number(rms[name], digits=2) for name in names)
+            tiles.append({"value": value, "unit": unit, "label": f"{what} {listed(names)}, RMS"})
     tiles.append({"value": f"{len(stuck)} of {len(free)}", "unit": "", "label": "parameters on a bound"})
     slow = estimate.timing.median_us >= 1000.0
     step = number(estimate.timing.median_us * (1e-3 if slow else 1.0), digits=2)

@@ -15,7 +15,7 @@ import numpy.typing as npt
 from markupsafe import Markup
 
 from dynakin.report.body import chain_of, marker_segments, painted
-from dynakin.report.labels import is_planar, number, sentence, short_marker_names, words
+from dynakin.report.labels import is_planar, short_marker_names
 from dynakin.report.plot import INK, MEASURED
 from dynakin.report.sides import Joint, joints_of, normalising_mass, values_of
 from dynakin.report.styles import SIDE_COLOURS
@@ -23,6 +23,7 @@ from dynakin.results.estimate import Estimate
 from dynakin.results.measures.feet import foot_sources
 from dynakin.results.measures.pressure import centre_of_pressure
 from dynakin.results.measures.sources import DERIVED, moment_sources, wrench_sources
+from dynakin.results.naming import number, sentence, words
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]

@@ -9,13 +9,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynakin.report.labels import is_planar, sentence, words
+from dynakin.report.labels import is_planar
 from dynakin.report.plot import ESTIMATED
 from dynakin.report.styles import SIDE_COLOURS, LineStyle, side_of
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.power import root_coordinates
 from dynakin.results.measures.sources import legs_of
 from dynakin.results.measures.symmetry import paired
+from dynakin.results.naming import sentence, words
 
 REGIONS = ("Legs", "Trunk and head", "Arms", "Whole body")
 """Of a body in space; a planar one has "" only."""

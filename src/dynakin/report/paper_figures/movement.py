@@ -15,7 +15,7 @@ from matplotlib.patches import Patch
 
 from dynakin.report.body import chain_of, marker_segments, painted
 from dynakin.report.chart import band_is_too_wide
-from dynakin.report.labels import COMPONENT_LABELS, is_planar, moment_note, number, sentence, words
+from dynakin.report.labels import COMPONENT_LABELS, is_planar, moment_note
 from dynakin.report.plot import ESTIMATED, INK, MEASURED, QUIET, draw_sourced
 from dynakin.report.sections.repetitions import (
     KINDS,
@@ -36,6 +36,7 @@ from dynakin.results.measures.mean_curves import PERCENT, estimate_curves
 from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.measures.repetitions import repetitions_of
 from dynakin.results.measures.sources import DERIVED, moment_sources, wrench_sources
+from dynakin.results.naming import number, sentence, words
 from dynakin.validation.differences import angle_differences, moment_differences
 from dynakin.validation.methods import AT, CLASSICAL, Method, Trial
 
@@ -128,8 +129,7 @@ def angles_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure
 
 def wrench_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
     """Figure 6: the wrench as measured, estimated, and from the table and classical angles ("AT")."""
-    measured = estimate.data["wrench_measured"].transpose("time", "component").values
-    estimated = estimate.data["wrench_estimated"].transpose("time", "component").values
+    measured, estimated = (values_of(estimate, f"wrench_{kind}") for kind in ("measured", "estimated"))
     shown = [k for k in range(len(COMPONENTS)) if np.isfinite(estimated[:, k]).any()]
     if not shown:
         return None
@@ -159,29 +159,26 @@ def wrench_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure
 
 def knee_moment_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
     """Figure 7: the moment about each knee, estimated, and from the table and classical angles ("AT")."""
-    names = [name for name in estimate.coordinate_names if "knee" in name]
-    if not is_planar(estimate):
-        moved = {k for joint in joints_of(estimate) for k in joint.columns.values()}
-        names = [name for name in names if estimate.coordinate_names.index(name) in moved]
-    known = np.isfinite(values_of(estimate, "moments")).any(axis=0)
-    names = [name for name in names if known[estimate.coordinate_names.index(name)]]
-    if not names:
+    moments, names = values_of(estimate, "moments"), estimate.coordinate_names
+    free = sorted(k for joint in joints_of(estimate) for k in joint.columns.values())
+    knees = [k for k in free if "knee" in names[k] and np.isfinite(moments[:, k]).any()]
+    if not knees:
         return None
-    source = moment_sources(estimate.data)[:, [estimate.coordinate_names.index(name) for name in names]]
-    figure = Figure(figsize=(4.6, 0.5 + 2.3 * len(names)), layout="constrained")
-    every = figure.subplots(len(names), 1, sharex=True, squeeze=False).ravel()
+    sources = moment_sources(estimate.data) == DERIVED
+    figure = Figure(figsize=(4.6, 0.5 + 2.3 * len(knees)), layout="constrained")
+    every = figure.subplots(len(knees), 1, sharex=True, squeeze=False).ravel()
     at = _reference(comparison, AT)
     differences = {row.coordinate: row for row in moment_differences([] if comparison is None else [comparison])}
-    for axes, name, derived in zip(every, names, (source == DERIVED).T, strict=True):
-        moment = estimate.data["moments"].sel(coordinate=name).values
+    for axes, k in zip(every, knees, strict=True):
+        name, moment, derived = names[k], moments[:, k], sources[:, k]
         draw_sourced(axes, estimate.time, moment, derived, color=ESTIMATED, linewidth=1.2)
         if "moments_sd" in estimate.data:
-            sd = np.where(derived, np.nan, estimate.data["moments_sd"].sel(coordinate=name).values)
+            sd = np.where(derived, np.nan, values_of(estimate, "moments_sd")[:, k])
             axes.fill_between(estimate.time, moment - 2.0 * sd, moment + 2.0 * sd, color=ESTIMATED, alpha=0.2, lw=0)
         note = moment_note(estimate, name)
         axes.set_title(f"{sentence(words(name))} moment, N m{f' ({note})' if note else ''}")
         if at is not None:
-            _draw(axes, estimate.time, at.moments[:, estimate.coordinate_names.index(name)], at)
+            _draw(axes, estimate.time, at.moments[:, k], at)
             row = differences[name]
             axes.set_xlabel(
                 f"time, s\nRMS difference {number(row.rms.mean, 'N m')}, "
@@ -190,7 +187,7 @@ def knee_moment_figure(estimate: Estimate, comparison: Trial | None = None) -> F
         else:
             axes.set_xlabel("time, s")
         axes.set_xlim(float(estimate.time[0]), float(estimate.time[-1]))
-    _key(figure, every[0], [_EKF, *([_DERIVED] if (source == DERIVED).any() else []), *_styles(at)])
+    _key(figure, every[0], [_EKF, *([_DERIVED] if sources[:, knees].any() else []), *_styles(at)])
     return figure
 
 

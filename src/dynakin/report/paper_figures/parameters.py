@@ -9,9 +9,10 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from dynakin.report.body import colours_of
-from dynakin.report.labels import number, signed_percent, words
+from dynakin.report.labels import signed_percent
 from dynakin.report.plot import LIMIT, QUIET, thin
 from dynakin.results.estimate import Estimate
+from dynakin.results.naming import number, words
 from dynakin.results.records import Parameter
 from dynakin.validation.methods import Trial
 

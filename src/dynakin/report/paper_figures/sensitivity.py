@@ -19,8 +19,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from dynakin.errors import ConfigError
-from dynakin.report.labels import number
 from dynakin.report.plot import INK, QUIET
+from dynakin.results.naming import number
 
 Array = npt.NDArray[np.float64]
 

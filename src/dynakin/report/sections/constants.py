@@ -10,12 +10,13 @@ import numpy as np
 
 from dynakin.elements import element
 from dynakin.report.chart import Bound, Line, Panel, chart
-from dynakin.report.labels import number, parameter_label, sentence, short_marker_names, signed_percent, words
+from dynakin.report.labels import parameter_label, short_marker_names, signed_percent
 from dynakin.report.plot import ESTIMATED, GRID, INK, MEASURED, QUIET, new_axes, to_svg
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.posterior import JUDGEMENT_WORDS, KNOWN, NOTHING, group_of, told_in_words
+from dynakin.results.naming import number, sentence, words
 from dynakin.results.records import Parameter
 
 _ROW_IN = 0.155

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from dynakin.report.chart import Line, chart
-from dynakin.report.labels import COMPONENT_LABELS, number, sentence
+from dynakin.report.labels import COMPONENT_LABELS
 from dynakin.report.plot import ESTIMATED, MEASURED
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.sides import side_key, values_of
@@ -19,6 +19,7 @@ from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.measures.pressure import centre_of_pressure
 from dynakin.results.measures.sources import DERIVED, measured_only, wrench_sources
 from dynakin.results.measures.stances import compared_stances
+from dynakin.results.naming import number, sentence
 
 DIRECTIONS = {"x": "forward", "y": "up", "z": "to the right"}
 
@@ -76,13 +77,13 @@ def foot_section(page: Page) -> Section | None:
 
 
 def _adjustments(figures: dict[str, Any]) -> TextTable:
-    rows = []
-    for foot, rms in figures["adjustment_rms"].items():
-        cells = tuple("–" if rms is None else number(rms[name], digits=2) for name in COMPONENTS)
-        rows.append((f"{sentence(foot)} foot, adjustment", *cells))
+    each = {f"{sentence(foot)} foot, adjustment": rms for foot, rms in figures["adjustment_rms"].items()}
     if figures["remainder_rms"] is not None:
-        cells = tuple(number(figures["remainder_rms"][name], digits=2) for name in COMPONENTS)
-        rows.append((f"In flight, left over ({figures['flight_frames']} frames)", *cells))
+        each[f"In flight, left over ({figures['flight_frames']} frames)"] = figures["remainder_rms"]
+    rows = [
+        (what, *("–" if rms is None else number(rms[name], digits=2) for name in COMPONENTS))
+        for what, rms in each.items()
+    ]
     headings = ("RMS", *(f"{name}, {COMPONENT_LABELS[name][1]}" for name in COMPONENTS))
     return TextTable("What was changed, in place of a residual", headings, rows, tuple(range(1, 7)))
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from dynakin.report.chart import Line, Panel, band_is_too_wide, chart
-from dynakin.report.labels import listed, moment_note, number
+from dynakin.report.labels import moment_note
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.sides import REGIONS, Joint, joints_of, normalising_mass, side_key, side_lines, values_of
 from dynakin.report.styles import DERIVED_LINE
@@ -15,6 +15,7 @@ from dynakin.results.measures.angles import convention_of
 from dynakin.results.measures.feet import ROUNDING
 from dynakin.results.measures.power import root_coordinates
 from dynakin.results.measures.sources import DERIVED, MEASURED, UNKNOWN, moment_sources
+from dynakin.results.naming import listed, number
 
 BAND = "± 2 standard deviations"
 

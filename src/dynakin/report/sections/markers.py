@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 
 from dynakin.report.body import marker_segments
 from dynakin.report.chart import Line, Panel, chart
-from dynakin.report.labels import number, short_marker_names, words
+from dynakin.report.labels import short_marker_names
 from dynakin.report.plot import ESTIMATED, INK, MEASURED, QUIET, new_axes, to_svg
 from dynakin.report.sections.forces import DIRECTIONS
 from dynakin.report.sections.section import Page, Section
@@ -15,6 +15,7 @@ from dynakin.report.sides import values_of
 from dynakin.report.styles import LineStyle
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import AXES
+from dynakin.results.naming import number, words
 
 _AXIS_COLOURS = {"x": "#0072B2", "y": "#009E73", "z": "#CC79A7"}
 

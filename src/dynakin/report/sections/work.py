@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from dynakin.report.chart import Line, Panel, chart
-from dynakin.report.labels import listed, number
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.sides import Joint, joints_of, normalising_mass, side_key, side_lines, values_of
 from dynakin.report.styles import DERIVED_LINE
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.sources import DERIVED, measured_moments, moment_sources
+from dynakin.results.naming import listed, number
 
 _NOT_MEANT = 0.02
 """Below this share of the largest of its kind a quantity is too small for a ratio of the sides to say anything."""
