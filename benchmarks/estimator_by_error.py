@@ -21,7 +21,8 @@ from dynakin.filter import presets
 from dynakin.filter.noise import Noise
 from dynakin.filter.samples import recording_arrays
 from dynakin.model.calibration.initial import InitialModel
-from dynakin.simulation.trial import SimulatedTrial, simulate
+from dynakin.simulation.output import SimulatedTrial
+from dynakin.simulation.trial import simulate
 from dynakin.validation.reference.methods import reference_methods
 from dynakin.validation.truth import LEG
 

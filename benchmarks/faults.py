@@ -21,8 +21,9 @@ from dynakin.errors import DivergenceError, DynakinError
 from dynakin.filter import presets
 from dynakin.filter.noise import Noise
 from dynakin.results.estimate import Estimate
+from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
-from dynakin.simulation.trial import SimulatedTrial, simulate
+from dynakin.simulation.trial import simulate
 
 DURATION_S = 12.0
 LOST_DEG = 25.0

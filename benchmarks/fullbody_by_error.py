@@ -21,7 +21,8 @@ import dynakin
 from dynakin.filter import presets
 from dynakin.filter.noise import Noise
 from dynakin.results.measures.sources import DERIVED, MEASURED
-from dynakin.simulation.trial import SimulatedTrial, simulate
+from dynakin.simulation.output import SimulatedTrial
+from dynakin.simulation.trial import simulate
 
 SUBJECT = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
 DURATION_S = {"squat": 15.0, "gait": 4.0}

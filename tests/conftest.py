@@ -10,6 +10,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 import pytest
 
+from dynakin.results.estimate import Estimate
+from support.estimates.synthetic import make_estimate
+
 ROOT = Path(__file__).resolve().parents[1]
 
 
@@ -21,6 +24,12 @@ def data_dir() -> Path:
     if not folder.is_dir():
         pytest.skip(f"real recordings not found in {folder} (set DYNAKIN_TEST_DATA)")
     return folder
+
+
+@pytest.fixture(scope="session")
+def estimate() -> Estimate:
+    """Twelve seconds of a squat, with gaps, bounds reached and a locked translation."""
+    return make_estimate()
 
 
 def pytest_addoption(parser: pytest.Parser) -> None:

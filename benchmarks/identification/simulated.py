@@ -22,7 +22,8 @@ from dynakin.identification.observability.measured import MeasuredModel
 from dynakin.identification.trials import Common, MeasuredTrial, measure_all
 from dynakin.identification.unknowns import Unknowns
 from dynakin.results.estimate import COMPONENTS
-from dynakin.simulation.trial import SimulatedTrial, simulate
+from dynakin.simulation.output import SimulatedTrial
+from dynakin.simulation.trial import simulate
 
 TASKS = {"sagittal7": ("squat", "sit-to-stand", "sway"), "fullbody": ("squat", "gait")}
 TASKS["squat7"] = TASKS["sagittal7"]

@@ -16,7 +16,8 @@ from dynakin.report.paper_figures import figures
 from dynakin.results.files.folder import OUTPUT_FILES
 from dynakin.results.files.markers import write_trc
 from dynakin.results.files.storage import write_storage
-from dynakin.simulation.trial import SimulatedTrial, simulate_squat
+from dynakin.simulation.output import SimulatedTrial
+from dynakin.simulation.trial import simulate_squat
 
 SUBJECT = ["--model", "sagittal7", "--markers", "opencap", "--mass", "70", "--height", "1.75"]
 Said = pytest.CaptureFixture[str]

@@ -5,7 +5,8 @@ from __future__ import annotations
 import pytest
 
 import dynakin
-from dynakin.simulation.trial import SimulatedTrial, simulate_squat
+from dynakin.simulation.output import SimulatedTrial
+from dynakin.simulation.trial import simulate_squat
 from dynakin.validation.methods import Trial, compare_trial
 from dynakin.validation.setup import Setup
 

@@ -10,9 +10,9 @@ import pytest
 from dynakin import _core
 from dynakin.errors import LostError, RecordingError
 from dynakin.recordings.recording import Plate, Recording
-from dynakin.simulation.trial import SimulatedTrial
+from dynakin.simulation.output import SimulatedTrial
 from dynakin.validation.freeze import final_values, freeze, initial_values
-from dynakin.validation.held_out import Identified, halves, identify_on, judge, predict_blind
+from dynakin.validation.held_out import IdentifyingTrial, halves, identify_on, judge, predict_blind
 from dynakin.validation.setup import Setup
 
 
@@ -22,7 +22,7 @@ def parts(simulated: SimulatedTrial) -> tuple[Recording, Recording]:
 
 
 @pytest.fixture(scope="module")
-def identified(parts: tuple[Recording, Recording], setup: Setup) -> Identified:
+def identified(parts: tuple[Recording, Recording], setup: Setup) -> IdentifyingTrial:
     return identify_on(parts[0], setup, same_recording=True)
 
 
@@ -41,7 +41,7 @@ def test_halves_share_no_frame_and_leave_none_out(
         halves(simulated.recording.window(0.0, 0.02))
 
 
-def test_frozen_model_estimates_neither_lengths_nor_inertia_and_has_the_values(identified: Identified) -> None:
+def test_frozen_model_estimates_neither_lengths_nor_inertia_and_has_the_values(identified: IdentifyingTrial) -> None:
     values = final_values(identified.estimates["default"])
     frozen = freeze(identified.initial, values, {"knee": 0.3})
     model = _core.Model(frozen.spec)
@@ -57,7 +57,7 @@ def test_frozen_model_estimates_neither_lengths_nor_inertia_and_has_the_values(i
     assert frozen.x0[frozen.names.index(place)] == values[place]
 
 
-def test_frozen_at_its_own_start_the_model_says_what_it_said(identified: Identified) -> None:
+def test_frozen_at_its_own_start_the_model_says_what_it_said(identified: IdentifyingTrial) -> None:
     initial = identified.initial
     frozen = freeze(initial, initial_values(initial), {})
     ours, theirs = _core.Model(frozen.spec), _core.Model(initial.spec)
@@ -66,7 +66,7 @@ def test_frozen_at_its_own_start_the_model_says_what_it_said(identified: Identif
 
 
 def test_predictions_do_not_depend_on_the_plates_that_judge_them(
-    identified: Identified, parts: tuple[Recording, Recording]
+    identified: IdentifyingTrial, parts: tuple[Recording, Recording]
 ) -> None:
     second = parts[1]
     seen, other = predict_blind(identified, second), predict_blind(identified, with_other_plates(second))
@@ -77,7 +77,9 @@ def test_predictions_do_not_depend_on_the_plates_that_judge_them(
         assert np.array_equal(wrench, without.wrenches[method], equal_nan=True), method
 
 
-def test_every_method_is_judged_in_every_component(identified: Identified, parts: tuple[Recording, Recording]) -> None:
+def test_every_method_is_judged_in_every_component(
+    identified: IdentifyingTrial, parts: tuple[Recording, Recording]
+) -> None:
     blind = predict_blind(identified, parts[1])
     rows = judge(blind, parts[1])
     assert [row.quantity for row in rows[:: len(blind.wrenches)]] == ["fx", "fy", "mz"]
@@ -96,14 +98,14 @@ def test_every_method_is_judged_in_every_component(identified: Identified, parts
     assert last.rms.mean == pytest.approx(np.sqrt(np.mean((vertical[window] - identified.wrench[-1, 1]) ** 2)))
 
 
-def test_a_trial_without_plates_cannot_judge(identified: Identified, parts: tuple[Recording, Recording]) -> None:
+def test_a_trial_without_plates_cannot_judge(identified: IdentifyingTrial, parts: tuple[Recording, Recording]) -> None:
     bare = replace(parts[1], plates=())
     with pytest.raises(RecordingError, match="no force plates"):
         judge(predict_blind(identified, bare), bare)
 
 
 def test_a_marker_that_the_judging_trial_lacks_is_missing_not_zero(
-    identified: Identified, parts: tuple[Recording, Recording]
+    identified: IdentifyingTrial, parts: tuple[Recording, Recording]
 ) -> None:
     gone = identified.initial.recorded_markers[8]
     kept = [k for k, name in enumerate(parts[1].marker_names) if name != gone]
@@ -117,7 +119,7 @@ def test_a_marker_that_the_judging_trial_lacks_is_missing_not_zero(
 
 
 def test_a_trial_in_which_a_filter_lost_the_person_neither_teaches_nor_judges(
-    identified: Identified, parts: tuple[Recording, Recording], setup: Setup
+    identified: IdentifyingTrial, parts: tuple[Recording, Recording], setup: Setup
 ) -> None:
     """Three seconds of six with every marker but the feet's under another one's label."""
 

@@ -14,7 +14,7 @@ from dynakin.model.identified import IdentifiedSubject
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.results.measures.mean_curves import MEASURED
 from dynakin.results.measures.repetitions import body_paths, find_repetitions
-from dynakin.simulation.trial import SimulatedTrial
+from dynakin.simulation.output import SimulatedTrial
 from dynakin.validation.methods import Trial, trial_of
 from dynakin.validation.reference.chain import PlanarChain
 from dynakin.validation.reference.classical import classical_angles

@@ -9,8 +9,9 @@ import pytest
 
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.filter import presets
+from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
-from dynakin.simulation.trial import SimulatedTrial, simulate_squat
+from dynakin.simulation.trial import simulate_squat
 from dynakin.validation.extrapolation import extrapolated, held, line, persisted
 from dynakin.validation.setup import Setup
 from dynakin.validation.unseen import unseen, unseen_figures

@@ -6,12 +6,12 @@ import copy
 
 import numpy as np
 import pytest
-from oracle.spec import Coordinate, Function
 
-from core.bridge import filter_of, model_of
-from core.random_models import planar_model, settings, trial
 from dynakin import _core
 from dynakin.errors import DivergenceError
+from support.core.bridge import filter_of, model_of
+from support.core.random_models import planar_model, settings, trial
+from support.oracle.spec import Coordinate, Function
 
 SPEC = planar_model(0)
 DATA = trial(SPEC, 1, 20)

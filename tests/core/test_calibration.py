@@ -6,13 +6,13 @@ from functools import cache
 
 import numpy as np
 import pytest
-from oracle import gate
-from oracle.state import Layout
 from scipy.stats import chi2
 
-from core.bridge import filter_of
-from core.own_model import chain, draw, settings
-from core.random_models import PLANE
+from support.core.bridge import filter_of
+from support.core.own_model import chain, draw, settings
+from support.core.random_models import PLANE
+from support.oracle import gate
+from support.oracle.state import Layout
 
 SEEDS, FRAMES = 80, 200
 LOOKED_AT = (0, 20, 60, 120, 199)  # frames, for NEES

@@ -6,15 +6,15 @@ import copy
 
 import numpy as np
 import pytest
-from oracle.inertia import all_possible, is_planar
-from oracle.mechanics import inertia_tensor
-from oracle.spec import Axis, Coordinate, Marker, Segment, Spec
-from oracle.state import Layout
 from scipy.optimize import least_squares
 
-from core.bridge import filter_of
-from core.projecting import covariance, project
-from core.random_models import PLANAR_INERTIA, continuous, inertia, planar_model, spatial_model, trial
+from support.core.bridge import filter_of
+from support.core.projecting import covariance, project
+from support.core.random_models import PLANAR_INERTIA, continuous, inertia, planar_model, spatial_model, trial
+from support.oracle.inertia import all_possible, is_planar
+from support.oracle.mechanics import inertia_tensor
+from support.oracle.spec import Axis, Coordinate, Marker, Segment, Spec
+from support.oracle.state import Layout
 
 TRIANGLE = np.tril_indices(4)
 MARGIN, TOLERATED = 1e-4, 0.5e-4  # consistency.hpp

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from oracle.state import Layout, unpack
 
-from core.bridge import close, filter_of, model_of
-from core.random_models import FEET, ROOT, floating_model, prior_sd, random_state, settings, trial
-from core.test_derivatives import BLOCKS, central_differences, compare
 from dynakin import _core
+from support.core.bridge import close, filter_of, model_of
+from support.core.differences import BLOCKS, central_differences, compare
+from support.core.random_models import FEET, ROOT, floating_model, prior_sd, random_state, settings, trial
+from support.oracle.state import Layout, unpack
 
 MODELS = [floating_model(seed) for seed in range(6)]
 NONE, MEASURED, UNMEASURED = 0, 1, 2
@@ -61,7 +61,7 @@ def behind(spec, foot):
 
 @pytest.mark.parametrize("spec", MODELS, ids=lambda s: s.name)
 def test_nothing_is_left_at_the_root_and_moments_equal_pinocchios(spec):
-    from oracle import pinocchio_tree
+    from support.oracle import pinocchio_tree
 
     for seed in range(3):
         model, layout, x, wrench, covariance = drawn(spec, seed)
@@ -291,7 +291,7 @@ def test_a_smoothed_run_reports_the_smoothed_state():
 
 @pytest.mark.parametrize("spec", MODELS[:4], ids=lambda s: s.name)
 def test_joint_loads_and_mass_centre_equal_pinocchios(spec):
-    from oracle import pinocchio_tree
+    from support.oracle import pinocchio_tree
 
     model, layout, x, wrench, covariance = drawn(spec, 17)
     feet = _core.contact_moments(model, x, loads_of(wrench, covariance))["foot_wrench"]
@@ -319,7 +319,7 @@ def moved(layout, x, dt):
 @pytest.mark.parametrize("spec", MODELS[:4], ids=lambda s: s.name)
 def test_powers_are_the_rate_of_mechanical_energy(spec):
     """Joints and feet together: sum of moment times speed, and of each foot's wrench times its motion."""
-    from oracle import pinocchio_tree
+    from support.oracle import pinocchio_tree
 
     model, layout, x, wrench, covariance = drawn(spec, 18)
     found = _core.contact_moments(model, x, loads_of(wrench, covariance))

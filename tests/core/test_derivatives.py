@@ -4,37 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from oracle import measurement
-from oracle.state import Layout
 
-from core.bridge import model_of
-from core.random_models import planar_model, random_state, spatial_model, with_functions, with_slow_errors
 from dynakin import _core
+from support.core.bridge import model_of
+from support.core.differences import BLOCKS, central_differences, compare
+from support.core.random_models import planar_model, random_state, spatial_model, with_functions, with_slow_errors
+from support.oracle import measurement
+from support.oracle.state import Layout
 
 MODELS = [planar_model(s) for s in range(5)] + [spatial_model(s) for s in range(16)]
 MODELS += [with_functions(spatial_model(s), s) for s in range(16, 26)]
 SLOW = [with_slow_errors(spec, k) for k, spec in enumerate(MODELS)]
 OFFSETS_ONLY = with_slow_errors(planar_model(3), 7, delay=False)
-BLOCKS = ("coordinates", "speeds", "accelerations", "lengths", "markers", "soft_tissue", "inertia", "plates")
-
-
-def central_differences(function, x):
-    """Steps of 1e-5: truncation about 1e-10, rounding about 1e-11 of the function's size."""
-    columns = []
-    for i in range(x.size):
-        h = 1e-5 * max(1.0, abs(x[i]))
-        plus, minus = x.copy(), x.copy()
-        plus[i] += h
-        minus[i] -= h
-        columns.append((function(plus) - function(minus)).ravel() / (plus[i] - minus[i]))
-    return np.array(columns).T
-
-
-def compare(name, actual, expected, relative, scale):
-    """``scale``: size of the quantity itself, below which a derivative is as good as zero."""
-    assert actual.shape == expected.shape, name
-    tolerance = relative * max(scale, np.abs(expected).max(initial=0.0))
-    np.testing.assert_allclose(actual, expected, rtol=0, atol=tolerance, err_msg=name)
 
 
 @pytest.mark.parametrize("spec", [*MODELS, *SLOW[::3]], ids=lambda s: s.name)

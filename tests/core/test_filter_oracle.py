@@ -6,13 +6,13 @@ from functools import cache
 
 import numpy as np
 import pytest
-from oracle import gate
-from oracle.filter import Filter, Settings
-from oracle.inertia import all_possible
-from oracle.state import Layout
 
-from core.bridge import filter_of
-from core.random_models import continuous, planar_model, settings, spatial_model, trial, with_slow_errors
+from support.core.bridge import filter_of
+from support.core.random_models import continuous, planar_model, settings, spatial_model, trial, with_slow_errors
+from support.oracle import gate
+from support.oracle.filter import Filter, Settings
+from support.oracle.inertia import all_possible
+from support.oracle.state import Layout
 
 FRAMES = 300
 CHUNKS = (1, 7, 28, 1000)

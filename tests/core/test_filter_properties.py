@@ -6,12 +6,12 @@ import copy
 
 import numpy as np
 import pytest
-from oracle.filter import Filter as Oracle
-from oracle.filter import Settings
-from oracle.spec import Axis, Coordinate, Marker, Segment, Spec
 
-from core.bridge import filter_of
-from core.random_models import planar_model, settings, spatial_model, trial
+from support.core.bridge import filter_of
+from support.core.random_models import planar_model, settings, spatial_model, trial
+from support.oracle.filter import Filter as Oracle
+from support.oracle.filter import Settings
+from support.oracle.spec import Axis, Coordinate, Marker, Segment, Spec
 
 SPECS = [planar_model(3), planar_model(50, n_segments=7), spatial_model(6)]
 each_spec = pytest.mark.parametrize("spec", SPECS, ids=lambda s: s.name)
@@ -306,7 +306,7 @@ def test_linear_case_is_the_plain_kalman_filter(chunk_rows):
 
 def test_a_perfect_measurement_leaves_the_mean_alone():
     """v = 0: nothing to correct, NIS 0, and the covariance still shrinks."""
-    from oracle import measurement
+    from support.oracle import measurement
 
     spec = SPECS[0]
     data, options = prepared(spec, 1, total_mass=None)

@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.random_models import planar_model, spatial_model
-from core.smoother_cases import case
-from core.test_smoother_constraints import BOUNDED, lost_and_found
 from dynakin import _core
+from support.core.random_models import planar_model, spatial_model
+from support.core.smoother_cases import BOUNDED, case, lost_and_found
 
 CASES = {
     "planar": lambda: case(planar_model(50, n_segments=5), 31, 40),

@@ -6,14 +6,14 @@ import copy
 
 import numpy as np
 import pytest
-from oracle import gate, measurement
-from oracle.filter import Filter as Oracle
-from oracle.filter import Settings
-from oracle.state import Layout
 from scipy.optimize import least_squares
 
-from core.bridge import filter_of
-from core.random_models import continuous, planar_model, prior_sd, spatial_model, trial, with_slow_errors
+from support.core.bridge import filter_of
+from support.core.random_models import continuous, planar_model, prior_sd, spatial_model, trial, with_slow_errors
+from support.oracle import gate, measurement
+from support.oracle.filter import Filter as Oracle
+from support.oracle.filter import Settings
+from support.oracle.state import Layout
 
 SPECS = [with_slow_errors(planar_model(50, n_segments=5), 1), with_slow_errors(spatial_model(4), 2)]
 each_spec = pytest.mark.parametrize("spec", SPECS, ids=lambda s: s.name)

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from oracle import measurement
-from oracle.state import Layout, unpack
 
-from core.bridge import close, model_of
-from core.random_models import planar_model, random_state, spatial_model, with_functions, with_slow_errors
 from dynakin import _core
+from support.core.bridge import close, model_of
+from support.core.random_models import planar_model, random_state, spatial_model, with_functions, with_slow_errors
+from support.oracle import measurement
+from support.oracle.state import Layout, unpack
 
 PLANAR = [planar_model(s) for s in range(6)] + [planar_model(50, n_segments=7)]
 SPATIAL = [spatial_model(s) for s in range(20)]
@@ -60,7 +60,7 @@ def test_layout_equals_the_oracles(spec):
 
 @pytest.mark.parametrize("spec", MODELS, ids=lambda s: s.name)
 def test_equals_pinocchio(spec):
-    from oracle import pinocchio_tree
+    from support.oracle import pinocchio_tree
 
     model, layout = model_of(spec), Layout(spec)
     rng = np.random.default_rng(11)
@@ -101,7 +101,7 @@ def test_external_wrenches_are_taken_from_the_joint_moments(spec):
     expected = measurement.joint_moments(layout, x)
     values = unpack(layout, x)
     for j in range(len(spec.coordinates)):
-        from oracle import mechanics
+        from support.oracle import mechanics
 
         unit = np.zeros(len(spec.coordinates))
         unit[j] = 1.0

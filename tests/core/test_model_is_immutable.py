@@ -6,10 +6,10 @@ import pickle
 
 import numpy as np
 import pytest
-from oracle.state import Layout
 
-from core.bridge import filter_of, model_of, to_core
-from core.random_models import (
+from dynakin import _core
+from support.core.bridge import filter_of, model_of, to_core
+from support.core.random_models import (
     planar_model,
     random_state,
     settings,
@@ -18,7 +18,7 @@ from core.random_models import (
     with_functions,
     with_slow_errors,
 )
-from dynakin import _core
+from support.oracle.state import Layout
 
 SPECS = [planar_model(1), *(spatial_model(s) for s in (2, 5, 6, 9)), with_slow_errors(planar_model(2), 2)]
 SPECS += [with_functions(spatial_model(5), 5)]

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from oracle import measurement, mechanics
-from oracle.state import Layout, unpack
 
-from core.bridge import close, model_of
-from core.random_models import planar_model, random_state, spatial_model, with_functions, with_slow_errors
-from core.test_derivatives import BLOCKS, central_differences, compare
 from dynakin import _core
+from support.core.bridge import close, model_of
+from support.core.differences import BLOCKS, central_differences, compare
+from support.core.random_models import planar_model, random_state, spatial_model, with_functions, with_slow_errors
+from support.oracle import measurement, mechanics
+from support.oracle.state import Layout, unpack
 
 MODELS = [planar_model(s) for s in range(6)] + [planar_model(50, n_segments=7)] + [spatial_model(s) for s in range(30)]
 MODELS += [with_functions(spatial_model(s), s) for s in range(30, 40)]

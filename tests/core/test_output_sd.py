@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.random_models import planar_model, spatial_model
-from core.smoother_cases import case, walk
 from dynakin import _core
+from support.core.random_models import planar_model, spatial_model
+from support.core.smoother_cases import case, walk
 
 CASES = {
     "planar, plates late": lambda: case(planar_model(50, n_segments=4), 31, 12, states="all", delay=True),

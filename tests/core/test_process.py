@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from oracle import process
-from oracle.state import Layout
 
-from core.bridge import filter_of
-from core.random_models import continuous, planar_model, prior_sd, settings, spatial_model, with_slow_errors
 from dynakin import _core
+from support.core.bridge import filter_of
+from support.core.random_models import continuous, planar_model, prior_sd, settings, spatial_model, with_slow_errors
+from support.oracle import process
+from support.oracle.state import Layout
 
 SPECS = [with_slow_errors(planar_model(50, n_segments=7), 1), with_slow_errors(spatial_model(6), 2)]
 each_spec = pytest.mark.parametrize("spec", SPECS, ids=lambda s: s.name)

@@ -6,12 +6,12 @@ import copy
 
 import numpy as np
 import pytest
-from oracle import projection
-from oracle.state import Layout
 
-from core.bridge import filter_of
-from core.projecting import covariance, project
-from core.random_models import continuous, planar_model, spatial_model, trial, with_slow_errors
+from support.core.bridge import filter_of
+from support.core.projecting import covariance, project
+from support.core.random_models import continuous, planar_model, spatial_model, trial, with_slow_errors
+from support.oracle import projection
+from support.oracle.state import Layout
 
 
 def without_inertia(spec):

@@ -6,14 +6,14 @@ from functools import cache
 
 import numpy as np
 import pytest
-from oracle import gate, measurement, process
-from oracle.inertia import all_possible
-from oracle.state import Layout
 
-from core.bridge import filter_of, model_of
-from core.random_models import continuous, planar_model, spatial_model, trial, with_slow_errors
 from dynakin import _core
 from dynakin.errors import DivergenceError
+from support.core.bridge import filter_of, model_of
+from support.core.random_models import continuous, planar_model, spatial_model, trial, with_slow_errors
+from support.oracle import gate, measurement, process
+from support.oracle.inertia import all_possible
+from support.oracle.state import Layout
 
 SPECS = [with_slow_errors(planar_model(50, n_segments=5), 1), with_slow_errors(spatial_model(4, nonlinear=False), 2)]
 each_spec = pytest.mark.parametrize("spec", SPECS, ids=lambda s: s.name)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from oracle.state import Layout
 
-from core.bridge import filter_of, model_of
-from core.own_model import chain, draw, settings
 from dynakin import _core
+from support.core.bridge import filter_of, model_of
+from support.core.own_model import chain, draw, settings
+from support.oracle.state import Layout
 
 FRAMES, FIRST, AHEAD = 60, 20, 5
 

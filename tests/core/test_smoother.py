@@ -6,10 +6,10 @@ from functools import cache
 
 import numpy as np
 import pytest
-from oracle.smoother import batch, rauch_tung_striebel
 
-from core.random_models import planar_model, spatial_model
-from core.smoother_cases import case, walk
+from support.core.random_models import planar_model, spatial_model
+from support.core.smoother_cases import assert_equal, case, deviations, walk
+from support.oracle.smoother import batch, rauch_tung_striebel
 
 FRAMES = 25
 CASES = {
@@ -32,16 +32,6 @@ def solved(name):
     c = CASES[name]()
     w = walk(c)
     return c, w, *batch(c.data.x0, c.data.P0, w.frames)
-
-
-def deviations(covariances):
-    return np.sqrt(np.diagonal(covariances, axis1=1, axis2=2))
-
-
-def assert_equal(out, x, P, tolerance):
-    sd = deviations(P)
-    np.testing.assert_array_less(np.abs(out["smoothed_state"] - x) / sd, tolerance)
-    np.testing.assert_array_less(np.abs(out["smoothed_state_sd"] / sd - 1.0), tolerance)
 
 
 @each_case

@@ -7,20 +7,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from oracle.smoother import batch, rauch_tung_striebel
 
-from core.random_models import planar_model, spatial_model
-from core.smoother_cases import case, walk
-from core.test_smoother import assert_equal, deviations
 from dynakin import _core
-
-BOUNDED = {
-    "planar": lambda: case(planar_model(50, n_segments=7), 31, 60, bounds=True, constraint="projection"),
-    "spatial": lambda: case(spatial_model(6), 31, 60, bounds=True, constraint="projection"),
-    "all blocks": lambda: case(
-        planar_model(50, n_segments=4), 33, 60, bounds=True, constraint="projection", states="all"
-    ),
-}
+from support.core.random_models import planar_model, spatial_model
+from support.core.smoother_cases import BOUNDED, assert_equal, case, deviations, lost_and_found, walk
+from support.oracle.smoother import batch, rauch_tung_striebel
 
 
 @pytest.mark.parametrize("name", BOUNDED)
@@ -82,15 +73,6 @@ def test_iterated_updates(spec):
     assert np.abs(walk(case(spec, 31, 25)).x - w.x).max() > 1e-6
     expected = rauch_tung_striebel(w.x, w.P, w.x_predicted, w.P_predicted, [f.F for f in w.frames])
     assert_equal(c.smoothed(), *expected, 1e-8)
-
-
-def lost_and_found():
-    """Markers gone for 0.3 s while the body moves on; back, they lie too far off to be believed without a search."""
-    sought = _core.RecoverySettings(blind_s=0.06, coordinate_sd=0.01, speed_sd=2.0, acceleration_sd=20.0)
-    c = case(planar_model(50, n_segments=4), 31, 80, states="all", recovery=sought, iterate_beyond=0.1)
-    c.options |= {"marker_gate": [4.0] * 6, "wrench_needs_markers": True}
-    c.data.markers[30:60] = np.nan
-    return c
 
 
 def test_a_motion_that_was_lost_and_found():

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from core.random_models import planar_model, spatial_model
-from core.smoother_cases import case
-from core.test_smoother_constraints import BOUNDED, lost_and_found
+from support.core.random_models import planar_model, spatial_model
+from support.core.smoother_cases import BOUNDED, case, lost_and_found
 
 FRAMES = 60
 CASES = {

@@ -11,7 +11,7 @@ from dynakin.errors import ConfigError
 from dynakin.studies.engine.pools import open_pool
 from dynakin.studies.engine.tasks import Task
 from dynakin.studies.engine.work import work
-from engine import tasks_of_tests as functions
+from support import engine_tasks as functions
 
 distributed = pytest.importorskip("distributed", reason="dask.distributed is not installed")
 

@@ -12,7 +12,7 @@ from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import open_pool
 from dynakin.studies.engine.tasks import Task
 from dynakin.studies.engine.work import work
-from engine import tasks_of_tests as functions
+from support import engine_tasks as functions
 
 SHARED = {"base": 1.1}
 TASKS = [Task(f"{k:03d}", float(k)) for k in range(12)]

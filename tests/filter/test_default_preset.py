@@ -6,15 +6,16 @@ import dataclasses
 
 import numpy as np
 import pytest
-from filter.test_estimator import estimator, samples, with_markers
 
 import dynakin
 from dynakin.errors import ConfigError
 from dynakin.filter.samples import recording_arrays
 from dynakin.report.insights import insights
 from dynakin.results.estimate import Estimate
+from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
-from dynakin.simulation.trial import SimulatedTrial, simulate_squat
+from dynakin.simulation.trial import simulate_squat
+from support.squat_estimator import estimator, samples, with_markers
 
 START_S = 3.0
 

@@ -10,36 +10,15 @@ import pytest
 
 import dynakin
 from dynakin.errors import ConfigError, DivergenceError, RecordingError
+from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
-from dynakin.simulation.trial import SimulatedTrial, simulate_squat
-
-SUBJECT = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
+from dynakin.simulation.trial import simulate_squat
+from support.squat_estimator import estimator, samples, with_markers
 
 
 @pytest.fixture(scope="module")
 def trial() -> SimulatedTrial:
     return simulate_squat(seed=3, duration_s=6.0)
-
-
-def estimator(**options: object) -> dynakin.Estimator:
-    return dynakin.Estimator(dynakin.load_model("sagittal7", subject=SUBJECT, markers="opencap"), **options)
-
-
-def with_markers(recording: dynakin.Recording, change) -> dynakin.Recording:
-    markers = recording.markers.copy()
-    change(markers)
-    return dataclasses.replace(recording, markers=markers)
-
-
-def samples(recording: dynakin.Recording) -> list[dynakin.Sample]:
-    return [
-        dynakin.Sample(
-            time_s=float(t),
-            markers=dict(zip(recording.marker_names, recording.markers[k], strict=True)),
-            plates={p.name: np.concatenate([p.force[k], p.moment[k]]) for p in recording.plates},
-        )
-        for k, t in enumerate(recording.time)
-    ]
 
 
 @pytest.mark.parametrize(("preset", "rows"), [("paper", 38), ("default", 37)])  # the paper's total mass is a row

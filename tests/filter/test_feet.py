@@ -9,10 +9,6 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from core.bridge import filter_of, to_core
-from core.random_models import FEET, ROOT, Trial, floating_model, prior_sd, settings, trial
-from oracle import measurement
-from oracle.state import Layout
 
 from dynakin import _core
 from dynakin.errors import ModelError
@@ -24,6 +20,10 @@ from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
+from support.core.bridge import filter_of, to_core
+from support.core.random_models import FEET, ROOT, Trial, floating_model, prior_sd, settings, trial
+from support.oracle import measurement
+from support.oracle.state import Layout
 
 FRAMES = 60
 SPEC = floating_model(5)

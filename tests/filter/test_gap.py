@@ -6,14 +6,14 @@ import dataclasses
 
 import numpy as np
 import pytest
-from filter.gaps import GAPS_S, LATER_S, compared, distance, estimator, figures, follow, person, with_gap, without_gap
-from filter.gaps import Followed as Run
 from scipy.spatial.transform import Rotation
 
 import dynakin
 from dynakin.stream.session import Live
 from dynakin.stream.sinks.base import Callback, LiveFrame
 from dynakin.stream.sources.replay import Replay
+from support.gaps import GAPS_S, LATER_S, compared, distance, estimator, figures, follow, person, with_gap, without_gap
+from support.gaps import Followed as Run
 
 STOP_S, AFTER_S = 6.0, 2.0
 LENGTH_S = STOP_S + LATER_S + AFTER_S

@@ -25,12 +25,12 @@ from dynakin.recordings.formats.trc import read_trc
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.results.files.folder import check_output_writable
-from dynakin.simulation.trial import SimulatedTrial, simulate_squat
+from dynakin.simulation.output import SimulatedTrial
+from dynakin.simulation.trial import simulate_squat
 from dynakin.stream.sinks.record_format import packet_record, text_record
 from dynakin.stream.sinks.recorder import FILE, recorded
 from dynakin.stream.sources.packets import MarkerPacket, PlatePacket
-
-from .corpus import OSIM_3, OSIM_4, make
+from support.fuzz.corpus import OSIM_3, OSIM_4, make
 
 
 def refused(call: Callable[[], object], kind: type[DynakinError], expected: str) -> None:

@@ -1,6 +1,7 @@
 """Mutated files end in one clear error or in a clean result; a case is made anew from its kind and seed.
 
-A failure names seeds: `PYTHONPATH=tests python -m fuzz.worker KIND SEED 1 CORPUS WORK` repeats one (`corpus.make`).
+A failure names seeds: `python -m support.fuzz.worker KIND SEED 1 CORPUS WORK`, in `tests`, repeats one
+(`corpus.make`).
 """
 
 from __future__ import annotations
@@ -9,8 +10,8 @@ from pathlib import Path
 
 import pytest
 
-from .corpus import add_real, make
-from .run import run
+from support.fuzz.corpus import add_real, make
+from support.fuzz.run import run
 
 REAL_FROM = 1_000_000  # seeds of mutated real files
 

@@ -12,7 +12,7 @@ from dynakin.identification.observability.gauge_words import gauge_in_words, gau
 from dynakin.identification.observability.gauges import ZERO, Gauge, gauges_of, sparse_basis
 from dynakin.identification.observability.measured import MeasuredModel
 from dynakin.identification.observability.person import estimator_of
-from identifiability.conftest import changed_model
+from support.identifiability import changed_model
 
 
 def measured_change(measured: MeasuredModel, direction: dict[str, float], size: float) -> float:

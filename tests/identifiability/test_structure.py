@@ -16,7 +16,7 @@ from dynakin.identification.observability.element_words import base_words
 from dynakin.identification.observability.measured import MeasuredModel
 from dynakin.identification.observability.person import estimator_of
 from dynakin.identification.observability.structure import structure_of
-from identifiability.conftest import changed_model
+from support.identifiability import changed_model
 
 FIXED_FOOT = (
     'both_sides = true\naxes = [{ coordinate = "toe", coefficients = [0.0, -1.0] }]\n',

@@ -10,7 +10,7 @@ import xarray as xr
 
 from dynakin.identification.observability.excitation import Bench
 from dynakin.results.measures.posterior import judged, learned
-from identifiability.conftest import Told, estimated_squat
+from support.identifiability import Told, estimated_squat
 
 
 def test_an_exact_replay_of_the_trial_ends_as_sure_as_the_trial(squat: Told) -> None:

@@ -2,29 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import pytest
 
-import dynakin
-from dynakin.identification.subject import Identified, identify_subject
-from dynakin.identification.trials import Common, MeasuredTrial, measure_all
-from dynakin.simulation.trial import SimulatedTrial, simulate
-
-
-@dataclass(frozen=True, eq=False)
-class Case:
-    """A simulated subject's squat and sit-to-stand."""
-
-    sims: tuple[SimulatedTrial, ...]
-    common: Common
-    trials: tuple[MeasuredTrial, ...]
-
-
-def estimator() -> dynakin.Estimator:
-    """Not started."""
-    subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
-    return dynakin.Estimator(dynakin.load_model("sagittal7", subject=subject, markers="opencap"))
+from dynakin.identification.subject import Identification, identify_subject
+from dynakin.identification.trials import Common, measure_all
+from dynakin.simulation.trial import simulate
+from support.identification import Case, estimator
 
 
 @pytest.fixture(scope="session")
@@ -36,5 +19,5 @@ def case() -> Case:
 
 
 @pytest.fixture(scope="session")
-def identified(case: Case) -> Identified:
+def identified(case: Case) -> Identification:
     return identify_subject(estimator(), [sim.recording for sim in case.sims], static=case.common.static)

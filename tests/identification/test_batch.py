@@ -12,7 +12,7 @@ from dynakin.identification.coloured import integrated_autocorrelation
 from dynakin.identification.decision import decide
 from dynakin.identification.trials import MeasuredTrial
 from dynakin.identification.unknowns import Unknowns
-from identification.conftest import Case
+from support.identification import Case
 
 PLANE = [0, 1, 5]
 

@@ -11,7 +11,7 @@ from dynakin.errors import ModelError
 from dynakin.identification.decision import foretell, parts_of, rms_of
 from dynakin.identification.trials import Common, MeasuredTrial, measure_all
 from dynakin.recordings.recording import Recording
-from identification.conftest import Case, estimator
+from support.identification import Case, estimator
 
 
 def other_plates(recording: Recording, frames: slice) -> Recording:

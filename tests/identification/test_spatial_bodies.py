@@ -7,8 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dynakin.identification.body_priors import BodyPriors
-from dynakin.identification.spatial_bodies import SpatialBodies
+from dynakin.identification.bodies import Bodies, BodyPriors
 from dynakin.model.inertia import RigidBody
 
 _RNG = np.random.default_rng(7)
@@ -18,7 +17,7 @@ _CENTRE = np.array([[0.0, 0.05, 0.0], [0.01, -0.2, 0.02], [0.012, -0.21, -0.022]
 _ROOT = np.triu(_RNG.normal(0.0, 0.03, (4, 3, 3))) + 0.1 * np.eye(3)
 _MIRROR = np.diag([1.0, 1.0, -1.0])
 _ROOT[2] = _MIRROR @ _ROOT[1] @ _MIRROR
-BODIES = SpatialBodies.about(_NAMES, 35.0, _MASS, _CENTRE, _ROOT, BodyPriors())
+BODIES = Bodies.in_space(_NAMES, 35.0, _MASS, _CENTRE, _ROOT, BodyPriors())
 _COUNT = len(BODIES.sd)
 
 

@@ -13,14 +13,16 @@ from dynakin.errors import LostError, ModelError
 from dynakin.filter.augment import initial_covariance
 from dynakin.identification.change import change_between, change_in_words
 from dynakin.identification.decision import Decision, parts_of
-from dynakin.identification.subject import Identified, identify_subject
+from dynakin.identification.subject import Identification, identify_subject
 from dynakin.identification.trials import measure_all
 from dynakin.model.identified import read_identified, with_identified
 from dynakin.recordings.recording import Recording
-from identification.conftest import Case, estimator
+from support.identification import Case, estimator
 
 
-def test_a_subject_is_possible_weighs_the_same_and_survives_its_file(identified: Identified, tmp_path: Path) -> None:
+def test_a_subject_is_possible_weighs_the_same_and_survives_its_file(
+    identified: Identification, tmp_path: Path
+) -> None:
     subject = identified.subject
     m, mx, my, izz = np.array(subject.batch.values).reshape(-1, 4).T
     assert (m > 0.0).all() and (m * izz > mx**2 + my**2).all()
@@ -29,7 +31,7 @@ def test_a_subject_is_possible_weighs_the_same_and_survives_its_file(identified:
     assert read_identified(tmp_path / "subject.toml") == subject
 
 
-def test_the_table_is_kept_where_bodies_do_not_predict_better(identified: Identified) -> None:
+def test_the_table_is_kept_where_bodies_do_not_predict_better(identified: Identification) -> None:
     ratios = identified.decision.ratios("bodies")
     assert (identified.decision.use == "bodies") == bool(ratios.mean() <= 0.97 and ratios.max() <= 1.10)
     rms = {"table": np.ones((2, 3)), "bodies": np.full((2, 3), 1.01)}
@@ -37,7 +39,7 @@ def test_the_table_is_kept_where_bodies_do_not_predict_better(identified: Identi
     assert said[-1].startswith("The table is kept: held-out gain -1 %")
 
 
-def test_the_filter_starts_from_an_identified_subject(identified: Identified, case: Case) -> None:
+def test_the_filter_starts_from_an_identified_subject(identified: Identification, case: Case) -> None:
     subject = identified.subject.model_copy(update={"use": "bodies"})
     plain, other = estimator(), estimator()
     other.parameters = subject
@@ -53,7 +55,7 @@ def test_the_filter_starts_from_an_identified_subject(identified: Identified, ca
     np.testing.assert_array_equal(kept.x0, before.x0)
 
 
-def test_another_model_or_another_person_is_refused(identified: Identified, case: Case) -> None:
+def test_another_model_or_another_person_is_refused(identified: Identification, case: Case) -> None:
     start = case.common.initial
     with pytest.raises(ModelError, match="of model squat7, expected sagittal7"):
         with_identified(start, identified.subject.model_copy(update={"model": "squat7"}))
@@ -66,7 +68,7 @@ def test_few_trials_are_halved_and_many_are_not(case: Case) -> None:
     assert len(parts_of([*case.trials, case.trials[0]])) == 3
 
 
-def test_change_between_two_sessions(identified: Identified) -> None:
+def test_change_between_two_sessions(identified: Identification) -> None:
     before = identified.subject
     assert not any(change.clear for change in change_between(before, before))
     values = np.array(before.batch.values)
@@ -162,7 +164,7 @@ def test_lost_frames_of_a_trial_that_is_followed_say_nothing_of_the_body(case: C
 
 
 def test_a_file_that_does_not_fit_is_refused(
-    identified: Identified, files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    identified: Identification, files: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     batch = identified.subject.batch
     names = ("inertia/tail/mass", *batch.names[1:])

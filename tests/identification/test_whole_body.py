@@ -11,7 +11,7 @@ import dynakin
 from dynakin.errors import RecordingError
 from dynakin.filter.augment import initial_covariance
 from dynakin.identification.decision import foretell, rms_of
-from dynakin.identification.subject import Identified, identify_subject
+from dynakin.identification.subject import Identification, identify_subject
 from dynakin.identification.trials import Common, measure_all
 from dynakin.model.inertia import RigidBody
 from dynakin.simulation.trial import simulate
@@ -23,12 +23,12 @@ def estimator() -> dynakin.Estimator:
 
 
 @pytest.fixture(scope="module")
-def identified() -> Identified:
+def identified() -> Identification:
     trials = [simulate("fullbody", "squat", 2, 6.0).recording, simulate("fullbody", "gait", 2, 4.0).recording]
     return identify_subject(estimator(), trials, static=simulate("fullbody", "squat", 2, 5.0).recording)
 
 
-def test_bodies_are_possible_and_weigh_what_was_measured(identified: Identified) -> None:
+def test_bodies_are_possible_and_weigh_what_was_measured(identified: Identification) -> None:
     bodies = [RigidBody.from_vector(vector) for vector in np.array(identified.subject.batch.values).reshape(-1, 10)]
     assert len(bodies) == 15
     assert all(body.possible() for body in bodies)
@@ -37,7 +37,7 @@ def test_bodies_are_possible_and_weigh_what_was_measured(identified: Identified)
         assert text in " ".join(identified.subject.report)
 
 
-def test_six_rows_fit_better_than_the_table_and_errors_are_about_the_feet(identified: Identified) -> None:
+def test_six_rows_fit_better_than_the_table_and_errors_are_about_the_feet(identified: Identification) -> None:
     common, trial = identified.common, identified.trials[0]
     assert common.rows.tolist() == [0, 1, 2, 3, 4, 5]
     assert np.linalg.norm(trial.reference - [0.4, 0.0, 0.4]) < 0.3
@@ -53,7 +53,7 @@ def test_six_rows_fit_better_than_the_table_and_errors_are_about_the_feet(identi
     assert 0 < unknown.sum() < len(walked)  # where a foot is beside the plates
 
 
-def test_jacobian_of_the_wrench_is_the_central_difference(identified: Identified) -> None:
+def test_jacobian_of_the_wrench_is_the_central_difference(identified: Identification) -> None:
     unknowns, core = identified.posterior.unknowns, identified.common.core
     theta, h = 0.3 * unknowns.sd * np.random.default_rng(2).normal(size=len(unknowns.sd)), 1e-6
     states = identified.trials[1].movement.states[20:21]
@@ -66,7 +66,7 @@ def test_jacobian_of_the_wrench_is_the_central_difference(identified: Identified
         np.testing.assert_allclose(J[:, :, k], numeric, atol=2e-5, err_msg=name)
 
 
-def test_the_filter_starts_from_it(identified: Identified) -> None:
+def test_the_filter_starts_from_it(identified: Identification) -> None:
     other = estimator()
     other.parameters = identified.subject.model_copy(update={"use": "bodies"})
     after = other.start(identified.trials[0].movement.recording, static=identified.common.static)
@@ -85,7 +85,7 @@ def test_somebody_else_on_the_plates_is_refused_before_anything_takes_long() -> 
         common.check(heavier)
 
 
-def test_a_walk_is_foretold_without_its_plates(identified: Identified) -> None:
+def test_a_walk_is_foretold_without_its_plates(identified: Identification) -> None:
     """Other plates under the judging trial: the same prediction to the last bit, another verdict."""
     common, (squat, walk) = identified.common, identified.trials
     recording = simulate("fullbody", "gait", 2, 4.0).recording

@@ -11,8 +11,7 @@ from dynakin.model.calibration.initialise import initialise
 from dynakin.model.definition import load_model
 from dynakin.model.subject import Subject
 from dynakin.recordings.recording import Recording
-
-from .conftest import make, stand
+from support.made_person import make, stand
 
 _core = pytest.importorskip("dynakin._core", reason="the compiled core is not built")
 PERSON = Subject(mass_kg=70.0, height_m=1.75, sex="male")

@@ -12,7 +12,7 @@ from dynakin.model.calibration.initialise import initialise
 from dynakin.model.definition import load_model
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Recording
-from model.made_in_space import RATE, definition, measured, recording_of, standing, standing_places, states
+from support.made_in_space import RATE, definition, measured, recording_of, standing, standing_places, states
 
 LABORATORY = GroundFrame(np.eye(3), np.zeros(3), "+Y", np.array([1.0, 0.0, 0.0]))
 

@@ -18,8 +18,7 @@ from dynakin.model.priors import Bounds, Priors
 from dynakin.model.subject import Subject
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.recording import Recording
-
-from .conftest import FOOT_DIRECTION, LENGTHS, make, stand
+from support.made_person import FOOT_DIRECTION, LENGTHS, make, stand
 
 PERSON = Subject(mass_kg=70.0, height_m=1.75, sex="male")
 

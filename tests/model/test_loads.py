@@ -17,7 +17,8 @@ from dynakin.model.calibration.initial import InitialModel
 from dynakin.model.calibration.initialise import initialise
 from dynakin.model.calibration.loads import CarriedLoad, with_loads
 from dynakin.recordings.plates.loads import PlateLoad, without_plate_loads
-from dynakin.simulation.trial import SimulatedTrial, simulate_squat
+from dynakin.simulation.output import SimulatedTrial
+from dynakin.simulation.trial import simulate_squat
 
 SUBJECT = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
 BARBELL = CarriedLoad(

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from core.random_models import planar_model, settings, spatial_model, trial
 
-from oracle import measurement
-from oracle.filter import Filter, Settings
-from oracle.sensors import carried_to_origin
-from oracle.state import Layout
+from support.core.random_models import planar_model, settings, spatial_model, trial
+from support.oracle import measurement
+from support.oracle.filter import Filter, Settings
+from support.oracle.sensors import carried_to_origin
+from support.oracle.state import Layout
 
 
 def make(spec, seed=0, frames=3, gaps=False, **changes):

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from core.random_models import planar_model, random_state, spatial_model, with_functions
 
-from oracle import measurement, mechanics
-from oracle.spec import Axis, Coordinate, Marker, Segment, Spec
-from oracle.state import Layout, unpack
+from support.core.random_models import planar_model, random_state, spatial_model, with_functions
+from support.oracle import measurement, mechanics
+from support.oracle.spec import Axis, Coordinate, Marker, Segment, Spec
+from support.oracle.state import Layout, unpack
 
 MODELS = [planar_model(s) for s in range(4)] + [spatial_model(s) for s in range(12)]
 MODELS += [with_functions(spatial_model(s), s) for s in range(12, 18)]
@@ -21,7 +21,7 @@ def close(actual: np.ndarray, expected: np.ndarray, relative: float) -> None:
 
 @pytest.mark.parametrize("spec", MODELS + IDENTITY, ids=lambda s: s.name)
 def test_equals_pinocchio(spec):
-    from oracle import pinocchio_tree
+    from support.oracle import pinocchio_tree
 
     layout = Layout(spec)
     rng = np.random.default_rng(1)

@@ -13,11 +13,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_recordings import write_c3d
 
 from dynakin.errors import RecordingError
 from dynakin.recordings.formats import c3d
 from dynakin.recordings.formats.c3d import read_c3d
+from support.made_recordings import write_c3d
 
 T = 20
 START = 512  # of the parameter section that ezc3d writes

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from made_recordings import plain, standing
 
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.landmarks import FacingPairs, find_marker
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.standing import standing_window
+from support.made_recordings import plain, standing
 
 AXES = {"+Y": np.eye(3), "+Z": np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]]),
         "+X": np.array([[0, 1.0, 0], [1.0, 0, 0], [0, 0, -1.0]]), "-Y": np.diag([1.0, -1, -1])}  # fmt: skip

@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from made_recordings import standing
-from real_trials import real_trials
 from scipy.spatial.transform import Rotation
 
 from dynakin.errors import RecordingError
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.handedness import refuse_mirrored
 from dynakin.recordings.recording import Recording
+from support.made_recordings import standing
+from support.real_trials import real_trials
 
 Y_UP = np.array([0.0, 1.0, 0.0])
 

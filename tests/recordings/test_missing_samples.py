@@ -6,11 +6,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_recordings import TRC, write, write_c3d
 
 from dynakin.errors import DynakinError
 from dynakin.recordings.formats.c3d import read_c3d
 from dynakin.recordings.read import read
+from support.made_recordings import TRC, write, write_c3d
 
 FRAMES, PER_FRAME, REACH = 100, 10, 10  # frames that the kernel reaches to each side, rounded up
 

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from made_recordings import standing
 
 from dynakin.errors import RecordingError
 from dynakin.recordings.feet.distance import distance_to_hull
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.plates.checks import check_plates
 from dynakin.recordings.recording import Recording
+from support.made_recordings import standing
 
 
 def check(recording: Recording, mass_kg: float | None = None):  # type: ignore[no-untyped-def]

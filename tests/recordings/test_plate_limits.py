@@ -7,8 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_recordings import standing
-from real_trials import real_trials
 
 from dynakin.errors import RecordingError
 from dynakin.recordings.frame import find_ground_frame
@@ -16,6 +14,8 @@ from dynakin.recordings.plates.checks import check_plates
 from dynakin.recordings.plates.limits import beyond_limits
 from dynakin.recordings.plates.pressure import Surface, plate_from_wrench
 from dynakin.recordings.recording import Plate, Recording
+from support.made_recordings import standing
+from support.real_trials import real_trials
 
 TURNED = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # Z up in the laboratory
 

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from made_recordings import write, write_c3d
 
 from dynakin.errors import RecordingError
 from dynakin.recordings.read import read
+from support.made_recordings import write, write_c3d
 
 T = 20
 PER_FRAME = 10

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_recordings import write
 
 from dynakin.errors import ConfigError, RecordingError
-from dynakin.recordings.plates.options import ReadOptions
+from dynakin.recordings.formats.options import ReadOptions
 from dynakin.recordings.read import READERS, read, register_reader
 from dynakin.recordings.recording import Recording
+from support.made_recordings import write
 
 TEXT = """# standing
 time,RKNE_x,RKNE_y,RKNE_z,FP1_vx,FP1_vy,FP1_vz,FP1_px,FP1_py,FP1_pz,FP1_mx,FP1_my,FP1_mz

@@ -6,14 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_recordings import TRC_TOP, grf_text, plain, write
 
 from dynakin.errors import RecordingError
 from dynakin.recordings.formats.grf_columns import parse_column
+from dynakin.recordings.formats.ground_forces import attach_forces, plates_from_table
 from dynakin.recordings.formats.mot import read_table
-from dynakin.recordings.plates.forces import attach_forces, plates_from_table
-from dynakin.recordings.plates.options import ReadOptions
+from dynakin.recordings.formats.options import ReadOptions
 from dynakin.recordings.read import read
+from support.made_recordings import TRC_TOP, grf_text, plain, write
 
 QUANTITIES = {"vx": 10.0, "vy": 700.0, "vz": -20.0, "px": 0.2, "py": 0.01, "pz": 0.3}
 WRENCH_MOMENT = np.cross([0.2, 0.01, 0.3], [10.0, 700.0, -20.0]) + np.array([0.0, 5.0, 0.0])

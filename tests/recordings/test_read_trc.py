@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from made_recordings import TRC, TRC_TOP, write
 
 from dynakin.errors import RecordingError
 from dynakin.recordings.read import read
+from support.made_recordings import TRC, TRC_TOP, write
 
 
 def test_plain_file_in_millimetres(tmp_path: Path) -> None:

@@ -2,54 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import dynakin
-from dynakin.model.calibration.initial import InitialModel
 from dynakin.model.calibration.posture import Geometry
-from dynakin.model.definition import ModelDefinition
-from dynakin.model.plan import ModelPlan
 from dynakin.simulation.sensors.sizes import SensorNoise
-from dynakin.simulation.trial import SimulatedTrial, simulate_squat
-from dynakin.validation.reference.chain import Kinematics, PlanarChain
-
-MASS_KG = 70.0
-
-
-@dataclass(frozen=True)
-class Perfect:
-    """A trial, the model measured on it, and a chain, plan and landmarks that are the truth's."""
-
-    trial: SimulatedTrial
-    definition: ModelDefinition
-    initial: InitialModel
-    chain: PlanarChain
-    plan: ModelPlan
-    landmarks: dict[str, np.ndarray]
-
-    @property
-    def truth(self) -> Kinematics:
-        """The true coordinates and their exact derivatives."""
-        data = self.trial.truth.data
-        return Kinematics(data["coordinates"].values, data["speeds"].values, data["accelerations"].values)
-
-    def wrench(self) -> np.ndarray:
-        """The true wrench (T, 6), NaN out of the plane."""
-        return in_plane(self.trial.truth.data["wrench"].values)
-
-    def parameters(self, names: tuple[str, ...]) -> np.ndarray:
-        """The true inertial parameters."""
-        return np.array([self.trial.truth.parameters[name] for name in names])
-
-
-def in_plane(wrench: np.ndarray) -> np.ndarray:
-    """The same wrench with NaN for what a planar model does not explain."""
-    found = np.full(wrench.shape, np.nan)
-    found[:, [0, 1, 5]] = wrench[:, [0, 1, 5]]
-    return found
+from dynakin.simulation.trial import simulate_squat
+from dynakin.validation.reference.chain import PlanarChain
+from support.perfect import MASS_KG, Perfect, true_landmarks
 
 
 @pytest.fixture(scope="session")
@@ -67,13 +30,3 @@ def perfect() -> Perfect:
         directions[segment] = [place[segment] / lengths[length]]
     plan = replace(initial.plan, geometry=Geometry(lengths, directions, {}))
     return Perfect(trial, definition, initial, PlanarChain.of(plan), plan, true_landmarks(trial))
-
-
-def true_landmarks(trial: SimulatedTrial) -> dict[str, np.ndarray]:
-    """Joint centres and the middles of ASIS and PSIS (T, 3) m where they truly are, on the midline."""
-    data = trial.truth.data
-    found = {str(name): data["joint_centres"].sel(joint=name).values for name in data["joint"].values}
-    for spine in ("ASIS", "PSIS"):
-        names = [str(name) for name in data["marker"].values if spine in str(name)]
-        found[f"mid_{spine.lower()}"] = data["markers"].sel(marker=names).values.mean(axis=1)
-    return {name: path * [1.0, 1.0, 0.0] for name, path in found.items()}

@@ -10,11 +10,12 @@ import pytest
 import dynakin
 from dynakin.errors import ModelError
 from dynakin.model.calibration.posture import find_posture
-from dynakin.simulation.trial import SimulatedTrial, simulate_squat
+from dynakin.simulation.output import SimulatedTrial
+from dynakin.simulation.trial import simulate_squat
 from dynakin.validation.reference.chain import PlanarChain
 from dynakin.validation.reference.classical import classical_angles
 from dynakin.validation.reference.landmark_paths import landmark_paths
-from reference.conftest import Perfect
+from support.perfect import Perfect
 
 
 @pytest.fixture(scope="module")

@@ -12,8 +12,7 @@ from dynakin.model.priors import Bounds
 from dynakin.validation.reference.least_squares import bodies_of, identify, predicted_wrench
 from dynakin.validation.reference.regressor import parameter_names, table_parameters, wrench_regressor
 from dynakin.validation.reference.table_dynamics import table_dynamics
-from reference.conftest import MASS_KG, Perfect
-from reference.test_table_dynamics import PLANE, lively
+from support.perfect import MASS_KG, PLANE, Perfect, lively
 
 
 def test_the_regressor_times_the_table_is_newton_eulers_wrench(perfect: Perfect) -> None:

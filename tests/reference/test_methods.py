@@ -14,7 +14,7 @@ from dynakin.results.measures.fit import signal_fit, truth_error
 from dynakin.simulation.trial import simulate_squat
 from dynakin.validation.reference.least_squares import identify, predicted_wrench
 from dynakin.validation.reference.methods import reference_methods
-from reference.conftest import MASS_KG, Perfect
+from support.perfect import MASS_KG, Perfect
 
 PLANE = ["fx", "fy", "mz"]
 

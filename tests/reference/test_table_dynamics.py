@@ -13,19 +13,7 @@ from dynakin.validation.reference.classical import classical_angles, hinge_paths
 from dynakin.validation.reference.least_squares import bodies_of
 from dynakin.validation.reference.regressor import parameter_names
 from dynakin.validation.reference.table_dynamics import table_dynamics
-from reference.conftest import Perfect
-
-PLANE = [0, 1, 5]
-
-
-def lively(chain_size: int, frames: int = 400, seed: int = 1) -> Kinematics:
-    """Every coordinate moves, each at its own pace; exact derivatives."""
-    rng = np.random.default_rng(seed)
-    time = np.arange(frames) / 100.0
-    a, w, p = rng.uniform(0.3, 0.9, (3, chain_size))
-    w = 2.0 * np.pi * w
-    angle = np.outer(time, w) + 6.0 * p
-    return Kinematics(a * np.sin(angle), a * w * np.cos(angle), -a * w**2 * np.sin(angle))
+from support.perfect import PLANE, Perfect, lively
 
 
 def test_true_inertia_and_motion_give_the_true_wrench_and_moments(perfect: Perfect) -> None:

@@ -2,29 +2,18 @@
 
 from __future__ import annotations
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "results"))
-
-from synthetic_estimate import SEGMENTS, make_estimate
 
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.measures.repetitions import repetitions_of
 from dynakin.validation.methods import Method, Trial
+from support.estimates.synthetic import SEGMENTS
 
 JOINTS = ("toe", "ankle", "knee", "hip", "lumbar", "shoulder", "elbow")
-
-
-@pytest.fixture(scope="session")
-def estimate() -> Estimate:
-    """Twelve seconds of a squat, with gaps, bounds reached and a locked translation."""
-    return make_estimate()
 
 
 @pytest.fixture(scope="session")

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from walking_estimate import make_walker
 
 from dynakin.report.chart import Panel
 from dynakin.report.insights import in_short, insights
@@ -30,6 +29,7 @@ from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.repetitions import Found, Repetition
 from dynakin.results.measures.sources import ABSENT, DERIVED, measured_moments
 from dynakin.validation.methods import Trial
+from support.estimates.walking import make_walker
 
 DERIVED_WORDS = "derived from the motion"
 

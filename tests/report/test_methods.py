@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_report import Structure
 
 from dynakin.report.comparison_page import render_comparison
 from dynakin.report.page import render_report
@@ -18,6 +17,7 @@ from dynakin.validation.methods import Trial
 from dynakin.validation.statistics import Spread
 from dynakin.validation.table2 import table2
 from dynakin.validation.unseen import UnseenRow
+from support.page import Structure
 
 SETTINGS = [{"model": "sagittal7", "presets": {"paper": {"force": 0.1}}, "forces": None}]
 

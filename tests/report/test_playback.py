@@ -10,13 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
-from synthetic_estimate import make_estimate
 
 from dynakin.report.body import chain_of
 from dynakin.report.page import render_report
 from dynakin.report.playback import playback
 from dynakin.report.styles import segment_colours
 from dynakin.results.estimate import Estimate
+from support.estimates.synthetic import make_estimate
 
 
 def unpacked(packed: dict[str, Any]) -> np.ndarray:

@@ -5,11 +5,9 @@ from __future__ import annotations
 import re
 from collections import Counter
 from dataclasses import replace
-from html.parser import HTMLParser
 
 import numpy as np
 import pytest
-from synthetic_estimate import make_estimate
 
 from dynakin.report.insights import in_short, insights
 from dynakin.report.labels import moment_note, short_marker_names
@@ -20,42 +18,13 @@ from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.naming import listed, number
+from support.estimates.synthetic import make_estimate
+from support.page import Structure
 
 
 @pytest.fixture(scope="module")
 def html(estimate: Estimate) -> str:
     return render_report(estimate)
-
-
-class Structure(HTMLParser):
-    """Checks that tags close in order and keeps ids and addresses."""
-
-    VOID = frozenset({"meta", "link", "br", "img", "hr", "input"})
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.ids: list[str] = []
-        self.addresses: list[str] = []
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        if tag not in self.VOID:
-            self.open.append(tag)
-        self._keep(attrs)
-
-    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self._keep(attrs)
-
-    def _keep(self, attrs: list[tuple[str, str | None]]) -> None:
-        for key, value in attrs:
-            if key == "id":
-                self.ids.append(str(value))
-            if key in ("src", "href", "xlink:href"):
-                self.addresses.append(str(value))
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open and self.open[-1] == tag, f"</{tag}> closes {self.open[-3:]}"
-        self.open.pop()
 
 
 def test_page_is_well_formed_and_needs_no_other_file(html: str) -> None:

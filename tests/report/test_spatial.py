@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from spatial_estimate import MASS_KG, make_spatial
 
 from dynakin.report.chart import Bound, Line, chart
 from dynakin.report.page import render_report
@@ -25,6 +24,7 @@ from dynakin.report.styles import SIDE_COLOURS, side_of
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.angles import with_angles
 from dynakin.results.measures.metrics import compute_metrics
+from support.estimates.spatial import MASS_KG, make_spatial
 
 
 @pytest.fixture(scope="module")

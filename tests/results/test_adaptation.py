@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from synthetic_estimate import make_estimate
 
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.adaptation import adaptation, constant_settling, misfit_settling, running_rms
+from support.estimates.synthetic import make_estimate
 
 TIME = np.arange(2001) / 100.0
 RNG = np.random.default_rng(7)

@@ -10,8 +10,6 @@ from pathlib import Path
 
 import pytest
 from rich.console import Console
-from synthetic_estimate import make_estimate
-from walking_estimate import make_walker
 
 import dynakin.report
 from dynakin.cli import summary
@@ -21,6 +19,8 @@ from dynakin.results.estimate import Estimate
 from dynakin.results.failures import Failures
 from dynakin.results.files.folder import OUTPUT_FILES, check_folder_writable, check_output_writable
 from dynakin.results.measures import metrics
+from support.estimates.synthetic import make_estimate
+from support.estimates.walking import make_walker
 
 
 def broken(*_: object, **__: object) -> None:

@@ -9,7 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from synthetic_estimate import make_estimate
 
 from dynakin.recordings.formats.mot import read_table
 from dynakin.recordings.read import read
@@ -17,6 +16,7 @@ from dynakin.results.estimate import Estimate
 from dynakin.results.files.folder import OUTPUT_FILES
 from dynakin.results.files.markers import write_trc
 from dynakin.results.measures.fit import marker_rms_mm, wrench_fit
+from support.estimates.synthetic import make_estimate
 
 
 @pytest.fixture(scope="module")

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from synthetic_estimate import make_estimate
 
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures import consistency
 from dynakin.results.measures.consistency import lag_one
 from dynakin.results.measures.fit import marker_rms_mm, wrench_fit
 from dynakin.results.measures.metrics import compute_metrics, evaluation_window
+from support.estimates.synthetic import make_estimate
 
 PLANE = np.array([True, True, False])
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from synthetic_estimate import make_estimate
 
 from dynakin.errors import OutputError
 from dynakin.pipeline import save as save_module
 from dynakin.results.estimate import Estimate
 from dynakin.results.files.folder import check_output_writable, replacing
+from support.estimates.synthetic import make_estimate
 
 
 @pytest.fixture(scope="module")

@@ -12,8 +12,7 @@ from dynakin.model.markers.marker_set import available_marker_sets, load_marker_
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.soft_tissue import displacements, soft_tissue
 from dynakin.results.measures.soft_tissue_sizes import published_amplitude_mm
-from dynakin.simulation.sensors.opencap_markers import OPENCAP
-from dynakin.simulation.sensors.plug_in_gait_markers import PLUG_IN_GAIT
+from dynakin.simulation.bodies.marker_rows import OPENCAP, PLUG_IN_GAIT
 from dynakin.simulation.sensors.soft_tissue import regions
 
 KNEE = "S1:RKNE"

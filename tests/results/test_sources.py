@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 import xarray as xr
 from rich.console import Console
-from walking_estimate import MASS_KG, STANCE_S, make_walker
 
 from dynakin.cli import summary
 from dynakin.recordings.formats.mot import read_table
@@ -24,6 +23,7 @@ from dynakin.results.measures.repetitions import Repetition
 from dynakin.results.measures.sources import ABSENT, DERIVED, legs_of, measured_moments, moment_figures, moment_sources
 from dynakin.results.measures.stances import counted, phases
 from dynakin.results.measures.tracking import without_lost
+from support.estimates.walking import MASS_KG, STANCE_S, make_walker
 
 PEAK_N = 700.0
 ALL = (0, 1, 2, 3)

@@ -9,16 +9,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 import xarray as xr
-from synthetic_estimate import make_estimate
 
 import dynakin
 from dynakin.cli.app import main
 from dynakin.errors import LostError
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.tracking import refuse_lost, tracking_of, without_lost
-from dynakin.simulation.trial import SimulatedTrial, simulate_squat
+from dynakin.simulation.output import SimulatedTrial
+from dynakin.simulation.trial import simulate_squat
 from dynakin.validation.methods import compare_trial
 from dynakin.validation.setup import Setup
+from support.estimates.synthetic import make_estimate
 
 ARM = slice(7, 10)
 """Three of ten markers."""

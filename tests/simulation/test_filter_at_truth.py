@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from trees import spatial_body, waving
 
 import dynakin
 from dynakin import _core
 from dynakin.simulation.bodies.body import ten_numbers
+from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
-from dynakin.simulation.trial import SimulatedTrial, simulate
+from dynakin.simulation.trial import simulate
+from support.trees import spatial_body, waving
 
 PERFECT = SensorNoise.none()
 INERTIA = ("mass", "mx", "my", "mz", "ixx", "iyy", "izz", "ixy", "ixz", "iyz")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from trees import inverse_dynamics
 
 from dynakin.simulation.mechanics import Axis, Motion, Segment, dynamics, kinematics
+from support.trees import inverse_dynamics
 
 STEP_S = 1e-4
 

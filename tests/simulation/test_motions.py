@@ -6,14 +6,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from trees import inverse_dynamics
 
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.results.files.storage import write_storage
 from dynakin.simulation.mechanics import Motion, kinematics
 from dynakin.simulation.motions.registry import MOTIONS
+from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
-from dynakin.simulation.trial import SimulatedTrial, simulate
+from dynakin.simulation.trial import simulate
+from support.trees import inverse_dynamics
 
 PERFECT = SensorNoise.none()
 MODELS = ("sagittal7", "squat7")

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from dynakin.errors import ConfigError
+from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise, load_sensors
-from dynakin.simulation.trial import SimulatedTrial, simulate
+from dynakin.simulation.trial import simulate
 
 PERFECT = SensorNoise.none()
 

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from trees import inverse_dynamics, spatial_body, waving
 
 from dynakin.errors import ConfigError
 from dynakin.simulation.mechanics import Motion, kinematics
+from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
-from dynakin.simulation.trial import SimulatedTrial, simulate
+from dynakin.simulation.trial import simulate
+from support.trees import inverse_dynamics, spatial_body, waving
 
 RATE_HZ = 200.0
 MIDDLE = {"knee_r": 0.4, "knee_l": 0.4, "elbow_r": 0.5, "elbow_l": 0.5}

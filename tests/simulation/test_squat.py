@@ -8,9 +8,10 @@ import pytest
 from dynakin.errors import ConfigError
 from dynakin.recordings.standing import standing_window
 from dynakin.simulation.mechanics import Motion, kinematics
+from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.sensors.soft_tissue import regions
-from dynakin.simulation.trial import SimulatedTrial, simulate_squat
+from dynakin.simulation.trial import simulate_squat
 
 
 @pytest.fixture(scope="module")

@@ -13,9 +13,9 @@ import xarray as xr
 import dynakin
 from dynakin.errors import OutputError
 from dynakin.recordings.formats.mot import read_table
-from dynakin.simulation.output import TRIAL_FILES
+from dynakin.simulation.output import TRIAL_FILES, SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
-from dynakin.simulation.trial import SimulatedTrial, simulate
+from dynakin.simulation.trial import simulate
 
 WORST = SensorNoise.laboratory().changed({"occlusion_per_min": 3.0, "flying_per_min": 10.0, "swap_per_min": 5.0})
 

@@ -6,7 +6,6 @@ from functools import cache
 
 import numpy as np
 import pytest
-from trees import inverse_dynamics
 
 from dynakin.errors import ConfigError
 from dynakin.model.definition import load_model
@@ -14,9 +13,11 @@ from dynakin.simulation.bodies.whole_body import Sole
 from dynakin.simulation.jets import Jet
 from dynakin.simulation.mechanics import Motion, kinematics
 from dynakin.simulation.motions.leg_closure import close_legs, knee_flexion
+from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.support import Support, split_between
-from dynakin.simulation.trial import SimulatedTrial, simulate
+from dynakin.simulation.trial import simulate
+from support.trees import inverse_dynamics
 
 PERFECT = SensorNoise.none()
 MOTIONS = ("squat", "gait")

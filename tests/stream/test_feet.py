@@ -11,13 +11,13 @@ import dynakin
 from dynakin.filter import presets
 from dynakin.recordings.feet.loads import foot_loads
 from dynakin.results.measures.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
-from dynakin.simulation.trial import SimulatedTrial, simulate
+from dynakin.simulation.output import SimulatedTrial
+from dynakin.simulation.trial import simulate
 from dynakin.stream.feet import LiveFeet
 from dynakin.stream.session import Live
 from dynakin.stream.sinks.base import Callback, LiveFrame
 from dynakin.stream.sources.replay import Replay
-
-from .offline import offline_states
+from support.stream.offline import offline_states
 
 LAG = 5
 

@@ -9,8 +9,7 @@ from dynakin.errors import StreamError
 from dynakin.recordings.resampling import resample
 from dynakin.stream.fusion import Fusion
 from dynakin.stream.sources.packets import MarkerPacket, PlatePacket, StreamInfo
-
-from .made import MARKERS, PLATES, block, frame, play, times
+from support.stream.made import MARKERS, PLATES, block, frame, play, times
 
 
 def test_frames_in_order_are_not_delayed() -> None:

@@ -21,8 +21,7 @@ from dynakin.simulation.trial import simulate_squat
 from dynakin.stream.session import Live
 from dynakin.stream.sinks.base import Callback, LiveFrame, Sink
 from dynakin.stream.sources.packets import MarkerPacket, Packet, PlatePacket
-
-from .offline import offline_states
+from support.stream.offline import offline_states
 
 pylsl = pytest.importorskip("pylsl")
 from dynakin.stream.sinks.lsl import LslSink  # noqa: E402

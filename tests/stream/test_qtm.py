@@ -18,9 +18,8 @@ from dynakin.stream.session import Live
 from dynakin.stream.sinks.base import Callback, LiveFrame
 from dynakin.stream.sources.packets import MarkerPacket, Packet, PlatePacket
 from dynakin.stream.sources.plugins import SOURCES, plugin
-
-from .offline import offline_states
-from .qtm_server import QtmServer
+from support.stream.offline import offline_states
+from support.stream.qtm_server import QtmServer
 
 pytest.importorskip("qtm_rt")
 from dynakin.stream.sources.qtm import QtmSource

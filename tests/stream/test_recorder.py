@@ -22,14 +22,12 @@ from dynakin.stream.sinks.base import Callback, LiveFrame, Sink
 from dynakin.stream.sinks.recorder import FILE, Recorder, finish, recorded
 from dynakin.stream.sources.packets import Packet, PlatePacket
 from dynakin.stream.sources.replay import Replay
-
-from .made import MARKERS, PLATES, block, frame
+from support.stream.made import MARKERS, PLATES, block, frame
 
 SETTINGS = {"model": "sagittal7", "markers": "opencap", "mass_kg": 70.0, "height_m": 1.75, "sex": "male"}
 
 SESSION = """
-import sys, time
-sys.path.insert(0, {tests!r})
+import time
 from dynakin.simulation import simulate_squat
 from dynakin.stream import Callback, Live, LiveFrame, Packet, PlatePacket, Replay, Sink
 from dynakin.stream.sinks.recorder import Recorder
@@ -81,7 +79,7 @@ def test_a_recorded_session_becomes_the_usual_output(squat: Recording, tmp_path:
 
 def test_a_session_killed_while_recording_loses_nothing_but_the_last_moment(tmp_path: Path) -> None:
     folder = tmp_path / "r"
-    code = SESSION.format(tests=str(Path(__file__).parent), folder=str(folder), settings=SETTINGS)
+    code = SESSION.format(folder=str(folder), settings=SETTINGS)
     session = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
     assert session.stdout is not None
     times = []

@@ -19,9 +19,9 @@ from dynakin.recordings.recording import Recording
 from dynakin.simulation.trial import simulate_squat
 from dynakin.stream.session import Live
 from dynakin.stream.sinks.base import Callback, LiveFrame, Started, Status
+from dynakin.stream.sinks.picture import Picture, arrow, as_text, in_words, split, status_text
 from dynakin.stream.sources.replay import Replay
 from dynakin.stream.viewer.latest import Latest
-from dynakin.stream.viewer.picture import Picture, arrow, as_text, in_words, split, status_text
 
 
 def test_the_reader_gets_the_newest_once() -> None:

@@ -19,7 +19,7 @@ from dynakin.studies.tuning.fit import Fit, Fitter, belongs_to_fit, usual_names
 from dynakin.studies.tuning.likelihood import REACH, Likelihood
 from dynakin.studies.tuning.optimise import curvature, deviations, minimise
 from dynakin.studies.tuning.score import Shared
-from tuning.own_data import own_noise, own_trial
+from support.own_data import own_noise, own_trial
 
 WRONG = {"jerk": 5.0, "soft_tissue": 0.3, "marker_sd_m": 3.0, "force": 0.2, "plate_force": 4.0}
 """Settings to be found, and the factor by which the fit starts off."""

@@ -25,7 +25,7 @@ from dynakin.errors import ConfigError
 from dynakin.filter.estimator import Estimator
 from dynakin.identification.change import change_between, change_in_words
 from dynakin.identification.report import base_in_words, segment_rows
-from dynakin.identification.subject import Identified, identify_subject
+from dynakin.identification.subject import Identification, identify_subject
 from dynakin.model.definition import load_model
 from dynakin.model.identified import read_identified
 from dynakin.model.subject import Subject
@@ -79,7 +79,7 @@ def identify(
     out().print(f"Subject  {output}", soft_wrap=True)
 
 
-def _print(found: Identified) -> None:
+def _print(found: Identification) -> None:
     """What the decision was, what moved, how sure."""
     console = out()
     for text in (*found.lost, *found.decision.in_words()):

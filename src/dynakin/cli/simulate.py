@@ -15,9 +15,8 @@ from dynakin.simulation.bodies.registry import BODIES
 from dynakin.simulation.bodies.subject import Spread
 from dynakin.simulation.motions.motion_file import CUTOFF_HZ
 from dynakin.simulation.motions.registry import MOTIONS, MOTIONS_IN_SPACE
-from dynakin.simulation.output import check_trial_folder
+from dynakin.simulation.output import SimulatedTrial, check_trial_folder
 from dynakin.simulation.sensors.sizes import load_sensors
-from dynakin.simulation.trial import SimulatedTrial
 from dynakin.simulation.trial import simulate as simulate_trial
 
 _MOTIONS = f"{', '.join(MOTIONS)} (fullbody: {', '.join(MOTIONS_IN_SPACE)})"

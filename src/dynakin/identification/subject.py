@@ -27,7 +27,7 @@ _WORK, _SEEING = 1000, 850  # of a progress bar: nearly all of the time goes int
 
 
 @dataclass(frozen=True, eq=False)
-class Identified:
+class Identification:
     """Everything about one identification.
 
     Attributes:
@@ -50,7 +50,7 @@ def identify_subject(
     *,
     static: Recording | None = None,
     progress: Progress | None = None,
-) -> Identified:
+) -> Identification:
     """Identify a subject on one or several trials with force plates.
 
     Args:
@@ -77,7 +77,7 @@ def identify_subject(
         report=(*lost, *in_words(decision, bodies, batch)),
         batch=batch,
     )
-    return Identified(subject, common, tuple(trials), bodies, decision, tuple(lost))
+    return Identification(subject, common, tuple(trials), bodies, decision, tuple(lost))
 
 
 def _followed(

@@ -8,8 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 import dynakin._core as _core
-from dynakin.identification.bodies import Bodies, bodies_of
-from dynakin.identification.body_priors import BodyPriors
+from dynakin.identification.bodies import Bodies, BodyPriors
 from dynakin.identification.trials import Common
 
 Array = npt.NDArray[np.float64]
@@ -80,7 +79,7 @@ class Unknowns:
             ModelError: the model does not estimate what can be identified.
         """
         priors = priors or GeometryPriors()
-        bodies = bodies_of(common.initial, body_priors)
+        bodies = Bodies.of(common.initial, body_priors)
         names = list(common.core.layout.names)
         turning = {
             axis.coordinate

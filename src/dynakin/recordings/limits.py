@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from collections.abc import Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import RecordingError
 
-if TYPE_CHECKING:
-    from dynakin.recordings.recording import Array, Recording
+Array = npt.NDArray[np.float64]
 
 SLOWEST_HZ, FASTEST_HZ = 5.0, 1e5
 """Rates of markers and plates. A movement cannot be followed from a sample every 0.2 s; times in milliseconds are the
@@ -41,13 +40,12 @@ def rate_problem(time: Array) -> str | None:
     )
 
 
-def check_recording(recording: Recording) -> None:
-    """Times increase, and every marker and wrench is missing (NaN) or of a size that somebody could have measured.
+def check_markers(where: str, time: Array, names: Sequence[str], markers: Array) -> None:
+    """Times (T,) s increase, and every marker of (T, M, 3) m is missing (NaN) or where somebody could have measured it.
 
     Raises:
-        RecordingError: the first that is not, with its frame and marker or plate.
+        RecordingError: the first that is not, with its frame and marker.
     """
-    where, time = recording.path or recording.name, recording.time
     for k in np.flatnonzero(~np.isfinite(time))[:1]:
         raise RecordingError(f"{where}: time of frame {k + 1} is {time[k]}, expected a number")
     for k in np.flatnonzero(np.diff(time) <= 0)[:1]:
@@ -55,14 +53,12 @@ def check_recording(recording: Recording) -> None:
             f"{where}: time {time[k + 1]:g} s of frame {k + 2} does not come after {time[k]:g} s, "
             "expected increasing times"
         )
-    for frame, m in _beyond(recording.markers, FARTHEST_M):
+    for frame, m in _beyond(markers, FARTHEST_M):
         raise RecordingError(
-            f"{where}: marker {recording.marker_names[m]!r} at frame {frame + 1} is at "
-            f"{_listed(recording.markers[frame, m])} m, expected at most {FARTHEST_M:g} m from the origin: "
+            f"{where}: marker {names[m]!r} at frame {frame + 1} is at "
+            f"{_listed(markers[frame, m])} m, expected at most {FARTHEST_M:g} m from the origin: "
             "the value is damaged, or the length unit wrong"
         )
-    for plate in recording.plates:
-        check_wrench(plate.name, time, plate.force, plate.moment, str(where))
 
 
 def check_wrench(name: str, time: Array, force: Array, moment: Array, where: str) -> None:

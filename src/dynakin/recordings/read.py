@@ -12,11 +12,11 @@ from dynakin.errors import RecordingError
 from dynakin.recordings.formats.c3d import read_c3d
 from dynakin.recordings.formats.csv import read_csv, read_csv_table
 from dynakin.recordings.formats.grf_columns import parse_column
+from dynakin.recordings.formats.ground_forces import attach_forces
 from dynakin.recordings.formats.mot import Table, read_table
+from dynakin.recordings.formats.options import ReadOptions
 from dynakin.recordings.formats.textfile import require_file
 from dynakin.recordings.formats.trc import read_trc
-from dynakin.recordings.plates.forces import attach_forces
-from dynakin.recordings.plates.options import ReadOptions
 from dynakin.recordings.recording import Recording
 
 Reader = Callable[[Path, ReadOptions], Recording]

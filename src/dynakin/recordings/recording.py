@@ -12,7 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import RecordingError
-from dynakin.recordings.limits import check_recording
+from dynakin.recordings.limits import check_markers, check_wrench
 
 Array = npt.NDArray[np.float64]
 
@@ -101,7 +101,10 @@ class Recording:
                 raise RecordingError(
                     f"{self.name}: {plate.name} has arrays of shapes {sorted(shapes)}, expected ({len(self.time)}, 3)"
                 )
-        check_recording(self)
+        where = str(self.path or self.name)
+        check_markers(where, self.time, self.marker_names, self.markers)
+        for plate in self.plates:
+            check_wrench(plate.name, self.time, plate.force, plate.moment, where)
 
     @property
     def n_frames(self) -> int:

@@ -3,9 +3,9 @@ filter."""
 
 from dynakin.simulation.bodies.subject import SimulatedSubject, draw_subject
 from dynakin.simulation.motions.registry import MOTIONS
-from dynakin.simulation.output import save_trial
+from dynakin.simulation.output import SimulatedTrial, save_trial
 from dynakin.simulation.sensors.sizes import SensorNoise, load_sensors
-from dynakin.simulation.trial import SimulatedTrial, simulate, simulate_squat
+from dynakin.simulation.trial import simulate, simulate_squat
 from dynakin.simulation.truth import Truth
 
 __all__ = [

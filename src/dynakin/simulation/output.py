@@ -4,26 +4,37 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dynakin.absent import with_nulls
-from dynakin.recordings.recording import Plate
+from dynakin.recordings.recording import Plate, Recording
 from dynakin.results.files.folder import FolderKind, check_output_writable, replacing
 from dynakin.results.files.markers import write_trc
 from dynakin.results.files.storage import write_storage
 from dynakin.results.files.versions import versions
-
-if TYPE_CHECKING:
-    from dynakin.simulation.trial import SimulatedTrial
+from dynakin.simulation.truth import Truth
 
 Array = NDArray[np.float64]
 
 SCHEMA_VERSION = 1
+
+
+@dataclass(frozen=True)
+class SimulatedTrial:
+    """The recording, as a reader would return it, the truth behind it, and what it was made with."""
+
+    recording: Recording
+    truth: Truth
+    settings: dict[str, Any]
+
+    def save(self, folder: str | Path) -> Path:
+        """Write recording and truth into a folder; see `dynakin.simulation.output.save_trial`."""
+        return save_trial(self, folder)
 
 
 def save_trial(trial: SimulatedTrial, folder: str | Path) -> Path:

@@ -3,9 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +18,7 @@ from dynakin.simulation.mechanics import Motion
 from dynakin.simulation.motions.motion_file import CUTOFF_HZ
 from dynakin.simulation.motions.movement import Movement
 from dynakin.simulation.motions.registry import choose_movement
-from dynakin.simulation.output import save_trial
+from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.plates import sense_plates
 from dynakin.simulation.sensors.sensed_markers import sense_markers
 from dynakin.simulation.sensors.sizes import SensorNoise
@@ -33,19 +31,6 @@ GROUND_IN_LABORATORY = (-0.12, -0.60)  # x and z (m) of the ground origin; the f
 SYNTHETIC_S = 20.0  # duration of a motion that has no end of its own
 GAIT_S = 4.0  # of walking across a laboratory
 LONGEST_FRAMES = 2_000_000
-
-
-@dataclass(frozen=True)
-class SimulatedTrial:
-    """The recording, as a reader would return it, the truth behind it, and what it was made with."""
-
-    recording: Recording
-    truth: Truth
-    settings: dict[str, Any]
-
-    def save(self, folder: str | Path) -> Path:
-        """Write recording and truth into a folder; see `dynakin.simulation.output.save_trial`."""
-        return save_trial(self, folder)
 
 
 def simulate(

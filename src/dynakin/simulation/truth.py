@@ -10,12 +10,12 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from dynakin.simulation.bodies.body import SimulatedBody
+from dynakin.simulation.bodies.markers import Site, marker_positions
 from dynakin.simulation.bodies.subject import SimulatedSubject
 from dynakin.simulation.contacts import MechanicalState
 from dynakin.simulation.mechanics import Segment
 from dynakin.simulation.motions.movement import Repetition
 from dynakin.simulation.sensors.faults import Fault
-from dynakin.simulation.sensors.markers import Site, marker_positions
 from dynakin.simulation.sensors.plates import PlateErrors
 
 Array = NDArray[np.float64]

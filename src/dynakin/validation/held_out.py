@@ -34,7 +34,7 @@ Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class Identified:
+class IdentifyingTrial:
     """What was learned on the identifying trial.
 
     initial: the model as measured there. estimates: by preset. static: the recording that lengths were measured on.
@@ -83,7 +83,7 @@ def halves(recording: Recording) -> tuple[Recording, Recording]:
 
 def identify_on(
     recording: Recording, setup: Setup, *, static: Recording | None = None, same_recording: bool = False
-) -> Identified:
+) -> IdentifyingTrial:
     """Run every preset on the identifying trial.
 
     Args:
@@ -102,10 +102,10 @@ def identify_on(
     assert estimator.initial is not None
     wrench = measured_wrench(recording, estimator.initial, setup.plates)
     ground = estimator.initial.ground if same_recording else None
-    return Identified(recording, static, setup, estimator.initial, estimates, wrench, ground)
+    return IdentifyingTrial(recording, static, setup, estimator.initial, estimates, wrench, ground)
 
 
-def predict_blind(identified: Identified, recording: Recording) -> Blind:
+def predict_blind(identified: IdentifyingTrial, recording: Recording) -> Blind:
     """Every prediction of the judging trial's wrench. Its plates are taken away before anything else is done.
 
     Filters: `EKF (preset), identified` and `EKF (preset), table`, lengths and inertia frozen at what the identifying
@@ -244,7 +244,7 @@ def start_as(
     )
 
 
-def _start(identified: Identified, recording: Recording) -> InitialModel:
+def _start(identified: IdentifyingTrial, recording: Recording) -> InitialModel:
     """Where the judging trial begins; lengths, places and body as measured for the identifying one."""
     setup = identified.setup
     return start_as(
@@ -259,7 +259,7 @@ def _start(identified: Identified, recording: Recording) -> InitialModel:
     )
 
 
-def _referred(identified: Identified, recording: Recording, start: InitialModel) -> dict[str, Array]:
+def _referred(identified: IdentifyingTrial, recording: Recording, start: InitialModel) -> dict[str, Array]:
     setup, measured = identified.setup, identified.initial
     hertz = f"({setup.cutoff_hz:g} Hz)"
     at = reference_methods(recording, start, setup.definition, setup.cutoff_hz)

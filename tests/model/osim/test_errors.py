@@ -9,8 +9,7 @@ import pytest
 from dynakin.errors import ModelError
 from dynakin.model.opensim.read import read_osim
 from dynakin.model.opensim.scales import scale_names
-
-from .files import COUPLER, CUSTOM, small_model, transform, version_3, version_4
+from support.osim.files import COUPLER, CUSTOM, small_model, transform, version_3, version_4
 
 PIN = version_4("PinJoint", ("q",))
 CUSTOM_4 = version_4("CustomJoint", ("u", "v", "w"), transform(CUSTOM, 4), COUPLER)

@@ -7,9 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from core.bridge import to_core
-from core.random_models import planar_model, spatial_model, with_functions
-from oracle.spec import Spec
 from typer.testing import CliRunner
 
 from dynakin import _core
@@ -22,9 +19,11 @@ from dynakin.model.opensim.read import read_osim
 from dynakin.model.opensim.scales import scale_names
 from dynakin.model.opensim.spec import to_spec
 from dynakin.model.opensim.write import write_osim
-
-from .files import COUPLER, small_model
-from .states import as_state, coupled, random_motion
+from support.core.bridge import to_core
+from support.core.random_models import planar_model, spatial_model, with_functions
+from support.oracle.spec import Spec
+from support.osim.files import COUPLER, small_model
+from support.osim.states import as_state, coupled, random_motion
 
 SHIPPED = ["optimized_scale_and_markers.osim", "unscaled_generic.osim"]
 
@@ -127,7 +126,7 @@ def test_what_a_run_found_is_written(source: str, request: pytest.FixtureRequest
 @pytest.mark.parametrize("name", SHIPPED)
 def test_opensim_loads_what_is_written(name: str, data_dir: Path, tmp_path: Path) -> None:
     pytest.importorskip("opensim", reason="OpenSim is not installed (pip install opensim)")
-    from .peer import Peer
+    from support.osim.peer import Peer
 
     model = read_osim(data_dir / "opencap_subject4" / name)
     scales = scale_names(model)
@@ -152,8 +151,7 @@ def test_opensim_loads_a_built_in_model_measured_on_a_person(tmp_path: Path) -> 
     pytest.importorskip("opensim", reason="OpenSim is not installed (pip install opensim)")
     from dynakin.simulation.output import save_trial
     from dynakin.simulation.trial import simulate
-
-    from .peer import Peer
+    from support.osim.peer import Peer
 
     trial = next(save_trial(simulate("fullbody", "squat", 1, 5.0), tmp_path / "person").glob("*.trc"))
     out = tmp_path / "fullbody.osim"

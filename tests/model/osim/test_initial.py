@@ -21,8 +21,7 @@ from dynakin.model.opensim.read import read_osim
 from dynakin.model.opensim.skin import skin_of
 from dynakin.model.subject import Subject
 from dynakin.recordings.recording import Recording
-
-from .files import small_model, version_4
+from support.osim.files import small_model, version_4
 
 FILE = "optimized_scale_and_markers.osim"
 

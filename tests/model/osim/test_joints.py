@@ -11,12 +11,11 @@ from dynakin import _core
 from dynakin.model.opensim.read import read_osim
 from dynakin.model.opensim.scales import scale_names
 from dynakin.model.opensim.spec import to_spec
-
-from .files import COUNTS, COUPLER, small_model
-from .states import as_state, coupled, random_motion, summed
+from support.osim.files import COUNTS, COUPLER, small_model
+from support.osim.states import as_state, coupled, random_motion, summed
 
 pytest.importorskip("opensim", reason="OpenSim is not installed (pip install opensim)")
-from .peer import Peer
+from support.osim.peer import Peer
 
 KINDS = [*COUNTS, "CustomJoint"]
 

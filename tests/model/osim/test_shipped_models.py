@@ -18,11 +18,10 @@ from dynakin.model.opensim.description import OpenSimModel
 from dynakin.model.opensim.read import read_osim
 from dynakin.model.opensim.scales import scale_names
 from dynakin.model.opensim.spec import to_spec
-
-from .states import Motion, as_state, coupled, random_motion, summed
+from support.osim.states import Motion, as_state, coupled, random_motion, summed
 
 pytest.importorskip("opensim", reason="OpenSim is not installed (pip install opensim)")
-from .peer import Peer
+from support.osim.peer import Peer
 
 FILES = ["optimized_scale_and_markers.osim", "unscaled_generic.osim"]
 KNEES = ("knee_angle_r", "knee_angle_l")

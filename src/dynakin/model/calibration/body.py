@@ -36,9 +36,12 @@ class OnPlates(Protocol):
     """A recording and its ground frame: a ``Trial``, say."""
 
     @property
-    def recording(self) -> Recording: ...
+    def recording(self) -> Recording:
+        """What was measured."""
+
     @property
-    def ground(self) -> GroundFrame: ...
+    def ground(self) -> GroundFrame:
+        """The frame that it is taken to."""
 
 
 def find_mass(subject: Subject, trials: Sequence[OnPlates]) -> tuple[float, str]:

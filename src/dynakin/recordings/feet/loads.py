@@ -160,6 +160,7 @@ class PlateLoad:
 
     @classmethod
     def of(cls, plate: Plate, ground: GroundFrame) -> PlateLoad:
+        """The plate, turned to the ground frame."""
         wrench = ground.wrench_to_ground(np.hstack([plate.force, plate.moment]))
         known = np.asarray(np.isfinite(wrench).all(axis=1)) & ~saturated(wrench[:, 1])
         loaded = np.nan_to_num(wrench[:, 1]) > LOADED_N

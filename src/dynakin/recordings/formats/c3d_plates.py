@@ -18,8 +18,8 @@ import numpy as np
 from dynakin.errors import RecordingError
 from dynakin.recordings.formats.c3d_channels import plate_wrench
 from dynakin.recordings.formats.c3d_parameters import Parameters
+from dynakin.recordings.formats.options import ReadOptions
 from dynakin.recordings.limits import check_wrench
-from dynakin.recordings.plates.options import ReadOptions
 from dynakin.recordings.plates.pressure import DEFAULT_THRESHOLD_N, Surface, plate_from_wrench
 from dynakin.recordings.recording import Array, Plate
 from dynakin.recordings.resampling import CausalLowPass, filled, low_pass, reach_s, resample, touched

@@ -43,5 +43,5 @@ def published_amplitude_mm(marker: str, segment: str) -> tuple[float, str] | Non
 @cache
 def _sizes() -> dict[str, float]:
     # The list is data: the simulator's code is not imported.
-    text = (resources.files("dynakin") / "simulation" / "soft_tissue.toml").read_text(encoding="utf-8")
+    text = (resources.files("dynakin.results.measures") / "soft_tissue.toml").read_text(encoding="utf-8")
     return {region: float(row["amplitude_mm"]) for region, row in tomllib.loads(text).items()}

@@ -11,10 +11,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from dynakin.simulation.bodies.markers import HipCentres, Site
+from dynakin.simulation.bodies.posture import PosturePath
 from dynakin.simulation.bodies.subject import SimulatedSubject
 from dynakin.simulation.mechanics import Segment
-from dynakin.simulation.motions.posture import PosturePath
-from dynakin.simulation.sensors.markers import HipCentres, Site
 
 Array = NDArray[np.float64]
 

@@ -10,8 +10,8 @@ import numpy as np
 from dynakin.errors import ConfigError
 from dynakin.simulation.bodies import sagittal, squat_chain, whole_body
 from dynakin.simulation.bodies.body import SimulatedBody
+from dynakin.simulation.bodies.marker_rows import SETS
 from dynakin.simulation.bodies.subject import SimulatedSubject, Spread, draw_subject
-from dynakin.simulation.sensors.whole_body_markers import SETS
 from dynakin.simulation.streams import Streams
 
 BODIES: dict[str, Callable[[SimulatedSubject, np.random.Generator], SimulatedBody]] = {

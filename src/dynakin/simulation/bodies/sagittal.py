@@ -18,6 +18,9 @@ from dynakin.simulation.bodies.chain import (
     pelvis,
     toe_height,
 )
+from dynakin.simulation.bodies.marker_rows import OPENCAP
+from dynakin.simulation.bodies.markers import HipCentres, draw_sites
+from dynakin.simulation.bodies.posture import PosturePath, full_change
 from dynakin.simulation.bodies.subject import (
     ANKLE_DIRECTION,
     LUMBAR_DIRECTION,
@@ -28,9 +31,6 @@ from dynakin.simulation.bodies.subject import (
     symmetric,
 )
 from dynakin.simulation.mechanics import Segment
-from dynakin.simulation.motions.posture import PosturePath, full_change
-from dynakin.simulation.sensors.markers import HipCentres, draw_sites
-from dynakin.simulation.sensors.opencap_markers import OPENCAP
 
 Array = NDArray[np.float64]
 

@@ -13,6 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynakin.simulation.bodies.body import Contact, SimulatedBody
+from dynakin.simulation.bodies.marker_rows import SETS, draw_sites
+from dynakin.simulation.bodies.markers import HipCentres
 from dynakin.simulation.bodies.subject import (
     ANKLE_DIRECTION,
     LUMBAR_DIRECTION,
@@ -23,8 +25,6 @@ from dynakin.simulation.bodies.subject import (
     symmetric,
 )
 from dynakin.simulation.mechanics import Axis, Segment
-from dynakin.simulation.sensors.markers import HipCentres
-from dynakin.simulation.sensors.whole_body_markers import SETS, draw_sites
 
 Array = NDArray[np.float64]
 Direction = tuple[float, float, float]

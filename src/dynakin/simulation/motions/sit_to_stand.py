@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 
 from dynakin.errors import ConfigError
 from dynakin.simulation.bodies.body import SimulatedBody
+from dynakin.simulation.bodies.posture import PosturePath, balance, balanced_angle, posture_jets
 from dynakin.simulation.jets import Jet, constant, step
 from dynakin.simulation.mechanics import Motion, kinematics
 from dynakin.simulation.motions.movement import STANDING_S, Movement, Repetition, Seat, in_order
-from dynakin.simulation.motions.posture import PosturePath, balance, balanced_angle, posture_jets
 from dynakin.simulation.motions.squat import add_wander, draw_wander
 
 Array = NDArray[np.float64]

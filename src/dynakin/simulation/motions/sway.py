@@ -7,10 +7,10 @@ from numpy.typing import NDArray
 
 from dynakin.errors import ConfigError
 from dynakin.simulation.bodies.body import SimulatedBody
+from dynakin.simulation.bodies.posture import balance, posture_jets
 from dynakin.simulation.jets import Jet, constant, sinusoids, step
 from dynakin.simulation.mechanics import Motion
 from dynakin.simulation.motions.movement import STANDING_S, Movement, in_order
-from dynakin.simulation.motions.posture import balance, posture_jets
 
 Array = NDArray[np.float64]
 

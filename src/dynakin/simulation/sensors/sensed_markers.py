@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynakin.simulation.bodies.body import SimulatedBody
+from dynakin.simulation.bodies.markers import Site, hip_centres, marker_positions, misplace
 from dynakin.simulation.mechanics import Motion, TreeMotion
 from dynakin.simulation.sensors.faults import Fault, fly_markers, occlude_markers, swap_markers
-from dynakin.simulation.sensors.markers import Site, hip_centres, marker_positions, misplace
 from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.sensors.soft_tissue import draw_displacement
 from dynakin.simulation.streams import Streams

@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynakin.errors import ConfigError
+from dynakin.simulation.bodies.markers import Site
 from dynakin.simulation.mechanics import Motion
-from dynakin.simulation.sensors.markers import Site
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ class Region:
 @cache
 def regions() -> Mapping[str, Region]:
     """The list in soft_tissue.toml."""
-    text = (resources.files("dynakin.simulation") / "soft_tissue.toml").read_text(encoding="utf-8")
+    text = (resources.files("dynakin.results.measures") / "soft_tissue.toml").read_text(encoding="utf-8")
     return {
         name: Region(1e-3 * row["amplitude_mm"], row["coordinate"], row["source"])
         for name, row in tomllib.loads(text).items()

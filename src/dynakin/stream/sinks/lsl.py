@@ -10,7 +10,7 @@ import pylsl
 
 from dynakin.errors import ConfigError
 from dynakin.stream.sinks.base import LiveFrame, Sink, Started
-from dynakin.stream.viewer.picture import rotations
+from dynakin.stream.sinks.picture import rotations
 
 _KINDS = ("length", "marker", "inertia")
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from dynakin.errors import ConfigError
-from dynakin.recordings.plates.forces import plates_from_table
+from dynakin.recordings.formats.ground_forces import plates_from_table
 from dynakin.recordings.read import read, read_forces
 from dynakin.recordings.recording import Array, Recording
 from dynakin.stream.sources.packets import MarkerPacket, Packet, PlatePacket, StreamInfo, Streams

@@ -14,9 +14,9 @@ import numpy as np
 import viser
 from viser import uplot
 
+from dynakin.stream.sinks.picture import as_text, in_words, split
 from dynakin.stream.viewer.latest import Latest
 from dynakin.stream.viewer.own_origin import OwnOrigin
-from dynakin.stream.viewer.picture import as_text, in_words, split
 
 _PERIOD_S = 1.0 / 30.0
 _PLOT_S = 0.1

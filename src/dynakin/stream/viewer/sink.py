@@ -15,9 +15,9 @@ import numpy as np
 
 from dynakin.errors import ConfigError
 from dynakin.stream.sinks.base import LiveFrame, Sink, Started, Status
+from dynakin.stream.sinks.picture import Picture, status_text
 from dynakin.stream.sources.packets import StreamInfo
 from dynakin.stream.viewer.latest import Latest
-from dynakin.stream.viewer.picture import Picture, status_text
 
 _PORTS = 20  # that are tried from the one asked for
 _PICTURES_S = 1.0 / 40.0

@@ -28,7 +28,7 @@ _TO_TABLE = 1e-4
 
 
 @dataclass(frozen=True, eq=False)
-class Identification:
+class LeastSquares:
     """Inertial parameters, four a segment, by the names of the filter's state.
 
     Attributes:
@@ -58,7 +58,7 @@ def identify(
     mass_kg: float | None = None,
     sigma: tuple[float, float, float] = DECLARED_SIGMA,
     bounds: Bounds | None = None,
-) -> Identification:
+) -> LeastSquares:
     """Fit phi to the measured wrench.
 
     Args:
@@ -77,7 +77,7 @@ def identify(
     bounded, at_bound = _bounded(problem, plan, bounds or Bounds())
     bodies = bodies_of(chain, free)
     impossible = tuple(name for name, body in bodies.items() if body.mass != 0.0 and not body.possible_in_plane())
-    return Identification(
+    return LeastSquares(
         problem.names, problem.table, free, bounded, at_bound, impossible, base, problem.frames
     )  # fmt: skip
 

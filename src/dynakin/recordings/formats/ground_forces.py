@@ -1,0 +1,166 @@
+"""Ground forces from an OpenSim table, brought to the times of the markers."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from dynakin.errors import RecordingError
+from dynakin.recordings.formats.grf_columns import PlateColumns, group_columns
+from dynakin.recordings.formats.mot import Table
+from dynakin.recordings.formats.options import ReadOptions
+from dynakin.recordings.limits import check_wrench
+from dynakin.recordings.plates.pressure import DEFAULT_THRESHOLD_N, Surface, plate_from_wrench
+from dynakin.recordings.recording import Array, Plate, Recording
+from dynakin.recordings.resampling import low_pass, resample, same_times
+
+_MIN_RATE_RATIO = 0.99
+
+
+def plates_from_table(table: Table) -> tuple[tuple[Plate, ...], tuple[str, ...]]:
+    """The plates of a ground-force table (N, m, N m; ground-on-person, laboratory frame) at the table's own
+    times.
+
+    The table gives force F, point of application p and free moment tau; the wrench about the laboratory
+    origin is (F, p x F + tau). Force and moment are as in the file; the centre of pressure is NaN where the
+    force stays below 10 N, as the file's point means nothing there.
+
+    Returns:
+        the plates, and notes (columns that were not understood, plates without free moment).
+
+    Raises:
+        RecordingError: no ground-force columns, or some of a plate's are missing.
+    """
+    groups, others = group_columns(table.names)
+    if not groups:
+        raise RecordingError(
+            f"{table.path}: no ground force columns, expected names such as ground_force_vx, "
+            "1_ground_force_vx or "
+            f"FP1_vx; it has {', '.join(table.names[:6])}{', ...' if len(table.names) > 6 else ''}"
+        )
+    notes = list(table.notes)
+    if others:
+        notes.append(f"{table.path.name}: columns not used: {', '.join(others)}.")
+    plates = []
+    for group in groups:
+        plate, note = _plate(group, table)
+        plates.append(plate)
+        notes += note
+    return tuple(plates), tuple(notes)
+
+
+def _plate(group: PlateColumns, table: Table) -> tuple[Plate, list[str]]:
+    name = f"plate {group.plate}".strip()
+    notes = []
+    for quantity in ("force", "point"):
+        missing = [axis for axis in "xyz" if axis not in group.columns.get(quantity, {})]
+        if missing:
+            word = {"force": "vx, vy, vz", "point": "px, py, pz"}[quantity]
+            raise RecordingError(
+                f"{table.path}: {name} has no {quantity} {', '.join(missing)}, expected columns {word}"
+            )
+    torque = group.columns.get("torque", {})
+    if not torque:
+        notes.append(f"{name} has no free moment columns: 0 taken.")
+    force, point = (_three(table, group.columns[quantity]) for quantity in ("force", "point"))
+    free = _three(table, torque) if torque else np.zeros_like(force)
+    quiet = (force == 0.0).all(axis=1)
+    point[quiet & np.isnan(point).any(axis=1)] = 0.0  # a blank point of no force
+    with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused
+        moment = np.cross(point, force) + free
+    lost = np.isnan(moment).any(axis=1) & ~np.isnan(np.hstack([point, force, free])).any(axis=1)
+    moment[lost] = np.inf
+    check_wrench(name, table.time, force, moment, str(table.path))
+    unloaded = np.linalg.norm(force, axis=1) < DEFAULT_THRESHOLD_N
+    cop = np.where(unloaded[:, None], np.nan, point)
+    return Plate(name, force, moment, cop, free), notes
+
+
+def _three(table: Table, axes: dict[str, str]) -> Array:
+    # A free moment acts about the vertical only, and some files leave its two zero columns out.
+    zero = np.zeros(len(table.time))
+    return np.column_stack([table.column(axes[axis]) if axis in axes else zero for axis in "xyz"])
+
+
+def attach_forces(recording: Recording, table: Table, options: ReadOptions) -> Recording:
+    """The recording with the plates of a ground-force table, at the times of its markers.
+
+    A table at the markers' times passes through untouched (unless options ask for a filter or threshold); one
+    at a higher rate that covers the markers is resampled: the wrench about the laboratory origin, not the
+    centre of pressure, which jumps at each contact.
+
+    Raises:
+        RecordingError: the table is shorter than the markers or sampled more slowly; the message names both
+            lengths and ranges.
+    """
+    plates, notes = plates_from_table(table)
+    if recording.plates:
+        notes += (f"{table.path.name} replaces the {len(recording.plates)} plates of {recording.name}.",)
+    untouched = same_times(table.time, recording.time)
+    if not untouched:
+        _check_cover(recording, table)
+        first, last = table.time[0], table.time[-1]
+        notes += (
+            f"{table.path.name}: {len(table.time)} rows from {first:g} s to {last:g} s brought to the "
+            f"{recording.n_frames} marker frames ({'causal' if options.causal else 'zero-phase'} filter).",
+        )
+    if untouched and options.plate_filter_hz is None and options.force_threshold_n is None:
+        return recording.with_plates(plates, notes)
+    return recording.with_plates(tuple(_resampled(plate, table, recording, options) for plate in plates), notes)
+
+
+def _check_cover(recording: Recording, table: Table) -> None:
+    t, m = table.time, recording.time
+    step = float(np.median(np.diff(m))) if len(m) > 1 else 0.0
+    rate = float(1 / np.median(np.diff(t))) if len(t) > 1 else 0.0
+    slow = len(m) > 1 and rate < _MIN_RATE_RATIO * recording.rate
+    if slow or t[0] > m[0] + 0.5 * step or t[-1] < m[-1] - 0.5 * step:
+        what = "are sampled more slowly than" if slow else "do not cover"
+        raise RecordingError(
+            f"{table.path}: forces {what} the markers: "
+            f"{len(t)} rows from {t[0]:g} s to {t[-1]:g} s at {rate:.4g} Hz, "
+            f"expected to cover {len(m)} frames from {m[0]:g} s to {m[-1]:g} s at {recording.rate:.4g} Hz"
+        )
+
+
+def _resampled(plate: Plate, table: Table, recording: Recording, options: ReadOptions) -> Plate:
+    wrench = np.hstack([plate.force, plate.moment])
+    for row in np.flatnonzero(np.isnan(wrench).any(axis=1))[:1]:
+        raise RecordingError(
+            f"{table.path}: {plate.name} has no force at {table.time[row]:g} s, cannot be resampled or filtered"
+        )
+    if options.plate_filter_hz is not None:
+        rate = float(1 / np.median(np.diff(table.time)))
+        wrench = low_pass(wrench, rate, options.plate_filter_hz, causal=options.causal)
+    wrench = resample(wrench, table.time, recording.time, causal=options.causal)
+    threshold = DEFAULT_THRESHOLD_N if options.force_threshold_n is None else options.force_threshold_n
+    surface = _surface(plate)
+    if surface is None:  # never loaded
+        wrench[np.linalg.norm(wrench[:, :3], axis=1) < threshold] = 0.0
+        idle = plate.frames(np.zeros(recording.n_frames, dtype=int))
+        return replace(idle, force=wrench[:, :3], moment=wrench[:, 3:])
+    return plate_from_wrench(
+        plate.name,
+        wrench[:, :3],
+        wrench[:, 3:],
+        surface,
+        corners=None,
+        threshold_n=threshold,
+        zero_unloaded=True,
+    )
+
+
+def _surface(plate: Plate) -> Surface | None:
+    """The plane of the points of application: across the axis that carries most of the force, at their
+    height."""
+    loaded = ~np.isnan(plate.cop).any(axis=1)
+    if not loaded.any():
+        return None
+    mean = plate.force[loaded].mean(axis=0)
+    axis = int(np.argmax(np.abs(mean)))
+    normal = np.zeros(3)
+    # Towards the force as the file signs it: a file with person-on-ground forces is found by the check, not
+    # hidden here.
+    normal[axis] = np.sign(mean[axis])
+    return Surface(np.median(plate.cop[loaded], axis=0), normal)
