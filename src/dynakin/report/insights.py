@@ -58,19 +58,6 @@ class Insight:
     advice: str = ""
 
 
-def what_was_run(estimate: Estimate) -> str:
-    """One sentence: the recording, the model, the data used."""
-    recording, time = estimate.recording, estimate.time
-    plates = plural(len(recording.plates), "force plate") if recording.plates else "no force plate"
-    mass = estimate.config.get("mass_kg")
-    person = f" of a person of {mass:.4g} kg" if isinstance(mass, int | float) else ""
-    return (
-        f"{number(float(time[-1] - time[0]), 's')}{person}: {plural(len(time), 'frame')} at "
-        f"{recording.rate:.4g} Hz, {len(estimate.marker_names)} of {len(recording.marker_names)} "
-        f"markers, {plates}; each frame estimated {'from all frames' if estimate.smoothed else 'as it would be live'}."
-    )
-
-
 def in_short(found: list[Insight]) -> str:
     """One sentence for who reads no further: what holds, and what does not."""
     titles = [insight.title[:1].lower() + insight.title[1:] for insight in found if insight.level == "warning"]

@@ -9,7 +9,7 @@ from typing import Any
 import jinja2
 import tomli_w
 
-from dynakin.report.insights import in_short, insights, what_was_run
+from dynakin.report.insights import in_short, insights
 from dynakin.report.labels import is_planar, parameter_label, short_marker_names
 from dynakin.report.playback import playback
 from dynakin.report.sections.constants import length_section, mass_section, observability_section
@@ -26,7 +26,7 @@ from dynakin.results.files.versions import versions
 from dynakin.results.measures.facing import facing
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.sources import UNKNOWN
-from dynakin.results.naming import listed, number
+from dynakin.results.naming import listed, number, plural
 from dynakin.validation.methods import Trial
 
 _BOTH = (repetition_section, methods_section, length_section, mass_section, observability_section)
@@ -85,7 +85,7 @@ def render_report(estimate: Estimate, *, metrics: dict[str, Any] | None = None, 
             *([f"preset {preset}"] if preset else []),
             f"dynakin {versions()['dynakin']}",
         ],
-        what_was_run=what_was_run(estimate),
+        what_was_run=_what_was_run(estimate),
         figures=_headline(estimate, metrics),
         moments=(metrics["moments"] or UNKNOWN)["verdict"],
         insights=found,
@@ -112,6 +112,19 @@ def write_report(
     """Write `render_report` to ``path``."""
     html = render_report(estimate, metrics=metrics, comparison=comparison)
     path.write_text(html, encoding="utf-8", newline="\n")
+
+
+def _what_was_run(estimate: Estimate) -> str:
+    """One sentence: the recording, the model, the data used."""
+    recording, time = estimate.recording, estimate.time
+    plates = plural(len(recording.plates), "force plate") if recording.plates else "no force plate"
+    mass = estimate.config.get("mass_kg")
+    person = f" of a person of {mass:.4g} kg" if isinstance(mass, int | float) else ""
+    return (
+        f"{number(float(time[-1] - time[0]), 's')}{person}: {plural(len(time), 'frame')} at "
+        f"{recording.rate:.4g} Hz, {len(estimate.marker_names)} of {len(recording.marker_names)} "
+        f"markers, {plates}; each frame estimated {'from all frames' if estimate.smoothed else 'as it would be live'}."
+    )
 
 
 def _headline(estimate: Estimate, metrics: dict[str, Any]) -> list[dict[str, str]]:
