@@ -46,16 +46,9 @@ SECTIONS: dict[str, tuple[Callable[[Page], Section | None], ...]] = {
 }
 """The sections of a run's page in their order, by what the model moves in; one without anything to show is left out."""
 
-KEY_LABELS = {
-    "measured": "measured",
-    "estimated": "estimated",
-    "band": "± 2 standard deviations",
-    "bound": "bound",
-}
-
 
 def render_page(template: str, **content: Any) -> str:
-    """One of the templates, with what all pages have: the names of lines, the versions."""
+    """One of the templates, with the versions, which all pages have."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("dynakin.report", "templates"),
         autoescape=True,
@@ -63,7 +56,7 @@ def render_page(template: str, **content: Any) -> str:
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
-    return environment.get_template(template).render(key_labels=KEY_LABELS, versions=versions(), **content)
+    return environment.get_template(template).render(versions=versions(), **content)
 
 
 def render_report(estimate: Estimate, *, metrics: dict[str, Any] | None = None, comparison: Trial | None = None) -> str:

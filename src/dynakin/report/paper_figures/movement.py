@@ -29,7 +29,7 @@ from dynakin.report.sections.repetitions import (
     plots_by_method,
 )
 from dynakin.report.sides import joints_of, side_lines, values_of
-from dynakin.report.styles import DERIVED_LINE, LineStyle, method_styles
+from dynakin.report.styles import BAND, DERIVED_LINE, LineStyle, method_styles
 from dynakin.results.estimate import COMPONENTS, Estimate
 from dynakin.results.measures.fit import signal_fit
 from dynakin.results.measures.mean_curves import PERCENT, estimate_curves
@@ -228,7 +228,7 @@ def _key(
     styles: Sequence[LineStyle],
     *,
     band: str = "",
-    what: str = "± 2 standard deviations",
+    what: str = BAND,
     columns: int = 4,
 ) -> None:
     """One line of words above the panels, each with the line that it names; ``band``: its colour."""

@@ -11,7 +11,7 @@ from dynakin.report.labels import COMPONENT_LABELS
 from dynakin.report.plot import ESTIMATED, MEASURED
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.sides import side_key, values_of
-from dynakin.report.styles import DERIVED_LINE, SIDE_COLOURS
+from dynakin.report.styles import DERIVED_LINE, ESTIMATED_LINE, MEASURED_LINE, SIDE_COLOURS
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import AXES, COMPONENTS, Estimate
 from dynakin.results.measures.feet import foot_sources
@@ -45,8 +45,7 @@ def wrench_section(page: Page) -> Section | None:
         "Ground reaction",
         _IN_A_PLANE if page.planar else _IN_SPACE,
         panels,
-        key=("measured", "estimated"),
-        lines=(DERIVED_LINE,) if derived[:, shown].any() else (),
+        lines=(MEASURED_LINE, ESTIMATED_LINE, *((DERIVED_LINE,) if derived[:, shown].any() else ())),
     )
 
 
@@ -69,8 +68,7 @@ def foot_section(page: Page) -> Section | None:
         "feet",
         "Feet",
         figures["verdict"],
-        key=("measured",),
-        lines=(*side_key(estimate), *((DERIVED_LINE,) if derived else ())),
+        lines=(MEASURED_LINE, *side_key(estimate), *((DERIVED_LINE,) if derived else ())),
         tables=[table for table in (_adjustments(figures),) if table.rows],
         parts=[part for foot in estimate.foot_names if (part := _foot_part(estimate, foot)).panels],
     )
