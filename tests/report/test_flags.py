@@ -30,6 +30,7 @@ from dynakin.results.measures.repetitions import Found, Repetition
 from dynakin.results.measures.sources import ABSENT, DERIVED, measured_moments
 from dynakin.validation.methods import Trial
 from support.estimates.walking import make_walker
+from support.page import shown
 
 DERIVED_WORDS = "derived from the motion"
 
@@ -70,22 +71,24 @@ def test_derived_stretches_are_dashed_in_every_panel(walker: Estimate, metrics: 
             moment_section(Page(walker, metrics)).parts[0],
             moment_section(Page(whole, compute_metrics(whole))).parts[0],
         ),
-        (power_section(Page(walker, metrics)), power_section(Page(whole, compute_metrics(whole)))),
+        (shown(power_section(Page(walker, metrics))), shown(power_section(Page(whole, compute_metrics(whole))))),
     ):
         assert dashes(titled(section.panels, "Knee")) == 1 and dashes(titled(sure.panels, "Knee")) == 0
-    left = foot_section(Page(walker, metrics)).parts[1].panels
+    left = shown(foot_section(Page(walker, metrics))).parts[1].panels
     assert (
         dashes(titled(left, "Vertical")) == 1
-        and dashes(titled(foot_section(Page(walker, metrics)).parts[0].panels, "V")) == 0
+        and dashes(titled(shown(foot_section(Page(walker, metrics))).parts[0].panels, "V")) == 0
     )
-    assert dashes(titled(wrench_section(Page(walker, metrics)).panels, "Vertical")) == 1
+    assert dashes(titled(shown(wrench_section(Page(walker, metrics))).panels, "Vertical")) == 1
     for section in (
         moment_section(Page(walker, metrics)),
-        power_section(Page(walker, metrics)),
-        foot_section(Page(walker, metrics)),
+        shown(power_section(Page(walker, metrics))),
+        shown(foot_section(Page(walker, metrics))),
     ):
         assert any(line.label == DERIVED_WORDS and line.dash == "dashed" for line in section.lines)
-    assert not any(line.label == DERIVED_WORDS for line in power_section(Page(whole, compute_metrics(whole))).lines)
+    assert not any(
+        line.label == DERIVED_WORDS for line in shown(power_section(Page(whole, compute_metrics(whole)))).lines
+    )
 
 
 def test_a_derived_stretch_has_no_band_and_no_peak(walker: Estimate, metrics: dict[str, Any]) -> None:
@@ -93,13 +96,13 @@ def test_a_derived_stretch_has_no_band_and_no_peak(walker: Estimate, metrics: di
     assert knee.note == "right 0.00 to 1.17; left 0.00 to 1.17"  # derived it would be 1.75
     band = re.findall(r'<path d="([^"]+)" class="spread" fill="#D55E00"', knee.svg)
     assert len(band) == 1 and band[0].count("M") == 2
-    assert titled(foot_section(Page(walker, metrics)).parts[1].panels, "Vertical").note.startswith("peak 700 N")
+    assert titled(shown(foot_section(Page(walker, metrics))).parts[1].panels, "Vertical").note.startswith("peak 700 N")
     beside = make_walker((1, 2))
     found = compute_metrics(beside)
-    assert "no peak" in titled(foot_section(Page(beside, found)).parts[1].panels, "Vertical").note
-    text = asymmetry_section(Page(beside, found)).text
+    assert "no peak" in titled(shown(foot_section(Page(beside, found))).parts[1].panels, "Vertical").note
+    text = shown(asymmetry_section(Page(beside, found))).text
     assert "The left foot has no stance that is measured from touch-down to toe-off" in text
-    assert asymmetry_section(Page(beside, found)).tables[0].rows[0][1:] == ("–", "–")
+    assert shown(asymmetry_section(Page(beside, found))).tables[0].rows[0][1:] == ("–", "–")
 
 
 def test_absent_legs_are_not_drawn_and_the_page_says_so_first() -> None:
@@ -171,7 +174,7 @@ def test_planar_panels_dash_what_is_derived_and_leave_out_what_is_absent(estimat
     data = estimate.data.copy(deep=True)
     data["wrench_measured"][100:200] = np.nan
     missing = replace(estimate, data=data)
-    assert dashes(titled(wrench_section(Page(missing, compute_metrics(missing))).panels, "Vertical")) == 1
+    assert dashes(titled(shown(wrench_section(Page(missing, compute_metrics(missing)))).panels, "Vertical")) == 1
 
 
 def test_moments_by_method_are_compared_where_measured_and_dashed_elsewhere(

@@ -25,6 +25,7 @@ from dynakin.results.estimate import Estimate
 from dynakin.results.measures.angles import with_angles
 from dynakin.results.measures.metrics import compute_metrics
 from support.estimates.spatial import MASS_KG, make_spatial
+from support.page import shown
 
 
 @pytest.fixture(scope="module")
@@ -112,7 +113,7 @@ def test_moments_are_per_kg_and_derived_ones_dashed(spatial: Estimate, metrics: 
 
 
 def test_feet_show_what_was_changed_in_place_of_a_residual(spatial: Estimate, metrics: dict[str, Any]) -> None:
-    section = foot_section(Page(spatial, metrics))
+    section = shown(foot_section(Page(spatial, metrics)))
     right, left = section.tables[0].rows
     assert right[0] == "Right foot, adjustment" and right[2] == "2.0"
     assert set(left[1:]) == {"0"}
@@ -122,11 +123,11 @@ def test_feet_show_what_was_changed_in_place_of_a_residual(spatial: Estimate, me
 
 
 def test_work_and_symmetry_tables_hold_the_metrics(spatial: Estimate, metrics: dict[str, Any]) -> None:
-    work = power_section(Page(spatial, metrics)).tables[0]
+    work = shown(power_section(Page(spatial, metrics))).tables[0]
     knee = next(row for row in work.rows if row[0] == "Knee")
     assert knee[1] == "right"
     assert float(knee[2]) == pytest.approx(metrics["work"]["knee_angle_r"]["positive_j"], rel=0.01)
-    tables = {table.title: table for table in asymmetry_section(Page(spatial, metrics)).tables}
+    tables = {table.title: table for table in shown(asymmetry_section(Page(spatial, metrics))).tables}
     rows = {row[0]: row for row in tables["Legs: symmetry index, %"].rows}
     assert rows["Knee angle"][1] == "+67"  # (80 - 40) / 60
     assert rows["Hip flexion"][1] == "0"

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from html.parser import HTMLParser
 
+from dynakin.report.sections.section import Section
+
 
 class Structure(HTMLParser):
     """Checks that tags close in order and keeps ids and addresses."""
@@ -34,3 +36,9 @@ class Structure(HTMLParser):
     def handle_endtag(self, tag: str) -> None:
         assert self.open and self.open[-1] == tag, f"</{tag}> closes {self.open[-3:]}"
         self.open.pop()
+
+
+def shown(section: Section | None) -> Section:
+    """A section that has to be there."""
+    assert section is not None
+    return section

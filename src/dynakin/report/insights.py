@@ -6,12 +6,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from dynakin.report.convergence import convergence
 from dynakin.report.labels import COMPONENT_LABELS, parameter_label, short_marker_names
 from dynakin.results.estimate import Estimate
 from dynakin.results.failures import FAILED, LOG
 from dynakin.results.measures.bounds import counts_in_words
 from dynakin.results.measures.consistency import CONSISTENT
+from dynakin.results.measures.convergence import convergence
 from dynakin.results.measures.metrics import ADAPTATION_S, evaluation_window, speed_consistency, window_consistency
 from dynakin.results.measures.soft_tissue import excess_in_words
 from dynakin.results.measures.tracking import why_lost
@@ -61,19 +61,6 @@ class Insight:
     title: str
     text: str
     advice: str = ""
-
-
-def what_was_run(estimate: Estimate) -> str:
-    """One sentence: the recording, the model, the data used."""
-    recording, time = estimate.recording, estimate.time
-    plates = plural(len(recording.plates), "force plate") if recording.plates else "no force plate"
-    mass = estimate.config.get("mass_kg")
-    person = f" of a person of {mass:.4g} kg" if isinstance(mass, int | float) else ""
-    return (
-        f"{number(float(time[-1] - time[0]), 's')}{person}: {plural(len(time), 'frame')} at "
-        f"{recording.rate:.4g} Hz, {len(estimate.marker_names)} of {len(recording.marker_names)} "
-        f"markers, {plates}; each frame estimated {'from all frames' if estimate.smoothed else 'as it would be live'}."
-    )
 
 
 def in_short(found: list[Insight]) -> str:

@@ -4,22 +4,8 @@ from __future__ import annotations
 
 from dynakin.elements import element
 from dynakin.results.estimate import Estimate
-from dynakin.results.naming import INERTIA_WORDS, listed, number, plural, sentence, words
+from dynakin.results.naming import INERTIA_WORDS, words
 from dynakin.results.records import Parameter
-
-__all__ = [
-    "COMPONENT_LABELS",
-    "is_planar",
-    "listed",
-    "moment_note",
-    "number",
-    "parameter_label",
-    "plural",
-    "sentence",
-    "short_marker_names",
-    "signed_percent",
-    "words",
-]
 
 COMPONENT_LABELS = {
     "fx": ("Forward force", "N"),

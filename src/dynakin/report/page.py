@@ -9,7 +9,7 @@ from typing import Any
 import jinja2
 import tomli_w
 
-from dynakin.report.insights import in_short, insights, what_was_run
+from dynakin.report.insights import in_short, insights
 from dynakin.report.labels import is_planar, parameter_label, short_marker_names
 from dynakin.report.playback import playback
 from dynakin.report.sections.constants import length_section, mass_section, observability_section
@@ -26,7 +26,7 @@ from dynakin.results.files.versions import versions
 from dynakin.results.measures.facing import facing
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.sources import UNKNOWN
-from dynakin.results.naming import listed, number
+from dynakin.results.naming import listed, number, plural
 from dynakin.validation.methods import Trial
 
 _BOTH = (repetition_section, methods_section, length_section, mass_section, observability_section)
@@ -46,16 +46,9 @@ SECTIONS: dict[str, tuple[Callable[[Page], Section | None], ...]] = {
 }
 """The sections of a run's page in their order, by what the model moves in; one without anything to show is left out."""
 
-KEY_LABELS = {
-    "measured": "measured",
-    "estimated": "estimated",
-    "band": "± 2 standard deviations",
-    "bound": "bound",
-}
-
 
 def render_page(template: str, **content: Any) -> str:
-    """One of the templates, with what all pages have: the names of lines, the versions."""
+    """One of the templates, with the versions, which all pages have."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("dynakin.report", "templates"),
         autoescape=True,
@@ -63,7 +56,7 @@ def render_page(template: str, **content: Any) -> str:
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
-    return environment.get_template(template).render(key_labels=KEY_LABELS, versions=versions(), **content)
+    return environment.get_template(template).render(versions=versions(), **content)
 
 
 def render_report(estimate: Estimate, *, metrics: dict[str, Any] | None = None, comparison: Trial | None = None) -> str:
@@ -85,7 +78,7 @@ def render_report(estimate: Estimate, *, metrics: dict[str, Any] | None = None, 
             *([f"preset {preset}"] if preset else []),
             f"dynakin {versions()['dynakin']}",
         ],
-        what_was_run=what_was_run(estimate),
+        what_was_run=_what_was_run(estimate),
         figures=_headline(estimate, metrics),
         moments=(metrics["moments"] or UNKNOWN)["verdict"],
         insights=found,
@@ -114,22 +107,29 @@ def write_report(
     path.write_text(html, encoding="utf-8", newline="\n")
 
 
+def _what_was_run(estimate: Estimate) -> str:
+    """One sentence: the recording, the model, the data used."""
+    recording, time = estimate.recording, estimate.time
+    plates = plural(len(recording.plates), "force plate") if recording.plates else "no force plate"
+    mass = estimate.config.get("mass_kg")
+    person = f" of a person of {mass:.4g} kg" if isinstance(mass, int | float) else ""
+    return (
+        f"{number(float(time[-1] - time[0]), 's')}{person}: {plural(len(time), 'frame')} at "
+        f"{recording.rate:.4g} Hz, {len(estimate.marker_names)} of {len(recording.marker_names)} "
+        f"markers, {plates}; each frame estimated {'from all frames' if estimate.smoothed else 'as it would be live'}."
+    )
+
+
 def _headline(estimate: Estimate, metrics: dict[str, Any]) -> list[dict[str, str]]:
     rms = metrics["wrench"]["rms"] if metrics["wrench"] else {}
-    forces = [value for name, value in rms.items() if name.startswith("f")]
-    moments = [value for name, value in rms.items() if name.startswith("m")]
     stuck = [p for p in estimate.parameters if p.at_bound]
     free = [p for p in estimate.parameters if p.estimated and p.lower is not None]
     mean = metrics["markers"]["mean_rms_mm"] if metrics["markers"] else None
     tiles = [{"value": number(mean, digits=2), "unit": "mm", "label": "markers, mean RMS"}]
-    if forces:
-        names = listed([name for name in rms if name.startswith("f")])
-        value = " / ".join(number(force, digits=2) for force in forces)
-        tiles.append({"value": value, "unit": "N", "label": f"ground forces {names}, RMS"})
-    if moments:
-        names = listed([name for name in rms if name.startswith("m")])
-        value = " / ".join(number(moment, digits=2) for moment in moments)
-        tiles.append({"value": value, "unit": "N m", "label": f"ground moment {names}, RMS"})
+    for letter, what, unit in (("f", "ground forces", "N"), ("m", "ground moment", "N m")):
+        if names := [name for name in rms if name.startswith(letter)]:
+            value = " / ".join(number(rms[name], digits=2) for name in names)
+            tiles.append({"value": value, "unit": unit, "label": f"{what} {listed(names)}, RMS"})
     tiles.append({"value": f"{len(stuck)} of {len(free)}", "unit": "", "label": "parameters on a bound"})
     slow = estimate.timing.median_us >= 1000.0
     step = number(estimate.timing.median_us * (1e-3 if slow else 1.0), digits=2)

@@ -10,8 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynakin.report.labels import is_planar
-from dynakin.report.plot import ESTIMATED
-from dynakin.report.styles import SIDE_COLOURS, LineStyle, side_of
+from dynakin.report.styles import ESTIMATED_LINE, SIDE_COLOURS, LineStyle, side_of
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.power import root_coordinates
 from dynakin.results.measures.sources import legs_of
@@ -30,7 +29,7 @@ def values_of(estimate: Estimate, name: str) -> np.ndarray:
 def side_lines(estimate: Estimate) -> dict[str, LineStyle]:
     """Line of the right, the left and the middle; in a plane that of the estimate."""
     if is_planar(estimate):
-        return {"": LineStyle("estimated", ESTIMATED, 1.2, band=True)}
+        return {"": ESTIMATED_LINE}
     return {side: LineStyle(side, colour, 1.2, band=True) for side, colour in SIDE_COLOURS.items()}
 
 

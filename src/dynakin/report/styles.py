@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from dynakin.report.plot import ESTIMATED, MEASURED, QUIET, REFERENCE
+from dynakin.report.plot import ESTIMATED, LIMIT, MEASURED, QUIET, REFERENCE
 
 # Paul Tol's "muted" scheme (SRON/EPS/TN/09-002), made for people with any kind of colour vision; the light ones are
 # darkened to be seen as thin lines on white. Neighbours in the body are far apart in hue or lightness.
@@ -62,6 +62,9 @@ class LineStyle:
         return " ".join(f"{10.0 * self.width * length:.0f}" for length in _PATTERNS[self.dash])
 
 
+MEASURED_LINE, ESTIMATED_LINE = LineStyle("measured", MEASURED, 2.6), LineStyle("estimated", ESTIMATED, 1.2, band=True)
+BOUND_LINE = LineStyle("bound", LIMIT, 1.0, "dashed")
+BAND = "± 2 standard deviations"
 DERIVED_LINE = LineStyle("derived from the motion", QUIET, 1.2, "dashed")
 """In the key of figures in which some of a line is derived, because a contact is not measured."""
 
@@ -98,7 +101,7 @@ def method_styles(names: Iterable[str]) -> dict[str, LineStyle]:
     filters = 0
     for name in names:
         if name == "measured":
-            found[name] = LineStyle(name, MEASURED, 2.6)
+            found[name] = MEASURED_LINE
         elif name.startswith("AT"):
             found[name] = LineStyle(name, REFERENCE, 1.1, "dashed")
         elif name.startswith("classical"):

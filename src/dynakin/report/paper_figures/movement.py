@@ -29,7 +29,7 @@ from dynakin.report.sections.repetitions import (
     plots_by_method,
 )
 from dynakin.report.sides import joints_of, side_lines, values_of
-from dynakin.report.styles import DERIVED_LINE, LineStyle, method_styles
+from dynakin.report.styles import BAND, DERIVED_LINE, LineStyle, method_styles
 from dynakin.results.estimate import COMPONENTS, Estimate
 from dynakin.results.measures.fit import signal_fit
 from dynakin.results.measures.mean_curves import PERCENT, estimate_curves
@@ -130,8 +130,7 @@ def angles_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure
 
 def wrench_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
     """Figure 6: the wrench as measured, estimated, and from the table and classical angles ("AT")."""
-    measured = estimate.data["wrench_measured"].transpose("time", "component").values
-    estimated = estimate.data["wrench_estimated"].transpose("time", "component").values
+    measured, estimated = (values_of(estimate, f"wrench_{kind}") for kind in ("measured", "estimated"))
     shown = [k for k in range(len(COMPONENTS)) if np.isfinite(estimated[:, k]).any()]
     if not shown:
         return None
@@ -161,29 +160,26 @@ def wrench_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure
 
 def knee_moment_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
     """Figure 7: the moment about each knee, estimated, and from the table and classical angles ("AT")."""
-    names = [name for name in estimate.coordinate_names if "knee" in name]
-    if not is_planar(estimate):
-        moved = {k for joint in joints_of(estimate) for k in joint.columns.values()}
-        names = [name for name in names if estimate.coordinate_names.index(name) in moved]
-    known = np.isfinite(values_of(estimate, "moments")).any(axis=0)
-    names = [name for name in names if known[estimate.coordinate_names.index(name)]]
-    if not names:
+    moments, names = values_of(estimate, "moments"), estimate.coordinate_names
+    free = sorted(k for joint in joints_of(estimate) for k in joint.columns.values())
+    knees = [k for k in free if "knee" in names[k] and np.isfinite(moments[:, k]).any()]
+    if not knees:
         return None
-    source = moment_sources(estimate.data)[:, [estimate.coordinate_names.index(name) for name in names]]
-    figure = Figure(figsize=(4.6, 0.5 + 2.3 * len(names)), layout="constrained")
-    every = figure.subplots(len(names), 1, sharex=True, squeeze=False).ravel()
+    sources = moment_sources(estimate.data) == DERIVED
+    figure = Figure(figsize=(4.6, 0.5 + 2.3 * len(knees)), layout="constrained")
+    every = figure.subplots(len(knees), 1, sharex=True, squeeze=False).ravel()
     at = _reference(comparison, AT)
     differences = {row.coordinate: row for row in moment_differences([] if comparison is None else [comparison])}
-    for axes, name, derived in zip(every, names, (source == DERIVED).T, strict=True):
-        moment = estimate.data["moments"].sel(coordinate=name).values
+    for axes, k in zip(every, knees, strict=True):
+        name, moment, derived = names[k], moments[:, k], sources[:, k]
         draw_sourced(axes, estimate.time, moment, derived, color=ESTIMATED, linewidth=1.2)
         if "moments_sd" in estimate.data:
-            sd = np.where(derived, np.nan, estimate.data["moments_sd"].sel(coordinate=name).values)
+            sd = np.where(derived, np.nan, values_of(estimate, "moments_sd")[:, k])
             axes.fill_between(estimate.time, moment - 2.0 * sd, moment + 2.0 * sd, color=ESTIMATED, alpha=0.2, lw=0)
         note = moment_note(estimate, name)
         axes.set_title(f"{sentence(words(name))} moment, N m{f' ({note})' if note else ''}")
         if at is not None:
-            _draw(axes, estimate.time, at.moments[:, estimate.coordinate_names.index(name)], at)
+            _draw(axes, estimate.time, at.moments[:, k], at)
             row = differences[name]
             axes.set_xlabel(
                 f"time, s\nRMS difference {number(row.rms.mean, 'N m')}, "
@@ -192,7 +188,7 @@ def knee_moment_figure(estimate: Estimate, comparison: Trial | None = None) -> F
         else:
             axes.set_xlabel("time, s")
         axes.set_xlim(float(estimate.time[0]), float(estimate.time[-1]))
-    _key(figure, every[0], [_EKF, *([_DERIVED] if (source == DERIVED).any() else []), *_styles(at)])
+    _key(figure, every[0], [_EKF, *([_DERIVED] if sources[:, knees].any() else []), *_styles(at)])
     return figure
 
 
@@ -233,7 +229,7 @@ def _key(
     styles: Sequence[LineStyle],
     *,
     band: str = "",
-    what: str = "± 2 standard deviations",
+    what: str = BAND,
     columns: int = 4,
 ) -> None:
     """One line of words above the panels, each with the line that it names; ``band``: its colour."""

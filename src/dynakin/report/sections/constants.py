@@ -13,6 +13,7 @@ from dynakin.report.chart import Bound, Line, Panel, chart
 from dynakin.report.labels import parameter_label, short_marker_names, signed_percent
 from dynakin.report.plot import ESTIMATED, GRID, INK, MEASURED, QUIET, new_axes, to_svg
 from dynakin.report.sections.section import Page, Section
+from dynakin.report.styles import BAND, BOUND_LINE, ESTIMATED_LINE
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.posterior import JUDGEMENT_WORDS, KNOWN, NOTHING, group_of, told_in_words
@@ -31,7 +32,7 @@ class ShareRow:
     sizes: str
 
 
-_KEY = ("estimated", "band", "bound")
+_KEY = (ESTIMATED_LINE, BOUND_LINE)
 
 
 def length_section(page: Page) -> Section:
@@ -42,7 +43,8 @@ def length_section(page: Page) -> Section:
         "Segment lengths",
         "How the filter settles on each length. A line on its bound says that the model does not fit there.",
         [_path(page, p, words(element(p.name).owner), *_length_unit(p)) for p in lengths],
-        key=_KEY,
+        lines=_KEY,
+        band=BAND,
     )
 
 
@@ -56,7 +58,8 @@ def mass_section(page: Page) -> Section:
         f"From the anthropometric table to what the plates and the movement suggest.{sides} Masses are hard to "
         "tell apart from a squat alone: read them with their bands.",
         [_path(page, p, words(p.segment), 1.0, "kg") for p in masses],
-        key=_KEY,
+        lines=_KEY,
+        band=BAND,
     )
 
 

@@ -11,7 +11,7 @@ from dynakin.report.labels import COMPONENT_LABELS
 from dynakin.report.plot import ESTIMATED, MEASURED
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.sides import side_key, values_of
-from dynakin.report.styles import DERIVED_LINE, SIDE_COLOURS
+from dynakin.report.styles import DERIVED_LINE, ESTIMATED_LINE, MEASURED_LINE, SIDE_COLOURS
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import AXES, COMPONENTS, Estimate
 from dynakin.results.measures.feet import foot_sources
@@ -45,8 +45,7 @@ def wrench_section(page: Page) -> Section | None:
         "Ground reaction",
         _IN_A_PLANE if page.planar else _IN_SPACE,
         panels,
-        key=("measured", "estimated"),
-        lines=(DERIVED_LINE,) if derived[:, shown].any() else (),
+        lines=(MEASURED_LINE, ESTIMATED_LINE, *((DERIVED_LINE,) if derived[:, shown].any() else ())),
     )
 
 
@@ -69,21 +68,20 @@ def foot_section(page: Page) -> Section | None:
         "feet",
         "Feet",
         figures["verdict"],
-        key=("measured",),
-        lines=(*side_key(estimate), *((DERIVED_LINE,) if derived else ())),
+        lines=(MEASURED_LINE, *side_key(estimate), *((DERIVED_LINE,) if derived else ())),
         tables=[table for table in (_adjustments(figures),) if table.rows],
         parts=[part for foot in estimate.foot_names if (part := _foot_part(estimate, foot)).panels],
     )
 
 
 def _adjustments(figures: dict[str, Any]) -> TextTable:
-    rows = []
-    for foot, rms in figures["adjustment_rms"].items():
-        cells = tuple("–" if rms is None else number(rms[name], digits=2) for name in COMPONENTS)
-        rows.append((f"{sentence(foot)} foot, adjustment", *cells))
+    each = {f"{sentence(foot)} foot, adjustment": rms for foot, rms in figures["adjustment_rms"].items()}
     if figures["remainder_rms"] is not None:
-        cells = tuple(number(figures["remainder_rms"][name], digits=2) for name in COMPONENTS)
-        rows.append((f"In flight, left over ({figures['flight_frames']} frames)", *cells))
+        each[f"In flight, left over ({figures['flight_frames']} frames)"] = figures["remainder_rms"]
+    rows = [
+        (what, *("–" if rms is None else number(rms[name], digits=2) for name in COMPONENTS))
+        for what, rms in each.items()
+    ]
     headings = ("RMS", *(f"{name}, {COMPONENT_LABELS[name][1]}" for name in COMPONENTS))
     return TextTable("What was changed, in place of a residual", headings, rows, tuple(range(1, 7)))
 

@@ -10,14 +10,12 @@ from dynakin.report.chart import Line, Panel, band_is_too_wide, chart
 from dynakin.report.labels import moment_note
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.sides import REGIONS, Joint, joints_of, normalising_mass, side_key, side_lines, values_of
-from dynakin.report.styles import DERIVED_LINE
+from dynakin.report.styles import BAND, DERIVED_LINE
 from dynakin.results.measures.angles import convention_of
 from dynakin.results.measures.feet import ROUNDING
 from dynakin.results.measures.power import root_coordinates
 from dynakin.results.measures.sources import DERIVED, MEASURED, UNKNOWN, moment_sources
 from dynakin.results.naming import listed, number
-
-BAND = "± 2 standard deviations"
 
 
 def angle_section(page: Page) -> Section:

@@ -12,7 +12,7 @@ from dynakin.report.plot import ESTIMATED, INK, MEASURED, QUIET, new_axes, to_sv
 from dynakin.report.sections.forces import DIRECTIONS
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.sides import values_of
-from dynakin.report.styles import LineStyle
+from dynakin.report.styles import ESTIMATED_LINE, MEASURED_LINE, LineStyle
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import AXES
 from dynakin.results.naming import number, words
@@ -40,7 +40,7 @@ def marker_section(page: Page) -> Section | None:
             ],
             folded=_over_time(page, measured, estimated),
             folded_title="Every marker over time",
-            key=("measured", "estimated"),
+            lines=(MEASURED_LINE, ESTIMATED_LINE),
         )
     order = sorted(rms, key=lambda name: -(rms[name] or 0.0))
     half = -(-len(order) // 2)

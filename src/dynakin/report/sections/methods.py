@@ -9,7 +9,6 @@ import numpy as np
 
 from dynakin.report.chart import Line, Panel, chart
 from dynakin.report.labels import COMPONENT_LABELS, moment_note
-from dynakin.report.plot import MEASURED as MEASURED_COLOUR
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.styles import DERIVED_LINE, LineStyle, method_styles
 from dynakin.report.text_tables import table2_text
@@ -18,7 +17,7 @@ from dynakin.results.measures.mean_curves import MEASURED
 from dynakin.results.measures.sources import DERIVED, moment_sources
 from dynakin.results.naming import number, sentence, words
 from dynakin.validation.differences import AngleDifference, MomentDifference, angle_differences, moment_differences
-from dynakin.validation.methods import AT, CLASSICAL, Method, Trial
+from dynakin.validation.methods import AT, CLASSICAL, Trial
 from dynakin.validation.statistics import Spread
 from dynakin.validation.table2 import table2
 
@@ -62,12 +61,13 @@ def wrench_part(trial: Trial, key: str) -> Section:
         if not trial.of_kind(AT) or not np.isfinite(trial.measured_wrench[:, k]).any():
             continue
         title, unit = COMPONENT_LABELS[component]
-        lines = _lines(trial, methods, [method.wrench[:, k] for method in methods])
-        measured = (method_styles([MEASURED])[MEASURED], trial.measured_wrench[:, k])
+        lines = {MEASURED: trial.measured_wrench[:, k], **{method.name: method.wrench[:, k] for method in methods}}
         note = _each({method.name: rms[component, method.name] for method in reversed(methods)}, unit)
-        panels.append(_overlaid(title, unit, trial, [measured, *lines], derived[:, k], note=f"RMS: {note}"))
-    styles = _key(trial, [MEASURED], methods, derived=bool(derived.any()))
-    return Section(f"{key}-wrench", "Ground reaction by method", "", panels, lines=styles)
+        panels.append(_overlaid(trial, title, unit, lines, f"RMS: {note}", derived[:, k]))
+    names = [MEASURED, *(method.name for method in methods)]
+    return Section(
+        f"{key}-wrench", "Ground reaction by method", "", panels, lines=_key(trial, names, bool(derived.any()))
+    )
 
 
 def angle_part(trial: Trial, key: str) -> Section:
@@ -80,17 +80,17 @@ def angle_part(trial: Trial, key: str) -> Section:
             continue  # locked
         turn = bool(trial.rotation[k])
         unit, scale = ("deg", np.degrees(1.0)) if turn else ("mm", 1000.0)
-        lines = _lines(trial, methods, [scale * method.coordinates[:, k] for method in methods])
+        lines = {method.name: scale * method.coordinates[:, k] for method in methods}
         note = f"RMS difference {_each({row.method: row.rms for row in rows}, unit)}"
         if len(rows) == 1:
             note += f", {number(rows[0].rms_about_mean.mean, unit)} about its mean"
-        panels.append(_overlaid(sentence(words(name)), unit, trial, lines, note=note))
+        panels.append(_overlaid(trial, sentence(words(name)), unit, lines, note))
     return Section(
         f"{key}-angles",
         "Joint angles beside the classical method",
         "A constant difference is mostly a matter of where zero is; what is left about the mean is the movement’s.",
         panels,
-        lines=_key(trial, [], methods),
+        lines=_key(trial, [method.name for method in methods]),
     )
 
 
@@ -103,14 +103,13 @@ def moment_part(trial: Trial, key: str) -> Section:
     for name, rows in _by_coordinate(moment_differences([trial])).items():
         k = trial.coordinate_names.index(name)
         unit = rows[0].unit
-        lines = _lines(trial, methods, [method.moments[:, k] for method in methods])
+        lines = {method.name: method.moments[:, k] for method in methods}
         note = f"RMS difference {_each({row.method: row.rms for row in rows}, unit)}"
         if len(rows) == 1:
             note += f", {number(rows[0].nrms_rms_percent.mean, digits=2)} % of AT’s RMS"
-        about = moment_note(estimate, name)
-        note = f"{about}; {note}" if about else note
-        title = f"{sentence(words(name))} moment"
-        panels[name] = _overlaid(title, unit, trial, lines, derived[:, k], note=note)
+        if about := moment_note(estimate, name):
+            note = f"{about}; {note}"
+        panels[name] = _overlaid(trial, f"{sentence(words(name))} moment", unit, lines, note, derived[:, k])
     knees = [panel for name, panel in panels.items() if "knee" in name]
     others = [panel for name, panel in panels.items() if "knee" not in name]
     return Section(
@@ -120,7 +119,7 @@ def moment_part(trial: Trial, key: str) -> Section:
         knees or others,
         folded=others if knees else [],
         folded_title="The other joints’ moments against AT",
-        lines=_key(trial, [], methods, derived=bool(derived.any())),
+        lines=_key(trial, [method.name for method in methods], bool(derived.any())),
     )
 
 
@@ -129,32 +128,24 @@ PARTS = (wrench_part, angle_part, moment_part)
 
 
 def _overlaid(
-    title: str,
-    unit: str,
-    trial: Trial,
-    lines: Sequence[tuple[LineStyle, np.ndarray]],
-    derived: np.ndarray | None = None,
-    *,
-    note: str,
+    trial: Trial, title: str, unit: str, lines: dict[str, np.ndarray], note: str, derived: np.ndarray | None = None
 ) -> Panel:
-    """Signals (T,) of several methods over time, the first at the bottom; solid ones but the measured are dashed where
-    they are ``derived`` (T,) bool, because a contact is not measured."""
-    drawn = []
-    for style, values in lines:
-        own = derived if style.dash == "solid" and style.colour != MEASURED_COLOUR else None
-        drawn.append(Line(values, style.colour, style.width, dashed=own, dashes=style.dashes))
+    """Signals (T,) by method, the first at the bottom; a filter's is dashed where it is ``derived`` (T,) bool, because
+    a contact is not measured."""
+    styles, drawn = _styles(trial), []
+    for name, values in lines.items():
+        own = derived if styles[name].dash == "solid" and name != MEASURED else None
+        drawn.append(Line(values, styles[name].colour, styles[name].width, dashed=own, dashes=styles[name].dashes))
     return chart(title, unit, trial.time, drawn, note=note)
 
 
-def _lines(trial: Trial, methods: Sequence[Method], values: list[np.ndarray]) -> list[tuple[LineStyle, np.ndarray]]:
-    styles = method_styles(method.name for method in trial.methods)
-    return [(styles[method.name], signal) for method, signal in zip(methods, values, strict=True)]
+def _styles(trial: Trial) -> dict[str, LineStyle]:
+    return method_styles([MEASURED, *(method.name for method in trial.methods)])
 
 
-def _key(trial: Trial, more: list[str], methods: Sequence[Method], *, derived: bool = False) -> tuple[LineStyle, ...]:
-    styles = method_styles([MEASURED, *(method.name for method in trial.methods)])
-    own = tuple(styles[name] for name in [*more, *(method.name for method in methods)])
-    return (*own, DERIVED_LINE) if derived else own
+def _key(trial: Trial, names: Sequence[str], derived: bool = False) -> tuple[LineStyle, ...]:
+    styles = _styles(trial)
+    return (*(styles[name] for name in names), *((DERIVED_LINE,) if derived else ()))
 
 
 def _each(figures: dict[str, Spread], unit: str) -> str:

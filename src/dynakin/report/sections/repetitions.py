@@ -11,7 +11,7 @@ from dynakin.report.chart import Line, Panel, chart
 from dynakin.report.labels import COMPONENT_LABELS, moment_note
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.sides import Joint, joints_of, side_key, side_lines
-from dynakin.report.styles import LineStyle, method_styles
+from dynakin.report.styles import ESTIMATED_LINE, MEASURED_LINE, LineStyle, method_styles
 from dynakin.results.estimate import COMPONENTS, Estimate
 from dynakin.results.measures.mean_curves import MEASURED, PERCENT, MeanCurve
 from dynakin.results.measures.repetitions import Found
@@ -55,9 +55,7 @@ def side_repetitions(estimate: Estimate, found: Found, curves: Sequence[MeanCurv
     }
     more = " All curves are in repetitions.csv."
     more += f" No cycle is left of the moments of {listed(missing, 12)}." if missing else ""
-    keys = dict.fromkeys(KINDS, side_key(estimate)) | {
-        "wrench": tuple(method_styles((MEASURED, own[0].method)).values())
-    }
+    keys = dict.fromkeys(KINDS, side_key(estimate)) | {"wrench": (MEASURED_LINE, ESTIMATED_LINE)}
     return _section(found, plots, keys, more=more)
 
 

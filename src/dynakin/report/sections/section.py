@@ -49,9 +49,8 @@ class Page:
 class Section:
     """A heading, paragraphs, tables and panels; ``folded`` panels open on a click.
 
-    key: names of the lines that all pages know ("measured", "estimated", "band", "bound"); lines: further ones. band:
-    what the bands of ``lines`` are. notes: further lines of words. parts: sections of their own, below a smaller
-    heading.
+    lines: the key of the panels. band: what the bands of ``lines`` are. notes: further lines of words. parts: sections
+    of their own, below a smaller heading.
     """
 
     anchor: str
@@ -61,7 +60,6 @@ class Section:
     wide: list[Panel] = field(default_factory=list)
     folded: list[Panel] = field(default_factory=list)
     folded_title: str = ""
-    key: tuple[str, ...] = ()
     lines: tuple[LineStyle, ...] = ()
     band: str = ""
     tables: list[TextTable] = field(default_factory=list)
