@@ -117,7 +117,7 @@ class Estimator:
         """Estimate a whole recording.
 
         Frames in which the filter lost the person are NaN (`Estimate.lost`), and a message names them; of a trial that
-        was lost as a whole `Estimate.why_lost` gives the reason.
+        was lost as a whole `results.measures.tracking.why_lost` gives the reason.
 
         Args:
             recording: markers and plates, as `read` gives them.
