@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -73,8 +74,11 @@ def test_what_was_recorded_is_what_came(squat: Recording, tmp_path: Path) -> Non
 
 def test_a_recorded_session_becomes_the_usual_output(squat: Recording, tmp_path: Path) -> None:
     record(squat, tmp_path / "r")
-    estimate = finish(tmp_path / "r", tmp_path / "out").estimate
-    assert len(estimate.time) == squat.n_frames
+    result = finish(tmp_path / "r", tmp_path / "out")
+    assert len(result.estimate.time) == squat.n_frames and result.failures.found == []
+    assert result.comparison is not None and len(result.comparison.methods) == 3  # as `dynakin run` gives it
+    config = tomllib.loads((tmp_path / "out" / "config.toml").read_text())
+    assert (config["trial"], config["preset"]) == ("r", "default")
     assert {"coordinates.mot", "estimate.nc", "report.html"} <= {path.name for path in (tmp_path / "out").iterdir()}
 
 

@@ -13,18 +13,16 @@ from rich.table import Table
 
 from dynakin.cli.console import busy, out, progress_bar, table
 from dynakin.cli.summary import end, print_summary
-from dynakin.filter.estimator import Estimator
-from dynakin.identification.observability.trial import identifiability
-from dynakin.model.definition import load_model
-from dynakin.pipeline.result import Result
+from dynakin.pipeline.stages import judged
 from dynakin.results.estimate import Estimate
+from dynakin.results.failures import Failures
 from dynakin.results.files.folder import check_output_writable
 from dynakin.results.measures.fit import truth_error
 from dynakin.results.measures.metrics import evaluation_window
-from dynakin.settings import presets
-from dynakin.settings.subject import Subject
+from dynakin.settings.settings import Settings
+from dynakin.validation.case import case_of
 from dynakin.validation.coverage import block_coverage, parameter_coverage
-from dynakin.validation.methods import trial_of
+from dynakin.validation.methods import estimate_each
 from dynakin.validation.truth import FIGURES, LEG, parameter_errors, truth_errors
 
 if TYPE_CHECKING:
@@ -42,18 +40,20 @@ def demo(
     check_output_writable(output)
     trial = simulate_squat(seed=seed, duration_s=duration)
     who = trial.truth.subject
-    subject = Subject(mass_kg=who.mass_kg, height_m=who.height_m, sex=who.sex)
-    model = load_model("sagittal7", subject, markers="opencap")
+    keys = {"trial": trial.recording.name, "model": "sagittal7", "markers": "opencap", "output": output}
+    keys |= {"mass_kg": who.mass_kg, "height_m": who.height_m, "sex": who.sex}
+    # with the paper's settings too, for comparison
+    case = case_of(Settings.of(keys, "demo"), ("default", "paper"), recording=trial.recording)
+    failures = Failures()
     with progress_bar("estimating") as progress:
-        estimate, tracker = Estimator(model).track(trial.recording, progress=progress)
-    with busy("and with the paper's settings, for comparison"):
-        paper = Estimator(model, presets.paper()).run(trial.recording)
-    demo_config = {"trial": trial.recording.name, "preset": "default", "seed": seed, "duration_s": duration}
-    estimate = replace(estimate, config=demo_config | estimate.config)
-    comparison = trial_of({"default": estimate, "paper": paper}, tracker.calibrated, model)
-    methods = {method.name: method.data for method in comparison.methods}
+        estimates, lost, trackers = estimate_each(case.recording, case.setup, progress=progress, failures=failures)
+    with busy("comparing with the truth and the reference methods"):
+        result = judged(case, estimates, lost, trackers, failures)
+    drawn = {"seed": seed, "duration_s": duration}
+    result = replace(result, estimate=replace(result.estimate, config=drawn | result.estimate.config))
+    estimate, comparison = result.estimate, result.comparison
+    methods = {method.name: method.data for method in comparison.methods} if comparison else {}
     with busy("writing results and report"):
-        result = Result(estimate, tracker.calibrated, comparison, identifiability(tracker, estimate))
         folder = result.save(output, check=False)
     console = out()
     console.print(methods_by_error(methods, estimate, trial.truth))
