@@ -169,7 +169,9 @@ def test_run_replaces_its_own_output_and_draws_figures(data_dir: Path, tmp_path:
     options = ["--model", "squat7", "--mass", "78.6", "-o", str(tmp_path / "out")]
     assert main(["run", trial, *options]) == 0
     gains = tmp_path / "gains.csv"
-    gains.write_text("log10_coordinate,log10_speed,log10_acceleration,criterion\n3,2,3,5\n4,2,3,\n")
+    gains.write_text(
+        "log10_coordinate_variance,log10_speed_variance,log10_acceleration_variance,criterion\n3,2,3,5\n4,2,3,\n"
+    )
     figures = ["--figures", str(tmp_path / "figures"), "--sensitivity", str(gains)]
     assert main(["run", trial, *options, *figures]) == 0
     drawn = {entry.suffix for entry in (tmp_path / "figures").iterdir()}

@@ -59,10 +59,10 @@ def test_figure_has_three_slices_through_the_optimum_with_units(table: Path, tmp
 @pytest.mark.parametrize(
     ("content", "expected"),
     [
-        ("a,b\n1,2\n", "no column log10_coordinate, expected log10_coordinate, log10_speed"),
+        ("a,b\n1,2\n", "no column log10_coordinate_variance, expected log10_coordinate_variance, log10_speed_variance"),
         (HEADER, "no rows"),
-        (f"{HEADER}\n1,2,x,4", "row 1: log10_acceleration is 'x', expected a number"),
-        (f"{HEADER}\n1,,3,4", "row 1: log10_speed is blank, expected a finite number"),
+        (f"{HEADER}\n1,2,x,4", "row 1: log10_acceleration_variance is 'x', expected a number"),
+        (f"{HEADER}\n1,,3,4", "row 1: log10_speed_variance is blank, expected a finite number"),
         (f"{HEADER}\n1,2,3,4\n1,2,3,5", "[1.0, 2.0, 3.0] stand there twice"),
         (f"{HEADER}\n1,2,3,nan", "no finite criterion"),
         (f"{HEADER}\n1,2,3", "no finite criterion"),
@@ -83,5 +83,5 @@ def test_what_is_no_grid_is_refused(tmp_path: Path) -> None:
     with pytest.raises(ConfigError, match=r"text\.nc: cannot be read"):
         read_sensitivity(tmp_path / "text.nc")
     xr.Dataset({"criterion": ("a", [1.0])}).to_netcdf(tmp_path / "other.nc", engine="h5netcdf")
-    with pytest.raises(ConfigError, match="no variable criterion over log10_coordinate"):
+    with pytest.raises(ConfigError, match="no variable criterion over log10_coordinate_variance"):
         read_sensitivity(tmp_path / "other.nc")

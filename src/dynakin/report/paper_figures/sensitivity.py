@@ -24,7 +24,7 @@ from dynakin.report.plot import INK, QUIET
 
 Array = npt.NDArray[np.float64]
 
-GAINS = ("log10_coordinate", "log10_speed", "log10_acceleration")
+GAINS = ("log10_coordinate_variance", "log10_speed_variance", "log10_acceleration_variance")
 CRITERION = "criterion"
 LABEL, UNIT = "sum of RMS differences", "mm + N + N m"
 """The paper's criterion: markers and wrench together."""
@@ -58,9 +58,10 @@ class Sensitivity:
 def read_sensitivity(path: str | Path) -> Sensitivity:
     """Read a grid of gains: CSV or netCDF.
 
-    CSV: columns ``log10_coordinate``, ``log10_speed``, ``log10_acceleration`` and ``criterion``, one row a combination,
-    in any order; a blank or ``nan`` criterion is a filter that diverged. netCDF: a variable ``criterion`` over
-    coordinates of these three names; its attributes ``long_name`` and ``units`` say what it is.
+    CSV: columns ``log10_coordinate_variance``, ``log10_speed_variance``, ``log10_acceleration_variance`` and
+    ``criterion``, one row a combination, in any order; a blank or ``nan`` criterion is a filter that diverged. netCDF:
+    a variable ``criterion`` over coordinates of these three names; its attributes ``long_name`` and ``units`` say what
+    it is.
 
     Raises:
         ConfigError: not such a file, or no finite criterion.
