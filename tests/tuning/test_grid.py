@@ -188,7 +188,7 @@ def test_a_range_that_is_none_is_refused(name: str, span: tuple, expected: str) 
     ("options", "expected"),
     [
         (["--vary", "jerk_density_rad2_s5"], "--vary: found 'jerk_density_rad2_s5', expected NAME=FROM:TO:STEPS"),
-        (["--vary", "speed=1:10:2"], "each once"),
+        (["--vary", "speed_variance=1:10:2"], "each once"),
         (["--backend", "dask"], "--scheduler ADDRESS"),
         (["--preset", "papr"], "preset 'papr' is unknown"),
     ],

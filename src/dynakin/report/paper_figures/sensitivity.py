@@ -59,9 +59,9 @@ def read_sensitivity(path: str | Path) -> Sensitivity:
     """Read a grid of gains: CSV or netCDF.
 
     CSV: columns ``log10_coordinate_variance``, ``log10_speed_variance``, ``log10_acceleration_variance`` and
-    ``criterion``, one row a combination, in any order; a blank or ``nan`` criterion is a filter that
-    diverged. netCDF: a variable ``criterion`` over coordinates of these three names; its attributes ``long_name`` and
-    ``units`` say what it is.
+    ``criterion``, one row a combination, in any order; a blank or ``nan`` criterion is a filter that diverged. netCDF:
+    a variable ``criterion`` over coordinates of these three names; its attributes ``long_name`` and ``units`` say what
+    it is.
 
     Raises:
         ConfigError: not such a file, or no finite criterion.
