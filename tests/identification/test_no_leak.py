@@ -76,8 +76,8 @@ def test_a_trial_is_foretold_without_its_plates(case: Case) -> None:
 
 
 def test_plates_of_a_judged_trial_do_not_tell_the_mass(case: Case) -> None:
-    unweighed = estimator()
-    unweighed.model = replace(unweighed.model, subject=unweighed.model.subject.changed(mass_kg=None))
+    model = estimator().model
+    unweighed = replace(estimator(), model=model.with_subject(model.subject.changed(mass_kg=None)))
     with pytest.raises(ModelError, match="body mass is not known; expected it"):
         Common.measure(unweighed, case.sims[0].recording)
     common = Common.measure(unweighed, case.sims[0].recording, case.common.static)
