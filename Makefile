@@ -87,13 +87,13 @@ test-cpp-install: test-cpp
 
 # What editors and mypy know of the compiled module; committed, so lint checks that it is up to date.
 stubs: $(VENV)/.dev
-	$(BIN)/python -m nanobind.stubgen -q -m dynakin._core -o src/dynakin/_core.pyi
-	$(BIN)/python -m nanobind.stubgen -q -m dynakin._cpu -o src/dynakin/_cpu.pyi
+	$(BIN)/python -m nanobind.stubgen -q -m dynakin.bindings._core -o src/dynakin/bindings/_core.pyi
+	$(BIN)/python -m nanobind.stubgen -q -m dynakin.bindings._cpu -o src/dynakin/bindings/_cpu.pyi
 
 lint: $(VENV)/.dev
 	@mkdir -p build/stubs
-	@for m in _core _cpu; do $(BIN)/python -m nanobind.stubgen -q -m dynakin.$$m -o build/stubs/$$m.pyi && \
-	  diff -u src/dynakin/$$m.pyi build/stubs/$$m.pyi || { echo "src/dynakin/$$m.pyi is out of date: run make stubs" >&2; exit 1; }; done
+	@for m in _core _cpu; do $(BIN)/python -m nanobind.stubgen -q -m dynakin.bindings.$$m -o build/stubs/$$m.pyi && \
+	  diff -u src/dynakin/bindings/$$m.pyi build/stubs/$$m.pyi || { echo "src/dynakin/bindings/$$m.pyi is out of date: run make stubs" >&2; exit 1; }; done
 	$(BIN)/ruff check src tests benchmarks examples
 	$(BIN)/ruff format --check src tests benchmarks examples
 	$(BIN)/mypy

@@ -71,7 +71,7 @@ nb::tuple interleaved(Filter& filter, const Array1& time, const Array3& markers,
 }  // namespace
 
 NB_MODULE(dynakin_bench, m) {
-  nb::module_::import_("dynakin._core");  // registers Model and FilterSettings
+  nb::module_::import_("dynakin.bindings._core");  // registers Model and FilterSettings
   m.def("interleaved",
         [](const Model& model, const FilterSettings& settings, const Eigen::VectorXd& x0, const Eigen::MatrixXd& P0,
            const Array1& time, const Array3& markers, const Array2& wrench, int rows) {

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from dynakin import _core
+from dynakin.bindings import _core
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from contextlib import suppress
 
 import numpy as np
 
-from dynakin import _core
+from dynakin.bindings import _core
 from dynakin.errors import DynakinError, RecordingError
 from dynakin.filter.estimator import Estimator
 from dynakin.identification.batch import FIRST_SIGMA, Posterior, at_start, identify_batch

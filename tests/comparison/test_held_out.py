@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dynakin import _core
+from dynakin.bindings import _core
 from dynakin.errors import LostError, RecordingError
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.simulation.output import SimulatedTrial

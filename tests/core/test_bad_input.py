@@ -7,7 +7,7 @@ import copy
 import numpy as np
 import pytest
 
-from dynakin import _core
+from dynakin.bindings import _core
 from dynakin.errors import DivergenceError
 from support.core.bridge import filter_of, model_of
 from support.core.random_models import planar_model, settings, trial

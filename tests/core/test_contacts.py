@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dynakin import _core
+from dynakin.bindings import _core
 from support.core.bridge import close, filter_of, model_of
 from support.core.differences import BLOCKS, central_differences, compare
 from support.core.random_models import FEET, ROOT, floating_model, prior_sd, random_state, settings, trial

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dynakin import _core
+from dynakin.bindings import _core
 from support.core.bridge import close, model_of
 from support.core.random_models import planar_model, random_state, spatial_model, with_functions, with_slow_errors
 from support.oracle import measurement

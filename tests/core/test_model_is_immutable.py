@@ -7,7 +7,7 @@ import pickle
 import numpy as np
 import pytest
 
-from dynakin import _core
+from dynakin.bindings import _core
 from support.core.bridge import filter_of, model_of, to_core
 from support.core.random_models import (
     planar_model,

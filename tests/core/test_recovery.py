@@ -7,7 +7,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from dynakin import _core
+from dynakin.bindings import _core
 from dynakin.errors import DivergenceError
 from support.core.bridge import filter_of, model_of
 from support.core.random_models import continuous, planar_model, spatial_model, trial, with_slow_errors

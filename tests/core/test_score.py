@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dynakin import _core
+from dynakin.bindings import _core
 from support.core.bridge import filter_of, model_of
 from support.core.own_model import chain, draw, settings
 from support.oracle.state import Layout

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dynakin import _core
+from dynakin.bindings import _core
 from support.core.random_models import planar_model, spatial_model
 from support.core.smoother_cases import BOUNDED, assert_equal, case, deviations, lost_and_found, walk
 from support.oracle.smoother import batch, rauch_tung_striebel

@@ -11,6 +11,7 @@ import pytest
 import xarray as xr
 
 import dynakin
+from dynakin.bindings import _core
 from dynakin.errors import ConfigError, DivergenceError, RecordingError
 from dynakin.pipeline.result import Result
 from dynakin.results.measures.metrics import compute_metrics
@@ -101,7 +102,7 @@ def test_bounds_are_kept_at_every_frame(trial: SimulatedTrial, preset: str) -> N
 
 def test_a_model_survives_pickling(trial: SimulatedTrial) -> None:
     spec = estimator().start(trial.recording).calibrated.spec
-    model = dynakin._core.Model(spec)
+    model = _core.Model(spec)
     again = pickle.loads(pickle.dumps(model))
     assert again.layout.names == model.layout.names
     np.testing.assert_array_equal(again.initial_state(), model.initial_state())

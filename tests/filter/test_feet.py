@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-from dynakin import _core
+from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.filter.assemble import assemble
 from dynakin.filter.foot_wrenches import FootWrenches

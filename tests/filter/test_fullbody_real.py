@@ -8,7 +8,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from dynakin import _core, read
+from dynakin import read
+from dynakin.bindings import _core
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.tracker import Tracker
 from dynakin.model.definition import load_model

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynakin import _core, load_model
+from dynakin import load_model
+from dynakin.bindings import _core
 from dynakin.identification.observability.gauge_words import gauge_in_words, gauges_in_words
 from dynakin.identification.observability.gauges import ZERO, Gauge, gauges_of, sparse_basis
 from dynakin.identification.observability.measured import MeasuredModel

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynakin import _core, load_model
+from dynakin import load_model
+from dynakin.bindings import _core
 from dynakin.errors import DynakinError, ModelError
 from dynakin.identification.observability.base import base_of, in_no_base_parameter, told_alone
 from dynakin.identification.observability.element_words import base_words

@@ -12,7 +12,7 @@ from dynakin.recordings.recording import Recording
 from dynakin.settings.subject import Subject
 from support.made_person import make, stand
 
-_core = pytest.importorskip("dynakin._core", reason="the compiled core is not built")
+_core = pytest.importorskip("dynakin.bindings._core", reason="the compiled core is not built")
 PERSON = Subject(mass_kg=70.0, height_m=1.75, sex="male")
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dynakin import _core
+from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.filter.estimator import Estimator
 from dynakin.model.definition import load_model

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import dynakin
-from dynakin import _core
+from dynakin.bindings import _core
 from dynakin.errors import ConfigError, ModelError, RecordingError
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.loads import with_loads

@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from dynakin import _core
+from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.model.calibration.pose_start import start_posture
 

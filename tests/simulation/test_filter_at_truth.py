@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import dynakin
-from dynakin import _core
+from dynakin.bindings import _core
 from dynakin.simulation.bodies.body import ten_numbers
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import dynakin
+from dynakin.bindings import _core
 from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.recordings.feet.loads import foot_loads
 from dynakin.results.measures.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
@@ -99,7 +100,7 @@ def test_smoothed_moments_and_bands_are_those_with_the_feet(squat: tuple[Live, l
     assert np.sqrt(np.mean((now - smoothed)[50:] ** 2)) < 5.0
     told = [f.deviations["moments"][knees] for f in frames if f.deviations is not None]
     assert told and np.all(np.array(told) > 0.0)
-    plain = dynakin._core.moment_jacobian(live.tracker.core_model, live.tracker.state)
+    plain = _core.moment_jacobian(live.tracker.core_model, live.tracker.state)
     without = np.sqrt(np.einsum("ij,jk,ik->i", plain, live.tracker.covariance, plain))
     assert (np.abs(live.tracker.deviations()["moments"] - without)[knees] > 0.02 * without[knees]).all()
 
@@ -131,7 +132,7 @@ class Standing:
         self.initial, self.model, self.state = tracker.calibrated, tracker.core_model, tracker.state
         self.feet = LiveFeet(self.initial, presets.default(), ("one",), {})
         self.frame = 0
-        places = dynakin._core.marker_positions(self.model, self.state)
+        places = _core.marker_positions(self.model, self.state)
         segments = [marker.segment for marker in self.initial.spec.markers]
         self.middles = [
             places[[s == self.initial.feet[foot] for s in segments]].mean(axis=0) for foot in self.initial.feet

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-from dynakin import _core
+from dynakin.bindings import _core
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import ModelDefinition, load_model
 from dynakin.recordings.recording import Plate, Recording

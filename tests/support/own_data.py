@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from dynakin import _core
+from dynakin.bindings import _core
 from dynakin.filter.augment import continuous_noise, initial_covariance
 from dynakin.filter.core_filter import core_filter
 from dynakin.filter.noise import wrench_covariance

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-import dynakin._core as _core
 from dynakin.absent import finite
+from dynakin.bindings import _core
 from dynakin.filter.events import events_of
 from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.filter.parameters import parameters_of

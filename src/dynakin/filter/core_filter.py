@@ -7,7 +7,7 @@ from collections.abc import Collection
 import numpy as np
 import numpy.typing as npt
 
-import dynakin._core as _core
+from dynakin.bindings import _core
 from dynakin.errors import ConfigError
 from dynakin.filter.augment import continuous_noise, extended, initial_covariance
 from dynakin.filter.noise import gate_limits, marker_variance, process_variance, wrench_covariance

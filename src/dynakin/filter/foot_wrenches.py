@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-import dynakin._core as _core
+from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.filter.samples import in_step
 from dynakin.results.measures.feet import IN_THE_AIR, MEASURED, NOT_MEASURED

@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 from scipy import signal
 
-import dynakin._core as _core
 from dynakin.arrays import runs
+from dynakin.bindings import _core
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.recording import rate_of
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Collection
 import numpy as np
 import numpy.typing as npt
 
-import dynakin._core as _core
+from dynakin.bindings import _core
 from dynakin.errors import ConfigError, DivergenceError, RecordingError
 from dynakin.filter.core_filter import core_filter
 from dynakin.filter.foot_wrenches import FootWrenches

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-import dynakin._core as _core
+from dynakin.bindings import _core
 from dynakin.identification.bodies import Bodies, BodyPriors
 from dynakin.identification.trials import Common
 

@@ -10,7 +10,7 @@ from typing import Protocol
 
 import numpy as np
 
-import dynakin._core as _core
+from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.files import is_file
 from dynakin.model.calibration.calibrated import CalibratedModel, first_centre_of_pressure

@@ -11,7 +11,7 @@ import numpy as np
 import tomli_w
 from pydantic import Field, model_validator
 
-import dynakin._core as _core
+from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.model.calibration.calibrated import CalibratedModel, JointPrior
 from dynakin.model.inertia import INERTIA_NAMES

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 import numpy.typing as npt
 
-import dynakin._core as _core
+from dynakin.bindings import _core
 from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.filter.total_wrench import foot_wrenches
 from dynakin.model.calibration.calibrated import CalibratedModel

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-import dynakin._core as _core
+from dynakin.bindings import _core
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.filter.core_filter import filter_settings
 from dynakin.filter.estimator import Estimator

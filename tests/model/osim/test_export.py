@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-from dynakin import _core
+from dynakin.bindings import _core
 from dynakin.cli.app import app
 from dynakin.errors import ModelError, OutputError
 from dynakin.model.opensim.description import OpenSimModel

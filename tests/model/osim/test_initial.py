@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import dynakin
-from dynakin import _core
+from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition, load_model

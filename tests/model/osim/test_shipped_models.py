@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from dynakin import _core
+from dynakin.bindings import _core
 from dynakin.model.opensim.description import OpenSimModel
 from dynakin.model.opensim.read import read_osim
 from dynakin.model.opensim.scales import scale_names

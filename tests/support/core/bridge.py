@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dynakin import _core
+from dynakin.bindings import _core
 from support.oracle.spec import Axis, Spec
 
 

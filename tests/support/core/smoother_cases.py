@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dynakin import _core
+from dynakin.bindings import _core
 from support.core.bridge import filter_of, model_of
 from support.core.random_models import Trial, continuous, planar_model, settings, spatial_model, trial, with_slow_errors
 from support.oracle import measurement, process, sensors

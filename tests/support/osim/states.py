@@ -6,7 +6,7 @@ import numpy as np
 from numpy.random import Generator
 from numpy.typing import NDArray
 
-from dynakin import _core
+from dynakin.bindings import _core
 from dynakin.model.opensim.description import Coupler, OpenSimModel
 from dynakin.model.opensim.spec import free_coordinates
 from support.oracle.functions import axis_function

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
-import dynakin._core as _core
+from dynakin.bindings import _core
 from dynakin.elements import element
 from dynakin.identification.observability.element_words import INERTIA, inertia_words, is_planar
 from dynakin.identification.observability.excitation import Bench, Excitation

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import dynakin._core as _core
+from dynakin.bindings import _core
 from dynakin.elements import element
 from dynakin.results.naming import listed, number, words
 from dynakin.validation.reference.base_parameters import BaseParameters

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-import dynakin._core as _core
+from dynakin.bindings import _core
 from dynakin.filter.core_filter import filter_settings
 from dynakin.filter.tracker import Tracker
 from dynakin.identification.observability.measured import MeasuredModel

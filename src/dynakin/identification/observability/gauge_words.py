@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-import dynakin._core as _core
+from dynakin.bindings import _core
 from dynakin.elements import element
 from dynakin.identification.observability.element_words import INERTIA
 from dynakin.identification.observability.gauges import ZERO, Gauge

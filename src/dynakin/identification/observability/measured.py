@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-import dynakin._core as _core
+from dynakin.bindings import _core
 from dynakin.filter.augment import initial_covariance
 from dynakin.filter.noise import marker_variance, wrench_covariance
 from dynakin.filter.tracker import Tracker

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-import dynakin._core as _core
+from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.model.calibration.lumping import PlacedPart
 from dynakin.model.plan import ModelPlan

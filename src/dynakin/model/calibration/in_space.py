@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
-import dynakin._core as _core
+from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.model.calibration.frames import Trial
 from dynakin.model.calibration.pose_start import PoseFit, near, start_posture

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-import dynakin._core as _core
+from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.settings.loads import CarriedLoad

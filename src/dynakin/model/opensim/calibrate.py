@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
-import dynakin._core as _core
+from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.model.calibration.body import find_mass
 from dynakin.model.opensim.description import Marker, OpenSimModel

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-import dynakin._core as _core
+from dynakin.bindings import _core
 from dynakin.model.calibration.calibrated import CalibratedModel, first_centre_of_pressure
 from dynakin.model.calibration.pose_start import start_posture
 from dynakin.model.inertia import INERTIA_NAMES

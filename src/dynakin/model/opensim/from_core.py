@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-import dynakin._core as _core
+from dynakin.bindings import _core
 from dynakin.model.inertia import INERTIA_NAMES, RigidBody
 from dynakin.model.opensim.description import (
     Body,

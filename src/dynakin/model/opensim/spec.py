@@ -6,7 +6,7 @@ from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-import dynakin._core as _core
+from dynakin.bindings import _core
 from dynakin.model.opensim.chains import ChainAxis, Placed, place
 from dynakin.model.opensim.description import GROUND, Coordinate, Marker, OpenSimModel
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-import dynakin._core as _core
+from dynakin.bindings import _core
 from dynakin.filter.step import Labelled, StepEstimate
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.stream.fusion import Fused

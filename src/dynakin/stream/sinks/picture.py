@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-import dynakin._core as _core
+from dynakin.bindings import _core
 from dynakin.filter.step import Labelled
 from dynakin.stream.sinks.base import LiveFrame, Started, Status
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-import dynakin._core as _core
+from dynakin.bindings import _core
 from dynakin.filter.augment import extended
 from dynakin.filter.core_filter import core_filter
 from dynakin.filter.noise import marker_variance, wrench_covariance
