@@ -16,11 +16,11 @@ from dynakin.filter.assemble import assemble
 from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.filter.smoothing import smoothed
 from dynakin.pipeline.result import Result
+from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
 from dynakin.recordings.formats.mot import read_table
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.results.estimate import Estimate
-from dynakin.results.measures.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.pressure import floor_height, foot_pressure
 from support.core.bridge import filter_of, to_core
@@ -36,11 +36,11 @@ REFERENCE = np.array([[0.1, 0.0, -0.2], [0.1, 0.0, 0.2]])
 
 def contacts() -> np.ndarray:
     """Both measured, one in the air, one beside the plates, none, both beside the plates."""
-    codes = np.full((FRAMES, 2), MEASURED, np.uint8)
-    codes[20:25, 1] = IN_THE_AIR
-    codes[25:35, 0] = NOT_MEASURED
-    codes[35:40] = IN_THE_AIR
-    codes[40:45] = NOT_MEASURED
+    codes = np.full((FRAMES, 2), ON_PLATE, np.uint8)
+    codes[20:25, 1] = NO_CONTACT
+    codes[25:35, 0] = UNMEASURED
+    codes[35:40] = NO_CONTACT
+    codes[40:45] = UNMEASURED
     return codes
 
 
@@ -139,7 +139,7 @@ def test_figures_of_the_feet(estimate: Estimate) -> None:
     assert figures["derived_frames"] == 10 and figures["unknown_frames"] == 5 and figures["flight_frames"] == 5
     both = np.r_[0:25, 35:40, 45:FRAMES]
     adjustment = values(estimate, "foot_adjustment")[:, 0, 1]
-    own = both[values(estimate, "foot_contact")[both, 0] == MEASURED]
+    own = both[values(estimate, "foot_contact")[both, 0] == ON_PLATE]
     rms = np.sqrt(np.mean(adjustment[own] ** 2))
     assert figures["adjustment_rms"]["left"]["fy"] == pytest.approx(rms)
     assert "10 of 60 frames one contact was not measured" in figures["verdict"]
@@ -193,9 +193,9 @@ def test_both_sides_are_compared(estimate: Estimate) -> None:
 
 
 def test_feet_are_compared_over_whole_measured_stances(data: Trial) -> None:
-    codes = np.full((FRAMES, 2), MEASURED, np.uint8)
-    codes[:5, 0] = codes[25:30, 0] = codes[:10, 1] = codes[30:35, 1] = IN_THE_AIR
-    codes[45:50, 0] = NOT_MEASURED  # one contact: derived
+    codes = np.full((FRAMES, 2), ON_PLATE, np.uint8)
+    codes[:5, 0] = codes[25:30, 0] = codes[:10, 1] = codes[30:35, 1] = NO_CONTACT
+    codes[45:50, 0] = UNMEASURED  # one contact: derived
     stepping = estimate_of(data, feet_of(data, codes))
     found = compute_metrics(stepping)["asymmetry"]
     assert found["stances"] == {"left": 1, "right": 1} and found["reason"] is None
@@ -227,7 +227,7 @@ def test_files(estimate: Estimate, tmp_path: Path) -> None:
     assert powers.names[0] == f"{estimate.coordinate_names[0]}_power"
     with xr.open_dataset(folder / "estimate.nc") as stored:
         np.testing.assert_array_equal(stored["foot_wrench"].values, values(estimate, "foot_wrench"))
-        assert stored["foot_contact"].attrs["flag_meanings"] == "in_the_air measured not_measured"
+        assert stored["foot_contact"].attrs["flag_meanings"] == "none plate unmeasured"
 
 
 def test_the_feet_change_nothing_but_the_moments(data: Trial, feet: FootWrenches) -> None:
@@ -238,7 +238,7 @@ def test_the_feet_change_nothing_but_the_moments(data: Trial, feet: FootWrenches
 
 
 def test_errors_about_a_reference_point_are_carried_to_the_origin() -> None:
-    codes = np.full((1, 2), MEASURED)
+    codes = np.full((1, 2), ON_PLATE)
     feet = FootWrenches.of(NAMES, FEET, np.zeros((1, 2, 6)), codes, 20.0, 3.0, [[1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
     rng = np.random.default_rng(34)
     force, moment = rng.normal(size=(200_000, 3)) * 20.0, rng.normal(size=(200_000, 3)) * 3.0
@@ -251,9 +251,9 @@ def test_errors_about_a_reference_point_are_carried_to_the_origin() -> None:
 def test_late_plates_are_taken_earlier(data: Trial, feet: FootWrenches) -> None:
     late = feet.in_step(data.time, 0.01)  # a frame
     np.testing.assert_allclose(late.wrench[10], feet.wrench[11], rtol=1e-6, atol=1e-6)
-    assert (late.contact[18] == MEASURED).all() and late.contact[19, 1] == IN_THE_AIR
+    assert (late.contact[18] == ON_PLATE).all() and late.contact[19, 1] == NO_CONTACT
     half = feet.in_step(data.time, 0.005)
-    assert not ((half.contact == MEASURED) & ~np.isfinite(half.wrench).all(axis=2)).any()
+    assert not ((half.contact == ON_PLATE) & ~np.isfinite(half.wrench).all(axis=2)).any()
     assert feet.in_step(data.time, 0.0) is feet
 
 

@@ -13,11 +13,11 @@ import dynakin
 from dynakin import Estimate, Estimator, Subject, load_model
 from dynakin.filter.closure import closure
 from dynakin.filter.total_wrench import Ground
+from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
 from dynakin.recordings.feet.loads import UNKNOWN as FOOT_UNKNOWN
 from dynakin.recordings.feet.loads import foot_loads
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Plate, Recording
-from dynakin.results.measures.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
 from dynakin.results.measures.sources import ABSENT, DERIVED
 from dynakin.simulation.trial import simulate as simulate_anew
 from dynakin.units import GRAVITY_M_S2
@@ -83,12 +83,12 @@ def test_without_plates_a_leg_that_may_stand_has_no_moments_and_one_that_swings_
     walk = simulate("fullbody", "gait", 3, 4.0, 50.0).recording
     blind = person("fullbody").run(walk.with_plates(()), smooth=False)
     contact = blind.data["foot_contact"].transpose("time", "foot").values
-    assert set(np.unique(contact)) == {IN_THE_AIR, NOT_MEASURED}
+    assert set(np.unique(contact)) == {NO_CONTACT, UNMEASURED}
     for k, side in enumerate("rl"):
         for joint in ("hip_flexion", "knee_angle", "ankle_angle"):
             moments = blind.data["moments"].sel(coordinate=f"{joint}_{side}").values
-            assert np.array_equal(np.isnan(moments), contact[:, k] == NOT_MEASURED)
-        assert 0.1 < np.mean(contact[:, k] == IN_THE_AIR) < 0.45
+            assert np.array_equal(np.isnan(moments), contact[:, k] == UNMEASURED)
+        assert 0.1 < np.mean(contact[:, k] == NO_CONTACT) < 0.45
         assert np.isfinite(blind.data["moments"].sel(coordinate=f"elbow_flex_{side}").values).all()
     assert np.isnan(blind.data["moments"].sel(coordinate="pelvis_ty").values).all()
     assert np.isnan(blind.data["joint_loads"].sel(joint="pelvis").values).all()
@@ -102,7 +102,7 @@ def test_a_box_that_nothing_measures_is_no_flight() -> None:
     found = person("fullbody").run(with_loads(recording, np.where(off, 0.0, 1.0)), smooth=False)
     contact = found.data["foot_contact"].transpose("time", "foot").values
     early, late = recording.time < 1.9, recording.time > 2.4
-    assert (contact[early] == NOT_MEASURED).all() and (contact[late] == MEASURED).all()
+    assert (contact[early] == UNMEASURED).all() and (contact[late] == ON_PLATE).all()
     assert np.isnan(found.data["moments"].sel(coordinate="knee_angle_r").values[early]).all()
     assert (sources(found, "elbow_flex_r")[early] == ABSENT).all()  # it may be a rail as well
     assert (sources(found, "knee_angle_r")[late] == 0).all()

@@ -14,10 +14,10 @@ from rich.console import Console
 
 from dynakin.cli import summary
 from dynakin.pipeline.result import Result
+from dynakin.recordings.feet.contact import UNMEASURED
 from dynakin.recordings.formats.mot import read_table
 from dynakin.report.insights import in_short, insights
 from dynakin.results.estimate import Estimate
-from dynakin.results.measures.feet import NOT_MEASURED
 from dynakin.results.measures.mean_curves import curve_points, mean_curves, signals, write_curves
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.repetitions import Repetition
@@ -82,7 +82,7 @@ def test_standing_on_a_plate_that_fails_for_a_frame_has_no_peak() -> None:
     walker = make_walker()
     data = walker.data.copy(deep=True)
     data["foot_contact"][:] = 1
-    data["foot_contact"][100, 1] = NOT_MEASURED
+    data["foot_contact"][100, 1] = UNMEASURED
     data["moment_source"][100, 2] = DERIVED
     standing = replace(walker, data=data)
     assert counted(standing, np.ones(301, dtype=bool)).sum(axis=0).tolist() == [301, 301, 0, 301, 301]
@@ -205,7 +205,7 @@ def test_netcdf_flags_follow_cf(saved: tuple[Estimate, Path]) -> None:
             assert list(stored[name].attrs["flag_values"]) == [0, 1, 2]
             assert stored[name].attrs["flag_meanings"] == "measured derived absent"
             np.testing.assert_array_equal(stored[name].values, walker.data[name].values)
-        assert stored["foot_contact"].attrs["flag_meanings"] == "in_the_air measured not_measured"
+        assert stored["foot_contact"].attrs["flag_meanings"] == "none plate unmeasured"
         assert stored["moments"].attrs["ancillary_variables"] == "moment_source"
         assert stored["joint_loads"].attrs["ancillary_variables"] == "joint_source"
 
@@ -263,7 +263,7 @@ def test_nothing_left_at_the_root_is_said_by_the_numbers_only() -> None:
         and "are left in flight (" in flying
         and "or a contact that is not measured" in flying
     )
-    data["foot_contact"][:] = NOT_MEASURED
+    data["foot_contact"][:] = UNMEASURED
     unknown = compute_metrics(replace(walker, data=data))["feet"]
     assert unknown["left_at_root"] == {"grounded": None, "flight": None}
     assert "Nothing is left" not in unknown["verdict"]

@@ -10,8 +10,8 @@ import pytest
 import dynakin
 from dynakin.bindings import _core
 from dynakin.filter.foot_wrenches import FootWrenches
+from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
 from dynakin.recordings.feet.loads import foot_loads
-from dynakin.results.measures.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
 from dynakin.settings import presets
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.trial import simulate
@@ -152,7 +152,7 @@ def test_two_feet_on_one_plate_share_it_as_offline_and_it_is_said_once(trial: Si
     right, left = person.middles
     for _ in range(3):
         found, known = person.look(700.0, 0.75 * right + 0.25 * left)
-    assert known and found.contact.tolist() == [[MEASURED, MEASURED, IN_THE_AIR]]  # last: elsewhere
+    assert known and found.contact.tolist() == [[ON_PLATE, ON_PLATE, NO_CONTACT]]  # last: elsewhere
     np.testing.assert_allclose(found.wrench[0, :2, 1], [525.0, 175.0], atol=1.0)
     assert np.sqrt(found.covariance[0, 0, 1, 1]) > 100.0  # the division is unsure
     assert person.feet.news() == [
@@ -164,17 +164,17 @@ def test_two_feet_on_one_plate_share_it_as_offline_and_it_is_said_once(trial: Si
 def test_a_foot_beside_the_plate_is_not_measured(trial: SimulatedTrial) -> None:
     person = Standing(trial)
     found, known = person.look(350.0, person.middles[0])
-    assert not known and found.contact.tolist() == [[MEASURED, NOT_MEASURED, IN_THE_AIR]]
+    assert not known and found.contact.tolist() == [[ON_PLATE, UNMEASURED, NO_CONTACT]]
     np.testing.assert_allclose(found.wrench[0, 0, 1], 350.0)
     person.feet = LiveFeet(person.initial, presets.default(), ("one",), {"one": "left"})  # the user knows better
     found, known = person.look(350.0, person.middles[0])
-    assert not known and found.contact.tolist() == [[NOT_MEASURED, MEASURED, IN_THE_AIR]]
+    assert not known and found.contact.tolist() == [[UNMEASURED, ON_PLATE, NO_CONTACT]]
 
 
 def test_a_load_where_nobody_stands_is_not_the_person(trial: SimulatedTrial) -> None:
     person = Standing(trial)
     found, known = person.look(300.0, person.middles[0] + np.array([1.0, 0.0, 0.0]))
-    assert not known and (found.contact == NOT_MEASURED).all()
+    assert not known and (found.contact == UNMEASURED).all()
     assert len(person.feet.news()) == 1
 
 

@@ -17,10 +17,10 @@ from dynakin.filter.parameters import parameters_of
 from dynakin.filter.sources import with_sources
 from dynakin.filter.total_wrench import ELSEWHERE
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.recordings.feet.contact import ON_PLATE
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import AXES, COMPONENTS, Estimate
 from dynakin.results.measures.facing import nearly_singular
-from dynakin.results.measures.feet import MEASURED
 from dynakin.results.records import Timing
 
 Array = npt.NDArray[np.float64]
@@ -173,7 +173,7 @@ def _sensors(arrays: Mapping[str, Array]) -> dict[str, Any]:
 
 def _feet(arrays: Mapping[str, Array], feet: FootWrenches) -> dict[str, Any]:
     per_foot = ("time", "foot", "component")
-    measured = np.where((feet.contact == MEASURED)[..., None], feet.wrench, np.nan)
+    measured = np.where((feet.contact == ON_PLATE)[..., None], feet.wrench, np.nan)
     others = [k for k, name in enumerate(feet.names) if name == ELSEWHERE]
     no_feet = arrays["remainder"] + np.asarray(arrays["foot_wrench"])[:, others].sum(axis=1)  # a seat's, say
     return {

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.filter.samples import in_step
-from dynakin.results.measures.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
+from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
 
 Array = npt.NDArray[np.float64]
 
@@ -25,7 +25,7 @@ class FootWrenches:
         segments: of the model, one a foot.
         wrench: (T, F, 6) N and N m; counts where measured.
         covariance: (T, F, 6, 6) of its errors, positive definite.
-        contact: (T, F) IN_THE_AIR, MEASURED or NOT_MEASURED.
+        contact: (T, F) NO_CONTACT, ON_PLATE or UNMEASURED.
     """
 
     names: tuple[str, ...]
@@ -63,7 +63,7 @@ class FootWrenches:
         carry[..., 3:, :3] = np.cross(point[..., None, :], np.eye(3)).swapaxes(-1, -2)  # f -> point x f
         variance = np.concatenate([force, moment], axis=-1) ** 2
         covariance = (carry * variance[..., None, :]) @ np.swapaxes(carry, -1, -2)
-        known = np.where((codes == MEASURED)[..., None], wrench, np.where(codes == IN_THE_AIR, 0.0, np.nan)[..., None])
+        known = np.where((codes == ON_PLATE)[..., None], wrench, np.where(codes == NO_CONTACT, 0.0, np.nan)[..., None])
         return cls(tuple(names), tuple(segments), known, covariance, codes)
 
     def check(self, model: _core.Model) -> None:
@@ -79,7 +79,7 @@ class FootWrenches:
                 )
             if self.segments.count(segment) > 1:
                 raise ModelError(f"foot {name!r}: segment {segment!r} is given twice, expected one foot a segment")
-        bad = np.argwhere((self.contact == MEASURED) & ~np.isfinite(self.wrench).all(axis=2))
+        bad = np.argwhere((self.contact == ON_PLATE) & ~np.isfinite(self.wrench).all(axis=2))
         if len(bad):
             frame, foot = bad[0]
             raise ModelError(
@@ -103,5 +103,5 @@ class FootWrenches:
         wrench = np.stack([in_step(time, self.wrench[:, k], delay_s) for k in range(len(self.names))], axis=1)
         nearest = np.clip(np.searchsorted(time, time + delay_s - 0.5 * np.median(np.diff(time))), 0, len(time) - 1)
         contact = self.contact[nearest]
-        contact = np.where((contact == MEASURED) & ~np.isfinite(wrench).all(axis=2), NOT_MEASURED, contact)
+        contact = np.where((contact == ON_PLATE) & ~np.isfinite(wrench).all(axis=2), UNMEASURED, contact)
         return replace(self, wrench=wrench, covariance=self.covariance[nearest], contact=contact.astype(np.uint8))

@@ -7,7 +7,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from dynakin.filter.foot_wrenches import FootWrenches
-from dynakin.results.measures.feet import NOT_MEASURED
+from dynakin.recordings.feet.contact import UNMEASURED
 from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED
 
 Flags = npt.NDArray[np.bool_]
@@ -54,7 +54,7 @@ def with_sources(data: xr.Dataset, feet: FootWrenches | None, undeclared: Flags)
 
 def _behind(contact: Codes, at: list[int], parents: npt.NDArray[np.int_]) -> Codes:
     """(T, J) codes of the joints' loads by the unmeasured contacts (T, F) that lie behind each."""
-    lacks = contact == NOT_MEASURED
+    lacks = contact == UNMEASURED
     code = np.where(lacks.sum(axis=1) > 1, ABSENT, DERIVED)
     joints = np.zeros((len(contact), len(parents)), dtype=np.uint8)
     for k, segment in enumerate(at):

@@ -14,11 +14,11 @@ from dynakin.filter.closure import EXCESS, Closure, closure
 from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet import loads as on_plates
+from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
 from dynakin.recordings.feet.distance import distance_to_hull
 from dynakin.recordings.feet.loads import LOADED_N, NEAR_M, FootLoads, foot_loads
 from dynakin.recordings.plates.checks import PlateCheck, check_plates
 from dynakin.recordings.recording import Recording
-from dynakin.results.measures.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
 from dynakin.settings.noise import Noise
 from dynakin.units import GRAVITY_M_S2
 
@@ -31,11 +31,11 @@ MASS_APART = 0.05
 """Part of the weight by which the plates' mean may differ before the mass is doubted: movement explains 2 or 3 %."""
 
 _CONTACT = {
-    on_plates.SWING: IN_THE_AIR,
-    on_plates.MEASURED: MEASURED,
-    on_plates.SHARED: MEASURED,
-    on_plates.OFF_PLATE: NOT_MEASURED,
-    on_plates.UNKNOWN: NOT_MEASURED,
+    on_plates.SWING: NO_CONTACT,
+    on_plates.MEASURED: ON_PLATE,
+    on_plates.SHARED: ON_PLATE,
+    on_plates.OFF_PLATE: UNMEASURED,
+    on_plates.UNKNOWN: UNMEASURED,
 }
 UNJUDGED = (
     "The recording is too short, or shows too few markers, to check by the motion of the centre of mass that the "
@@ -58,7 +58,7 @@ def foot_wrenches(loads: FootLoads, initial: CalibratedModel, noise: Noise) -> F
     On a shared plate the division is known to a fifth of the load, and to the feet's distance.
     """
     contact = np.vectorize(_CONTACT.get, otypes=[np.uint8])(loads.reason)
-    contact = np.column_stack([contact, np.where(loads.elsewhere, NOT_MEASURED, IN_THE_AIR)])
+    contact = np.column_stack([contact, np.where(loads.elsewhere, UNMEASURED, NO_CONTACT)])
     wrench = np.concatenate([loads.wrench, np.zeros((len(contact), 1, 6))], axis=1)
     known = np.nan_to_num(wrench)
     push = np.maximum(known[..., 1], LOADED_N)

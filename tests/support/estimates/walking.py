@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
 from dynakin.results.estimate import Estimate
-from dynakin.results.measures.feet import IN_THE_AIR, MEASURED, NOT_MEASURED
 from dynakin.results.measures.sources import ABSENT, DERIVED
 from support.estimates.synthetic import make_estimate
 
@@ -44,16 +44,16 @@ def make_walker(withheld: tuple[int, ...] = (), *, absent: bool = False) -> Esti
     made = make_estimate(3.0, gaps=False)
     time = made.time
     frames = len(time)
-    contact = np.full((frames, 2), IN_THE_AIR, dtype=np.uint8)
+    contact = np.full((frames, 2), NO_CONTACT, dtype=np.uint8)
     push = np.zeros((frames, 2))
     for foot, (_, touch_downs) in enumerate(TOUCH_DOWN_S.items()):
         for k, start in enumerate(touch_downs):
             stands = (time > start - 1e-6) & (time < start + STANCE_S - 1e-6)
             beside = foot == 1 and k in withheld
-            contact[stands, foot] = NOT_MEASURED if beside else MEASURED
+            contact[stands, foot] = UNMEASURED if beside else ON_PLATE
             load = 700.0 * np.sin(np.pi * (time[stands] - start) / STANCE_S)
             push[stands, foot] = (np.nan if absent else WRONG * load) if beside else load
-    lacking = contact == NOT_MEASURED
+    lacking = contact == UNMEASURED
     code = ABSENT if absent else DERIVED
     source = np.zeros((frames, len(COORDINATES)), dtype=np.uint8)
     source[lacking[:, 1], 2] = source[lacking[:, 1], 0] = code
@@ -65,9 +65,9 @@ def make_walker(withheld: tuple[int, ...] = (), *, absent: bool = False) -> Esti
     feet = np.zeros((frames, 2, 6))
     feet[:, :, 1], feet[:, 0, 3], feet[:, 1, 3] = push, -0.1 * push[:, 0], 0.1 * push[:, 1]
     feet[np.isnan(push)] = np.nan
-    measured = np.where((contact == MEASURED)[..., None], feet, np.nan)
+    measured = np.where((contact == ON_PLATE)[..., None], feet, np.nan)
     total = np.where(lacking.any(axis=1)[:, None], np.nan, np.nan_to_num(feet).sum(axis=1))
-    flight = (contact == IN_THE_AIR).all(axis=1)
+    flight = (contact == NO_CONTACT).all(axis=1)
     markers = np.zeros((frames, 10, 3))
     markers[:, :, 0], markers[:, :, 1], markers[:, :, 2] = 0.05, np.linspace(0.05, 1.6, 10), np.tile([0.15, -0.15], 5)
     centres = np.broadcast_to([0.0, 0.9, 0.0], (frames, len(SEGMENTS), 3))

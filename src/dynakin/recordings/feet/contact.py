@@ -15,6 +15,9 @@ from dynakin.recordings.standing import marker_speeds
 
 Flags = npt.NDArray[np.bool_]
 
+NO_CONTACT, ON_PLATE, UNMEASURED = range(3)
+"""Status of a contact, which is a segment that something may push (a foot), in a frame: nothing touches it and its
+wrench is zero; plates bear it; it touches something that measures nothing. Codes of ``foot_contact``."""
 NEAR_FLOOR_M = 0.025
 """Height of a marker over its own lowest place (5th percentile) up to which the skin under it may touch the floor."""
 SLOW_M_S = 0.5

@@ -34,7 +34,7 @@ _UNITS = {
 _FLAGS = {
     "moment_source": (MEANINGS, "where each moment comes from; derived: from the motion"),
     "joint_source": (MEANINGS, "where each joint's load comes from; derived: from the motion"),
-    "foot_contact": (("in_the_air", "measured", "not_measured"), "contact of each foot"),
+    "foot_contact": (("none", "plate", "unmeasured"), "contact of each foot"),
     "verdict": (("missing", "accepted", "refused"), "what became of each sensor"),
 }
 """Codes by CF's conventions for flags: what 0, 1 and 2 mean, and of what."""

@@ -8,13 +8,12 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
 from dynakin.results.estimate import COMPONENTS, Estimate
 from dynakin.results.measures import sources
 from dynakin.results.naming import plural
 from dynakin.units import GRAVITY_M_S2
 
-IN_THE_AIR, MEASURED, NOT_MEASURED = range(3)
-"""Codes of ``foot_contact``: a foot's wrench is zero, is measured, or is not known."""
 ROUNDING = 1.0
 """N or N m at the root up to which nothing is left there."""
 FLIGHT = 0.05
@@ -25,7 +24,7 @@ def foot_sources(data: xr.Dataset) -> sources.Codes:
     """(T, F) codes of `results.measures.sources` of the feet's wrenches: in the air they are known to be zero."""
     contact = data["foot_contact"].transpose("time", "foot").values
     known = np.isfinite(data["foot_wrench"].transpose("time", "foot", "component").values).all(axis=2)
-    codes = np.where(contact == NOT_MEASURED, sources.DERIVED, sources.MEASURED)
+    codes = np.where(contact == UNMEASURED, sources.DERIVED, sources.MEASURED)
     return np.where(known, codes, sources.ABSENT).astype(np.uint8)
 
 
@@ -49,10 +48,10 @@ def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str,
     remainder = estimate.data["wrench_remainder"].transpose("time", "component").values[window]
     codes = foot_sources(estimate.data)[window]
     told = np.isfinite(remainder).all(axis=1)
-    flight = (contact == IN_THE_AIR).all(axis=1) & told
-    grounded = (contact != NOT_MEASURED).all(axis=1) & (contact == MEASURED).any(axis=1) & told
+    flight = (contact == NO_CONTACT).all(axis=1) & told
+    grounded = (contact != UNMEASURED).all(axis=1) & (contact == ON_PLATE).any(axis=1) & told
     grounded &= _root_measured(estimate)[window]
-    known = (contact == MEASURED) & grounded[:, None] & np.isfinite(adjusted).all(axis=2)  # not where it is lost
+    known = (contact == ON_PLATE) & grounded[:, None] & np.isfinite(adjusted).all(axis=2)  # not where it is lost
     rms = {
         name: dict(zip(COMPONENTS, _rms(adjusted[known[:, k], k]), strict=True)) if known[:, k].any() else None
         for k, name in enumerate(estimate.foot_names)

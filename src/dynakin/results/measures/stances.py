@@ -13,9 +13,9 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures import sources
-from dynakin.results.measures.feet import IN_THE_AIR, MEASURED
 
 Flags = npt.NDArray[np.bool_]
 
@@ -45,13 +45,13 @@ def phases(estimate: Estimate, foot: str, window: Flags) -> list[Phase]:
     at = np.flatnonzero(window)
     start, stop = int(at[0]), int(at[-1]) + 1
     contact = estimate.data["foot_contact"].sel(foot=foot).values[start:stop]
-    stands = contact != IN_THE_AIR
+    stands = contact != NO_CONTACT
     edges = [0, *(np.flatnonzero(np.diff(stands)) + 1), len(stands)]
     found = []
     for first, end in pairwise(edges):
         own = contact[first:end]
         whole = (first > 0 and end < len(stands)) or len(edges) == 2
-        known = bool(((own == MEASURED) | (own == IN_THE_AIR)).all())
+        known = bool(((own == ON_PLATE) | (own == NO_CONTACT)).all())
         found.append(Phase(start + int(first), start + int(end), bool(stands[first]), whole, known))
     return found
 
