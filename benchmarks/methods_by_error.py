@@ -16,7 +16,7 @@ import dynakin
 from dynakin.simulation.trial import simulate_squat
 from dynakin.validation.reference.least_squares import bodies_of, identify
 from dynakin.validation.reference.methods import plane_wrench, reference_methods
-from dynakin.validation.reference.table_dynamics import table_dynamics
+from dynakin.validation.reference.regressor import table_dynamics
 from dynakin.validation.truth import FIGURES, LEG, truth_errors
 
 SUBJECT = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")

@@ -14,7 +14,7 @@ from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.filter.assemble import assemble
 from dynakin.filter.foot_wrenches import FootWrenches
-from dynakin.filter.smoothing import smoothed
+from dynakin.filter.tracker import smoothed
 from dynakin.pipeline.result import Result
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
 from dynakin.recordings.formats.mot import read_table

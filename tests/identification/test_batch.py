@@ -7,8 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dynakin.identification.batch import identify_batch
-from dynakin.identification.coloured import integrated_autocorrelation
+from dynakin.identification.batch import identify_batch, integrated_autocorrelation
 from dynakin.identification.decision import decide
 from dynakin.identification.trials import MeasuredTrial
 from dynakin.identification.unknowns import Unknowns

@@ -17,8 +17,8 @@ from dynakin.model.definition import ModelDefinition
 from dynakin.pipeline.stages import configure
 from dynakin.recordings.plates.loads import without_plate_loads
 from dynakin.results.measures.metrics import compute_metrics
-from dynakin.settings.loads import CarriedLoad, PlateLoad
 from dynakin.settings.settings import Settings
+from dynakin.settings.subject import CarriedLoad, PlateLoad
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.trial import simulate_squat
 

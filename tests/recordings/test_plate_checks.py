@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dynakin.errors import RecordingError
-from dynakin.recordings.feet.distance import distance_to_hull
+from dynakin.recordings.feet.contact import distance_to_hull
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.plates.checks import check_plates
 from dynakin.recordings.recording import Recording

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from dynakin.errors import ConfigError, RecordingError
-from dynakin.recordings.formats.options import ReadOptions
 from dynakin.recordings.read import READERS, read, register_reader
 from dynakin.recordings.recording import Recording
+from dynakin.recordings.resampling import ReadOptions
 from support.made_recordings import write
 
 TEXT = """# standing

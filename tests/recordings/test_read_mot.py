@@ -11,8 +11,8 @@ from dynakin.errors import RecordingError
 from dynakin.recordings.formats.grf_columns import parse_column
 from dynakin.recordings.formats.ground_forces import attach_forces, plates_from_table
 from dynakin.recordings.formats.mot import read_table
-from dynakin.recordings.formats.options import ReadOptions
 from dynakin.recordings.read import read
+from dynakin.recordings.resampling import ReadOptions
 from support.made_recordings import TRC_TOP, grf_text, plain, write
 
 QUANTITIES = {"vx": 10.0, "vy": 700.0, "vz": -20.0, "px": 0.2, "py": 0.01, "pz": 0.3}

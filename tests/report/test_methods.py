@@ -14,8 +14,7 @@ from dynakin.report.text_tables import table2_text, unseen_text
 from dynakin.results.estimate import Estimate
 from dynakin.validation.differences import angle_differences, moment_differences
 from dynakin.validation.methods import Trial
-from dynakin.validation.statistics import Spread
-from dynakin.validation.table2 import table2
+from dynakin.validation.table2 import Spread, table2
 from dynakin.validation.unseen import UnseenRow
 from support.page import Structure
 

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from dynakin.absent import finite, with_nulls
+from dynakin.arrays import finite, with_nulls
 from dynakin.pipeline.result import Result
 from dynakin.recordings.formats.mot import read_table
 from dynakin.results.estimate import Estimate

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dynakin.results.measures.kinematic_consistency import mismatch_in_words, speed_mismatch
+from dynakin.results.measures.consistency import mismatch_in_words, speed_mismatch
 
 TIME = np.linspace(0.0, 4.0, 401)
 ANGLES = np.stack([np.sin(TIME), 0.2 * np.cos(2.0 * TIME)], axis=1)

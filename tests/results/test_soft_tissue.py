@@ -11,8 +11,7 @@ import xarray as xr
 
 from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
 from dynakin.results.estimate import Estimate
-from dynakin.results.measures.soft_tissue import displacements, soft_tissue
-from dynakin.results.measures.soft_tissue_sizes import published_amplitude_mm
+from dynakin.results.measures.soft_tissue import displacements, published_amplitude_mm, soft_tissue
 from dynakin.simulation.bodies.marker_rows import OPENCAP, PLUG_IN_GAIT
 from dynakin.simulation.sensors.soft_tissue import regions
 

@@ -12,7 +12,7 @@ from dynakin.model.definition import load_model
 from dynakin.simulation.bodies.whole_body import Sole
 from dynakin.simulation.jets import Jet
 from dynakin.simulation.mechanics import Motion, kinematics
-from dynakin.simulation.motions.leg_closure import close_legs, knee_flexion
+from dynakin.simulation.motions.posed import close_legs, knee_flexion
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.support import Support, split_between

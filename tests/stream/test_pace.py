@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dynakin.stream.sources.pace import Pace
+from dynakin.stream.sources.clock import Pace
 
 
 @pytest.mark.parametrize("rate_error", [0.0, 1e-3, -1e-3])

@@ -17,8 +17,7 @@ from dynakin.validation.differences import angle_differences, moment_differences
 from dynakin.validation.files import save_comparison
 from dynakin.validation.methods import Trial, compare_trial
 from dynakin.validation.setup import Setup
-from dynakin.validation.statistics import Spread, spread
-from dynakin.validation.table2 import marker_fit, table2
+from dynakin.validation.table2 import Spread, marker_fit, spread, table2
 
 IN_PLANE = np.array([True, True, False])
 

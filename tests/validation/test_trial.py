@@ -17,8 +17,7 @@ from dynakin.results.measures.repetitions import body_paths, find_repetitions
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.validation.methods import Trial, trial_of
 from dynakin.validation.reference.chain import PlanarChain
-from dynakin.validation.reference.classical import classical_angles
-from dynakin.validation.reference.landmark_paths import landmark_paths
+from dynakin.validation.reference.classical import classical_angles, landmark_paths
 from dynakin.validation.setup import Setup
 
 

@@ -19,7 +19,7 @@ from dynakin.cli.demo import demo
 from dynakin.cli.identify import identify
 from dynakin.cli.live import live
 from dynakin.cli.model import model
-from dynakin.cli.print_config import print_config
+from dynakin.cli.options import print_config
 from dynakin.cli.run import run
 from dynakin.cli.simulate import simulate
 from dynakin.cli.tune import tune

@@ -14,8 +14,7 @@ from dynakin.recordings.smoothing import CUTOFF_HZ
 from dynakin.report.text_tables import table2_text
 from dynakin.results.naming import plural
 from dynakin.studies.batch.dataset import read_dataset
-from dynakin.studies.batch.output import write_batch
-from dynakin.studies.batch.process import Options, belongs_to, run_batch
+from dynakin.studies.batch.process import Options, belongs_to, run_batch, write_batch
 from dynakin.studies.engine.folder import ROWS, open_folder
 from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import open_pool

@@ -1,4 +1,4 @@
-"""`dynakin model`: what a model is made of."""
+"""`dynakin model`: what a model is made of, what its measurements observe, and any model as an .osim file."""
 
 from __future__ import annotations
 
@@ -7,20 +7,29 @@ from typing import Annotated
 
 import numpy as np
 import typer
+from rich.console import Console
 from rich.table import Table
 from rich.tree import Tree
 
-from dynakin.cli.console import out, table
-from dynakin.cli.identifiability import print_identifiability
-from dynakin.cli.opensim_model import export_model, print_opensim
+from dynakin.cli.console import out, progress_bar, table
 from dynakin.cli.options import Given, with_settings
 from dynakin.filter.build import definition_of
-from dynakin.model.definition import ModelDefinition, available_models, load_built_in_or_toml
+from dynakin.filter.estimator import Estimator
+from dynakin.identification.observability.measured import tracker_of
+from dynakin.identification.observability.structure import Structure, structure_of
+from dynakin.identification.observability.trial import Identifiability, identifiability
+from dynakin.model.definition import Definition, ModelDefinition, available_models, load_built_in_or_toml
 from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
 from dynakin.model.markers.schema import Marker, MarkerSetFile
 from dynakin.model.opensim.definition import OpenSimDefinition
+from dynakin.model.opensim.export import mass_of_run, of_definition, of_initial, read_values
+from dynakin.model.opensim.spec import free_coordinates, placements, used_scales
+from dynakin.model.opensim.write import write_osim
 from dynakin.model.schema import ModelFile
 from dynakin.model.schema import Segment as ModelSegment
+from dynakin.recordings.read import read
+from dynakin.results.measures.posterior import JUDGEMENT_WORDS, judged
+from dynakin.results.naming import number, sentence
 from dynakin.settings.model import Bounds
 from dynakin.settings.settings import Settings, option_names
 
@@ -181,4 +190,127 @@ def _states(model: ModelFile) -> Table:
         f"mass, moments of inertia: ± {100 * bounds.mass_fraction:g}, {100 * bounds.inertia_fraction:g} %; "
         f"first moments: ± {100 * bounds.first_moment_fraction:g} % of mass times length",
     )
+    return rows
+
+
+def print_identifiability(definition: ModelDefinition, trial: Path | None, forces: Path | None) -> None:
+    """Structure of the model, by a simulated person where no trial is given; what the trial told where one is.
+
+    Raises:
+        DynakinError: model and trial do not fit.
+    """
+    if trial is None:
+        _print_structure(structure_of(tracker_of(definition)))
+        return
+    with progress_bar("estimating") as progress:
+        estimate, tracker = Estimator(definition).track(read(trial, forces), progress=progress)
+    with progress_bar("trying motions") as progress:
+        found = identifiability(tracker, estimate, progress)
+    _print_structure(found.structure, found)
+    console = out()
+    console.print("\nWhat this trial tells", style="bold")
+    for text in found.in_words():
+        console.print(f"- {text}")
+    console.print("\nWhat would tell more", style="bold")
+    for text in found.advice:
+        console.print(f"- {text}")
+
+
+def _print_structure(structure: Structure, told: Identifiability | None = None) -> None:
+    console = out()
+    for text in structure.in_words():
+        console.print(text)
+    console.print(_base(structure, told))
+    console.print("Gauges: what no measurement sees", style="bold")
+    for text in structure.gauges_in_words:
+        console.print(f"- {sentence(text)}.")
+
+
+def _base(structure: Structure, told: Identifiability | None) -> Table:
+    if told is None:
+        rows = table("", "base parameter", numbers=(0,), title="Base parameters")
+        for k, text in enumerate(structure.base_in_words, start=1):
+            rows.add_row(str(k), text)
+        return rows
+    rows = table(
+        "base parameter", "value", "sd before", "sd after", "", numbers=(1, 2, 3), title="Base parameters (kg, m)"
+    )
+    for entry in told.base:
+        numbers = (number(value) for value in (entry.value, entry.prior_sd, entry.sd))
+        rows.add_row(entry.words, *numbers, JUDGEMENT_WORDS[judged(entry.share)])
+    return rows
+
+
+def print_opensim(console: Console, definition: OpenSimDefinition) -> None:
+    """Tree, coordinates, markers and scales of the model."""
+    source = definition.source
+    console.print(
+        f"{definition.name}: OpenSim model, {len(source.bodies)} bodies, {source.mass:.2f} kg", soft_wrap=True
+    )
+    for line in source.left_out:
+        console.print(f"  {line}", soft_wrap=True)
+    console.print()
+    console.print(_opensim_tree(definition))
+    console.print()
+    console.print(_opensim_coordinates(definition))
+    console.print(_opensim_markers(definition))
+    scales = used_scales(placements(source, definition.scales))
+    console.print(f"Scales (1 as the file has it): {', '.join(scales) or 'none'}", soft_wrap=True)
+
+
+def export_model(
+    definition: Definition,
+    path: Path,
+    parameters: Path | None,
+    mass_kg: float | None,
+    trial: Path | None,
+    forces: Path | None,
+) -> None:
+    """Write a model with a run's values, where given.
+
+    Raises:
+        DynakinError: files that cannot be read or written, or do not fit; in one line.
+    """
+    if path.suffix.casefold() != ".osim":
+        raise typer.BadParameter(f"--export is {path}, expected a file that ends in .osim")
+    values = {} if parameters is None else read_values(parameters)
+    if isinstance(definition, OpenSimDefinition):
+        mass = mass_of_run(parameters) if mass_kg is None and parameters is not None else mass_kg
+        write_osim(of_definition(definition, values, mass), path)
+        return
+    if trial is None:
+        raise typer.BadParameter("--export of a model that is no .osim file: expected --trial to measure it on")
+    write_osim(of_initial(definition.calibrate(read(trial, forces)), values), path)
+
+
+def _opensim_tree(definition: OpenSimDefinition) -> Tree:
+    root = Tree("ground")
+    nodes = {"ground": root}
+    for joint in definition.source.joints:
+        names = ", ".join(c.name for c in joint.coordinates) or "fixed"
+        mass = definition.source.body(joint.child).mass
+        nodes[joint.child] = nodes[joint.parent].add(f"{joint.child} ({mass:.3g} kg): {joint.kind}, {names}")
+    return root
+
+
+def _opensim_coordinates(definition: OpenSimDefinition) -> Table:
+    rows = table("coordinate", "limits", "unit", "meaning", numbers=(1,), title="Coordinates")
+    free = {c.name for c in free_coordinates(definition.source)}
+    for joint in definition.source.joints:
+        kinds = {axis.coordinate: axis.kind for axis in reversed(joint.axes)}
+        for c in joint.coordinates:
+            turn = kinds[c.name] == "rotation"
+            low, high = (np.degrees(v) if turn else v for v in c.limits)
+            limits = "locked" if c.locked else f"{low:.4g} to {high:.4g}"
+            follows = "" if c.name in free else "coupled to another"
+            rows.add_row(c.name, limits, "deg" if turn else "m", follows)
+    return rows
+
+
+def _opensim_markers(definition: OpenSimDefinition) -> Table:
+    rows = table("body", "markers", title="Markers")
+    for body in definition.source.bodies:
+        names = [marker.name for marker in definition.source.markers if marker.body == body.name]
+        if names:
+            rows.add_row(body.name, ", ".join(names))
     return rows

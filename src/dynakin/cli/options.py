@@ -11,6 +11,7 @@ from typing import Annotated, Any, get_args
 import typer
 
 from dynakin.settings.settings import Settings, option_names
+from dynakin.settings.template import config_template
 
 Given = dict[str, Any]
 """What was given on the command line, by the key of the settings."""
@@ -86,3 +87,9 @@ def _same(value: Any) -> Any:
 
 
 _READ: dict[str, Callable[[Any], Any]] = {"forward": _forward, "estimate": _estimate}
+
+
+@with_settings("preset")
+def print_config(given: Given) -> None:
+    """Print a commented configuration file for `run`."""
+    typer.echo(config_template(given.get("preset", "default")), nl=False)

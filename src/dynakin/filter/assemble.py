@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from dynakin.absent import finite
+from dynakin.arrays import finite
 from dynakin.bindings import _core
 from dynakin.filter.events import events_of
 from dynakin.filter.foot_wrenches import FootWrenches

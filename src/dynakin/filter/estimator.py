@@ -15,9 +15,8 @@ from dynakin.filter.assemble import assemble
 from dynakin.filter.augment import initial_covariance
 from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.filter.samples import in_step, recording_arrays
-from dynakin.filter.smoothing import whether_to_smooth
 from dynakin.filter.total_wrench import Ground, doubtful_mass, foot_wrenches, known_ground
-from dynakin.filter.tracker import Progress, Tracker
+from dynakin.filter.tracker import Progress, Tracker, whether_to_smooth
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.loads import with_loads
 from dynakin.model.definition import Definition
@@ -27,10 +26,10 @@ from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.tracking import without_lost
 from dynakin.settings import presets
-from dynakin.settings.loads import CarriedLoad
 from dynakin.settings.model import QUANTITIES, Bounds, Priors, Quantity
 from dynakin.settings.noise import Noise
 from dynakin.settings.strict import nearest
+from dynakin.settings.subject import CarriedLoad
 
 Array = npt.NDArray[np.float64]
 Feet = Callable[[CalibratedModel], FootWrenches | None]
@@ -172,7 +171,7 @@ class Estimator:
         Args:
             recording: markers and plates, as `read` gives them.
             static: the same person and markers, standing: lengths and marker places are taken from it.
-            smooth: whether each frame is estimated from all frames, those after it too (`filter.smoothing`); False: as
+            smooth: whether each frame is estimated from all frames, those after it too (`filter.tracker`); False: as
                 it would be live. None: smoothed wherever the noise settings have a smoother, else a message says so.
             feet: for models with a floating root: gives the wrench of each foot once the model is measured and its
                 ground frame known, instead of the plates' own division by `foot_loads`. Moments are those that the

@@ -14,8 +14,7 @@ from dynakin.filter.closure import EXCESS, Closure, closure
 from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet import loads as on_plates
-from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
-from dynakin.recordings.feet.distance import distance_to_hull
+from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED, distance_to_hull
 from dynakin.recordings.feet.loads import LOADED_N, NEAR_M, FootLoads, foot_loads
 from dynakin.recordings.plates.checks import PlateCheck, check_plates
 from dynakin.recordings.recording import Recording

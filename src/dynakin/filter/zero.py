@@ -9,7 +9,7 @@ import numpy as np
 
 from dynakin.errors import RecordingError
 from dynakin.filter.samples import recording_arrays
-from dynakin.filter.smoothing import can_smooth
+from dynakin.filter.tracker import can_smooth
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.loads import with_loads
 from dynakin.recordings.recording import Recording

@@ -19,9 +19,8 @@ from dynakin.results.estimate import Estimate
 from dynakin.results.failures import LOG, Failures
 from dynakin.results.files import body as body_files
 from dynakin.results.files import motion as motion_files
-from dynakin.results.files.config import write_config
+from dynakin.results.files.config import write_config, write_metrics, write_parameters
 from dynakin.results.files.folder import replacing
-from dynakin.results.files.json import write_metrics, write_parameters
 from dynakin.results.files.markers import write_markers
 from dynakin.results.files.netcdf import write_netcdf
 from dynakin.results.measures.mean_curves import curve_points, estimate_curves, write_curves

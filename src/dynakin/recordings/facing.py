@@ -1,11 +1,13 @@
-"""Which way the person faces."""
+"""Where up and forward are in a laboratory, and whether its axes are right-handed."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
-from dynakin.errors import RecordingError
-from dynakin.recordings.landmarks import FacingPairs, mean_position, present_pairs
+from dynakin.errors import ConfigError, RecordingError
+from dynakin.recordings.landmarks import FacingPairs, mean_position, plain_name, present_pairs
 from dynakin.recordings.recording import Array, Recording
 from dynakin.recordings.standing import standing_window
 
@@ -97,3 +99,197 @@ def _walking(recording: Recording, up: Array) -> tuple[Array | None, float]:
     way = way - (way @ up) * up
     length = float(np.linalg.norm(way))
     return (way / length if length >= WALKS_M else None), length
+
+
+AXES = ("+X", "-X", "+Y", "-Y", "+Z", "-Z")
+_MIN_SHARE = 0.8  # how much of a direction an axis must hold to be taken for it (37 deg)
+
+
+def axis_vector(axis: str) -> Array:
+    """Unit vector (3,) of "+X", "-Y", ... ("Z" alone is "+Z").
+
+    Raises:
+        ConfigError: no such axis.
+    """
+    word = axis.strip().upper()
+    word = word if word[:1] in "+-" else "+" + word
+    if word not in AXES:
+        raise ConfigError(f"found axis {axis!r}, expected one of {', '.join(AXES)}")
+    vector = np.zeros(3)
+    vector["XYZ".index(word[1])] = 1.0 if word[0] == "+" else -1.0
+    return vector
+
+
+def find_vertical(recording: Recording, pairs: FacingPairs) -> tuple[str, list[str]]:
+    """The laboratory axis that points up, and sentences on how it was found.
+
+    Witnesses, the first that speaks decides and the others are heard: the body itself (pelvis above heels),
+    the plates (they push upwards), the longer side of the markers' box (an axis without its sign), what the
+    file says of its screen (can be wrong: it is often left over from another laboratory).
+
+    Raises:
+        RecordingError: no witness.
+    """
+    witnesses: list[tuple[str, Callable[[], str | None]]] = [
+        ("the pelvis above the feet", lambda: _from_body(recording, pairs)),
+        ("the plates' force", lambda: _from_plates(recording)),
+        ("the longer side of the markers' box", lambda: _from_spread(recording)),
+        ("the file's Y_SCREEN", lambda: _from_screen(recording)),
+    ]
+    found = [(why, axis) for why, witness in witnesses if (axis := witness())]
+    if not found:
+        where = recording.path or recording.name
+        raise RecordingError(f"{where}: vertical axis not found, expected it to be given")
+    why, vertical = found[0]
+    agree = [other for other, axis in found[1:] if axis == vertical]
+    how = [f"Vertical {vertical}: {why}" + (f"; so say {', '.join(agree)}." if agree else ".")]
+    for other, axis in found:
+        if axis != vertical:
+            how.append(f"Vertical: {other} says {axis}, not {vertical}; not followed.")
+    return vertical, how
+
+
+def _name(direction: Array) -> str | None:
+    """The axis nearest to a direction, None where none is near."""
+    length = float(np.linalg.norm(direction))
+    if not np.isfinite(length) or length < 1e-9:
+        return None
+    k = int(np.argmax(np.abs(direction)))
+    if abs(direction[k]) < _MIN_SHARE * length:
+        return None
+    return ("+" if direction[k] > 0 else "-") + "XYZ"[k]
+
+
+def _from_body(recording: Recording, pairs: FacingPairs) -> str | None:
+    everything = slice(None)
+    feet = [name for pair in present_pairs(recording, pairs.heel_toe) for name in pair]
+    pelvis = [name for pair in present_pairs(recording, pairs.pelvis) for name in pair]
+    low, high = (mean_position(recording, names, everything) for names in (feet, pelvis))
+    return None if low is None or high is None else _name(high - low)
+
+
+def _from_plates(recording: Recording) -> str | None:
+    if not recording.plates:
+        return None
+    force = np.sum([plate.force for plate in recording.plates], axis=0)
+    force = force[np.isfinite(force).all(axis=1)]
+    return _name(force.mean(axis=0)) if len(force) and np.abs(force).max() > 50 else None
+
+
+def _from_spread(recording: Recording) -> str | None:
+    """The axis along which the markers of one frame span most (median over frames), if it is clearly the
+    longest.
+
+    Its sign: the markers lie on the positive side of the laboratory's floor.
+    """
+    seen = np.isfinite(recording.markers).any(axis=(1, 2)) if recording.marker_names else np.array([False])
+    if not seen.any():
+        return None
+    markers = recording.markers[seen]
+    span = np.median(np.nanmax(markers, axis=1) - np.nanmin(markers, axis=1), axis=0)
+    k = int(np.argmax(span))
+    if span[k] < max(0.5, 1.3 * np.sort(span)[1]):
+        return None
+    return ("+" if np.nanmedian(markers[:, :, k]) > 0 else "-") + "XYZ"[k]
+
+
+def _from_screen(recording: Recording) -> str | None:
+    word = recording.hints.get("Y_SCREEN", "").strip().upper()
+    word = word if word[:1] in ("+", "-") else "+" + word
+    return word if word in AXES else None
+
+
+# Whether the laboratory's axes are right-handed, by a body whose left and right, front and back are named.
+#
+# A frame with one axis negated (or all three) shows a person in a mirror. Turned in any way, walking backwards or lying
+# down, a body stays what it is: forward, up and right of one's own are a right-handed frame.
+_HEEL = ("hee", "heel", "calc", "cal", "calcaneus")
+_TOE = ("toe", "toetip", "tt2", "mt2", "bigtoe", "mt5", "5meta", "mfh5", "mfh1")
+_FRONT = ("asi", "asis", "ias")
+_BACK = ("psi", "psis", "ips")
+_SACRUM = ("sacr", "sacrum", "vsacral", "s2")
+_SURE = 0.3
+"""Sine of the angle that the three directions span, below which they say nothing: feet in line, or crossed."""
+
+
+def refuse_mirrored(recording: Recording, up: Array, vertical: str) -> None:
+    """Refuse a recording in which pelvis and feet, as far as their markers are named, are all seen in a mirror.
+
+    Args:
+        up: (3,) unit vector, taken where the pelvis or the feet are not named; vertical: its axis ("+Y").
+
+    Raises:
+        RecordingError: says which axis looks negated, or that left and right may be exchanged.
+    """
+    found = {what: value for what, value in _witnesses(recording, up).items() if abs(value) > _SURE}
+    if not found or max(found.values()) > 0.0:
+        return
+    if vertical.startswith("-"):
+        looks = (
+            f"the body points along {vertical}, so the laboratory's {vertical[1].lower()} axis looks negated (or all "
+            "three are)"
+        )
+    else:
+        level = " or ".join(axis for axis in "xyz" if axis != vertical[1].lower())
+        looks = f"one level axis of the laboratory looks negated ({level}), or all names of left and right exchanged"
+    raise RecordingError(
+        f"{recording.path or recording.name}: the person is seen in a mirror: by the {' and the '.join(found)}, what "
+        f"is named left lies on the right; {looks}, expected a right-handed frame"
+    )
+
+
+def _witnesses(recording: Recording, up: Array) -> dict[str, float]:
+    """Median over the frames of the volume that the unit vectors forward, up and right span: near 1, or -1 mirrored."""
+    roles = {
+        (role, side): [name for name in recording.marker_names if _is(name, side, words)]
+        for role, words in (("heel", _HEEL), ("toe", _TOE), ("front", _FRONT), ("back", _BACK))
+        for side in "rl"
+    }
+    sacrum = [name for name in recording.marker_names if plain_name(name) in _SACRUM]
+    place = {
+        key: _mean(recording, names or (sacrum if key[0] == "back" else [])) for key, names in roles.items()
+    }  # fmt: skip
+    pelvis = [place[role, side] for role in ("front", "back") for side in "rl"]
+    feet = [place[role, side] for role in ("heel", "toe") for side in "rl"]
+    own_up = np.broadcast_to(up, (recording.n_frames, 3))
+    if all(np.isfinite(p).all(axis=1).any() for p in (*pelvis, *feet)):
+        own_up = _middle(pelvis) - _middle(feet)
+    right = {
+        "pelvis": place["front", "r"] - place["front", "l"],
+        "feet": _middle([place["heel", "r"], place["toe", "r"]]) - _middle([place["heel", "l"], place["toe", "l"]]),
+    }
+    ahead = {
+        "pelvis": _middle(pelvis[:2]) - _middle(pelvis[2:]),
+        "feet": _middle(feet[2:]) - _middle(feet[:2]),
+    }
+    spanned = {what: _volume(ahead[what], own_up, right[what]) for what in ahead}
+    return {what: value for what, value in spanned.items() if value is not None}
+
+
+def _is(name: str, side: str, stems: tuple[str, ...]) -> bool:
+    """Whether a marker's name is one of these with a side before or after it."""
+    plain = plain_name(name)
+    words = {"r": ("r", "right"), "l": ("l", "left")}[side]
+    return any(plain in (f"{word}{stem}", f"{stem}{word}") for word in words for stem in stems)
+
+
+def _mean(recording: Recording, names: list[str]) -> Array:
+    """Mean (T, 3) m of some markers, NaN in frames in which one of them is not seen."""
+    if not names:
+        return np.full((recording.n_frames, 3), np.nan)
+    return np.asarray(np.mean([recording.marker(name) for name in names], axis=0))
+
+
+def _middle(places: list[Array]) -> Array:
+    return np.asarray(np.mean(places, axis=0))
+
+
+def _volume(ahead: Array, up: Array, right: Array) -> float | None:
+    axes = np.stack([ahead, up, right], axis=1)
+    axes = axes[np.isfinite(axes).all(axis=(1, 2))]
+    if not len(axes):
+        return None
+    with np.errstate(invalid="ignore"):
+        axes = axes / np.linalg.norm(axes, axis=2, keepdims=True)
+    volumes = np.linalg.det(axes)
+    return float(np.median(volumes[np.isfinite(volumes)])) if np.isfinite(volumes).any() else None

@@ -9,11 +9,9 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ConfigError
-from dynakin.recordings.facing import find_forward, horizontal
-from dynakin.recordings.handedness import refuse_mirrored
+from dynakin.recordings.facing import axis_vector, find_forward, find_vertical, horizontal, refuse_mirrored
 from dynakin.recordings.landmarks import DEFAULT_PAIRS, FacingPairs
 from dynakin.recordings.recording import Array, Recording
-from dynakin.recordings.vertical import axis_vector, find_vertical
 
 UPRIGHT = {
     "+Y": (((1, 0, 0), (0, 1, 0), (0, 0, 1)), ""),

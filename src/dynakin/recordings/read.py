@@ -15,9 +15,9 @@ from dynakin.recordings.formats.csv import read_csv, read_csv_table
 from dynakin.recordings.formats.grf_columns import parse_column
 from dynakin.recordings.formats.ground_forces import attach_forces
 from dynakin.recordings.formats.mot import Table, read_table
-from dynakin.recordings.formats.options import ReadOptions
 from dynakin.recordings.formats.trc import read_trc
 from dynakin.recordings.recording import Recording
+from dynakin.recordings.resampling import ReadOptions
 
 Reader = Callable[[Path, ReadOptions], Recording]
 ForceReader = Callable[[Path], Table]

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import numpy.typing as npt
 from scipy import interpolate, signal
 
-from dynakin.errors import RecordingError
+from dynakin.errors import ConfigError, RecordingError
 from dynakin.recordings.recording import Array
 
 UNEVEN = 0.1
@@ -172,3 +174,26 @@ def _check_cutoff(rate_hz: float, cutoff_hz: float) -> None:
         raise RecordingError(
             f"low-pass at {cutoff_hz:g} Hz is not possible at {rate_hz:g} Hz, expected less than {rate_hz / 2:g} Hz"
         )
+
+
+@dataclass(frozen=True)
+class ReadOptions:
+    """Options that concern the plates.
+
+    Attributes:
+        plate_filter_hz: low-pass all plates at this frequency (4th-order zero-lag Butterworth, -3 dB there;
+            2nd order one way if causal), besides what resampling needs; None: no filter of its own.
+        force_threshold_n: push along the plate's normal below which a plate's wrench is set to 0, N. None: 10
+            N for plates that are resampled, while a force file at the marker rate passes through untouched.
+        causal: only filters that look back, as in live use (they delay; the notes say by how much).
+    """
+
+    plate_filter_hz: float | None = None
+    force_threshold_n: float | None = None
+    causal: bool = False
+
+    def __post_init__(self) -> None:
+        if self.plate_filter_hz is not None and not self.plate_filter_hz > 0:
+            raise ConfigError(f"plate_filter_hz: found {self.plate_filter_hz!r}, expected a frequency above 0 Hz")
+        if self.force_threshold_n is not None and not self.force_threshold_n >= 0:
+            raise ConfigError(f"force_threshold_n: found {self.force_threshold_n!r}, expected 0 N or more")

@@ -9,9 +9,9 @@ from typing import Any, Literal
 from dynakin.report.labels import COMPONENT_LABELS, parameter_label, short_marker_names
 from dynakin.results.estimate import Estimate
 from dynakin.results.failures import FAILED, LOG
+from dynakin.results.measures.adaptation import convergence
 from dynakin.results.measures.bounds import counts_in_words
 from dynakin.results.measures.consistency import CONSISTENT
-from dynakin.results.measures.convergence import convergence
 from dynakin.results.measures.metrics import ADAPTATION_S, evaluation_window, speed_consistency, window_consistency
 from dynakin.results.measures.soft_tissue import excess_in_words
 from dynakin.results.measures.tracking import why_lost

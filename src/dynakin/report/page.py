@@ -21,8 +21,7 @@ from dynakin.report.sections.repetitions import repetition_section
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.sections.work import asymmetry_section, power_section
 from dynakin.results.estimate import Estimate
-from dynakin.results.files.config import plain
-from dynakin.results.files.versions import versions
+from dynakin.results.files.config import plain, versions
 from dynakin.results.measures.facing import facing
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.sources import UNKNOWN

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 from dynakin.results.estimate import COMPONENTS
 from dynakin.validation.differences import AngleDifference, MomentDifference
-from dynakin.validation.statistics import Spread
-from dynakin.validation.table2 import MARKERS, Row
+from dynakin.validation.table2 import MARKERS, Row, Spread
 from dynakin.validation.unseen import UnseenRow
 
 

@@ -1,11 +1,10 @@
 """Everything that can be set, each once: strict classes, read from and written to TOML."""
 
 from dynakin.settings import presets
-from dynakin.settings.loads import CarriedLoad, PlateLoad
 from dynakin.settings.model import Bounds, OpenSimOptions, Priors
 from dynakin.settings.noise import Noise
 from dynakin.settings.settings import Settings
-from dynakin.settings.subject import Subject
+from dynakin.settings.subject import CarriedLoad, PlateLoad, Subject
 
 __all__ = [
     "Bounds",

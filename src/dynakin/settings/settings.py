@@ -11,11 +11,10 @@ from pydantic import Field, model_validator
 from dynakin.errors import ConfigError, DynakinError
 from dynakin.files import is_file
 from dynakin.settings import presets
-from dynakin.settings.loads import CarriedLoad, PlateLoad
 from dynakin.settings.model import QUANTITIES, Bounds, OpenSimOptions, Priors, Quantity
 from dynakin.settings.noise import Noise
 from dynakin.settings.strict import Strict, read_toml, validate
-from dynakin.settings.subject import Sex, Subject
+from dynakin.settings.subject import CarriedLoad, PlateLoad, Sex, Subject
 
 # How keys are called on the command line, where it is not --key.
 _OPTIONS = {

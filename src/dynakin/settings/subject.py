@@ -1,13 +1,14 @@
-"""Who is measured."""
+"""Who is measured, and the known loads that are not theirs: carried, or on a plate."""
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from dataclasses import dataclass
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
 from dynakin.errors import ModelError
-from dynakin.settings.strict import Strict, validate
+from dynakin.settings.strict import Name, Strict, validate
 
 Sex = Literal["male", "female"]
 
@@ -45,3 +46,42 @@ def _hint(fields: dict[str, Any]) -> str:
         metres = next((height * unit for unit in (0.01, 0.001) if 0.3 < height * unit < 2.8), None)
         return "; expected metres (--height)" if metres is None else f"; expected metres (--height), {metres:.2f}?"
     return ""
+
+
+Vector3 = tuple[float, float, float]
+Positive = Annotated[float, Field(gt=0.0)]
+NotNegative = Annotated[float, Field(ge=0.0)]
+
+
+class CarriedLoad(Strict):
+    """A rigid body of known mass that moves with a segment."""
+
+    segment: str
+    """The segment that it is fixed to."""
+    mass_kg: Positive
+    """Its mass, kg; `mass_kg` of the person does not hold it."""
+    place_m: Vector3
+    """Its centre of mass in the segment's frame, m."""
+    inertia_kg_m2: tuple[NotNegative, NotNegative, NotNegative] = (0.0, 0.0, 0.0)
+    """Moments of inertia about its own centre, along the segment's axes; not given: all of it in one point."""
+    name: Name = "load"
+    """Its own name among the segments."""
+
+
+@dataclass(frozen=True)
+class PlateLoad:
+    """A constant wrench that something else than the person leaves on a plate, laboratory frame.
+
+    Attributes:
+        plate: its name, as `dynakin check` shows it.
+        force_n: as the plate reads it (its reaction: a weight of 50 N reads +50 N along the vertical).
+        point_m: where the force acts.
+        moment_nm: beside that, about the point.
+    """
+
+    plate: str
+    force_n: Vector3
+    point_m: Vector3
+    moment_nm: Vector3 = (0.0, 0.0, 0.0)
+
+    __pydantic_config__: ClassVar = {"extra": "forbid", "allow_inf_nan": False}  # of a configuration

@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dynakin.absent import with_nulls
+from dynakin.arrays import with_nulls
 from dynakin.recordings.recording import Plate, Recording
+from dynakin.results.files.config import versions
 from dynakin.results.files.folder import FolderKind, check_output_writable, replacing
 from dynakin.results.files.markers import write_trc
 from dynakin.results.files.storage import write_storage
-from dynakin.results.files.versions import versions
 from dynakin.simulation.truth import Truth
 
 Array = NDArray[np.float64]

@@ -11,8 +11,7 @@ from dynakin.bindings import _core
 from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.filter.total_wrench import foot_wrenches
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.recordings.feet.contact import AFTER_S, ALOFT_M, NEAR_FLOOR_M, SLOW_M_S
-from dynakin.recordings.feet.distance import distance_to_hull
+from dynakin.recordings.feet.contact import AFTER_S, ALOFT_M, NEAR_FLOOR_M, SLOW_M_S, distance_to_hull
 from dynakin.recordings.feet.loads import (
     BETWEEN_M,
     EMPTY_N,

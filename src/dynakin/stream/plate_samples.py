@@ -7,7 +7,7 @@ import numpy.typing as npt
 
 from dynakin.recordings.limits import LARGEST_MOMENT_NM
 from dynakin.recordings.resampling import CausalLowPass, latest_before, low_pass_for
-from dynakin.stream.sources.pace import Pace
+from dynakin.stream.sources.clock import Pace
 
 Array = npt.NDArray[np.float64]
 

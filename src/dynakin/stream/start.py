@@ -16,13 +16,13 @@ from dynakin.filter.tracker import Tracker
 from dynakin.model.calibration.body import steady_load
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition
+from dynakin.recordings.facing import axis_vector, find_vertical
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.landmarks import DEFAULT_PAIRS
 from dynakin.recordings.plates.checks import LOADED_N, check_plates
 from dynakin.recordings.plates.pressure import DEFAULT_THRESHOLD_N, Surface, plate_from_wrench
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.recordings.standing import standing_window
-from dynakin.recordings.vertical import axis_vector, find_vertical
 from dynakin.stream.fusion import Fused
 
 _NOW_S = 0.1  # the present posture, from a few frames

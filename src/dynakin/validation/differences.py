@@ -10,7 +10,7 @@ import numpy as np
 
 from dynakin.results.measures.fit import SignalFit, TruthError, signal_fit, truth_error
 from dynakin.validation.methods import AT, CLASSICAL, Method, Trial
-from dynakin.validation.statistics import Spread, spread
+from dynakin.validation.table2 import Spread, spread
 
 
 @dataclass(frozen=True)

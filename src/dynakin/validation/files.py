@@ -8,11 +8,10 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from dynakin.absent import with_nulls
+from dynakin.arrays import with_nulls
+from dynakin.results.files.config import versions, write_metrics
 from dynakin.results.files.folder import FolderKind, check_output_writable, replacing
-from dynakin.results.files.json import write_metrics
-from dynakin.results.files.versions import versions
-from dynakin.validation.statistics import Spread
+from dynakin.validation.table2 import Spread
 
 SCHEMA_VERSION = 1
 FILES = (

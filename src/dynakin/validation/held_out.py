@@ -11,9 +11,8 @@ import numpy.typing as npt
 from dynakin.errors import LostError, ModelError, RecordingError
 from dynakin.filter.assemble import assemble
 from dynakin.filter.estimator import Estimator
-from dynakin.filter.smoothing import can_smooth
 from dynakin.filter.total_wrench import known_ground
-from dynakin.filter.tracker import Tracker
+from dynakin.filter.tracker import Tracker, can_smooth
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition
 from dynakin.recordings.frame import GroundFrame
@@ -27,8 +26,7 @@ from dynakin.validation.freeze import final_values, freeze, initial_values
 from dynakin.validation.reference.least_squares import identify, predicted_wrench
 from dynakin.validation.reference.methods import reference_methods
 from dynakin.validation.setup import Setup
-from dynakin.validation.statistics import spread
-from dynakin.validation.table2 import Row, unit_of
+from dynakin.validation.table2 import Row, spread, unit_of
 
 Array = npt.NDArray[np.float64]
 

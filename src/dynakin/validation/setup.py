@@ -13,9 +13,9 @@ from dynakin.model.identified import IdentifiedSubject
 from dynakin.recordings.smoothing import CUTOFF_HZ
 from dynakin.results.measures.angles import Signs
 from dynakin.settings import presets
-from dynakin.settings.loads import CarriedLoad
 from dynakin.settings.model import QUANTITIES, Bounds, Priors, Quantity
 from dynakin.settings.noise import Noise
+from dynakin.settings.subject import CarriedLoad
 
 
 @dataclass(frozen=True, eq=False)

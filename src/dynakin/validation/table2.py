@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +12,6 @@ import numpy.typing as npt
 from dynakin.results.estimate import COMPONENTS
 from dynakin.results.measures.fit import SignalFit, signal_fit
 from dynakin.validation.methods import Mask, Trial
-from dynakin.validation.statistics import Spread, spread
 
 Array = npt.NDArray[np.float64]
 
@@ -131,3 +131,20 @@ def unit_of(quantity: str) -> str:
     if quantity not in COMPONENTS:
         return "mm"
     return "N" if quantity.startswith("f") else "N m"
+
+
+class Spread(NamedTuple):
+    """Mean over ``n`` trials and the sample standard deviation (None below two); mean None if no trial has it."""
+
+    mean: float | None
+    sd: float | None
+    n: int
+
+
+def spread(values: Sequence[float | None]) -> Spread:
+    """Over the values that are defined."""
+    known = [value for value in values if value is not None]
+    if not known:
+        return Spread(None, None, 0)
+    sd = float(np.std(known, ddof=1)) if len(known) > 1 else None
+    return Spread(float(np.mean(known)), sd, len(known))

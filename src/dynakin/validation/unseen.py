@@ -21,8 +21,7 @@ from dynakin.results.measures.metrics import evaluation_window
 from dynakin.validation.extrapolation import extrapolated, held, line, persisted, span_frames
 from dynakin.validation.held_out import halves, identify_on, judge, predict_blind
 from dynakin.validation.setup import Setup
-from dynakin.validation.statistics import Spread, spread
-from dynakin.validation.table2 import MARKERS, unit_of
+from dynakin.validation.table2 import MARKERS, Spread, spread, unit_of
 
 Array = npt.NDArray[np.float64]
 Figures = dict[tuple[str, str, str], float | None]  # (yardstick, quantity, method) -> RMS in the quantity's unit

@@ -9,10 +9,9 @@ import pytest
 
 from dynakin import load_model
 from dynakin.bindings import _core
-from dynakin.identification.observability.gauge_words import gauge_in_words, gauges_in_words
+from dynakin.identification.observability.element_words import gauge_in_words, gauges_in_words
 from dynakin.identification.observability.gauges import ZERO, Gauge, gauges_of, sparse_basis
-from dynakin.identification.observability.measured import MeasuredModel
-from dynakin.identification.observability.person import tracker_of
+from dynakin.identification.observability.measured import MeasuredModel, tracker_of
 from support.identifiability import changed_model
 
 

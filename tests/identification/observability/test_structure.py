@@ -13,8 +13,7 @@ from dynakin.bindings import _core
 from dynakin.errors import DynakinError, ModelError
 from dynakin.identification.observability.base import base_of, in_no_base_parameter, told_alone
 from dynakin.identification.observability.element_words import base_words
-from dynakin.identification.observability.measured import MeasuredModel
-from dynakin.identification.observability.person import tracker_of
+from dynakin.identification.observability.measured import MeasuredModel, tracker_of
 from dynakin.identification.observability.structure import structure_of
 from support.identifiability import changed_model
 

@@ -16,7 +16,7 @@ from dynakin.model.definition import Definition, load_model
 from dynakin.model.opensim.calibrate import feet_of, limits_of
 from dynakin.model.opensim.definition import load_opensim
 from dynakin.model.opensim.read import read_osim
-from dynakin.model.opensim.skin import skin_of
+from dynakin.model.opensim.sites import skin_of
 from dynakin.recordings.recording import Recording
 from dynakin.settings import presets
 from dynakin.settings.subject import Subject

@@ -13,8 +13,7 @@ from dynakin.model.calibration.posture import find_posture
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.trial import simulate_squat
 from dynakin.validation.reference.chain import PlanarChain
-from dynakin.validation.reference.classical import classical_angles
-from dynakin.validation.reference.landmark_paths import landmark_paths
+from dynakin.validation.reference.classical import classical_angles, landmark_paths
 from support.perfect import Perfect
 
 

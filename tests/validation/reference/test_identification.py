@@ -10,8 +10,7 @@ import pytest
 from dynakin.errors import RecordingError
 from dynakin.settings.model import Bounds
 from dynakin.validation.reference.least_squares import bodies_of, identify, predicted_wrench
-from dynakin.validation.reference.regressor import parameter_names, table_parameters, wrench_regressor
-from dynakin.validation.reference.table_dynamics import table_dynamics
+from dynakin.validation.reference.regressor import parameter_names, table_dynamics, table_parameters, wrench_regressor
 from support.perfect import MASS_KG, PLANE, Perfect, lively
 
 

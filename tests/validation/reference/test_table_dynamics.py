@@ -11,8 +11,7 @@ from dynakin.recordings.smoothing import smooth
 from dynakin.validation.reference.chain import Kinematics
 from dynakin.validation.reference.classical import classical_angles, hinge_paths
 from dynakin.validation.reference.least_squares import bodies_of
-from dynakin.validation.reference.regressor import parameter_names
-from dynakin.validation.reference.table_dynamics import table_dynamics
+from dynakin.validation.reference.regressor import parameter_names, table_dynamics
 from support.perfect import PLANE, Perfect, lively
 
 

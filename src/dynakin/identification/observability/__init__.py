@@ -9,7 +9,7 @@ It stands beside the chain, as `comparison` does: it needs the core, the filter 
 
 from dynakin.identification.observability.advice import GAIN
 from dynakin.identification.observability.gauges import Gauge, Gauges
-from dynakin.identification.observability.person import tracker_of
+from dynakin.identification.observability.measured import tracker_of
 from dynakin.identification.observability.structure import Structure, structure_of
 from dynakin.identification.observability.trial import BaseParameterTold, Identifiability, identifiability
 

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
 from dynakin.bindings import _core
 from dynakin.elements import element
-from dynakin.results.naming import listed, number, words
+from dynakin.identification.observability.gauges import ZERO, Gauge
+from dynakin.results.naming import listed, number, plural, words
 from dynakin.validation.reference.base_parameters import BaseParameters
 
 INERTIA = {
@@ -79,3 +81,106 @@ def _carried(segment: str, children: dict[str, list[str]]) -> set[str]:
     for child in children.get(segment, []):
         found |= {child} | _carried(child, children)
     return found
+
+
+def gauges_in_words(gauges: tuple[Gauge, ...], spec: _core.ModelSpec) -> list[str]:
+    """A sentence a gauge, or for all that are said alike; the displacements of skin, each marker's own, in one."""
+    skin = [gauge for gauge in gauges if _is_skin(gauge)]
+    alike = Counter(gauge_in_words(gauge, spec) for gauge in gauges if not _is_skin(gauge))
+    said = [text if count == 1 else f"{text}, in {count} directions" for text, count in alike.items()]
+    if len(skin) > 1:
+        markers = {element(name).owner for gauge in skin for name in gauge.direction}
+        said.append(
+            f"{plural(len(markers), 'marker')} ({plural(len(skin), 'direction')}): the mean displacement of the skin "
+            "under each against its place on the segment"
+        )
+    else:
+        said += [gauge_in_words(gauge, spec) for gauge in skin]
+    return said
+
+
+def gauge_in_words(gauge: Gauge, spec: _core.ModelSpec) -> str:
+    """What moves against what, unseen."""
+    names = list(gauge.direction)
+    joints = {segment.name: _joint(segment) for segment in spec.segments}
+    parents = {segment.name: segment.parent for segment in spec.segments}
+    homes = {marker.name: marker.segment for marker in spec.markers}
+    zeros = [name.removeprefix(ZERO) for name in names if name.startswith(ZERO)]
+    masses = {element(name).owner: gauge.direction[name] for name in names if name.endswith("/mass")}
+    segments = {_segment(name, homes) for name in names if not name.startswith((ZERO, "length/", "plates/"))}
+    if len(names) == 1:
+        return f"{_element(names[0], homes)}: nothing that is measured depends on it"
+    if _is_skin(gauge):
+        marker = element(names[0]).owner
+        return f"{marker}: the mean displacement of the skin under it against its place on the {words(homes[marker])}"
+    if all(name.startswith("inertia/") for name in names):
+        if len(masses) == 2:
+            one, other = masses
+            if parents[one] == other:
+                one, other = other, one
+            if parents[other] == one and abs(masses[one] + masses[other]) < 1e-6 * abs(masses[one]):
+                return f"{joints[other]}: a mass at it may belong to the {words(one)} or to the {words(other)}"
+        if len(segments) == 1:
+            numbers = listed([INERTIA[name.rpartition("/")[2]] for name in names], 10)
+            return f"{words(segments.pop())}: {numbers} against each other"
+    if len(zeros) == 1 and len(segments) == 1 and not any(name.startswith(("length/", "plates/")) for name in names):
+        (segment,) = segments
+        against = []
+        if any(name.startswith(("marker/", "soft_tissue/")) for name in names):
+            against.append("its markers' places")
+        if any(name.startswith("inertia/") for name in names):
+            against.append("its first moments" if not masses else "its inertia")
+        return f"{words(segment)}: a turn about the {words(zeros[0])}: the angle's zero against {listed(against)}"
+    if any(name.startswith("plates/") for name in names) and masses:
+        errors = listed([element(name).owner for name in names if name.startswith("plates/")])
+        return f"{listed([words(s) for s in masses])} mass against a constant error of the plates ({errors})"
+    lengths = [name for name in names if name.startswith("length/")]
+    rest = _summary([name for name in names if name not in lengths], homes)
+    if lengths:
+        return f"{listed([_element(name, homes) for name in lengths])} against {listed(rest)}"
+    return f"{rest[0]} against {listed(rest[1:])}" if len(rest) > 1 else f"{rest[0]} against each other"
+
+
+def _is_skin(gauge: Gauge) -> bool:
+    kinds = {element(name).kind for name in gauge.direction}
+    return kinds == {"marker", "soft_tissue"} and len({element(name).owner for name in gauge.direction}) == 1
+
+
+def _joint(segment: _core.SegmentSpec) -> str:
+    coordinates = {axis.coordinate for axis in segment.axes}
+    return words(coordinates.pop()) if len(coordinates) == 1 else f"joint of the {words(segment.name)}"
+
+
+def _segment(name: str, homes: dict[str, str]) -> str:
+    kind, owner, _ = element(name)
+    return owner if kind == "inertia" else homes[owner]
+
+
+def _element(name: str, homes: dict[str, str]) -> str:
+    kind, owner, number = element(name)
+    if kind == "zero":
+        return f"{words(owner)} zero"
+    if kind == "length":
+        return f"{words(owner)} length"
+    if kind == "plates":
+        return f"plates' error of {owner}"
+    if kind == "inertia":
+        return f"{words(owner)} {INERTIA[number]}"
+    what = "place" if kind == "marker" else "skin"
+    return f"{what} of {owner} on the {words(homes[owner])}, {number}"
+
+
+def _summary(names: list[str], homes: dict[str, str]) -> list[str]:
+    """The elements, those of a kind and a segment in one."""
+    found: dict[str, None] = {}
+    for name in names:
+        kind, owner, _ = element(name)
+        if kind in ("marker", "soft_tissue"):
+            found[f"the markers' places on the {words(homes[owner])}"] = None
+        elif kind == "inertia":
+            found[f"the {words(owner)}'s inertia"] = None
+        elif kind == "zero":
+            found[f"the zero of the {words(owner)}"] = None
+        else:
+            found[f"the {_element(name, homes)}"] = None
+    return list(found)

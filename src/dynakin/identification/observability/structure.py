@@ -7,8 +7,7 @@ from typing import Any
 
 from dynakin.filter.tracker import Tracker
 from dynakin.identification.observability.base import base_of, in_no_base_parameter, told_alone
-from dynakin.identification.observability.element_words import base_words, inertia_words, is_planar
-from dynakin.identification.observability.gauge_words import gauges_in_words
+from dynakin.identification.observability.element_words import base_words, gauges_in_words, inertia_words, is_planar
 from dynakin.identification.observability.gauges import Gauges, gauges_of
 from dynakin.identification.observability.measured import MeasuredModel
 from dynakin.results.naming import listed

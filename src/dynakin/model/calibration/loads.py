@@ -10,8 +10,8 @@ import numpy as np
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.settings.loads import CarriedLoad
 from dynakin.settings.strict import nearest
+from dynakin.settings.subject import CarriedLoad
 
 
 def with_loads(initial: CalibratedModel, loads: Sequence[CarriedLoad]) -> CalibratedModel:

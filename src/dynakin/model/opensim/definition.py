@@ -28,8 +28,7 @@ from dynakin.model.opensim.calibrate import (
 from dynakin.model.opensim.description import OpenSimModel
 from dynakin.model.opensim.read import read_osim
 from dynakin.model.opensim.scales import scale_names
-from dynakin.model.opensim.sites import sites
-from dynakin.model.opensim.skin import skin_of
+from dynakin.model.opensim.sites import sites, skin_of
 from dynakin.model.opensim.spec import to_spec, unseen
 from dynakin.model.spec import in_layout
 from dynakin.model.state_priors import state_bounds, state_prior

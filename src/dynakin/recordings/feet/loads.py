@@ -15,8 +15,7 @@ import numpy.typing as npt
 
 from dynakin.arrays import runs
 from dynakin.errors import ConfigError
-from dynakin.recordings.feet.contact import FootContact, foot_contact
-from dynakin.recordings.feet.distance import DEFAULT_FOOT_MARKERS, distance_to_hull
+from dynakin.recordings.feet.contact import DEFAULT_FOOT_MARKERS, FootContact, distance_to_hull, foot_contact
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Array, Plate, Recording
 

@@ -10,14 +10,14 @@ import ezc3d
 import numpy as np
 
 from dynakin.errors import RecordingError
-from dynakin.recordings.formats.c3d_layout import check_c3d_file
 from dynakin.recordings.formats.c3d_parameters import Parameters
 from dynakin.recordings.formats.c3d_plates import read_plates
-from dynakin.recordings.formats.options import ReadOptions
+from dynakin.recordings.formats.c3d_records import check_c3d_file
 from dynakin.recordings.formats.textfile import check_unique, trial_name
 from dynakin.recordings.formats.trajectories import clean_markers
 from dynakin.recordings.limits import FASTEST_HZ, SLOWEST_HZ
 from dynakin.recordings.recording import Recording
+from dynakin.recordings.resampling import ReadOptions
 from dynakin.units import length_factor
 
 _UNLABELLED = re.compile(r"^\*\d+$|^(unlabell?ed|uname)\W*\d*$", re.IGNORECASE)

@@ -16,13 +16,11 @@ from typing import Literal
 import numpy as np
 
 from dynakin.errors import RecordingError
-from dynakin.recordings.formats.c3d_channels import plate_wrench
 from dynakin.recordings.formats.c3d_parameters import Parameters
-from dynakin.recordings.formats.options import ReadOptions
 from dynakin.recordings.limits import check_wrench
 from dynakin.recordings.plates.pressure import DEFAULT_THRESHOLD_N, Surface, plate_from_wrench
 from dynakin.recordings.recording import Array, Plate
-from dynakin.recordings.resampling import CausalLowPass, filled, low_pass, reach_s, resample, touched
+from dynakin.recordings.resampling import CausalLowPass, ReadOptions, filled, low_pass, reach_s, resample, touched
 from dynakin.units import force_factor, moment_factor
 
 _CERTAIN_LOAD_N = 50.0  # a push that no offset of an idle plate reaches: from it the sign is judged
@@ -217,3 +215,50 @@ def _at_marker_times(raw: _Raw, time_in: Array, time: Array, options: ReadOption
         threshold_n=threshold,
         zero_unloaded=True,
     )
+
+
+def plate_wrench(
+    kind: int, channels: Array, *, origin: Array, calibration: Array | None, units: Array
+) -> tuple[Array, Array]:
+    """Force (N, 3) N and moment (N, 3) N m about the centre of the surface, in the plate's frame (z into the
+    floor).
+
+    Args:
+        kind: 1 force, centre of pressure and free moment; 2 force and moment about the transducers' origin; 3
+            eight piezo-electric forces; 4 as 2, through a calibration matrix.
+        channels: (6 or 8, N) as the file scales them.
+        origin: (3,) m. Types 2 and 4: between the transducers' origin and the surface's centre; type 3:
+            distances a, b of the sensors from the axes, and their depth. Files differ in the sign of its
+            depth: the transducers lie below the surface, that is settled here.
+        calibration: (6, 6), type 4 only.
+        units: (6 or 8,) factor from each channel (type 4: each calibrated channel) to N, N m or m.
+    """
+    if calibration is not None:
+        channels = calibration @ channels
+    values = channels * units[:, None]
+    if kind == 1:
+        force = values[:3].T
+        arm = np.column_stack([values[3], values[4], np.zeros(values.shape[1])])
+        return force, np.cross(arm, force) + np.outer(values[5], [0.0, 0.0, 1.0])
+    if kind == 3:
+        return _eight_forces(values, a=abs(origin[0]), b=abs(origin[1]), depth=abs(origin[2]))
+    # From the transducers' origin T to the surface's centre S, which lies above it, at negative z: a file
+    # with a positive depth holds the opposite vector. M_S = M_T + F x (S - T).
+    to_surface = -origin if origin[2] > 0 else origin
+    force = values[:3].T
+    return force, values[3:].T + np.cross(force, to_surface)
+
+
+def _eight_forces(values: Array, a: float, b: float, depth: float) -> tuple[Array, Array]:
+    """Kistler: f_x12, f_x34, f_y14, f_y23, f_z1 to f_z4; sensors at (+-a, +-b), ``depth`` below the
+    surface."""
+    x12, x34, y14, y23, z1, z2, z3, z4 = values
+    force = np.column_stack([x12 + x34, y14 + y23, z1 + z2 + z3 + z4])
+    moment = np.column_stack(
+        [
+            b * (z1 + z2 - z3 - z4),
+            a * (z2 + z3 - z1 - z4),
+            b * (x34 - x12) + a * (y14 - y23),
+        ]
+    )
+    return force, moment + np.cross(force, [0.0, 0.0, -depth])

@@ -21,10 +21,10 @@ from dynakin.errors import RecordingError
 from dynakin.recordings.formats.grf_columns import parse_column
 from dynakin.recordings.formats.ground_forces import attach_forces
 from dynakin.recordings.formats.mot import Table
-from dynakin.recordings.formats.options import ReadOptions
 from dynakin.recordings.formats.textfile import check_time, check_unique, parse_row, read_lines, split_cells, trial_name
 from dynakin.recordings.formats.trajectories import clean_markers, timing_notes
 from dynakin.recordings.recording import Recording
+from dynakin.recordings.resampling import ReadOptions
 
 
 def read_csv_table(path: Path) -> Table:

@@ -9,11 +9,10 @@ import numpy as np
 from dynakin.errors import RecordingError
 from dynakin.recordings.formats.grf_columns import PlateColumns, group_columns
 from dynakin.recordings.formats.mot import Table
-from dynakin.recordings.formats.options import ReadOptions
 from dynakin.recordings.limits import check_wrench
 from dynakin.recordings.plates.pressure import DEFAULT_THRESHOLD_N, Surface, plate_from_wrench
 from dynakin.recordings.recording import Array, Plate, Recording
-from dynakin.recordings.resampling import low_pass, resample, same_times
+from dynakin.recordings.resampling import ReadOptions, low_pass, resample, same_times
 
 _MIN_RATE_RATIO = 0.99
 

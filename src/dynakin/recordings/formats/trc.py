@@ -22,10 +22,10 @@ from typing import Literal
 import numpy as np
 
 from dynakin.errors import RecordingError
-from dynakin.recordings.formats.options import ReadOptions
 from dynakin.recordings.formats.textfile import check_time, check_unique, parse_row, read_lines, split_cells, trial_name
 from dynakin.recordings.formats.trajectories import clean_markers, timing_notes
 from dynakin.recordings.recording import Array, Recording
+from dynakin.recordings.resampling import ReadOptions
 from dynakin.units import length_factor
 
 _AXES_ROW = re.compile(r"^[XYZ]_?\d*$", re.IGNORECASE)

@@ -8,7 +8,7 @@ from itertools import combinations, pairwise
 
 import numpy as np
 
-from dynakin.recordings.feet.distance import DEFAULT_FOOT_MARKERS, distance_to_hull, foot_outline
+from dynakin.recordings.feet.contact import DEFAULT_FOOT_MARKERS, distance_to_hull, foot_outline
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.plates.limits import beyond_limits
 from dynakin.recordings.recording import Array, Plate, Recording

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.recordings.feet.distance import distance_to_hull
+from dynakin.recordings.feet.contact import distance_to_hull
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Array, Plate, Recording
 

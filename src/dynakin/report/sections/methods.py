@@ -18,8 +18,7 @@ from dynakin.results.measures.sources import DERIVED, moment_sources
 from dynakin.results.naming import number, sentence, words
 from dynakin.validation.differences import AngleDifference, MomentDifference, angle_differences, moment_differences
 from dynakin.validation.methods import AT, CLASSICAL, Trial
-from dynakin.validation.statistics import Spread
-from dynakin.validation.table2 import table2
+from dynakin.validation.table2 import Spread, table2
 
 _Difference = TypeVar("_Difference", AngleDifference, MomentDifference)
 ABOUT_TABLE2 = (

@@ -1,13 +1,19 @@
-"""``config.toml``: the configuration as used, which `dynakin run config.toml` takes again, and what made the result."""
+"""``config.toml``, ``parameters.json`` and ``metrics.json``, and which versions made them."""
 
 from __future__ import annotations
 
+import json
+import platform
+from dataclasses import asdict
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import tomli_w
 
-from dynakin.results.files.versions import versions
+from dynakin.arrays import with_nulls
+from dynakin.results.estimate import Estimate
+from dynakin.results.measures.metrics import SCHEMA_VERSION
 
 _HEADER = """\
 # The configuration of this run as used. `dynakin run` on this file repeats it.
@@ -31,3 +37,44 @@ def plain(value: Any) -> Any:
     if hasattr(value, "item"):  # a numpy scalar
         return value.item()
     return str(value)
+
+
+def write_parameters(estimate: Estimate, path: Path) -> None:
+    """Every length, marker position and inertial parameter with its standard deviation, start, table and bounds."""
+    _write(
+        path,
+        {
+            "schema_version": SCHEMA_VERSION,
+            "model": estimate.model_name,
+            "parameters": [asdict(parameter) for parameter in estimate.parameters],
+        },
+    )
+
+
+def write_metrics(metrics: dict[str, Any], path: Path) -> None:
+    """The figures of `dynakin.results.measures.metrics.compute_metrics`."""
+    _write(path, metrics)
+
+
+def _write(path: Path, content: dict[str, Any]) -> None:
+    text = json.dumps(with_nulls(content), indent=2, ensure_ascii=False, allow_nan=False)
+    path.write_text(text + "\n", encoding="utf-8", newline="\n")
+
+
+_PACKAGES = ("dynakin", "numpy", "scipy", "xarray", "ezc3d")
+
+
+def versions() -> dict[str, str]:
+    """Versions of dynakin, Python, the system and the packages that touch the numbers."""
+    found = {name: _version(name) for name in _PACKAGES}
+    return found | {
+        "python": platform.python_version(),
+        "system": f"{platform.system()} {platform.machine()}",
+    }
+
+
+def _version(name: str) -> str:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:  # run from a source tree that is not installed
+        return "not installed"

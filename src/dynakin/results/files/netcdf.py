@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from dynakin.absent import finite, with_nulls
+from dynakin.arrays import finite, with_nulls
 from dynakin.results.estimate import Estimate
-from dynakin.results.files.versions import versions
+from dynakin.results.files.config import versions
 from dynakin.results.measures.metrics import SCHEMA_VERSION
 from dynakin.results.measures.sources import MEANINGS
 

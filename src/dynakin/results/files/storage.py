@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dynakin.absent import finite
+from dynakin.arrays import finite
 from dynakin.errors import OutputError
 
 # 15 significant digits: what a reader computes from the file equals what was computed from the arrays.

@@ -14,11 +14,10 @@ from dynakin.results.estimate import COMPONENTS, Estimate
 from dynakin.results.failures import Failures
 from dynakin.results.measures.adaptation import adaptation
 from dynakin.results.measures.bounds import parameter_bounds
-from dynakin.results.measures.consistency import Consistency, consistency
+from dynakin.results.measures.consistency import Consistency, consistency, mismatch_in_words, speed_mismatch
 from dynakin.results.measures.facing import facing
 from dynakin.results.measures.feet import foot_figures
 from dynakin.results.measures.fit import WrenchFit, marker_rms_mm, wrench_fit
-from dynakin.results.measures.kinematic_consistency import mismatch_in_words, speed_mismatch
 from dynakin.results.measures.posterior import learned
 from dynakin.results.measures.power import work
 from dynakin.results.measures.soft_tissue import soft_tissue

@@ -8,7 +8,7 @@ from typing import Generic, TypeVar
 
 import numpy as np
 
-from dynakin.stream.sources.pace import Pace
+from dynakin.stream.sources.clock import Pace
 
 T = TypeVar("T")
 

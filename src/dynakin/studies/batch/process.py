@@ -12,16 +12,18 @@ from dynakin.pipeline.stages import judged
 from dynakin.recordings.smoothing import CUTOFF_HZ
 from dynakin.results.estimate import COMPONENTS
 from dynakin.results.failures import Failures
-from dynakin.results.files.versions import versions
+from dynakin.results.files.config import versions
 from dynakin.results.measures.fit import SignalFit
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.settings.settings import Settings
 from dynakin.studies.batch.dataset import Dataset, Session
+from dynakin.studies.engine.folder import write_csv, write_json
 from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import Pool
 from dynakin.studies.engine.tasks import Failure, Task
 from dynakin.studies.engine.work import Progress, work
 from dynakin.validation.case import case_of
+from dynakin.validation.files import flat
 from dynakin.validation.methods import estimate_each
 from dynakin.validation.table2 import MARKERS, Row, mean_fit, table2_of, trial_fits
 
@@ -136,3 +138,33 @@ def run_batch(
     rows = {o.key: o.row for o in outcomes if o.row is not None}
     failures = {o.key: o.failure for o in outcomes if o.failure is not None}
     return Batch(dataset.sessions, rows, failures)
+
+
+def write_batch(folder: Path, batch: Batch) -> None:
+    """``table2.csv`` (over trials), ``table2_subjects.csv`` (over subjects), ``trials.csv`` (a row a trial, quantity
+    and method) and ``batch.json`` (what failed and why, notes, events).
+
+    Raises:
+        OutputError: a file cannot be written.
+    """
+    for name, rows in (("table2", batch.table2()), ("table2_subjects", batch.table2_of_subjects())):
+        if rows:
+            write_csv(folder / f"{name}.csv", [flat(row) for row in rows])
+    single = [
+        {"trial": name, "quantity": quantity, "method": method, **dict(zip(SignalFit._fields, fit, strict=True))}
+        for name, fits in batch.fits().items()
+        for (quantity, method), fit in fits.items()
+    ]
+    if single:
+        write_csv(folder / "trials.csv", single)
+    write_json(
+        folder / "batch.json",
+        {
+            "versions": versions(),
+            "trials": {name: {k: v for k, v in row.items() if k != "fits"} for name, row in batch.rows.items()},
+            "failed": {
+                name: {"message": failure.message, "unexpected": failure.unexpected, "details": failure.details}
+                for name, failure in batch.failures.items()
+            },
+        },
+    )

@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from dynakin.absent import with_nulls
+from dynakin.arrays import with_nulls
 from dynakin.errors import OutputError
 
 ROWS = "rows.jsonl"

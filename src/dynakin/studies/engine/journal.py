@@ -7,7 +7,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from dynakin.absent import with_nulls
+from dynakin.arrays import with_nulls
 from dynakin.errors import OutputError
 from dynakin.studies.engine.tasks import Row
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ConfigError
-from dynakin.results.files.versions import versions
+from dynakin.results.files.config import versions
 from dynakin.settings.noise import Noise
 from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import Pool

@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from dynakin.results.files.versions import versions
+from dynakin.results.files.config import versions
 from dynakin.settings.noise import SCALES
 from dynakin.settings.presets import write_preset
 from dynakin.studies.engine.folder import write_csv, write_json

@@ -6,7 +6,7 @@ from dynakin.validation.reference.chain import Kinematics, PlanarChain
 from dynakin.validation.reference.classical import classical_angles
 from dynakin.validation.reference.least_squares import LeastSquares, identify
 from dynakin.validation.reference.methods import Reference, reference_methods
-from dynakin.validation.reference.table_dynamics import ChainDynamics, table_dynamics
+from dynakin.validation.reference.regressor import ChainDynamics, table_dynamics
 
 __all__ = [
     "BaseParameters",

@@ -13,13 +13,13 @@ from dynakin.model.inertia import INERTIA_NAMES
 from dynakin.model.plan import ModelPlan
 from dynakin.validation.reference.chain import Kinematics, PlanarChain
 from dynakin.validation.reference.regressor import (
+    IN_PLANE,
     PLANAR_NAMES,
     parameter_names,
     parameter_scales,
     table_parameters,
     wrench_regressor,
 )
-from dynakin.validation.reference.table_dynamics import IN_PLANE
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]

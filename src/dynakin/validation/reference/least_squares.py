@@ -18,8 +18,7 @@ from dynakin.settings.model import Bounds
 from dynakin.validation.reference.base_parameters import BaseParameters, base_parameters
 from dynakin.validation.reference.chain import Kinematics, PlanarChain
 from dynakin.validation.reference.condensed import DECLARED_SIGMA, Condensed, condense
-from dynakin.validation.reference.regressor import parameter_names, wrench_regressor
-from dynakin.validation.reference.table_dynamics import IN_PLANE
+from dynakin.validation.reference.regressor import IN_PLANE, parameter_names, wrench_regressor
 
 Array = npt.NDArray[np.float64]
 

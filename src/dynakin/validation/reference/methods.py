@@ -16,9 +16,8 @@ from dynakin.recordings.recording import Recording
 from dynakin.recordings.smoothing import CUTOFF_HZ, MAX_GAP_S, smooth
 from dynakin.results.estimate import COMPONENTS
 from dynakin.validation.reference.chain import Kinematics, PlanarChain
-from dynakin.validation.reference.classical import classical_angles, hinge_paths
-from dynakin.validation.reference.landmark_paths import landmark_paths
-from dynakin.validation.reference.table_dynamics import IN_PLANE, table_dynamics
+from dynakin.validation.reference.classical import classical_angles, hinge_paths, landmark_paths
+from dynakin.validation.reference.regressor import IN_PLANE, table_dynamics
 
 Array = npt.NDArray[np.float64]
 Lengths = Literal["constant", "frame"]
