@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
 from dynakin.errors import RecordingError
-from dynakin.recordings.facing import refuse_mirrored
 from dynakin.recordings.frame import find_ground_frame
+from dynakin.recordings.orientation import refuse_mirrored
 from dynakin.recordings.recording import Recording
 from support.made_recordings import standing
 from support.real_trials import real_trials

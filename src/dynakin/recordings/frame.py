@@ -9,8 +9,8 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ConfigError
-from dynakin.recordings.facing import axis_vector, find_forward, find_vertical, horizontal, refuse_mirrored
 from dynakin.recordings.landmarks import DEFAULT_PAIRS, FacingPairs
+from dynakin.recordings.orientation import axis_vector, find_forward, find_vertical, horizontal, refuse_mirrored
 from dynakin.recordings.recording import Array, Recording
 
 UPRIGHT = {

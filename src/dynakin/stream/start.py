@@ -16,9 +16,9 @@ from dynakin.filter.tracker import Tracker
 from dynakin.model.calibration.body import steady_load
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition
-from dynakin.recordings.facing import axis_vector, find_vertical
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.landmarks import DEFAULT_PAIRS
+from dynakin.recordings.orientation import axis_vector, find_vertical
 from dynakin.recordings.plates.checks import LOADED_N, check_plates
 from dynakin.recordings.plates.pressure import DEFAULT_THRESHOLD_N, Surface, plate_from_wrench
 from dynakin.recordings.recording import Plate, Recording

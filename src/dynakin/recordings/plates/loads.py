@@ -7,8 +7,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from dynakin.errors import RecordingError
-from dynakin.recordings.facing import axis_vector, find_vertical
 from dynakin.recordings.landmarks import DEFAULT_PAIRS
+from dynakin.recordings.orientation import axis_vector, find_vertical
 from dynakin.recordings.plates.pressure import DEFAULT_THRESHOLD_N, Surface, centre_of_pressure
 from dynakin.recordings.recording import Array, Plate, Recording
 from dynakin.settings.subject import PlateLoad
