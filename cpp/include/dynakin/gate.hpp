@@ -30,7 +30,7 @@ class Gate {
   void decide(int marker, Verdict verdict);
   // A sensor a marker, then the plates.
   const std::vector<Verdict>& verdicts() const { return verdicts_; }
-  // On demand, as H P H' of all sensors takes some per cent of a step.
+  // On demand, as H P H' of all sensors takes about a tenth of a step.
   void report_sensors(bool on) { reports_ = on; }
   const SensorReport& sensors() const { return sensors_; }
   int markers_measured() const { return measured_; }
