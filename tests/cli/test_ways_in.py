@@ -95,9 +95,12 @@ def test_settings_and_a_recording_that_was_read_give_the_same(
             np.testing.assert_array_equal(result.estimate.data[name], from_python.estimate.data[name])
         assert result.comparison is not None and len(result.comparison.methods) == 3
     assert read.estimate.config["trial"] == str(trial / "markers.trc")
+    assert read.estimate.config["forces"] == str(trial / "forces.mot")  # config.toml can be run again
     assert set_up.save() == tmp_path / "out" and (tmp_path / "out" / "report.html").exists()
     with pytest.raises(OutputError, match=r"no folder was given, expected save\(FOLDER\)"):
         read.save()
+    with pytest.raises(ConfigError, match="trial is missing"):
+        dynakin.run(Settings.of({"model": "squat7"}, "test", ("model",)))
     with pytest.raises(ConfigError, match="model is given next to settings"):
         dynakin.run(settings, model="squat7")
     with pytest.raises(ConfigError, match="plate_filter_hz takes effect while a file is read"):

@@ -69,7 +69,8 @@ def demo(
         style="dim",
     )
     console.print()
-    print_summary(result, folder)
+    with failures.stage("summary"):
+        print_summary(result, folder)
     end(result)
 
 

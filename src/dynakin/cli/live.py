@@ -83,7 +83,8 @@ def live(
             raise typer.BadParameter("--finish needs -o OUT, the folder for the results")
         with busy("estimating"):
             result = finish(finish_folder, output)
-        print_summary(result, output)
+        with result.failures.stage("summary"):
+            print_summary(result, output)
         end(result)
         return
     if source is None:

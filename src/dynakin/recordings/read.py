@@ -65,10 +65,14 @@ def read(
         raise RecordingError(f"{path}: found extension {path.suffix!r}, expected one of {', '.join(sorted(READERS))}")
     recording = reader(path, options)
     _check_unit(recording, path)
-    if forces is None:
-        return recording
-    table = read_forces(Path(forces))
-    return attach_forces(recording, table, options)
+    if forces is not None:
+        recording = attach_forces(recording, read_forces(Path(forces)), options)
+    asked = {
+        "forces": None if forces is None else str(Path(forces).absolute()),
+        "plate_filter_hz": plate_filter_hz,
+        "force_threshold_n": force_threshold_n,
+    }
+    return replace(recording, read_with={key: value for key, value in asked.items() if value is not None})
 
 
 def _check_unit(recording: Recording, path: Path) -> None:

@@ -78,6 +78,7 @@ class Recording:
         notes: what the reader found or changed, one sentence each.
         subject: "mass_kg" and "height_m" where the file tells.
         hints: what the file says of its axes (C3D: "X_SCREEN", "Y_SCREEN"); can be wrong, so it only votes.
+        read_with: settings that it was read with (forces, plate_filter_hz, ...), by their keys in a configuration.
     """
 
     name: str
@@ -90,6 +91,7 @@ class Recording:
     notes: tuple[str, ...] = ()
     subject: dict[str, float] = field(default_factory=dict)
     hints: dict[str, str] = field(default_factory=dict)
+    read_with: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         expected = (len(self.time), len(self.marker_names), 3)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 from dynakin.errors import ConfigError
 from dynakin.filter.build import definition_of, identified_of
@@ -30,8 +31,10 @@ class Case:
     def with_config(self, title: str, estimate: Estimate) -> Estimate:
         """An estimate with one of the presets, with the configuration as used in it."""
         used = self.configs[title].as_used()
-        if self.recording.path is None:  # was never a file
-            used["trial"] = self.recording.name
+        used |= self.recording.read_with  # of a recording that was read before the settings were made
+        for key, given in (("trial", self.recording), ("static", self.static)):
+            if given is not None and given.path is None:  # was never a file
+                used[key] = given.name
         return replace(estimate, config=used | estimate.config)
 
 
@@ -71,6 +74,8 @@ def case_of(
         config.signs,
     )
     if recording is None:
+        if config.trial == Path():
+            raise ConfigError("run: trial is missing, expected a recording or settings that name one")
         recording = read(
             config.trial,
             config.forces,
