@@ -105,11 +105,15 @@ def test_settings_and_a_recording_that_was_read_give_the_same(
         dynakin.run(settings, model="squat7")
     with pytest.raises(ConfigError, match="plate_filter_hz takes effect while a file is read"):
         dynakin.run(recording, plate_filter_hz=20.0, **KEYS)
+    with pytest.raises(ConfigError, match="mass_kg is given next to subject"):
+        dynakin.run(recording, subject=subject, **KEYS)
     with pytest.raises(ConfigError, match="unknown key 'modle'"):
         dynakin.run(recording, modle="squat7", **KEYS)
 
 
 def test_a_result_as_a_researcher_takes_it(from_python: dynakin.Result) -> None:
+    assert repr(from_python) == "<Result: <Estimate of markers: sagittal7, 501 frames, smoothed>>"
+    assert repr(from_python.estimate.recording).startswith("<Recording markers: 501 frames, ")
     table = from_python.to_dataframe("moments")
     estimate = from_python.estimate
     assert list(table.columns) == estimate.coordinate_names and table.index.name == "time"

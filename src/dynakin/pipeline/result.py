@@ -34,7 +34,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Result:
     """What `dynakin.run` found. ``Result(estimate)`` alone can be saved too.
 
@@ -53,6 +53,10 @@ class Result:
     observability: Identifiability | None = None
     settings: Settings | None = None
     failures: Failures = field(default_factory=Failures)
+
+    def __repr__(self) -> str:
+        failed = f", {len(self.failures.found)} late stages failed" if self.failures.found else ""
+        return f"<Result: {self.estimate!r}{failed}>"
 
     @property
     def events(self) -> list[Event]:

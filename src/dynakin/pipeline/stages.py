@@ -65,6 +65,8 @@ def run(
     """
     given = settings | {"model": None if model is None else str(model), "forces": forces, "output": output}
     if subject is not None:
+        if twice := [key for key in ("mass_kg", "height_m", "sex") if settings.get(key) is not None]:
+            raise ConfigError(f"run: {twice[0]} is given next to subject, expected it in one of them")
         given |= {"mass_kg": subject.mass_kg, "height_m": subject.height_m, "sex": subject.sex}
     if noise is not None:
         given["noise"] = noise.model_dump() if isinstance(noise, Noise) else dict(noise)

@@ -60,7 +60,7 @@ def rate_of(time: Array) -> float:
     return 1.0 / step
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Recording:
     """A trial as read: SI, laboratory frame of the file, a missing marker is NaN.
 
@@ -107,6 +107,12 @@ class Recording:
         check_markers(where, self.time, self.marker_names, self.markers)
         for plate in self.plates:
             check_wrench(plate.name, self.time, plate.force, plate.moment, where)
+
+    def __repr__(self) -> str:
+        return (
+            f"<Recording {self.name}: {self.n_frames} frames, {len(self.marker_names)} markers, "
+            f"{len(self.plates)} force plates>"
+        )
 
     @property
     def n_frames(self) -> int:

@@ -16,7 +16,7 @@ AXES = ("x", "y", "z")
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Estimate:
     """What one run estimated. Do not change it: every output file and the report are made from it.
 
@@ -79,6 +79,10 @@ class Estimate:
     messages: list[str] = field(default_factory=list)
     tracking: Tracking | None = None
     """How the person was followed (`results.measures.tracking`), as judged when it was estimated."""
+
+    def __repr__(self) -> str:
+        way = "smoothed" if self.smoothed else "filtered"
+        return f"<Estimate of {self.recording.name}: {self.model_name}, {len(self.time)} frames, {way}>"
 
     @property
     def time(self) -> np.ndarray:
