@@ -4,7 +4,7 @@
 
 Every trial is a squat of a drawn subject with soft tissue and noise of the default sizes. The filter starts from
 landmarks on the displaced markers, the table's inertia, and lengths that are 3 % off (each its own way). Errors are
-taken after 5 s; angles about their mean error, whose size is told apart.
+taken after 5 s; angles about their mean error, whose size is given apart.
 """
 
 from __future__ import annotations

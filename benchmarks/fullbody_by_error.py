@@ -3,10 +3,10 @@
     python benchmarks/fullbody_by_error.py [--motions squat gait] [--markers opencap] [--seeds 1 4] [--set KEY=VALUE]
 
 Every trial is of a drawn subject with soft tissue and noise of the default sizes, at 100 Hz; nothing but mass, height
-and sex is told. A walk is measured on the same person's quiet standing (``static``). Errors are taken after 5 s of a
-squat and after 0.5 s of a walk; angles about their mean error, whose size is told apart. Moments are judged while every
-foot that carries stands on a plate, those apart that the estimate marks as derived (it can't know that a foot near the
-floor off the plates carries nothing).
+and sex is given. A walk is measured on the same person's quiet standing (``static``). Errors are taken after 5 s of a
+squat and after 0.5 s of a walk; angles about their mean error, whose size is given apart. Moments are judged while
+every foot that carries stands on a plate, those apart that the estimate marks as derived (it can't know that a foot
+near the floor off the plates carries nothing).
 """
 
 from __future__ import annotations
@@ -46,7 +46,7 @@ Array = np.ndarray
 @dataclass(frozen=True)
 class Errors:
     """Of one run: by coordinate RMS about the mean and mean error of the angle (deg), RMS of the speed (rad/s) and of
-    the moment (N m, NaN where none is told), while all that it hangs on is measured and while it is derived."""
+    the moment (N m, NaN where none is given), while all that it depends on is measured and while it is derived."""
 
     names: tuple[str, ...]
     angle: Array

@@ -113,7 +113,7 @@ def measure(name: str, seconds: float, view: bool) -> None:
 
 
 def busy_s() -> float:
-    """Time that all cores have worked, of all processes; NaN where the system does not tell."""
+    """Time that all cores have worked, of all processes; NaN where the system does not say."""
     stat = Path("/proc/stat")
     if not stat.exists():
         return float("nan")
@@ -175,7 +175,7 @@ def between(time_in: np.ndarray, values: np.ndarray, time_out: np.ndarray) -> np
 
 
 def resident_kb() -> int:
-    """Memory of this process, kB: now where the system tells it, else the most so far."""
+    """Memory of this process, kB: now where the system gives it, else the most so far."""
     status = Path("/proc/self/status")
     if status.exists():
         line = next(line for line in status.read_text().splitlines() if line.startswith("VmRSS"))

@@ -1,4 +1,4 @@
-"""dynakin beside OpenSim and biorbd on the same recordings in one run: fit, residuals, angles, forecasts, step times.
+"""dynakin against OpenSim and biorbd on the same recordings in one run: fit, residuals, angles, forecasts, step times.
 
     make peers        (or OMP_NUM_THREADS=1 python benchmarks/peers.py [part ...])
 
@@ -84,7 +84,7 @@ def fit(peer: Kinematics) -> None:
     names = [name for name in peer.markers if name in recording.marker_names]
     places = peer.places[:, [peer.markers.index(name) for name in names]]
     theirs = distance_mm(np.stack([recording.marker(name) for name in names], axis=1), places)
-    print(f"| method ({len(names)} markers) | RMS | beside OpenSim |\n|---|---|---|")
+    print(f"| method ({len(names)} markers) | RMS | against OpenSim |\n|---|---|---|")
     print(f"| OpenSim, inverse kinematics | {theirs:.2f} | 1 |")
     for title, kinds, smooth in (
         ("dynakin, places and geometry held, no soft tissue", (), False),
@@ -150,7 +150,7 @@ GROUPS = (("flexions", FLEXION, 4), ("others of the legs", OTHERS, 6), ("pelvis"
 
 
 def angles() -> None:
-    """Beside the recording's own inverse kinematics, whose weights it does not tell, and beside equal weights."""
+    """Against the recording's own inverse kinematics, whose weights it does not give, and against equal weights."""
     for trial in ("squats1", "walking1"):
         recording = recorded(trial)
         judged = np.ones(recording.n_frames, dtype=bool)
@@ -161,7 +161,7 @@ def angles() -> None:
         peer = inverse_kinematics(load(FILE), DATA / f"{trial}.trc")
         equal = Angles(peer.coordinates, peer.time, peer.values)
         print(
-            f"\n### `{trial}`, OpenSim with equal weights beside the recording's own\n\n| what | measured |\n|---|---|"
+            f"\n### `{trial}`, OpenSim with equal weights against the recording's own\n\n| what | measured |\n|---|---|"
         )
         for title, wanted, _ in GROUPS:
             print(f"| {title}, deg | {apart(equal, theirs, recording.time[judged], wanted)} |")
@@ -172,7 +172,7 @@ def angles() -> None:
             estimate = estimator.run(recording, smooth=False)
             ours = Angles(estimate.coordinate_names, estimate.time, estimate.data["coordinates"].values)
             print(
-                f"\n### `{trial}`, {name}\n\n| what | beside the recording's own | with equal weights | goal |\n"
+                f"\n### `{trial}`, {name}\n\n| what | against the recording's own | with equal weights | goal |\n"
                 "|---|---|---|---|"
             )
             for title, wanted, goal in GROUPS:

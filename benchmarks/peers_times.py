@@ -64,7 +64,7 @@ def times(file: Path, data: Path, mass: float) -> None:
             found[name].append(program())
     print(
         f"\n### Time a frame, the quietest of {ROUNDS} rounds; load {min(loads):.0f} to {max(loads):.0f} on "
-        f"{os.cpu_count()} cores\n\n| program | holds | frames | median, us | p99, us | beside kinematics only |\n"
+        f"{os.cpu_count()} cores\n\n| program | holds | frames | median, us | p99, us | against kinematics only |\n"
         "|---|---|---|---|---|---|"
     )
     base = 0.0

@@ -222,7 +222,7 @@ def sources(data: xr.Dataset) -> dict[str, Codes] | None:
 
 @dataclass(frozen=True)
 class Agreement:
-    """What is measured beside a reference: frames, RMS (N m), slope of ours over theirs, Pearson's correlation."""
+    """What is measured against a reference: frames, RMS (N m), slope of ours over theirs, Pearson's correlation."""
 
     frames: int
     rms: float

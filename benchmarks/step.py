@@ -1,4 +1,4 @@
-"""Median and 99th percentile of a filter step, beside the bare dense update of its size in the same run.
+"""Median and 99th percentile of a filter step, against the bare dense update of its size in the same run.
 
 Run with ``make bench``. The trial is `squats1` of the shared recordings where they are (DYNAKIN_TEST_DATA or
 ../shared/data), else a simulated squat; it is repeated until there are at least 20000 steps.

@@ -3,7 +3,7 @@
     pip install cma optuna; python benchmarks/tuning_optimisers.py [--budget 400]
 
 Cost: minus the log-likelihood of a simulated squat (8 s at 50 Hz) over six settings of the preset `default`, from its
-own start. Told: evaluations until the cost is within 100, 10 and 1 nats of the best that any of them found.
+own start. Reported: evaluations until the cost is within 100, 10 and 1 nats of the best that any of them found.
 """
 
 from __future__ import annotations

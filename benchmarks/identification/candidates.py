@@ -25,7 +25,7 @@ Array = np.ndarray
 
 def filtered(common: Common, recordings: Sequence[Recording], preset: str) -> Array | None:
     """phi that a filter ends with, mean over the trials that it does not lose; None where it loses all."""
-    names, found = Unknowns.of(common).bodies.names, []
+    names, found = Unknowns.of(common).inertial.names, []
     for recording in recordings:
         given = common.estimator
         estimator = Estimator(given.model, presets.preset(preset), side=given.side, vertical=given.vertical)
@@ -52,30 +52,30 @@ def known(common: Common, trial: MeasuredTrial) -> tuple[Array, Array, Array]:
 
 def prior_spread(common: Common) -> Array:
     """(e, e) A with phi = table + A z, z of unit variance: what the table may be wrong by."""
-    bodies = Unknowns.of(common).bodies
-    P = bodies.covariance(np.zeros(len(bodies.sd)), np.diag(bodies.sd**2))
+    inertial = Unknowns.of(common).inertial
+    P = inertial.covariance(np.zeros(len(inertial.sd)), np.diag(inertial.sd**2))
     values, vectors = np.linalg.eigh(P)
     return vectors * np.sqrt(np.maximum(values, 0.0))
 
 
 def free(common: Common, trials: Sequence[MeasuredTrial]) -> Array:
     """Free least squares with the declared weights; what no frame sees stays at the table."""
-    bodies = Unknowns.of(common).bodies
-    table = bodies.phi(np.zeros(len(bodies.sd)))
+    inertial = Unknowns.of(common).inertial
+    table = inertial.phi(np.zeros(len(inertial.sd)))
     scale = np.linalg.norm(prior_spread(common), axis=1)
     every = np.ones(len(table), dtype=bool)
     parts = [(Y[on], y[on]) for Y, y, on in (known(common, trial) for trial in trials)]
     Y, y = (np.concatenate(values) for values in zip(*parts, strict=True))
     sigma = FIRST_SIGMA[common.rows].tolist()
-    problem = stacked(bodies.names, table, scale, every, Y, y, mass_kg=bodies.total, sigma=sigma)
+    problem = stacked(inertial.names, table, scale, every, Y, y, mass_kg=inertial.total, sigma=sigma)
     return free_parameters(problem, base_parameters(problem).rank)
 
 
 def base_estimate(common: Common, trials: Sequence[MeasuredTrial], like: Posterior) -> Array:
     """Base parameters with the prior that the table's spread gives them, weights as in ``like``; no body is asked to be
     possible. What the base parameters do not hold stays where it moves with them in the prior."""
-    bodies = Unknowns.of(common).bodies
-    table, spread = bodies.phi(np.zeros(len(bodies.sd))), prior_spread(common)
+    inertial = Unknowns.of(common).inertial
+    table, spread = inertial.phi(np.zeros(len(inertial.sd))), prior_spread(common)
     H, g = np.eye(spread.shape[1]), np.zeros(spread.shape[1])
     for k, trial in enumerate(trials):
         step = float(np.median(np.diff(trial.movement.time)))
@@ -115,7 +115,7 @@ def all_candidates(
     with suppress(RecordingError):  # fewer frames than parameters
         found["least squares, free"] = (free(common, trials), None)
     found["base parameters, prior"] = (base_estimate(common, trials, inertia), None)
-    found["bodies"] = (inertia.phi, None)
+    found["inertia"] = (inertia.phi, None)
     found["geometry"] = (geometry.phi, geometry)
-    found["geometry and bodies"] = (both.phi, both)
+    found["geometry and inertia"] = (both.phi, both)
     return found

@@ -1,4 +1,4 @@
-"""How long the model's error has to be taken to last: bodies against truth and held out, by the least time.
+"""How long the model's error has to be taken to last: inertia against truth and held out, by the least time.
 
     python benchmarks/identification/error_time.py [--model sagittal7|fullbody] [--seeds 11 20]
 
@@ -42,10 +42,10 @@ def main() -> None:
         spatial = args.model == "fullbody"
         common, sims, trials = subject_of(args.model, seed, 10.0 if spatial else 20.0)
         unknowns = Unknowns.of(common, geometry=False)
-        bodies, start = unknowns.bodies, np.zeros(len(unknowns.bodies.sd))
-        true = np.array([sims[0].truth.parameters[name] for name in bodies.names])
+        inertial, start = unknowns.inertial, np.zeros(len(unknowns.inertial.sd))
+        true = np.array([sims[0].truth.parameters[name] for name in inertial.names])
         K = base_of(MeasuredModel.of(common.tracker())).K
-        P = bodies.covariance(start, np.diag(bodies.sd**2))
+        P = inertial.covariance(start, np.diag(inertial.sd**2))
         prior = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", K, P, K), 0.0))
         told = prior > 1e-9 * prior.max()
         tasks = TASKS[args.model]
@@ -59,7 +59,7 @@ def main() -> None:
             folds += [(f"gestures -> {task}", trial, k) for k, task in enumerate(tasks)]
         for label, chosen, k in folds:
             raw = common.with_plates(trials[k].movement, sims[k].recording, as_measured=True)
-            found = {"table": (bodies.phi(start), start)}
+            found = {"table": (inertial.phi(start), start)}
             for least in LEAST_S:
                 batch.LEAST_TAU_S = least
                 posterior = identify_batch(common, chosen, unknowns)

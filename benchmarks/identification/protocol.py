@@ -3,9 +3,9 @@
     python benchmarks/identification/protocol.py [--minutes 2] [--verify 1 3]
 
 Gestures of ten seconds (`gestures.py`) and squats are chosen one after the other, each time the one after which the
-bodies' posterior has the smallest volume, by the information of the regressor: the trial's slow plate errors and delay
-are eliminated, and what geometry is held wrong by is counted. Weights are those that an identification finds on a
-simulated squat. ``--verify`` simulates the protocol with sensor noise and soft tissue, identifies on it, and foretells
+inertia's posterior has the smallest volume, by the information of the regressor: the trial's slow plate errors and
+delay are eliminated, and what geometry is held wrong by is counted. Weights are those that an identification finds on a
+simulated squat. ``--verify`` simulates the protocol with sensor noise and soft tissue, identifies on it, and predicts
 a gait.
 """
 
@@ -74,7 +74,7 @@ def information(common: Common, trial: MeasuredTrial, unknowns: Unknowns, weight
 
 
 def posterior(H: Array, unknowns: Unknowns) -> Array:
-    """Covariance (b, b) of the bodies: what geometry is held wrong by is counted (Schmidt)."""
+    """Covariance (b, b) of the inertia: what geometry is held wrong by is counted (Schmidt)."""
     free = np.concatenate([unknowns.free, np.ones(len(unknowns.nuisance_sd), dtype=bool)])
     prior = np.concatenate([unknowns.sd, unknowns.nuisance_sd])[free]
     inverse = np.linalg.inv(H[np.ix_(free, free)] + np.diag(prior**-2.0))
@@ -103,9 +103,9 @@ def choose(tried: dict[str, Array], unknowns: Unknowns, count: int) -> list[str]
 
 def shares(common: Common, H: Array, unknowns: Unknowns) -> tuple[Array, Array]:
     """(e,), (r,): deviations of the inertial numbers, and of the base parameters over the prior's."""
-    bodies, start = unknowns.bodies, np.zeros(len(unknowns.bodies.sd))
-    after = bodies.covariance(start, posterior(H, unknowns))
-    before = bodies.covariance(start, np.diag(bodies.sd**2))
+    inertial, start = unknowns.inertial, np.zeros(len(unknowns.inertial.sd))
+    after = inertial.covariance(start, posterior(H, unknowns))
+    before = inertial.covariance(start, np.diag(inertial.sd**2))
     K = base_of(MeasuredModel.of(common.tracker())).K
     told, known = (np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", K, P, K), 0.0)) for P in (after, before))
     keep = known > 1e-9 * known.max()
@@ -120,13 +120,13 @@ def promised(common: Common, H: Array, unknowns: Unknowns, title: str) -> None:
         f"\n{title}: of {len(share)} base parameters " + ", ".join(f"{words.count(w)} {w}" for w in sorted(set(words)))
     )
     print(f"  median deviation over the table's {np.median(share):.2f}")
-    bodies, start = unknowns.bodies, np.zeros(len(unknowns.bodies.sd))
-    P, before = posterior(H, unknowns), bodies.covariance(start, np.diag(bodies.sd**2))
+    inertial, start = unknowns.inertial, np.zeros(len(unknowns.inertial.sd))
+    P, before = posterior(H, unknowns), inertial.covariance(start, np.diag(inertial.sd**2))
     table = np.sqrt(np.diag(before))
     print("  segment        mass kg (sd, table's)   centre of mass mm (sd x, y, z; table's)")
-    u_sd = np.sqrt(np.diag(bodies.tie @ P @ bodies.tie.T)).reshape(-1, 10)
-    own = (np.abs(bodies.tie) @ bodies.sd).reshape(-1, 10)
-    for k, segment in enumerate(bodies.segments):
+    u_sd = np.sqrt(np.diag(inertial.tie @ P @ inertial.tie.T)).reshape(-1, 10)
+    own = (np.abs(inertial.tie) @ inertial.sd).reshape(-1, 10)
+    for k, segment in enumerate(inertial.segments):
         if not segment.endswith("_l"):
             c = " ".join(f"{1e3 * v:5.1f}" for v in u_sd[k, 1:4])
             print(f"  {segment:12s} {sd[10 * k]:8.2f} {table[10 * k]:8.2f}        {c}   {1e3 * own[k, 1]:5.1f}")
@@ -135,7 +135,7 @@ def promised(common: Common, H: Array, unknowns: Unknowns, title: str) -> None:
 def verify(
     seed: int, chosen: list[Gesture], squats: int, errors: list[Array], rows: dict[tuple[str, str], list[Array]]
 ) -> None:
-    """Identify a drawn person on the protocol (``squats`` parts are squats), and on one squat; foretell a gait."""
+    """Identify a drawn person on the protocol (``squats`` parts are squats), and on one squat; predict a gait."""
     common, squat = common_of(seed, Spread())
     recordings = []
     if chosen:
@@ -145,31 +145,31 @@ def verify(
         recordings.append(simulate("fullbody", "squat", seed, GESTURE_S * squats, **PLACES).recording)
     walking = simulate("fullbody", "gait", seed, DURATION_S["gait"], **PLACES)
     unknowns = Unknowns.of(common, geometry=False)
-    bodies, start = unknowns.bodies, np.zeros(len(unknowns.bodies.sd))
+    inertial, start = unknowns.inertial, np.zeros(len(unknowns.inertial.sd))
     protocol = identify_batch(common, measure_all(common, recordings), unknowns)
     phi = {
-        "table": bodies.phi(start),
+        "table": inertial.phi(start),
         "protocol": protocol.phi,
         "squat, 10 s": identify_batch(common, [squat], unknowns).phi,
-        "true bodies": np.array([walking.truth.parameters[name] for name in bodies.names]),
+        "true inertia": np.array([walking.truth.parameters[name] for name in inertial.names]),
     }
     K = base_of(MeasuredModel.of(common.tracker())).K
     after, before = (
         np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", K, P, K), 0.0))
-        for P in (protocol.phi_covariance(), bodies.covariance(start, np.diag(bodies.sd**2)))
+        for P in (protocol.phi_covariance(), inertial.covariance(start, np.diag(inertial.sd**2)))
     )
     told = before > 1e-9 * before.max()
     told &= after > 1e-6 * before  # all but the total mass
-    errors.append((np.abs(K @ (protocol.phi - phi["true bodies"])) / np.where(told, after, 1.0))[told])
+    errors.append((np.abs(K @ (protocol.phi - phi["true inertia"])) / np.where(told, after, 1.0))[told])
     seen = common.see(walking.recording)
     raw = common.with_plates(seen, walking.recording, as_measured=True)
     for name, values in phi.items():
-        off = (K @ (values - phi["true bodies"]) / np.where(told, before, 1.0))[told]
+        off = (K @ (values - phi["true inertia"]) / np.where(told, before, 1.0))[told]
         rows.setdefault(("base parameters from truth, prior sds, RMS:", name), []).append(
             np.sqrt(np.mean(off**2, keepdims=True))
         )
         wrench = predicted(common, seen.states, values)
-        rows.setdefault(("gait foretold, RMS fx to mz:", name), []).append(
+        rows.setdefault(("gait predicted, RMS fx to mz:", name), []).append(
             judged(common, raw, wrench, SKIPPED_S["gait"])
         )
 

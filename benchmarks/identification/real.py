@@ -80,7 +80,7 @@ def compare(
     print(f"  cross-validation inside the trials: {decided.use}.")
     for text in decided.report[:4]:
         print(f"    {text}")
-    for name, parameters in (("product, table", None), ("product, bodies", used)):
+    for name, parameters in (("product, table", None), ("product, inertia", used)):
         wrench = of_movement(seen, judging, product(model, judging, static, parameters))
         print(f"  {name:26s} {judge(common, raw, wrench).round(1)}", flush=True)
 

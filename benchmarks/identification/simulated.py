@@ -3,9 +3,9 @@
     python benchmarks/identification/simulated.py [--model sagittal7] [--seeds 1 10] [--duration 20] [--filters]
     python benchmarks/identification/simulated.py --model fullbody [--seeds 1 10] [--duration 10]
 
-The judging trial's kinematics come from its markers alone; its plates are read by `judged` only. `true bodies` is the
+The judging trial's kinematics come from its markers alone; its plates are read by `judged` only. `true inertia` is the
 simulated subject's own phi in place of the table's, with the table's geometry, so that
-(table - candidate) / (table - true bodies) is the share of what perfect inertial parameters could gain.
+(table - candidate) / (table - true inertia) is the share of what perfect inertial parameters could gain.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ STANDING = {"sagittal7": ("sway", 3.0), "squat7": ("sway", 3.0), "fullbody": ("s
 SKIPPED_S = {"gait": 0.3}
 SKIPPED_ELSE_S = 2.0
 DURATION_S = {"gait": 4.0}
-GAP_NM = 2.0  # MZ by which true bodies must be better than the table for a share to be told
+GAP_NM = 2.0  # MZ by which true inertia must be better than the table for a share to be reported
 Array = np.ndarray
 
 
@@ -57,15 +57,15 @@ def subject_of(model: str, seed: int, duration_s: float) -> tuple[Common, list[S
 def one(model: str, seed: int, duration_s: float, filters: tuple[str, ...]) -> dict[tuple[str, str], Array]:
     """RMS by (task left out, candidate), and distances from the truth by ("truth", candidate)."""
     common, sims, trials = subject_of(model, seed, duration_s)
-    bodies = Unknowns.of(common).bodies
-    true = np.array([sims[0].truth.parameters[name] for name in bodies.names])
-    prior = bodies.covariance(np.zeros(len(bodies.sd)), np.diag(bodies.sd**2))
+    inertial = Unknowns.of(common).inertial
+    true = np.array([sims[0].truth.parameters[name] for name in inertial.names])
+    prior = inertial.covariance(np.zeros(len(inertial.sd)), np.diag(inertial.sd**2))
     spread = np.sqrt(np.diag(prior))
     found: dict[tuple[str, str], Array] = {}
     for k, task in enumerate(TASKS[model]):
         others = [j for j in range(len(trials)) if j != k]
         candidates = all_candidates(common, [trials[j] for j in others], [sims[j].recording for j in others], filters)
-        candidates |= {"true bodies": (true, None)}
+        candidates |= {"true inertia": (true, None)}
         raw = common.with_plates(trials[k].movement, sims[k].recording, as_measured=True)
         for name, (phi, geometry) in candidates.items():
             wrench = predicted(common, trials[k].movement.states, phi, geometry)
@@ -73,13 +73,13 @@ def one(model: str, seed: int, duration_s: float, filters: tuple[str, ...]) -> d
             found[task + ", from truth", name] = np.sqrt(np.mean(((phi - true) / spread) ** 2, keepdims=True))
     every = batch(common, trials, inertia=True, geometry=False)
     K = base_of(MeasuredModel.of(common.tracker())).K
-    order = [MeasuredModel.of(common.tracker()).names.index(name) for name in bodies.names]
+    order = [MeasuredModel.of(common.tracker()).names.index(name) for name in inertial.names]
     assert order == sorted(order)  # K is over the inertial numbers in the state's order
     sd, before = (np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", K, P, K), 0.0)) for P in (every.phi_covariance(), prior))
     told = (before > 0.0) & (sd > 1e-6 * before)  # all but the total mass, which is known
     found["base", "errors over sd"] = (np.abs(K @ (every.phi - true)) / np.where(told, sd, 1.0))[told]
     found["base", "table's errors over prior sd"] = (
-        np.abs(K @ (bodies.phi(np.zeros(len(bodies.sd))) - true)) / np.where(told, before, 1.0)
+        np.abs(K @ (inertial.phi(np.zeros(len(inertial.sd))) - true)) / np.where(told, before, 1.0)
     )[told]
     return found
 
@@ -105,7 +105,7 @@ def main() -> None:
     width = len(rows[TASKS[args.model][0], "table"][0])
     components = [COMPONENTS[k] for k in ((0, 1, 5) if width == 3 else range(6))]
     for task in TASKS[args.model]:
-        table, true = (np.array(rows[task, name])[:, -1] for name in ("table", "true bodies"))
+        table, true = (np.array(rows[task, name])[:, -1] for name in ("table", "true inertia"))
         gap = table - true
         wide = gap > GAP_NM
         print(f"\nleft out: {task}. RMS {', '.join(components)} (N, N m), mean of {len(gap)} seeds; share of MZ's gap")

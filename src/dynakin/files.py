@@ -31,7 +31,7 @@ def is_file(path: Path) -> bool:
 def require_file(path: Path, raises: type[DynakinError] = RecordingError) -> None:
     """Raise RecordingError (or ``raises``) unless ``path`` is a file: a pipe would be waited for for ever."""
     if not is_text(str(path)):
-        raise raises(f"{path}: its name is no UTF-8 text, which outputs could not tell; rename it")
+        raise raises(f"{path}: its name is no UTF-8 text, so outputs could not hold it; rename it")
     try:
         mode = path.stat().st_mode
     except (FileNotFoundError, NotADirectoryError):

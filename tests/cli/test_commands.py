@@ -68,7 +68,7 @@ def test_model_says_what_a_trial_tells(data_dir: Path, capsys: Said) -> None:
     trial = ["--trial", str(folder / "squats1.trc"), "--forces", str(folder / "squats1_grf.mot"), "--mass", "60.05"]
     assert main(["model", "sagittal7", "--identifiability", *trial]) == 0
     told = " ".join(capsys.readouterr().out.split())
-    for words in ("Of 6 lengths the recording tells 5 from the data", "What would tell more", "the foot's mass, first"):
+    for words in ("Lengths (6): 5 known from the data", "Movements that would help", "the foot's mass, first"):
         assert words in told
 
 

@@ -47,7 +47,7 @@ def test_what_fails_after_the_estimate_is_named_and_the_rest_saved(
     said = capsys.readouterr().err.splitlines()
     failed = [
         "comparison with the reference methods",
-        "what the recording tells of the constants",
+        "observability of the constants",
         "summary",
         "figure figure5_angles",
     ]
@@ -76,7 +76,7 @@ def test_figures_that_cannot_be_written_are_refused_before_or_named_after(
     monkeypatch.setitem(figures.FIGURES, "figure4_markers", full)
     assert main(["run", *trial, *SUBJECT, "-o", str(out), "--figures", str(tmp_path / "figures")]) == 1
     said = capsys.readouterr().err.splitlines()
-    assert said[0].endswith("Failed: what the recording tells of the constants: ValueError: zero-size array.")
+    assert said[0].endswith("Failed: observability of the constants: ValueError: zero-size array.")
     assert said[1].endswith("figures: cannot write figures there (No space left on device).") and len(said) == 2
     assert json.loads((out / "metrics.json").read_text())["failures"][-1] == "figures"
 

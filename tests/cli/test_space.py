@@ -32,7 +32,7 @@ def test_compare_judges_a_body_in_space_by_what_it_has_not_seen(motion: str, tmp
         rows = list(csv.DictReader(file))
     fit = {(row["yardstick"], row["quantity"]): float(row["rms"]) for row in rows if row["method"] == "EKF (default)"}
     assert fit["marker left out", "markers"] < 20.0  # mm
-    # of 687 N, which was the error where a foot beside the plates was taken for a body in the air
+    # of 687 N, which was the error where a foot off the plates was taken for a body in the air
     assert fit["plates withheld", "fy"] < (60.0 if motion == "squat" else 350.0)
     with (out / "table2.csv").open(encoding="utf-8", newline="") as file:
         (weight,) = (row for row in csv.DictReader(file) if row["quantity"] == "fy")

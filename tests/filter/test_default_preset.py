@@ -56,10 +56,10 @@ def test_lengths_are_as_sure_as_skin_allows(plain: Estimate, trial: SimulatedTri
     alone would not."""
     lengths = [p for p in plain.parameters if p.kind == "length"]
     error = np.array([p.value - trial.truth.parameters[p.name] for p in lengths])
-    told, own = (np.array([getattr(p, name) for p in lengths]) for name in ("sd", "learnt_sd"))
+    told, own = (np.array([getattr(p, name) for p in lengths]) for name in ("sd", "posterior_sd"))
     thigh = next(p for p in lengths if p.name == "length/thigh")
     assert thigh.skin_sd == pytest.approx(0.6 * 0.018)  # 0.6 of the 18 mm that the marker set declares of the thigh
-    assert thigh.sd == pytest.approx(np.hypot(thigh.skin_sd, thigh.learnt_sd))
+    assert thigh.sd == pytest.approx(np.hypot(thigh.skin_sd, thigh.posterior_sd))
     assert np.mean((error / told) ** 2) < 1.5 and np.mean((error / own) ** 2) > 2.0
     assert all(p.skin_sd == 0.0 for p in plain.parameters if p.kind != "length")
 
@@ -105,7 +105,7 @@ def test_what_only_describes_live_estimates_is_no_headline_of_a_smoothed_one(
     assert "Adaptation" not in after and compute_metrics(smoothed)["adaptation"]["verdict"] == ""
     assert "Speeds" not in after and after["One frame ahead"].level in ("good", "note")
     for found in (live, after):  # true of both: it is the filter's covariance
-        assert found["Uncertainty"].text.startswith("The standard deviations are larger than needed")
+        assert found["Uncertainty"].text.startswith("The filter is conservative")
     assert "Settled" not in " ".join(i.text for i in after.values())
 
 

@@ -60,7 +60,7 @@ def test_a_recording_whose_time_jumps_is_estimated_with_the_motion_sought_anew()
     recording, _ = with_gap(person("sagittal7", LENGTH_S), STOP_S, 10.0)
     result = estimator("sagittal7").run(recording, smooth=True)
     words = [event.message for event in result.events if event.subject == "motion"]
-    assert len(words) == 1 and "sought anew from the markers, and found for 1 frame" in words[0]
+    assert len(words) == 1 and "found again from the markers for 1 frame" in words[0]
     residual = result.data["markers_measured"].values - result.data["markers_estimated"].values
     assert np.nanmax(np.abs(residual[:, :, :2])) < 0.02
 

@@ -74,7 +74,7 @@ def test_flywheel_squat_runs_to_the_end_without_preparation(data_dir: Path, side
 
 
 def test_what_weighs_nobody_is_no_mass(data_dir: Path) -> None:
-    """0.1 took 33 kg (a drop jump), 39 kg (a chair), 63 kg, 57 kg (steps beside plates) and 129 kg (a flywheel)."""
+    """0.1 took 33 kg (a drop jump), 39 kg (a chair), 63 kg, 57 kg (steps off the plates) and 129 kg (a flywheel)."""
     opencap, gait = data_dir / "opencap_subject4", data_dir / "plugin_gait"
 
     def mass_of(trial: Path, forces: Path | None, model: str, markers: str = "auto") -> float:
@@ -85,7 +85,7 @@ def test_what_weighs_nobody_is_no_mass(data_dir: Path) -> None:
         return mass_of(opencap / f"{name}.trc", opencap / f"{name}_grf.mot", "fullbody", "opencap")
 
     for name, why in (
-        ("DJ1", r"2\.7 s of a movement on them weigh nobody"),
+        ("DJ1", r"2\.7 s of a movement on them are too short to weigh the person"),
         ("walking1", r"1\.1 s of a movement"),
         ("STS1", r"their load goes from 0 to 205 % of its mean, which is no weight"),
     ):

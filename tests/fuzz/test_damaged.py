@@ -345,10 +345,10 @@ def test_a_damaged_record_of_a_session_is_passed_over(trial: SimulatedTrial, tmp
 @pytest.mark.parametrize(
     ("told", "expected"),
     [
-        ({"markers": {"names": ["a"]}}, "its streams are not told as expected"),
+        ({"markers": {"names": ["a"]}}, "its streams are not described as expected"),
         ({"markers": {"names": ["a"], "rate_hz": 0.0, "clock": "a"}, "plates": None}, "0 Hz"),
-        ({"markers": {"names": 3, "rate_hz": 50.0, "clock": "a"}, "plates": None}, "its streams are not told"),
-        ([], "its streams are not told"),
+        ({"markers": {"names": 3, "rate_hz": 50.0, "clock": "a"}, "plates": None}, "its streams are not described"),
+        ([], "its streams are not described"),
     ],
 )
 def test_a_session_whose_streams_are_not_told(tmp_path: Path, told: Any, expected: str) -> None:

@@ -9,13 +9,13 @@ from hypothesis import strategies as st
 
 import dynakin
 from dynakin.errors import ModelError
-from dynakin.identification.bodies import Bodies, BodyPriors
+from dynakin.identification.inertial_parameters import InertialParameters, InertialPriors
 from dynakin.identification.unknowns import Unknowns
 from dynakin.simulation.trial import simulate
 from support.identification import Case
 
 _M, _C, _R = np.array([2.0, 30.0, 38.0]), np.array([[0.1, 0.0], [0.0, 0.2], [0.02, 0.3]]), np.array([0.05, 0.1, 0.2])
-BODIES = Bodies.in_plane(("foot", "leg", "body"), 70.0, _M, _C, _R, np.ones(3), BodyPriors())
+BODIES = InertialParameters.in_plane(("foot", "leg", "body"), 70.0, _M, _C, _R, np.ones(3), InertialPriors())
 
 
 @settings(max_examples=60, deadline=None)
@@ -59,4 +59,4 @@ def test_a_model_that_estimates_no_inertia_is_refused_in_one_line() -> None:
     subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
     estimator = dynakin.Estimator(dynakin.load_model("sagittal7", subject=subject), estimate=["lengths"])
     with pytest.raises(ModelError, match=r"model sagittal7: identification needs .* this one estimates no inertia"):
-        Bodies.of(estimator.start(sim.recording).calibrated)
+        InertialParameters.of(estimator.start(sim.recording).calibrated)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from dynakin.errors import ModelError
-from dynakin.identification.decision import foretell, parts_of, rms_of
+from dynakin.identification.decision import parts_of, predict_wrench, rms_of
 from dynakin.identification.trials import Common, MeasuredTrial, measure_all
 from dynakin.recordings.recording import Recording
 from support.identification import Case, estimator
@@ -33,7 +33,7 @@ def foretold(case: Case, recordings: list[Recording]) -> tuple[list[MeasuredTria
     common = Common.measure(estimator(), recordings[0], case.common.static)
     parts = parts_of(measure_all(common, recordings))
     return parts, [
-        foretell(common, [p for j, p in enumerate(parts) if j != k], part.movement)["bodies"]
+        predict_wrench(common, [p for j, p in enumerate(parts) if j != k], part.movement)["bodies"]
         for k, part in enumerate(parts)
     ]
 
@@ -67,8 +67,8 @@ def test_a_half_is_foretold_without_its_plates(
 def test_a_trial_is_foretold_without_its_plates(case: Case) -> None:
     common, trials = case.common, list(case.trials)
     judged = replace(trials[1], wrench=np.full_like(trials[1].wrench, np.nan))
-    before = foretell(common, [trials[0]], trials[1].movement)
-    after = foretell(common, [trials[0]], judged.movement)
+    before = predict_wrench(common, [trials[0]], trials[1].movement)
+    after = predict_wrench(common, [trials[0]], judged.movement)
     for use in before:
         np.testing.assert_array_equal(before[use], after[use])
     assert not trials[1].movement.recording.plates

@@ -23,7 +23,7 @@ def test_squats_and_standing(data_dir: Path) -> None:
     found = identify_subject(dynakin.Estimator(definition), trials, static=standing)
     batch = found.subject.batch
     bodies = [RigidBody.from_vector(vector) for vector in np.array(batch.values).reshape(-1, 10)]
-    table = found.posterior.unknowns.bodies
+    table = found.posterior.unknowns.inertial
     assert all(body.possible() for body in bodies)
     assert sum(body.mass for body in bodies) == pytest.approx(table.total, rel=1e-9)
     held = 60.05 - table.total  # hands, toes and what else the file has of its own

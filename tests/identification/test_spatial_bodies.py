@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from dynakin.identification.bodies import Bodies, BodyPriors
+from dynakin.identification.inertial_parameters import InertialParameters, InertialPriors
 from dynakin.model.inertia import RigidBody
 
 _RNG = np.random.default_rng(7)
@@ -17,7 +17,7 @@ _CENTRE = np.array([[0.0, 0.05, 0.0], [0.01, -0.2, 0.02], [0.012, -0.21, -0.022]
 _ROOT = np.triu(_RNG.normal(0.0, 0.03, (4, 3, 3))) + 0.1 * np.eye(3)
 _MIRROR = np.diag([1.0, 1.0, -1.0])
 _ROOT[2] = _MIRROR @ _ROOT[1] @ _MIRROR
-BODIES = Bodies.in_space(_NAMES, 35.0, _MASS, _CENTRE, _ROOT, BodyPriors())
+BODIES = InertialParameters.in_space(_NAMES, 35.0, _MASS, _CENTRE, _ROOT, InertialPriors())
 _COUNT = len(BODIES.sd)
 
 
@@ -85,7 +85,7 @@ def test_prior_is_round_in_the_entropic_metric() -> None:
         step = deviations(of_phi(BODIES.phi(h))[k]) - deviations(of_phi(BODIES.phi(-h))[k])
         change = inverse @ step / 2e-5
         lengths.append(np.trace(change @ change) / 2.0)
-    np.testing.assert_allclose(lengths, 2.0 * BodyPriors().log_gyration ** 2, rtol=1e-5)
+    np.testing.assert_allclose(lengths, 2.0 * InertialPriors().log_gyration ** 2, rtol=1e-5)
 
 
 def test_covariance_counts_that_sides_may_differ_and_keeps_the_total() -> None:

@@ -139,7 +139,7 @@ def test_real_plates(data_dir: Path) -> None:
     assert any("plate 1 carries the right foot" in text for text in loads.messages)
     walk = read(folder / "walking1.trc", folder / "walking1_grf.mot")
     loads = foot_loads(walk, find_ground_frame(walk))
-    assert not loads.total_known[walk.time < 0.1].any()  # the left foot still pushes off beside the plates
+    assert not loads.total_known[walk.time < 0.1].any()  # the left foot still pushes, off the plates
     assert loads.total_known[(walk.time > 0.25) & (walk.time < 1.2)].all()
     gait = read(data_dir / "plugin_gait" / "GaitNormal_1.c3d")
     ground = find_ground_frame(gait)

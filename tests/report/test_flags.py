@@ -37,7 +37,7 @@ DERIVED_WORDS = "derived from the motion"
 
 @pytest.fixture(scope="module")
 def walker() -> Estimate:
-    """The left foot's second whole stance is beside the plates."""
+    """The left foot's second whole stance is off the plates."""
     return make_walker((2,))
 
 

@@ -183,8 +183,8 @@ def test_what_the_recording_tells_is_shown_where_the_prior_is_known(html: str, e
     page = render_report(replace(estimate, parameters=told))
     section = page.split('id="identifiability"')[-1].split("</section>")[0]
     lengths = sum(p.kind == "length" and p.estimated for p in told)
-    assert f"Of {lengths} lengths the recording tells {lengths} from the data." in section
-    assert "Moments of inertia" in section and "What would tell more" not in section
+    assert f"Lengths ({lengths}): {lengths} known from the data." in section
+    assert "Moments of inertia" in section and "Movements that would help" not in section
 
 
 def test_numbers_in_the_words_of_a_figure_keep_their_digits() -> None:

@@ -78,7 +78,7 @@ FUNCTIONS = {
     "adaptation": "adaptation",
     "bounds": "parameter_bounds",
     "soft_tissue": "soft_tissue",
-    "identifiability": "learned",
+    "identifiability": "posterior_figures",
     "moments": "moment_figures",
     "peak_moments_per_kg": "_peak_moments",
     "work": "work",

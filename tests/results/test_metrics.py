@@ -49,7 +49,7 @@ def test_window_starts_after_two_seconds_of_a_long_trial_only() -> None:
     assert longer[evaluation_window(longer)][0] == pytest.approx(9.0)
 
 
-@pytest.mark.parametrize(("scale", "word"), [(1.0, "consistent"), (9.0, "overconfident"), (0.01, "too cautious")])
+@pytest.mark.parametrize(("scale", "word"), [(1.0, "consistent"), (9.0, "overconfident"), (0.01, "conservative")])
 def test_verdict_follows_the_size_of_the_innovations(scale: float, word: str) -> None:
     rng = np.random.default_rng(1)
     found = consistency(

@@ -246,21 +246,21 @@ def test_impulse_is_the_stances() -> None:
 def test_nothing_left_at_the_root_is_said_by_the_numbers_only() -> None:
     walker = make_walker((2,))
     feet = compute_metrics(walker)["feet"]
-    assert feet["verdict"].startswith("Nothing is left at the root in the 241 of 301 frames in which every contact")
+    assert feet["verdict"].startswith("No residual is left at the root in the 241 of 301 frames in which every contact")
     data = walker.data.copy(deep=True)
     data["wrench_remainder"][50, 1] = 718.0
     contradicted = compute_metrics(replace(walker, data=data))["feet"]
     assert contradicted["left_at_root"]["grounded"]["force_n"] == pytest.approx(718.0)
     assert "Nothing is left" not in contradicted["verdict"]
-    assert "Up to 718 N and 0 N m are left at the root" in contradicted["verdict"]
+    assert "Up to 718 N and 0 N m of residual are left at the root" in contradicted["verdict"]
     seated = walker.data.copy(deep=True)  # both feet measured, and yet not all that bears the person
     seated["moment_source"][:100, 0] = ABSENT
     assert "in the 141 of 301 frames" in compute_metrics(replace(walker, data=seated))["feet"]["verdict"]
     data["foot_contact"][:] = 0  # both feet "in the air" for three seconds
     flying = compute_metrics(replace(walker, data=data))["feet"]["verdict"]
     assert (
-        "Nothing is left" not in flying
-        and "are left in flight (" in flying
+        "No residual is left" not in flying
+        and "of residual are left in flight (" in flying
         and "or a contact that is not measured" in flying
     )
     data["foot_contact"][:] = UNMEASURED

@@ -198,7 +198,7 @@ def test_restart_and_recalibrate_without_stopping(squat: Recording) -> None:
 
     live.sinks.append(Callback(on_frame))
     live.run()
-    assert "The estimate begins anew." in said
+    assert "The estimate starts again." in said
     assert said.count("Ready: move.") == 2 and len(frames) > 300
 
 
@@ -231,7 +231,7 @@ def test_buttons_record_restart_and_recalibrate(squat: Recording, tmp_path: Path
         record=lambda: Recorder(tmp_path / "r", settings),
     )
     live.run()
-    ends = [said.index(text) for text in ("Recording.", "The estimate begins anew.", "The recording has ended.")]
+    ends = [said.index(text) for text in ("Recording.", "The estimate starts again.", "The recording has ended.")]
     assert ends == sorted(ends) and said.count("Ready: move.") == 2
     assert 1.5 < np.ptp(recorded(tmp_path / "r").time) < 2.6  # what came between the two presses
 
@@ -264,7 +264,7 @@ def test_silent_markers_are_told_with_what_happens_then(squat: Recording) -> Non
 
 
 def test_a_movement_weighs_a_person_only_where_it_is_long_and_steady(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As `find_mass` has it of files; a step beside the plates went into the mass, by half of it, before."""
+    """As `find_mass` has it of files; a step off the plates went into the mass, by half of it, before."""
     squats = replace(simulate_squat(seed=1, duration_s=12.0).recording.window(3.0, 12.0), subject={})
     monkeypatch.setattr(start, "standing_window", lambda recording: None)  # between the squats they do stand
     told = quietest(squats)
@@ -273,6 +273,9 @@ def test_a_movement_weighs_a_person_only_where_it_is_long_and_steady(monkeypatch
     uneven = squats.with_plates(
         tuple(replace(p, force=p.force * beside, moment=p.moment * beside) for p in squats.plates)
     )
-    for trial, why in ((uneven, "of its mean, which is no weight"), (squats.window(3.0, 7.0), "weigh nobody")):
+    for trial, why in (
+        (uneven, "of its mean, which is no weight"),
+        (squats.window(3.0, 7.0), "too short to weigh"),
+    ):
         present, _, text = quietest(trial)
         assert "mass_kg" not in present.subject and why in text and "mean load" not in text

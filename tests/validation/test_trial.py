@@ -59,7 +59,7 @@ def test_a_reference_that_cannot_be_had_is_a_note_where_the_run_asks_for_whateve
 ) -> None:
     with pytest.raises(RecordingError, match="80 Hz is not possible at 100 Hz"):
         trial_of(compared.estimates, initial, setup.definition, 80.0)
-    alone = trial_of(compared.estimates, initial, setup.definition, 80.0, whatever=True)
+    alone = trial_of(compared.estimates, initial, setup.definition, 80.0, tolerant=True)
     assert [method.name for method in alone.methods] == ["EKF (default)"]
     (note,) = alone.notes
     assert note.startswith("AT and the classical method are left out: ") and "\n" not in note

@@ -38,7 +38,7 @@ def figures(simulated: SimulatedTrial, setup: Setup) -> Figures:
     return unseen_figures(simulated.recording, setup)
 
 
-def test_rows_hold_every_yardstick_beside_what_raw_data_foretell(figures: Figures) -> None:
+def test_rows_hold_every_yardstick_next_to_what_raw_data_predict(figures: Figures) -> None:
     rows = unseen([figures])
     methods = {"EKF (default)", "persistence", "linear extrapolation"}
     for yardstick in ("plates withheld", "marker left out", "100 ms ahead"):
@@ -57,14 +57,14 @@ def test_a_marker_left_out_is_predicted_by_the_others_alone(
     name = "r_thigh2"
     column = recording.marker_names.index(name)
     moved = recording.markers.copy()
-    moved[recording.time > 3.0, column] += 0.5  # m; nobody can foretell it, so it must all be error
+    moved[recording.time > 3.0, column] += 0.5  # m; nobody can predict it, so it must all be error
     both = [figures, unseen_figures(replace(recording, markers=moved), setup)]
     honest, shifted = (each["marker left out", name, "EKF (default)"] for each in both)
     assert honest is not None and honest < 60.0
     assert shifted is not None and shifted > 400.0
 
 
-def test_a_filter_whose_noise_fits_foretells_what_the_paper_s_gains_do_not(setup: Setup) -> None:
+def test_a_filter_whose_noise_fits_predicts_what_the_paper_s_gains_do_not(setup: Setup) -> None:
     trial = simulate_squat(seed=2, duration_s=8.0, mass_kg=70.0, noise=SensorNoise.none())
     figures = unseen_figures(trial.recording, replace(setup, noise={**setup.noise, "paper": presets.paper()}))
     for yardstick, quantity in (

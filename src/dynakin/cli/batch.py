@@ -23,7 +23,7 @@ from dynakin.studies.engine.pools import open_pool
 def batch(
     dataset: Annotated[Path, typer.Argument(help="DATASET.toml: subjects, trials, and what holds for all.")],
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder, instead of the dataset's.")] = None,
-    preset: Annotated[list[str] | None, typer.Option(help="Noise settings beside each other. May be repeated.")] = None,
+    preset: Annotated[list[str] | None, typer.Option(help="Noise settings to compare. May be repeated.")] = None,
     cutoff: Annotated[float, typer.Option("--cutoff-hz", help="Low-pass of AT and classical, Hz.")] = CUTOFF_HZ,
     tables_only: Annotated[bool, typer.Option("--tables-only", help="Write no results of single trials.")] = False,
     backend: Backend = "processes",

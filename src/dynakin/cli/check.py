@@ -78,8 +78,8 @@ def _print_recording(console: Console, recording: Recording) -> None:
         f"  {recording.n_frames} frames at {recording.rate:.6g} Hz, {seconds:.4g} s from {recording.time[0]:g} s; "
         f"{len(recording.marker_names)} markers in {recording.length_unit}; {len(recording.plates)} force plates"
     )
-    told = [f"{key.replace('_', ' in ')} {value:g}" for key, value in recording.subject.items()]
-    _sentences(console, ([f"The file tells: {', '.join(told)}."] if told else []) + list(recording.notes))
+    subject = [f"{key.replace('_', ' in ')} {value:g}" for key, value in recording.subject.items()]
+    _sentences(console, ([f"Subject in the file: {', '.join(subject)}."] if subject else []) + list(recording.notes))
     window = standing_window(recording)
     if window is None:
         console.print("  Standing still: nowhere for half a second.")

@@ -1,4 +1,4 @@
-"""`dynakin compare`: filters, the table and the classical method beside each other, judged by what was measured."""
+"""`dynakin compare`: filters, the table and the classical method, judged by what was measured."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def compare(
         if not_seen:
             tables |= print_unseen(console, cases, horizon)
         tables |= print_repetitions(console, compared)
-        more["trials"] = [told(trial) for trial in compared]
+        more["trials"] = [_described(trial) for trial in compared]
     if output is not None:
         with busy("writing tables and report"):
             names = [case.recording.name for case in cases]
@@ -118,9 +118,9 @@ def print_held_out(
 ) -> dict[str, Sequence[Any]]:
     """Identified on one, judged on the other; (identifying, judging, of one recording) each. Adds to ``notes``."""
     tables = []
-    for learning, judging, same in pairs:
+    for fitted, judging, same in pairs:
         with busy(f"{judging.recording.name}: judging what was identified"):
-            identified = identify_on(learning.recording, learning.setup, static=learning.static, same_recording=same)
+            identified = identify_on(fitted.recording, fitted.setup, static=fitted.static, same_recording=same)
             blind = predict_blind(identified, judging.recording)
             tables.append(judge(blind, judging.recording))
             notes += [f"{judging.recording.name}: {note}" for note in blind.notes]
@@ -171,8 +171,8 @@ def settings_of(cases: Sequence[Case]) -> list[dict[str, Any]]:
     ]
 
 
-def told(trial: Trial) -> dict[str, Any]:
-    """What is written of a trial beside its figures."""
+def _described(trial: Trial) -> dict[str, Any]:
+    """What is written of a trial in addition to its figures."""
     seconds = trial.time[trial.window]
     return {
         "name": trial.name,

@@ -20,7 +20,7 @@ def out() -> Console:
 
 
 def print_error(message: str) -> None:
-    """One line on stderr, whatever the message holds."""
+    """One line on stderr, for any message."""
     print(f"error: {' '.join(message.split())}", file=sys.stderr)
 
 

@@ -110,7 +110,7 @@ def compared_with_truth(estimate: Estimate, truth: Truth) -> Table:
 
 
 def own_uncertainty(estimate: Estimate, truth: Truth) -> Table:
-    """Each block's errors beside the standard deviations that the filter gives with it."""
+    """Each block's errors and the standard deviations that the filter gives with it."""
     rows = table(
         "",
         "in 95 %",

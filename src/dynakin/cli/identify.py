@@ -28,7 +28,7 @@ def identify(
     ] = None,
     forces: Annotated[
         list[Path] | None,
-        typer.Option("--forces", help="Ground forces of the trials, in their order; else TRIAL_grf.mot beside."),
+        typer.Option("--forces", help="Ground forces of the trials, in their order; else TRIAL_grf.mot by each."),
     ] = None,
     *,
     given: Given,
@@ -62,10 +62,10 @@ def _print(found: Identification) -> None:
     for text in (*found.lost, *found.decision.in_words()):
         console.print(f"- {text}")
     used = "used" if found.subject.use == "bodies" else "not used: the table is kept"
-    total = found.posterior.unknowns.bodies.total
+    total = found.posterior.unknowns.inertial.total
     shown = table(
         "segment", "mass, kg", "table's", "sd", "centre of mass moved", numbers=(1, 2, 3),
-        title=f"Identified bodies ({used}), {total:.2f} kg of {found.subject.mass_kg:.2f}",
+        title=f"Identified segment masses ({used}), {total:.2f} kg of {found.subject.mass_kg:.2f}",
     )  # fmt: skip
     for row in segment_rows(found.posterior):
         shown.add_row(row.segment, f"{row.mass:.2f}", f"{row.table:.2f}", f"{row.sd:.2f}", row.moved)
@@ -77,13 +77,13 @@ def _print(found: Identification) -> None:
 def _check_trials(paths: list[Path]) -> None:
     if len(paths) == 1:
         raise ConfigError(
-            f"identify: one trial ({paths[0]}), expected at least two of the same subject: what is identified has to "
-            "foretell movements that it was not fitted to"
+            f"identify: one trial ({paths[0]}), expected at least two of the same subject: identified parameters "
+            "are judged by a trial that is held out"
         )
     seen: set[Path] = set()
     for path in paths:
         if path.resolve() in seen:
-            raise ConfigError(f"identify: {path} is given twice, expected different trials: it would foretell itself")
+            raise ConfigError(f"identify: {path} is given twice, expected different trials: each is held out in turn")
         seen.add(path.resolve())
 
 
@@ -96,10 +96,10 @@ def _check_output(output: Path) -> None:
 
 
 def _read(paths: list[Path], forces: list[Path], static: Path | None) -> tuple[list[Recording], Recording | None]:
-    """The trials and the standing one, each with the ground forces given or found beside it."""
+    """The trials and the standing one, each with the ground forces given or found in its folder."""
     if forces and len(forces) != len(paths):
         raise ConfigError(f"identify: {len(forces)} force files for {len(paths)} trials, expected one a trial or none")
-    chosen: list[Path | None] = [*forces] or [_beside(path) for path in paths]
+    chosen: list[Path | None] = [*forces] or [_forces_of(path) for path in paths]
     recordings = [read(path, force) for path, force in zip(paths, chosen, strict=True)]
     names = [recording.name for recording in recordings]
     recordings = [
@@ -109,11 +109,11 @@ def _read(paths: list[Path], forces: list[Path], static: Path | None) -> tuple[l
     if static is None:
         return recordings, None
     same = [recording for path, recording in zip(paths, recordings, strict=True) if path.resolve() == static.resolve()]
-    return recordings, same[0] if same else read(static, _beside(static))
+    return recordings, same[0] if same else read(static, _forces_of(static))
 
 
-def _beside(path: Path) -> Path | None:
-    """Ground forces that lie beside a trial: as recordings are often named, or as `dynakin simulate` names them."""
+def _forces_of(path: Path) -> Path | None:
+    """Ground forces in a trial's folder: as recordings are often named, or as `dynakin simulate` names them."""
     for name in (f"{path.stem}_grf.mot", *(["forces.mot"] if path.stem == "markers" else [])):
         if path.with_name(name).is_file():
             return path.with_name(name)

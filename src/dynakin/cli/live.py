@@ -50,7 +50,7 @@ def live(
             "plug-in's KIND:..."
         ),
     ] = None,
-    forces: Annotated[str | None, typer.Option(help="Plates: another source, or a force file beside replay.")] = None,
+    forces: Annotated[str | None, typer.Option(help="Plates: another source, or a force file for replay.")] = None,
     *,
     given: Given,
     parameters: Annotated[
@@ -129,10 +129,10 @@ def live(
         out().print(f"Recorded in {record}; results from it: dynakin live --finish {record} -o OUT", soft_wrap=True)
 
 
-def _for_replay(replay: Replay, told: str, again: bool) -> tuple[float, float]:
+def _for_replay(replay: Replay, address: str, again: bool) -> tuple[float, float]:
     """Seconds of standing and of waiting for them: a recording does not follow requests. One that is watched is
     played again and again, so that the page stays."""
-    if again and "loop" not in told and not replay.loop:
+    if again and "loop" not in address and not replay.loop:
         replay.loop = True
         out().print("Played again and again until Ctrl-C (loop=no: once).")
     length = replay.recording.time[-1] - replay.recording.time[0]

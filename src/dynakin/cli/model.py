@@ -42,11 +42,11 @@ def model(
     *,
     given: Given,
     identifiable: Annotated[
-        bool, typer.Option("--identifiability", help="What its measurements can tell: base parameters and gauges.")
+        bool, typer.Option("--identifiability", help="Observability of its constants: base parameters, gauges.")
     ] = False,
     trial: Annotated[
         Path | None,
-        typer.Option(help="With --identifiability: what this recording tells, and what would tell more."),
+        typer.Option(help="With --identifiability: posterior of this recording, and movements that would help."),
     ] = None,
     export: Annotated[
         Path | None,
@@ -194,7 +194,7 @@ def _states(model: ModelFile) -> Table:
 
 
 def print_identifiability(definition: ModelDefinition, trial: Path | None, forces: Path | None) -> None:
-    """Structure of the model, by a simulated person where no trial is given; what the trial told where one is.
+    """Structure of the model, by a simulated person where no trial is given; the trial's posterior where one is.
 
     Raises:
         DynakinError: model and trial do not fit.
@@ -208,34 +208,34 @@ def print_identifiability(definition: ModelDefinition, trial: Path | None, force
         found = identifiability(tracker, estimate, progress)
     _print_structure(found.structure, found)
     console = out()
-    console.print("\nWhat this trial tells", style="bold")
+    console.print("\nObservability in this trial", style="bold")
     for text in found.in_words():
         console.print(f"- {text}")
-    console.print("\nWhat would tell more", style="bold")
+    console.print("\nMovements that would help", style="bold")
     for text in found.advice:
         console.print(f"- {text}")
 
 
-def _print_structure(structure: Structure, told: Identifiability | None = None) -> None:
+def _print_structure(structure: Structure, trial: Identifiability | None = None) -> None:
     console = out()
     for text in structure.in_words():
         console.print(text)
-    console.print(_base(structure, told))
-    console.print("Gauges: what no measurement sees", style="bold")
+    console.print(_base(structure, trial))
+    console.print("Gauges: directions that no measurement observes", style="bold")
     for text in structure.gauges_in_words:
         console.print(f"- {sentence(text)}.")
 
 
-def _base(structure: Structure, told: Identifiability | None) -> Table:
-    if told is None:
+def _base(structure: Structure, trial: Identifiability | None) -> Table:
+    if trial is None:
         rows = table("", "base parameter", numbers=(0,), title="Base parameters")
         for k, text in enumerate(structure.base_in_words, start=1):
             rows.add_row(str(k), text)
         return rows
     rows = table(
-        "base parameter", "value", "sd before", "sd after", "", numbers=(1, 2, 3), title="Base parameters (kg, m)"
+        "base parameter", "value", "prior sd", "posterior sd", "", numbers=(1, 2, 3), title="Base parameters (kg, m)"
     )
-    for entry in told.base:
+    for entry in trial.base:
         numbers = (number(value) for value in (entry.value, entry.prior_sd, entry.sd))
         rows.add_row(entry.words, *numbers, JUDGEMENT_WORDS[judged(entry.share)])
     return rows

@@ -108,7 +108,7 @@ def _figures(estimate: Estimate, metrics: dict[str, Any]) -> Table:
         rows.add_row("refused for a time", str(len(refused)), ", ".join(refused))
     resets = [event for event in estimate.events if event.kind == "reset"]
     if resets:
-        rows.add_row("motion lost or sought anew", str(len(resets)), f"first at {resets[0].time_s:.2f} s")
+        rows.add_row("motion lost or found again", str(len(resets)), f"first at {resets[0].time_s:.2f} s")
     timing = estimate.timing
     rows.add_row(
         "time of a step, median", f"{timing.median_us:.0f} µs", f"{timing.realtime_factor:.0f} times real time"

@@ -142,8 +142,8 @@ def axes_of(vary: Sequence[str], cases: Sequence[Case]) -> tuple[Axis, ...]:
     """The settings to vary: of the command line, else of the first configuration's [grid], else the paper's gains."""
     if vary:
         return tuple(_axis(text) for text in vary)
-    told = cases[0].config.grid
-    return paper_axes() if told is None else tuple(axis(name, *values) for name, values in told.items())
+    grid = cases[0].config.grid
+    return paper_axes() if grid is None else tuple(axis(name, *values) for name, values in grid.items())
 
 
 def _axis(text: str) -> Axis:

@@ -19,7 +19,7 @@ LEAST_S = 0.003
 """A lesser delay is left to the state: a third of a frame at 100 Hz moves no moment by much."""
 SIGMAS = 3.0
 PASSES = 3
-"""The state extrapolates motion back over the delay and tells a long one a sixth too long; further passes mend that."""
+"""The state extrapolates motion back over the delay and finds a long one a sixth too long; further passes mend that."""
 
 
 class InStep(NamedTuple):

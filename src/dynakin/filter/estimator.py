@@ -61,7 +61,7 @@ class Estimator:
         estimate: kinds of parameters to estimate, of "lengths", "markers", "soft_tissue" and "inertia"; the others stay
             as they are at the start (displacements of skin are then noise of the markers).
         plates: plate -> "right" or "left", where a floating model's own assignment of plates to feet is wrong.
-        loads: known bodies that the person carries; the subject's mass is then needed, without them.
+        loads: known masses that the person carries; the subject's mass is then needed, without them.
         parameters: an identified subject (`model.identified`), whose values and deviations the filter starts from.
         lag: frames by which `Tracker.delayed` lies behind `Tracker.step`, for smoothing while it is measured; 0: none.
     """
@@ -104,7 +104,7 @@ class Estimator:
                 f"lag is {lag!r}, expected 0 to {LARGEST_LAG} frames (all of a recording: run with smooth=True)"
             )
         if loads and model.subject.mass_kg is None:
-            raise ConfigError("loads: the plates carry them too, expected the person's own mass beside them (mass_kg)")
+            raise ConfigError("loads: the plates carry them too, expected the person's own mass as well (mass_kg)")
         chosen: dict[str, object] = {
             "model": model,
             "noise": noise or presets.default(),

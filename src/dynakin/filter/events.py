@@ -44,7 +44,7 @@ def _missing(data: xr.Dataset) -> list[Event]:
 
 
 def _total_unknown(data: xr.Dataset) -> list[Event]:
-    """Stretches in which the plates of a floating model do not tell the total wrench, or were not used."""
+    """Stretches in which the plates of a floating model do not give the total wrench, or were not used."""
     lost = np.isnan(data["wrench_measured"].values).all(axis=1)
     return _stretches(data["time"].values, lost, "missing", "plates", "total wrench not known, left out")
 
@@ -65,15 +65,15 @@ def _refused(data: xr.Dataset) -> list[Event]:
 def _tracking(data: xr.Dataset) -> list[Event]:
     """Stretches in which the filter did not believe its markers, and what it did about them."""
     time, tracking = data["time"].values, data["tracking"].values
-    told: tuple[tuple[str, EventKind, str], ...] = (
+    kinds: tuple[tuple[str, EventKind, str], ...] = (
         ("doubtful", "gated", "most markers contradict the motion: nothing measured was used"),
         ("lost", "reset", "motion lost and held where it was"),
-        ("found", "reset", "motion sought anew from the markers, and found"),
-        ("restarted", "reset", "the numbers had broken down: everything started again"),
+        ("found", "reset", "motion found again from the markers"),
+        ("restarted", "reset", "numerical breakdown: the filter started again"),
     )
     events = [
         event
-        for word, kind, text in told
+        for word, kind, text in kinds
         for event in _stretches(time, tracking == TRACKING.index(word), kind, "motion", text)
     ]
     unmet = data["constraints_met"].values == 0
@@ -81,11 +81,11 @@ def _tracking(data: xr.Dataset) -> list[Event]:
 
 
 def _held(data: xr.Dataset, unseen_sd: float | None) -> list[Event]:
-    """Coordinates that no marker told anything of for so long that the filter stopped carrying them on."""
+    """Coordinates that no marker observed for so long that the filter stopped carrying them on."""
     if unseen_sd is None:
         return []
     following = data["tracking"].values == TRACKING.index("following")
-    unsure = data["coordinates_sd"].values > 0.4 * unseen_sd  # the plates tell a little even of what is held
+    unsure = data["coordinates_sd"].values > 0.4 * unseen_sd  # the plates say a little even of what is held
     return [
         event
         for k, name in enumerate(str(name) for name in data["coordinate"].values)

@@ -45,7 +45,7 @@ class FootWrenches:
         moment_sd: npt.ArrayLike,
         reference: npt.ArrayLike,
     ) -> FootWrenches:
-        """With errors that are told about a reference point: 20 N there are 20 N m at a metre's distance.
+        """With errors that are given about a reference point: 20 N there are 20 N m at a metre's distance.
 
         Args:
             force_sd: N, of each component; moment_sd: N m, about the reference point. Both broadcast to (T, F, 3).

@@ -46,7 +46,7 @@ def recording_arrays(recording: Recording, initial: CalibratedModel, *, gaps: bo
     if not recording.plates and not initial.feet:
         raise RecordingError(
             f"{where}: no force plates, expected at least one: the wrench is a measurement of this filter "
-            "(a force file can be given beside the markers)"
+            "(a force file can be given with the markers)"
         )
     markers = initial.ground.points_to_ground(
         np.stack([recording.marker(name) for name in initial.recorded_markers], axis=1)

@@ -17,9 +17,10 @@ Codes = npt.NDArray[np.uint8]
 def with_sources(data: xr.Dataset, feet: FootWrenches | None, undeclared: Flags) -> xr.Dataset:
     """The dataset of an estimate with ``moment_source`` and ``joint_source``, and NaN where a source is unknown.
 
-    A load that hangs on one unmeasured contact is derived from the motion, on several it is not known. Where something
-    undeclared bears the person, it may touch any segment but those between the plates and the thighs. A model that
-    stands on its root has the plates' sum behind every joint: without it all is derived, or unknown where undeclared.
+    A load that depends on one unmeasured contact is derived from the motion, on several it is not known. Where
+    something undeclared bears the person, it may touch any segment but those between the plates and the thighs. A model
+    that stands on its root has the plates' sum behind every joint: without it all is derived, or unknown where
+    undeclared.
 
     Args:
         data: with the joints' tree and, of floating models, the core's ``moment_source``.

@@ -25,7 +25,7 @@ Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
 ELSEWHERE = "elsewhere"
-"""Name of the contact that stands for whatever bears the person and is no foot; it acts on the root."""
+"""Name of the contact that stands for all that bears the person and is no foot; it acts on the root."""
 MASS_APART = 0.05
 """Part of the weight by which the plates' mean may differ before the mass is doubted: movement explains 2 or 3 %."""
 
@@ -133,7 +133,7 @@ def known_ground(
             "inertial parameters stay as the table has them."
         )
         return Ground(loads, np.zeros(n, dtype=bool), False, None, (text,), (text,))
-    # steps beside the plates: their mean load is no mass
+    # steps off the plates: their mean load is no mass
     mass, feet = (None, foot_markers(initial)) if initial.feet else (initial.weighed_kg, None)
     check = check_plates(recording, initial.ground, mass, feet)
     if check.refusal:
@@ -227,7 +227,7 @@ def _undeclared_in_words(
         f"Warning: the plates carry up to {abs(size):.0f} N {'less' if size > 0.0 else 'more'} "
         f"{'upwards' if axis == 1 else 'sideways'} than the motion needs ({abs(size) / weight:.0%} of the weight, "
         f"expected within {EXCESS:.0%}): something that no plate measures bears or pulls the person there (a seat, a "
-        f"rail, a box, a foot beside its plate){near}, from {', '.join(spans)}. The total wrench is left out there."
+        f"rail, a box, a foot off its plate){near}, from {', '.join(spans)}. The total wrench is left out there."
     ), beside
 
 
@@ -263,7 +263,7 @@ def _foreign_load(
     return (
         f"Warning: the plates carry {load:.1f} kg{mean} where the person weighs {mass_kg:.1f} kg (more than "
         f"{100.0 * tolerance:.0f} % apart): the mass is wrong, or something that the model does not have bears on them "
-        "(a weight, a cable, a rail, a foot beside a plate). The plates are not used for the total."
+        "(a weight, a cable, a rail, a foot off the plates). The plates are not used for the total."
     )
 
 

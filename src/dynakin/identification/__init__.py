@@ -1,17 +1,17 @@
 """Inertial parameters of a subject from several trials, and whether they predict."""
 
 from dynakin.identification.batch import Posterior, identify_batch
-from dynakin.identification.bodies import Bodies, BodyPriors
 from dynakin.identification.change import Change, change_between
 from dynakin.identification.decision import Decision
+from dynakin.identification.inertial_parameters import InertialParameters, InertialPriors
 from dynakin.identification.subject import identify_subject
 from dynakin.identification.trials import measure_all
 
 __all__ = [
-    "Bodies",
-    "BodyPriors",
     "Change",
     "Decision",
+    "InertialParameters",
+    "InertialPriors",
     "Posterior",
     "change_between",
     "identify_batch",

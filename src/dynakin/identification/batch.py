@@ -51,13 +51,13 @@ class Posterior:
 
     @property
     def phi(self) -> Array:
-        """(e,) inertial parameters, by ``unknowns.bodies.names``."""
-        return self.unknowns.bodies.phi(self.unknowns.split(self.theta)[0])
+        """(e,) inertial parameters, by ``unknowns.inertial.names``."""
+        return self.unknowns.inertial.phi(self.unknowns.split(self.theta)[0])
 
     def phi_covariance(self) -> Array:
         """(e, e) of ``phi``, to first order."""
         u = self.unknowns.split(self.theta)[0]
-        return self.unknowns.bodies.covariance(u, self.covariance[: len(u), : len(u)])
+        return self.unknowns.inertial.covariance(u, self.covariance[: len(u), : len(u)])
 
     def wrench(self, common: Common, states: Array) -> Array:
         """Predicted (T, 6) of a movement's states."""

@@ -1,6 +1,6 @@
 """Whether identified parameters earn their place: each trial predicted from its markers by the others.
 
-Of fewer than three trials halves are left out instead: with two, a standing trial would have to foretell a squat all by
+Of fewer than three trials halves are left out instead: with two, a standing trial would have to predict a squat all by
 itself. A fold leaves out a whole trial or half, never single frames: the model's error is alike from frame to frame, so
 single frames would judge themselves.
 """
@@ -52,7 +52,7 @@ class Decision:
         """Sentences."""
         found = {use: np.sqrt((self.rms[use] ** 2).mean(axis=0)) for use in USES}
         said = [
-            "Each left out in turn and predicted from its markers alone by what the others say: "
+            "Each left out in turn and predicted from its markers alone by the others' posterior: "
             f"{', '.join(self.folds)}."
         ]
         for use, values in found.items():
@@ -70,7 +70,7 @@ class Decision:
                 f"The table is kept: {verdict}; expected a gain of {100.0 * (1.0 - GAIN):.0f} % and no loss of more "
                 f"than {100.0 * (WORST - 1.0):.0f} %.",
             ]
-        return [*said, f"The identified bodies are used: {verdict}."]
+        return [*said, f"The identified segment inertia is used: {verdict}."]
 
 
 def parts_of(trials: Sequence[MeasuredTrial]) -> list[MeasuredTrial]:
@@ -86,7 +86,7 @@ def parts_of(trials: Sequence[MeasuredTrial]) -> list[MeasuredTrial]:
 
 
 def estimate(common: Common, trials: Sequence[MeasuredTrial], use: Use) -> Posterior:
-    """The table, or the batch estimate of the bodies.
+    """The table, or the batch estimate of the segments' inertia.
 
     Geometry stays as measured: lengths and zeros of angles predict as well in this batch, but a filter that follows its
     markers undoes them (docs/identification.md).
@@ -95,10 +95,11 @@ def estimate(common: Common, trials: Sequence[MeasuredTrial], use: Use) -> Poste
     return at_start(unknowns) if use == "table" else identify_batch(common, trials, unknowns)
 
 
-def foretell(
+def predict_wrench(
     common: Common, others: Sequence[MeasuredTrial], left_out: Movement, uses: Sequence[Use] = USES
 ) -> dict[Use, Array]:
-    """(T, 6) by candidate: what the other trials say of a movement. Its plates are not in here: a `Movement` has none.
+    """(T, 6) by candidate: the wrench of a held-out movement by the other trials' posterior, without its plates: a
+    `Movement` has none.
 
     Raises:
         RecordingError: the others have too few frames with the plates' wrench.
@@ -127,7 +128,7 @@ def decide(common: Common, trials: Sequence[MeasuredTrial], progress: Progress |
     for k, (left_out, half) in enumerate(zip(parts, halves, strict=True)):
         others = [part for j, part in enumerate(parts) if j != k]
         if np.isfinite(left_out.wrench[:, common.rows]).all(axis=1).any():  # else there is nothing to judge by
-            predicted = foretell(common, others, left_out.movement)
+            predicted = predict_wrench(common, others, left_out.movement)
             found.append({use: rms_of(common, left_out, wrench) for use, wrench in predicted.items()})
             names.append(left_out.movement.recording.name + half)
         if progress is not None:

@@ -55,11 +55,11 @@ class SegmentRow:
 
 def segment_rows(posterior: Posterior) -> list[SegmentRow]:
     """One row a segment."""
-    bodies = posterior.unknowns.bodies
+    inertial = posterior.unknowns.inertial
     u = posterior.unknowns.split(posterior.theta)[0]
-    mass = bodies.masses(u)
-    sd = np.sqrt(np.diag(posterior.phi_covariance()))[:: len(bodies.names) // len(mass)]
-    columns = zip(bodies.segments, mass, bodies.masses(0.0 * u), sd, bodies.centre_moves(u), strict=True)
+    mass = inertial.masses(u)
+    sd = np.sqrt(np.diag(posterior.phi_covariance()))[:: len(inertial.names) // len(mass)]
+    columns = zip(inertial.segments, mass, inertial.masses(0.0 * u), sd, inertial.centre_moves(u), strict=True)
     return [SegmentRow(words(segment), float(m), float(t), float(s), move) for segment, m, t, s, move in columns]
 
 
@@ -68,18 +68,18 @@ def _moved(posterior: Posterior) -> list[str]:
     masses = [f"{row.segment} {row.mass:.2f} kg (table {row.table:.2f}, sd {row.sd:.2f})" for row in rows]
     centres = [f"{row.segment} {row.moved}" for row in rows if row.moved]
     moved = listed(centres, 40) if centres else f"none by {1e3 * _CENTRE_M:.0f} mm"
-    total = posterior.unknowns.bodies.total
+    total = posterior.unknowns.inertial.total
     return [f"Masses, {total:.2f} kg together: {listed(masses, 40)}.", f"Centres of mass that moved: {moved}."]
 
 
 def base_in_words(batch: Batch) -> list[str]:
-    """How sure: what is known of the sums that plates can tell, and of which the data say nothing."""
+    """How sure: what is known of the sums that plates identify, and of which the data say nothing."""
     values, sd, prior = base_of_batch(batch)
     share = np.divide(sd, prior, out=np.ones_like(sd), where=prior > 0.0)
     verdicts = [judged(float(s)) for s in share]
     counts = {word: verdicts.count(word) for word in ("known", "partly", "nothing")}
     said = [
-        f"Of {len(values)} base parameters (sums of inertial numbers that plates can tell) {counts['known']} are known "
+        f"Of {len(values)} base parameters (sums of inertial numbers that plates identify) {counts['known']} are known "
         f"from these trials, {counts['partly']} in part, and of {counts['nothing']} they say nothing."
     ]
     best = np.argsort(share)[:5]

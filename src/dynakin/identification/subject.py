@@ -1,4 +1,4 @@
-"""From trials of one subject to its identified parameters: estimate, decide, and say what was learned."""
+"""From trials of one subject to its identified parameters: estimate, decide, and report."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class Identification:
 
     Attributes:
         subject: what is written to the file. common, trials: what it was made of.
-        posterior: the batch estimate of the bodies, used or not.
+        posterior: the batch estimate of the segments' inertia, used or not.
         decision: of cross-validation. lost: sentences on the trials that are left out, the person being lost in them.
     """
 
@@ -67,17 +67,17 @@ def identify_subject(
         estimator, recordings, static, lambda done, of: report(round(_SEEING * done / of), _WORK)
     )
     decision = decide(common, trials, lambda done, of: report(round(_SEEING + (_WORK - _SEEING) * done / of), _WORK))
-    bodies = estimate(common, trials, "bodies")
-    batch = _batch(common, bodies)
+    posterior = estimate(common, trials, "bodies")
+    batch = _batch(common, posterior)
     subject = IdentifiedSubject(
         model=common.initial.spec.name,
         mass_kg=common.initial.mass_kg,
         use=decision.use,
         trials=tuple(trial.movement.recording.name for trial in trials),
-        report=(*lost, *in_words(decision, bodies, batch)),
+        report=(*lost, *in_words(decision, posterior, batch)),
         batch=batch,
     )
-    return Identification(subject, common, tuple(trials), bodies, decision, tuple(lost))
+    return Identification(subject, common, tuple(trials), posterior, decision, tuple(lost))
 
 
 def _followed(
@@ -97,18 +97,18 @@ def _followed(
     return common, trials, said
 
 
-def _batch(common: Common, bodies: Posterior) -> Batch:
+def _batch(common: Common, posterior: Posterior) -> Batch:
     measured = MeasuredModel.of(common.tracker())
     base = base_of(measured)
-    names = bodies.unknowns.bodies.names
+    names = posterior.unknowns.inertial.names
     order = [base.over.index(name) for name in names]
-    unknowns = bodies.unknowns
-    start = np.zeros(len(unknowns.bodies.sd))
-    prior = unknowns.bodies.covariance(start, np.diag(unknowns.bodies.sd**2))
+    unknowns = posterior.unknowns
+    start = np.zeros(len(unknowns.inertial.sd))
+    prior = unknowns.inertial.covariance(start, np.diag(unknowns.inertial.sd**2))
     return Batch(
         names=names,
-        values=tuple(bodies.phi.tolist()),
-        covariance=_rows(bodies.phi_covariance()),
+        values=tuple(posterior.phi.tolist()),
+        covariance=_rows(posterior.phi_covariance()),
         prior_covariance=_rows(prior),
         base_names=base.names,
         base_words=tuple(base_words(base, measured.initial.spec)),

@@ -90,7 +90,7 @@ class Common:
 
     @classmethod
     def measure(cls, estimator: Estimator, first: Recording, static: Recording | None = None) -> Common:
-        """Measure the model on the markers of the first trial; only a standing trial's plates may tell the mass.
+        """Measure the model on the markers of the first trial; only a standing trial's plates may give the mass.
 
         Args:
             estimator: model and noise; preset default or another one that has a smoother.
@@ -102,7 +102,7 @@ class Common:
         if not estimator.model.has_mass and not weighed:
             raise ModelError(
                 "identification: the body mass is not known; expected it (--mass), or a standing trial with plates "
-                "(--static): the plates of a trial that is left out and foretold must not tell it"
+                "(--static): it must not come from the plates of a held-out trial"
             )
         initial = estimator.start(replace(first, plates=()), static=static).calibrated
         return cls(estimator, initial, static or first, _core.Model(initial.spec))
@@ -192,7 +192,7 @@ class Common:
         if abs(load - weighed) > LOAD_APART * weighed:
             raise RecordingError(
                 f"{where}: its plates carry {load:.1f} kg on average, the subject weighs {weighed:.1f} kg (expected "
-                f"within {100.0 * LOAD_APART:.0f} %): another person, other plates, or a foot beside them"
+                f"within {100.0 * LOAD_APART:.0f} %): another person, other plates, or a foot off the plates"
             )
 
     def measured(self, recording: Recording, progress: Progress | None = None) -> MeasuredTrial:
@@ -233,7 +233,7 @@ def about(wrench: Array, point: Array) -> Array:
 
 
 def _low_passed(time: Array, wrench: Array, middle: int) -> Array:
-    """Like the kinematics; each half on its own, for one half may have to foretell the other. What is unknown stays
+    """Like the kinematics; each half on its own, for one half may have to predict the other. What is unknown stays
     unknown."""
     halves = [smooth(time[part], wrench[part], CUTOFF_HZ).values for part in (slice(middle), slice(middle, None))]
     return np.where(np.isfinite(wrench), np.concatenate(halves), np.nan)

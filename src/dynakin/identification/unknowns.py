@@ -1,4 +1,4 @@
-"""What a batch identification asks for: bodies, lengths, zeros of angles, and each trial's own plates."""
+"""What a batch identification asks for: segments' inertia, lengths, zeros of angles, and each trial's own plates."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.bindings import _core
-from dynakin.identification.bodies import Bodies, BodyPriors
+from dynakin.identification.inertial_parameters import InertialParameters, InertialPriors
 from dynakin.identification.trials import Common
 
 Array = npt.NDArray[np.float64]
@@ -19,7 +19,7 @@ SCALED_M = 0.4  # of a segment that a dimensionless factor of an OpenSim model s
 @dataclass(frozen=True)
 class GeometryPriors:
     """Standard deviations of what geometry may be wrong by, where it is free. Tight, as skin that follows a posture is
-    no constant; 10 mm and 2 deg foretell one simulated task of three better and two as well (docs/identification.md).
+    no constant; 10 mm and 2 deg predict one simulated task of three better and two as well (docs/identification.md).
     """
 
     length_m: float = 0.004
@@ -40,13 +40,13 @@ class GeometryPriors:
 
 @dataclass(frozen=True, eq=False)
 class Unknowns:
-    """theta (U,) = [u of the bodies; lengths (m); zeros (rad)], deviations from the start, and which are free.
+    """theta (U,) = [u of the inertia; lengths (m); zeros (rad)], deviations from the start, and which are free.
 
     A zero is added to its angle at every frame; a length to its own. What is not free stays 0. A floating body's own
     turn in the room is no zero: markers on every segment see it.
 
     Attributes:
-        names: (U,). sd: (U,) prior standard deviations. bodies: u -> phi.
+        names: (U,). sd: (U,) prior standard deviations. inertial: u -> phi.
         lengths, rotations, inertia: their columns in a state of the core's model.
         considered_sd: (U,) what each may be wrong by while it is held.
         nuisance_sd: (r + 1,) of a trial's plates: each component of `Common.rows` (N, N m), delay (s).
@@ -55,7 +55,7 @@ class Unknowns:
 
     names: tuple[str, ...]
     sd: Array
-    bodies: Bodies
+    inertial: InertialParameters
     lengths: Array
     rotations: Array
     inertia: Array
@@ -70,7 +70,7 @@ class Unknowns:
         *,
         inertia: bool = True,
         geometry: bool = True,
-        body_priors: BodyPriors | None = None,
+        inertial_priors: InertialPriors | None = None,
         priors: GeometryPriors | None = None,
     ) -> Unknowns:
         """All of a measured model's; ``inertia`` and ``geometry`` say what is free.
@@ -79,7 +79,7 @@ class Unknowns:
             ModelError: the model does not estimate what can be identified.
         """
         priors = priors or GeometryPriors()
-        bodies = Bodies.of(common.initial, body_priors)
+        inertial = InertialParameters.of(common.initial, inertial_priors)
         names = list(common.core.layout.names)
         turning = {
             axis.coordinate
@@ -89,10 +89,10 @@ class Unknowns:
         }
         rotations = [k for k in _range(common.columns("coordinates")) if names[k] in turning]
         lengths = list(_range(common.columns("lengths")))
-        words = [*bodies.unknowns] + [names[k] for k in lengths] + [f"zero/{names[k]}" for k in rotations]
+        words = [*inertial.unknowns] + [names[k] for k in lengths] + [f"zero/{names[k]}" for k in rotations]
         metres = np.array([SCALED_M if names[k] in common.initial.dimensionless else 1.0 for k in lengths])
         sd, considered = (
-            np.concatenate([bodies.sd, length / metres, np.full(len(rotations), np.deg2rad(zero))])
+            np.concatenate([inertial.sd, length / metres, np.full(len(rotations), np.deg2rad(zero))])
             for length, zero in (
                 (priors.length_m, priors.zero_deg),
                 (priors.considered_length_m, priors.considered_zero_deg),
@@ -100,12 +100,12 @@ class Unknowns:
         )
         slow = np.where(common.rows < 3, priors.plate_force_n, priors.plate_moment_nm)
         plates = np.append(slow, priors.plate_delay_s)
-        free = np.array([inertia] * len(bodies.sd) + [geometry] * (len(lengths) + len(rotations)))
-        columns = np.array([names.index(name) for name in bodies.names])
+        free = np.array([inertia] * len(inertial.sd) + [geometry] * (len(lengths) + len(rotations)))
+        columns = np.array([names.index(name) for name in inertial.names])
         return cls(
             tuple(words),
             sd,
-            bodies,
+            inertial,
             np.array(lengths),
             np.array(rotations),
             columns,
@@ -116,7 +116,7 @@ class Unknowns:
 
     def split(self, theta: Array) -> tuple[Array, Array, Array]:
         """u, lengths, zeros."""
-        first, second = len(self.bodies.sd), len(self.bodies.sd) + len(self.lengths)
+        first, second = len(self.inertial.sd), len(self.inertial.sd) + len(self.lengths)
         return theta[:first], theta[first:second], theta[second:]
 
     def states(self, states: Array, theta: Array) -> Array:
@@ -125,7 +125,7 @@ class Unknowns:
         found = states.copy()
         found[:, self.lengths] += lengths
         found[:, self.rotations] += zeros
-        found[:, self.inertia] = self.bodies.phi(u)
+        found[:, self.inertia] = self.inertial.phi(u)
         return found
 
     def wrench(self, core: _core.Model, states: Array, theta: Array) -> Array:
@@ -136,8 +136,8 @@ class Unknowns:
         """d wrench / d theta (T, 6, U)."""
         u, _, _ = self.split(theta)
         rows = np.array([_core.wrench_jacobian(core, x) for x in self.states(states, theta)])
-        bodies = rows[:, :, self.inertia] @ self.bodies.jacobian(u)
-        return np.concatenate([bodies, rows[:, :, self.lengths], rows[:, :, self.rotations]], axis=2)
+        inertial = rows[:, :, self.inertia] @ self.inertial.jacobian(u)
+        return np.concatenate([inertial, rows[:, :, self.lengths], rows[:, :, self.rotations]], axis=2)
 
 
 def _range(columns: slice) -> range:

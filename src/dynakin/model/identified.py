@@ -69,12 +69,12 @@ class IdentifiedSubject(Strict):
         Raises:
             ModelError: the file cannot be written.
         """
-        beside = path.with_name(f".{path.name}.{os.getpid()}")  # so that a file is whole, or the one before
+        temporary = path.with_name(f".{path.name}.{os.getpid()}")  # so that a file is whole, or the one before
         try:
-            beside.write_text(tomli_w.dumps(self.model_dump(mode="json")), encoding="utf-8")
-            beside.replace(path)
+            temporary.write_text(tomli_w.dumps(self.model_dump(mode="json")), encoding="utf-8")
+            temporary.replace(path)
         except OSError as error:
-            beside.unlink(missing_ok=True)
+            temporary.unlink(missing_ok=True)
             raise ModelError(f"{path}: cannot be written ({error.strerror})") from None
 
 

@@ -82,7 +82,7 @@ class RigidBody:
         return RigidBody(self.mass, mirror @ self.first_moment, mirror @ self.inertia @ mirror)
 
     def __add__(self, other: RigidBody) -> RigidBody:
-        """Map 3b: two bodies of one frame joined rigidly."""
+        """Map 3b: two rigid bodies of one frame joined rigidly."""
         return RigidBody(self.mass + other.mass, self.first_moment + other.first_moment, self.inertia + other.inertia)
 
     @property

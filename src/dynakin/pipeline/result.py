@@ -40,7 +40,7 @@ class Result:
 
     Attributes:
         model: as it was calibrated on the recording, where the filter started.
-        comparison: the estimate beside the reference methods; None where that stage failed or was not asked for.
+        comparison: the estimate against the reference methods; None where that stage failed or was not asked for.
         observability: what the recording says of the constants, and what motion would say more; None as above, and
             where it would take too long (a message of the estimate says so).
         settings: that were asked for; ``estimate.config`` has them as used.
@@ -86,7 +86,7 @@ class Result:
     def _metrics(self) -> dict[str, Any]:
         metrics = compute_metrics(self.estimate, self.failures)
         if self.observability is not None:
-            with self.failures.stage("what the recording tells of the constants"):
+            with self.failures.stage("observability of the constants"):
                 metrics["identifiability"] = self.observability.as_dict()
         return metrics
 
@@ -101,7 +101,7 @@ class Result:
     ) -> Path:
         """Write every output file into ``folder`` (that of the settings where not given) and return it.
 
-        All files are first written into a temporary folder beside it, which then takes its place: a failure leaves
+        All files are first written into a temporary folder next to it, which then takes its place: a failure leaves
         what was there. A folder that exists is replaced only if ``overwrite`` is true and it is empty or holds
         nothing but an earlier output of dynakin.
 
@@ -139,7 +139,7 @@ class Result:
     def save_figures(
         self, folder: str | Path, formats: Sequence[str] = FORMATS, *, sensitivity: Sensitivity | None = None
     ) -> list[Path]:
-        """Write the paper's figures of this run into ``folder``, whatever it holds (see `dynakin.report.save_figures`);
+        """Write the paper's figures of this run into ``folder`` (see `dynakin.report.save_figures`);
         one that fails stands in ``failures``.
 
         Returns:

@@ -24,7 +24,7 @@ from dynakin.validation.methods import Trial, estimate_each, trial_of, with_lost
 Progress = Callable[[int, int], None]
 
 LARGEST_BENCH = 250
-"""States up to which a run also says what the recording tells of the constants: it filters a dozen motions more."""
+"""States up to which a run also judges the observability of the constants: it filters a dozen motions more."""
 
 
 def run(
@@ -41,7 +41,7 @@ def run(
     progress: Progress | None = None,
     **settings: Any,
 ) -> Result:
-    """Estimate a trial, compare it with the reference methods and say what it tells of the constants.
+    """Estimate a trial, compare it with the reference methods and judge the observability of the constants.
 
         result = dynakin.run("squat.c3d", model="squat7", mass_kg=70.0, height_m=1.75, sex="male")
         result.save("out/squat")
@@ -55,7 +55,7 @@ def run(
         noise: changes of the preset's noise settings, or all of them.
         output: folder for `Result.save`, which nothing is written into before.
         keep_lost: go on with a trial that was lost.
-        observability: whether to say what the recording tells of the constants; it takes longer than the estimate.
+        observability: whether to judge the observability of the constants; it takes longer than the estimate.
         progress: called with (frames done, frames in all) now and then.
         settings: further keys of a configuration (`dynakin print-config` lists them), such as ``preset``, ``smooth``.
 
@@ -140,14 +140,14 @@ def judged(
     trackers: Mapping[str, Tracker],
     failures: Failures,
     *,
-    whatever: bool = True,
+    tolerant: bool = True,
     observability: bool = True,
 ) -> Result:
     """What follows the estimates of a trial (see `estimate_each`), each stage on its own: the comparison of all with
-    the reference methods, and what the recording tells of the constants of the first.
+    the reference methods, and the observability of the constants of the first.
 
     Args:
-        failures: takes the stages that fail. whatever: as `trial_of` takes it.
+        failures: takes the stages that fail. tolerant: as `trial_of` takes it.
     """
     estimates = {title: case.with_config(title, estimate) for title, estimate in estimates.items()}
     title, first = next(iter(estimates.items()))
@@ -155,25 +155,25 @@ def judged(
     comparison: Trial | None = None
     with failures.stage("comparison with the reference methods"):
         setup = case.setup
-        comparison = trial_of(estimates, initial, setup.definition, setup.cutoff_hz, whatever=whatever)
+        comparison = trial_of(estimates, initial, setup.definition, setup.cutoff_hz, tolerant=tolerant)
         comparison = with_lost(comparison, lost)
     observed: Identifiability | None = None
     if observability:
-        with failures.stage("what the recording tells of the constants"):
+        with failures.stage("observability of the constants"):
             observed, note = _observability(trackers[title], first)
             if note:
                 first = replace(first, messages=[*first.messages, f"{_LEFT_OUT}: {note}"])
     return Result(first, initial, comparison, observed, case.config, failures)
 
 
-_LEFT_OUT = "What the recording tells of the constants is left out"
+_LEFT_OUT = "Observability of the constants is left out"
 
 
 def _observability(tracker: Tracker, estimate: Estimate) -> tuple[Identifiability | None, str]:
-    """What the recording tells of the constants, or why that cannot be said, which is no failure."""
+    """Observability of the constants in this recording, or why it is left out, which is no failure."""
     n_states = len(tracker.calibrated.names)
     if n_states > LARGEST_BENCH:
-        return None, f"with {n_states} states it takes many minutes; dynakin model --identifiability tells."
+        return None, f"with {n_states} states it takes many minutes; use dynakin model --identifiability."
     try:
         return identifiability(tracker, estimate), ""
     except DynakinError as error:  # a trial of a few frames, say

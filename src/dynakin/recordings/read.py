@@ -29,7 +29,7 @@ READERS: dict[str, Reader] = {".trc": read_trc, ".c3d": read_c3d, ".csv": read_c
 FORCE_READERS: dict[str, ForceReader] = {".mot": read_table, ".sto": read_table, ".csv": read_csv_table}
 """Readers of ground-force tables by extension."""
 
-_ENOUGH = 5  # markers that tell how large a person is
+_ENOUGH = 5  # markers that show how large a person is
 _SPAN_M = (0.02, 50.0)
 
 
@@ -109,6 +109,6 @@ def read_forces(path: Path) -> Table:
 
 
 def _only_forces(table: Table) -> Table:
-    """A csv may hold markers beside the forces: these are not columns "not used"."""
+    """A csv may hold markers and forces: these are not columns "not used"."""
     spots = [k for k, name in enumerate(table.names) if parse_column(name)]
     return replace(table, names=tuple(table.names[k] for k in spots), values=table.values[:, spots])

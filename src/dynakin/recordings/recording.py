@@ -27,7 +27,7 @@ class Plate:
         moment: (T, 3) N m, all of the wrench, about the LABORATORY origin.
         cop: (T, 3) m, centre of pressure; NaN where the plate is unloaded.
         free_moment: (T, 3) N m, what is left of the moment about the centre of pressure.
-        corners: (4, 3) m, or None where the file does not tell.
+        corners: (4, 3) m, or None where the file does not give them.
     """
 
     name: str
@@ -76,7 +76,7 @@ class Recording:
         plates: each force plate on its own.
         length_unit: unit of the file, in which its markers are written back.
         notes: what the reader found or changed, one sentence each.
-        subject: "mass_kg" and "height_m" where the file tells.
+        subject: "mass_kg" and "height_m" where the file gives them.
         hints: what the file says of its axes (C3D: "X_SCREEN", "Y_SCREEN"); can be wrong, so it only votes.
         read_with: settings that it was read with (forces, plate_filter_hz, ...), by their keys in a configuration.
     """

@@ -48,7 +48,7 @@ def render_comparison(
         trials: what all methods made of each; none where only parameters were judged (``held_out``).
         tables: rows by the name of their file, as `dynakin.validation.save_comparison` takes them.
         settings: of each recording that was read. names: theirs.
-        notes: sentences on what was left out, beside the trials' own.
+        notes: sentences on what was left out, in addition to the trials' own.
     """
     judged = not trials and len(names) == 2
     title = f"{names[0]} → {names[1]}" if judged else names[0] if len(names) == 1 else f"{len(names)} trials"
@@ -149,7 +149,7 @@ def _findings(tables: Mapping[str, Sequence[Any]]) -> list[Insight]:
 
 
 def _against_nothing(title: str, rows: Sequence[Row] | Sequence[UnseenRow]) -> list[Insight]:
-    """Each quantity by the filter and by whatever else comes closest, beside what costs nothing."""
+    """Each quantity by the filter and by the next best method, against what costs nothing."""
     sentences, worse = [], []
     for quantity in dict.fromkeys(row.quantity for row in rows):
         known = [row for row in rows if row.quantity == quantity and row.rms.mean is not None]

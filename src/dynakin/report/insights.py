@@ -100,17 +100,17 @@ def _moments(estimate: Estimate, metrics: Metrics) -> Insight | None:
 
 def _mass(estimate: Estimate, metrics: Metrics) -> Insight | None:
     """Plates that contradict the mass: forces, moments and inertia are all wrong then."""
-    told = [text.removeprefix("Warning: ") for text in estimate.messages if doubts_mass(text)]
-    if not told:
+    doubts = [text.removeprefix("Warning: ") for text in estimate.messages if doubts_mass(text)]
+    if not doubts:
         return None
-    return Insight("warning", "Mass", sentence(" ".join(told)), "Give the mass as weighed, with all that is worn.")
+    return Insight("warning", "Mass", sentence(" ".join(doubts)), "Give the mass as weighed, with all that is worn.")
 
 
 def _failed(estimate: Estimate, metrics: Metrics) -> Insight | None:
-    told = [message.removeprefix(FAILED).strip() for message in estimate.messages if message.startswith(FAILED)]
-    if not told:
+    failed = [message.removeprefix(FAILED).strip() for message in estimate.messages if message.startswith(FAILED)]
+    if not failed:
         return None
-    return Insight("warning", "Not made", " ".join(told), f"{LOG} has the details; please report them.")
+    return Insight("warning", "Not made", " ".join(failed), f"{LOG} has the details; please report them.")
 
 
 def _tracking(estimate: Estimate, metrics: Metrics) -> Insight | None:
@@ -152,10 +152,10 @@ def _markers(estimate: Estimate, metrics: Metrics) -> Insight | None:
 
 def _wrench(estimate: Estimate, metrics: Metrics) -> Insight | None:
     rms = metrics["wrench"]["rms"]
-    told = [text for text in estimate.messages if text.startswith(PLATE_WORDS) and not doubts_mass(text)]
+    about_plates = [text for text in estimate.messages if text.startswith(PLATE_WORDS) and not doubts_mass(text)]
     if not rms:
-        why = " ".join(told) or "No wrench was compared: none was measured, or none is modelled."
-        return Insight("warning" if told else "note", "Force plates", why.removeprefix("Warning: "))
+        why = " ".join(about_plates) or "No wrench was compared: none was measured, or none is modelled."
+        return Insight("warning" if about_plates else "note", "Force plates", why.removeprefix("Warning: "))
     text = [
         f"{COMPONENT_LABELS[name][0].lower()} {number(value, COMPONENT_LABELS[name][1])}"
         + (f" ({number(share, digits=2)} %)" if (share := metrics["wrench"]["nrms_percent"][name]) is not None else "")
@@ -165,7 +165,7 @@ def _wrench(estimate: Estimate, metrics: Metrics) -> Insight | None:
         "note",
         "Force plates",
         f"RMS difference between the model’s wrench and the plates’: {listed(text)}; percent of the measured RMS."
-        + "".join(f" {sentence}" for sentence in told),
+        + "".join(f" {sentence}" for sentence in about_plates),
     )
 
 
@@ -281,7 +281,7 @@ def _bounds(estimate: Estimate, metrics: Metrics) -> Insight | None:
 
 
 def _adaptation(estimate: Estimate, metrics: Metrics) -> Insight | None:
-    """When the estimate settled, beside the time from which the figures are taken."""
+    """When the estimate settled, against the time from which the figures are taken."""
     found = metrics["adaptation"]
     if not found["verdict"]:
         return None
@@ -316,12 +316,12 @@ def _soft_tissue(estimate: Estimate, metrics: Metrics) -> Insight | None:
         )
     most = max(moved, key=lambda name: moved[name])
     declared = markers[most]["declared_mm"]
-    beside = "" if declared is None else f" (declared {number(declared, 'mm', digits=2)})"
+    size = "" if declared is None else f" (declared {number(declared, 'mm', digits=2)})"
     return Insight(
         "good",
         "Soft tissue",
         f"No marker moves further on its segment than skin does; furthest is {most} with "
-        f"{number(moved[most], 'mm', digits=2)}{beside}.",
+        f"{number(moved[most], 'mm', digits=2)}{size}.",
     )
 
 
@@ -349,8 +349,8 @@ def _gated(estimate: Estimate, metrics: Metrics) -> Insight | None:
     gated = [event for event in estimate.events if event.kind in ("gated", "reset")]
     if not gated:
         return None
-    told = [e.message if not e.subject or e.subject in e.message else f"{e.subject} {e.message}" for e in gated]
-    return Insight("warning", "Left out or reset", f"{listed(told, 4)}.")
+    shown = [e.message if not e.subject or e.subject in e.message else f"{e.subject} {e.message}" for e in gated]
+    return Insight("warning", "Left out or reset", f"{listed(shown, 4)}.")
 
 
 def _locked(estimate: Estimate, metrics: Metrics) -> Insight | None:

@@ -62,7 +62,7 @@ def render_report(estimate: Estimate, *, metrics: dict[str, Any] | None = None, 
     """The report of a run as one HTML text that needs nothing else.
 
     Args:
-        comparison: this estimate beside the reference methods (`dynakin.validation.trial_of`).
+        comparison: this estimate against the reference methods (`dynakin.validation.trial_of`).
     """
     estimate = facing(estimate)
     metrics = metrics or compute_metrics(estimate)

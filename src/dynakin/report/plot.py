@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
-# Okabe and Ito's colours, told apart by people with any kind of colour vision; measured and estimated differ in
+# Okabe and Ito's colours, distinguished by people with any kind of colour vision; measured and estimated differ in
 # lightness and width too.
 MEASURED = "#9a9a9a"
 ESTIMATED = "#0072B2"

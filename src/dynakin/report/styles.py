@@ -24,12 +24,12 @@ _KNOWN = {
 _FURTHER = ("#aa4499", "#b38f2a", "#4d4d4d", "#7a5195", "#00798c", "#a44a3f", "#6b8e23", "#5b6ee1")
 _SIDES = ("_right", "_left", "_r", "_l")
 
-# Okabe and Ito's blue and vermilion, told apart by people with any kind of colour vision.
+# Okabe and Ito's blue and vermilion, distinguished by people with any kind of colour vision.
 SIDE_COLOURS = {"right": "#0072B2", "left": "#D55E00", "": "#4d5661"}
 """Right, left and what is in the middle, in every figure of a body with two sides."""
 
 
-# After the first filter: Okabe and Ito's green, purple and sky blue, for further presets beside it.
+# After the first filter: Okabe and Ito's green, purple and sky blue, for further presets.
 _FILTERS = (ESTIMATED, "#009E73", "#CC79A7", "#56B4E9")
 _CLASSICAL = "#6A3D9A"
 Dash = Literal["solid", "dashed", "dotted"]

@@ -1,4 +1,4 @@
-"""The small records that stand beside the arrays of an estimate: parameters, events, timing and tracking."""
+"""The small records that accompany the arrays of an estimate: parameters, events, timing and tracking."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ class Parameter:
     skin_sd: float = 0.0
 
     @property
-    def learnt_sd(self) -> float:
+    def posterior_sd(self) -> float:
         """``sd`` without ``skin_sd``: how sure the filter is of what it sees."""
         return math.sqrt(max(self.sd**2 - self.skin_sd**2, 0.0))
 

@@ -94,7 +94,7 @@ class OpenSimOptions(Strict, use_attribute_docstrings=True):
     scale_masses: bool = True
     """Whether all masses and inertias are multiplied so that they sum to the subject's mass."""
     lightest_share: float = Field(default=0.01, ge=0.0, lt=1.0)
-    """Bodies of less than this part of the whole mass keep the file's mass and inertia: no recording tells of them."""
+    """Bodies of less than this part of the whole mass keep the file's mass and inertia: no trial identifies them."""
     lock_unseen: bool = True
     """Whether coordinates that move no measured marker (toes, often) are locked at the file's default value."""
     leave_out: tuple[str, ...] = ()

@@ -91,7 +91,7 @@ class Noise(Strict, use_attribute_docstrings=True):
     look like lengths, and do not average out; without it a length is thought to be known the better the longer."""
     length_skin_fraction: NotNegative = 0.6
     """Part of the skin's declared displacement that is added to the standard deviation of the lengths about it when
-    they are told, not in the filter: skin that follows an angle never averages out."""
+    they are reported, not in the filter: skin that follows an angle never averages out."""
     soft_tissue_sd_fraction: NotNegative = scale(0.5, "of the declared size", "how far skin and flesh move")
     """Standard deviation of the displacement of skin and flesh under each marker, as a fraction of the size that its
     marker set declares; 0: none is estimated."""
@@ -138,11 +138,11 @@ class Noise(Strict, use_attribute_docstrings=True):
     wrench_gate: Probability = 1e-9
     """The same for the plates."""
     recover: bool = True
-    """Whether a motion that most markers contradict, or that was not seen for blind_s, is sought anew."""
+    """Whether a motion that most markers contradict, or that was not seen for blind_s, is searched for again."""
     blind_s: Seconds = 0.2
     """How long the motion is believed without markers that fit, s."""
     unseen_sd: Positive | None = 0.5
-    """Standard deviation of a coordinate (rad or m) from which on it is held where it is, because no marker tells of it
+    """Standard deviation of a coordinate (rad or m) from which on it is held where it is, because no marker observes it
     any more; not given: it is carried on with the speed it last had. Needs ``recover``."""
     iterate_beyond_sd: Positive | None = 0.2
     """Standard deviation of a coordinate (rad or m) beyond which an update is linearised anew; not given: never."""

@@ -90,7 +90,7 @@ class Settings(Strict, use_attribute_docstrings=True):
     signs: Literal["opensim", "clinical"] = "opensim"
     """Names and signs of the joint angles in angles.sto: opensim (the coordinates'), or clinical."""
     loads: tuple[CarriedLoad, ...] = ()
-    """Known bodies that the person carries: [[loads]] with segment, mass_kg, place_m (centre of mass in the segment's
+    """Known masses that the person carries: [[loads]] with segment, mass_kg, place_m (centre of mass in the segment's
     frame, m), inertia_kg_m2 and name. mass_kg, the person's own, is then needed."""
     plate_loads: tuple[PlateLoad, ...] = ()
     """Constant loads on plates that are not the person's (a rail): [[plate_loads]] with plate, force_n, point_m,
@@ -194,7 +194,7 @@ def read_keys(path: Path, paths: Sequence[str] = _PATHS) -> dict[str, Any]:
     for key in paths:
         if isinstance(content.get(key), str):
             content[key] = str(path.parent / content[key])
-    for key in ("model", "markers", "table", "preset"):  # a name, or a file beside the configuration
+    for key in ("model", "markers", "table", "preset"):  # a name, or a file next to the configuration
         value = content.get(key)
         if isinstance(value, str) and is_file(path.parent / value):
             content[key] = str(path.parent / value)

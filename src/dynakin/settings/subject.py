@@ -76,7 +76,7 @@ class PlateLoad:
         plate: its name, as `dynakin check` shows it.
         force_n: as the plate reads it (its reaction: a weight of 50 N reads +50 N along the vertical).
         point_m: where the force acts.
-        moment_nm: beside that, about the point.
+        moment_nm: in addition to that, about the point.
     """
 
     plate: str

@@ -78,7 +78,7 @@ def contacts_of(body: SimulatedBody, seat: Seat | None) -> tuple[Contact, ...]:
 def share_wrench(wrench: Array, feet: Sequence[Contact], seat: Seat | None) -> list[Array]:
     """Wrenches (T, 6) about the ground origin of each foot and, last, of the seat; they add up to ``wrench``.
 
-    Mechanics tell only the sum. The seat pushes up as much as the feet's centre of pressure needs not to go
+    Mechanics give only the sum. The seat pushes up as much as the feet's centre of pressure needs not to go
     behind its limit; what is left goes to the feet by the place of its centre of pressure between them.
     """
     seated = [] if seat is None else [seat_wrench(wrench, seat)]
@@ -105,7 +105,7 @@ def seat_wrench(wrench: Array, seat: Seat) -> Array:
 def split_wrench(wrench: Array, right_z: float, left_z: float) -> tuple[Array, Array]:
     """The wrench (T, 6) shared by the right and the left foot, at ``right_z`` and ``left_z`` (m).
 
-    Each carries the part of force and free moment that its place tells: half where the whole's centre of pressure
+    Each carries the part of force and free moment that its place gives: half where the whole's centre of pressure
     lies in the middle, all of it where that lies under the foot. Both press at the same x, so the sideways forces
     with which they push apart cancel in the sum, and so do their moments.
     """

@@ -1,4 +1,4 @@
-"""A simulated trial as files: what a laboratory would hand over, and beside it the truth."""
+"""A simulated trial as files: what a laboratory would hand over, and with it the truth."""
 
 from __future__ import annotations
 

@@ -15,7 +15,7 @@ Array = NDArray[np.float64]
 class Support:
     """How the feet stand at some times.
 
-    right, left: (T, 3) m, where each presses if the whole presses where its share tells, on the floor y = 0.
+    right, left: (T, 3) m, where each presses if the whole presses where its share says, on the floor y = 0.
     share: (T,) of the right foot, 0 to 1; None: as the whole's centre of pressure lies between the two.
     push: with which the feet push apart along the line between them, over the vertical force, times 1/4 where both
     carry the same.
@@ -39,8 +39,8 @@ class Footing:
 def split_between(wrench: Array, support: Support) -> tuple[Array, Array]:
     """The wrench (T, 6) about the ground origin shared by the right and the left foot.
 
-    Mechanics tell only the sum. Force and free moment are shared in one proportion. What the whole's centre of pressure
-    lies beside the weighted mean of both is made up by theirs, the more by the foot that carries more; so the sum is
+    Mechanics give only the sum. Force and free moment are shared in one proportion. What the whole's centre of pressure
+    lies off the weighted mean of both is made up by theirs, the more by the foot that carries more; so the sum is
     kept. The feet push apart along the line between their centres, which changes no sum.
     """
     force = wrench[:, :3]

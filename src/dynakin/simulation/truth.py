@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Truth:
-    """What the sensors should have told. Ground frame of the models (X forward, Y up, Z right; the planar chains'
+    """What the sensors should have measured. Ground frame of the models (X forward, Y up, Z right; the planar chains'
     origin: the toe landmark), SI.
 
     Attributes:

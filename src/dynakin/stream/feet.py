@@ -37,7 +37,7 @@ class LiveFeet:
 
     Offline (`recordings.feet.loads`) whole stances are seen; here a stance is what has been seen of it so far, with the
     same thresholds: a foot stands where a marker is near its lowest place and slow, and for a while after (push-off). A
-    stance that no plate has carried yet is beside the plates.
+    stance that no plate has carried yet is off the plates.
 
     Args:
         assigned: plate -> "right" or "left", where it is known.
@@ -48,7 +48,7 @@ class LiveFeet:
     ) -> None:
         self.initial, self.noise, self.plates = initial, noise, plates
         self.feet = tuple(initial.feet)
-        self._told = {p: self.feet.index(assigned[name]) for p, name in enumerate(plates) if name in assigned}
+        self._assigned = {p: self.feet.index(assigned[name]) for p, name in enumerate(plates) if name in assigned}
         segments = [marker.segment for marker in initial.spec.markers]
         own = [np.flatnonzero([s == initial.feet[foot] for s in segments]) for foot in self.feet]
         F, P, M = len(self.feet), len(plates), len(segments)
@@ -96,8 +96,8 @@ class LiveFeet:
             )
         if plates and not known:
             self._say(
-                "The plates do not carry all of the person (a foot beside them, a load where nobody stands, a plate at "
-                "the end of its range): the total wrench is left out for as long as that is so."
+                "The plates do not carry all of the person (a foot off the plates, a load where nobody stands, a plate "
+                "at the end of its range): the total wrench is left out for as long as that is so."
             )
         return foot_wrenches(loads, self.initial, self.noise), known
 
@@ -156,7 +156,7 @@ class LiveFeet:
         if touches.all() and apart.any():
             both = np.broadcast_to(outlines.reshape(1, -1, 2), (P, outlines.size // 2, 2))
             near |= apart & (distance_to_hull(cops, both) < BETWEEN_M)
-        for p, foot in self._told.items():
+        for p, foot in self._assigned.items():
             near[:, p] = np.arange(F) == foot
         loaded = np.array([plate.loaded[0] for plate in plates])
         self._loaded += touches[:, None] & loaded
@@ -166,7 +166,7 @@ class LiveFeet:
             push = float(plate.wrench[0, 1])
             if push <= EMPTY_N:
                 self._owners[:, p] = False
-            elif p in self._told:
+            elif p in self._assigned:
                 self._owners[:, p] = near[:, p]
             elif mine[:, p].any():
                 self._owners[:, p] = mine[:, p]
@@ -176,7 +176,7 @@ class LiveFeet:
 
 
 class _Range:
-    """Whether plates are at the end of their range, as `recordings.feet.loads.saturated` tells it afterwards."""
+    """Whether plates are at the end of their range, as `recordings.feet.loads.saturated` finds it afterwards."""
 
     def __init__(self, plates: int) -> None:
         self._top = np.full(plates, FOREIGN_N)

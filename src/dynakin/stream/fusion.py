@@ -22,7 +22,7 @@ DELAY_S = 0.05
 """Longest wait for a packet that is missing or late."""
 SILENT_S = 0.25
 """A stream from which nothing has come for so long is silent: nobody waits for it."""
-LEARN_S = 1.0
+OFFSET_S = 1.0
 """How long arrivals are watched before two clocks that have nothing in common are put together."""
 
 
@@ -56,7 +56,7 @@ class Fusion:
 
     def __init__(self, markers: StreamInfo | None, plates: StreamInfo | None, *, delay_s: float = DELAY_S) -> None:
         if markers is None or not markers.names:
-            raise StreamError("no stream of markers, expected one (plates alone tell no movement)")
+            raise StreamError("no stream of markers, expected one (plates alone show no movement)")
         self.markers, self.plates, self.delay_s = markers, plates, delay_s
         self.period_s = 1.0 / markers.rate_hz
         self._clocks = {info.clock: Clock() for info in (markers, plates) if info is not None}
@@ -72,7 +72,7 @@ class Fusion:
         self._head: tuple[float, MarkerPacket] | None = None
         self._marker_arrived = self._plate_arrived = -np.inf
         self._last_s: float | None = None
-        self.without_plates = 0  # frames that went without the wrench though plates were told
+        self.without_plates = 0  # frames that went without the wrench though plates were declared
 
     @property
     def marker_counts(self) -> Counts:
@@ -99,7 +99,7 @@ class Fusion:
         return now_s - self._marker_arrived > max(SILENT_S, 3.0 * self.period_s)
 
     def plates_silent(self, now_s: float) -> bool:
-        """Whether plates were told and nothing comes from them."""
+        """Whether plates were declared and nothing comes from them."""
         return self.plates is not None and now_s - self._plate_arrived > SILENT_S
 
     def push(self, packet: Packet) -> None:
@@ -139,14 +139,14 @@ class Fusion:
         placed = PlatePacket(stamps + (newest - stamps[-1]), packet.wrenches, packet.arrived_s)
         if self._offset_s is None:
             self._early.append(placed)
-            self._learn_offset(packet.arrived_s)
+            self._find_offset(packet.arrived_s)
             return
         self._take_block(placed)
 
-    def _learn_offset(self, now_s: float) -> None:
+    def _find_offset(self, now_s: float) -> None:
         """Put the two clocks together once both streams have been watched for a while."""
         assert self.plates is not None
-        if len(self._first_arrived) < 2 or now_s - max(self._first_arrived.values()) < LEARN_S:
+        if len(self._first_arrived) < 2 or now_s - max(self._first_arrived.values()) < OFFSET_S:
             return
         self._offset_s = offset_between(self._clocks[self.markers.clock], self._clocks[self.plates.clock])
         for packet in self._early:

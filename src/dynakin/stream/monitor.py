@@ -26,7 +26,7 @@ class Monitor:
     """What a session's status shows, kept cheap: a step pays for some sums only.
 
     Args:
-        plates: whether plates were told. used: whether the filter takes them. holds: whether the filter holds a motion
+        plates: whether there are plates. used: whether the filter takes them. holds: whether the filter holds a motion
             that it does not see, instead of carrying it on.
     """
 
@@ -42,8 +42,8 @@ class Monitor:
         self._begun: float | None = None
         self._silent = {"markers": False, "plates": False}
         self._restarts = 0
-        self.left_out = self._told_left_out = 0
-        self._told_s = -np.inf
+        self.left_out = self._said_left_out = 0
+        self._said_s = -np.inf
         self.stepped_s = -np.inf  # time of the last step
         self._followed_s = np.nan  # time of the last step with markers that fitted
         self._lost = False
@@ -153,12 +153,12 @@ class Monitor:
                     self.last = replace(self.last, tracking="lost")
                 goes_on = "going on with markers alone" if kind == "plates" else self._without_markers(fusion, now_s)
                 said.append(f"The {kind} are silent; {goes_on}." if silent else f"The {kind} are back.")
-        if self.left_out > self._told_left_out and now_s - self._told_s > _SLOW_S:
+        if self.left_out > self._said_left_out and now_s - self._said_s > _SLOW_S:
             said.append(
-                f"This computer is too slow for {self.rate_hz:g} Hz: {self.left_out - self._told_left_out} frames were "
+                f"This computer is too slow for {self.rate_hz:g} Hz: {self.left_out - self._said_left_out} frames were "
                 "left out."
             )
-            self._told_left_out, self._told_s = self.left_out, now_s
+            self._said_left_out, self._said_s = self.left_out, now_s
         if fusion.clock_restarts > self._restarts:
             self._restarts = fusion.clock_restarts
             said.append("A source's clock was set back; time goes on.")

@@ -26,7 +26,7 @@ _ASK_S = 0.1  # how often sinks are asked for wishes, and the standing person is
 _DEVIATIONS_S = 0.2
 _SPARSE_S = 0.05  # steps are never further apart than this because the computer is slow
 _CATCH_UP_S = 1.0  # with what came while the model was measured: that is left out too, but is no sign of slowness
-_MASS_KG = 70.0  # of a person of whom nothing is told, so that at least the movement is seen
+_MASS_KG = 70.0  # of a person of whom nothing is known, so that at least the movement is seen
 
 
 class Live:
@@ -73,7 +73,7 @@ class Live:
         self._window: deque[Fused] = deque()
         self._standing_since: float | None = None
         self._came_s = self._ready_s = 0.0
-        self._looked = self._asked = self._told_sd = -np.inf
+        self._looked = self._asked = self._sd_shown = -np.inf
         self._tracker: Tracker | None = None
         self._monitor: Monitor | None = None
         self._use_plates = True
@@ -143,7 +143,7 @@ class Live:
         if self._tracker is None:
             return
         self._tracker = self._tracker.fresh()
-        self._begin_running("The estimate begins anew.")
+        self._begin_running("The estimate starts again.")
 
     def recalibrate(self) -> None:
         """Measure the model anew: ask to stand still."""
@@ -157,8 +157,8 @@ class Live:
         markers, plates = streams.markers, streams.plates
         self._fusion = Fusion(markers, plates, delay_s=self.delay_s)
         assert markers is not None
-        told = "no plates" if plates is None else f"{len(plates.names)} plates at {plates.rate_hz:g} Hz"
-        self.say(f"Streams: {len(markers.names)} markers at {markers.rate_hz:g} Hz, {told}.")
+        force_plates = "no plates" if plates is None else f"{len(plates.names)} plates at {plates.rate_hz:g} Hz"
+        self.say(f"Streams: {len(markers.names)} markers at {markers.rate_hz:g} Hz, {force_plates}.")
         for note in streams.notes:
             self.say(note)
         if not streams.paced:
@@ -167,13 +167,13 @@ class Live:
         if unknown_mass(self.estimator.model, self._subject, plates is not None):
             self._subject["mass_kg"] = _MASS_KG
             self.say(
-                f"Warning: nobody tells the mass and there are no plates; {_MASS_KG:g} kg are taken, so that moments "
+                f"Warning: the mass is not given and there are no plates; {_MASS_KG:g} kg are taken, so that moments "
                 "are right in shape only."
             )
         for sink in self.sinks:
-            self._tell(sink)
+            self._begin(sink)
 
-    def _tell(self, sink: Sink) -> None:
+    def _begin(self, sink: Sink) -> None:
         sink.begins(self._subject, self.delay_s)
         sink.opened(self.fusion.markers, self.fusion.plates)
 
@@ -231,7 +231,7 @@ class Live:
         except DynakinError as error:
             self.say(error.message)
             return
-        self._tell(self._recording)
+        self._begin(self._recording)
         self.sinks.append(self._recording)
         self.say("Recording.")
 
@@ -305,7 +305,7 @@ class Live:
         rate, holds = self.fusion.markers.rate_hz, self.estimator.noise.recover
         self._monitor = Monitor(initial, rate, plates, plates and self._use_plates, holds)
         self._feet = None
-        if initial.feet:  # without plates too: what hangs on the ground is then absent
+        if initial.feet:  # without plates too: what depends on the ground is then absent
             names = () if self.fusion.plates is None else self.fusion.plates.names
             self._feet = LiveFeet(initial, self.estimator.noise, names, self.estimator.plates)
         self._running = True
@@ -328,14 +328,14 @@ class Live:
         try:
             estimate = tracker.step(sample, feet)
         except DivergenceError as error:
-            self.say(f"{error.message}; the estimate begins anew.")
+            self.say(f"{error.message}; the estimate starts again.")
             self.restart()
             return
         smoothed = tracker.delayed() if tracker.lag else None
         state = tracker.state
         deviations = None
-        if not 0.0 <= sample.time_s - self._told_sd < _DEVIATIONS_S and self._reader.backlog < 4:
-            self._told_sd = sample.time_s
+        if not 0.0 <= sample.time_s - self._sd_shown < _DEVIATIONS_S and self._reader.backlog < 4:
+            self._sd_shown = sample.time_s
             deviations = tracker.deviations()
         status = monitor.status(self.fusion, fused, whole, estimate, smoothed, state, tracker.verdicts)
         frame = LiveFrame(estimate, smoothed, fused, state, deviations, status)
@@ -348,7 +348,7 @@ class Live:
             self.say(text)
 
     def say(self, text: str) -> None:
-        """Tell the user."""
+        """Say something to the user."""
         phase = "running" if self._running else "waiting" if self._standing_since is None else "standing"
         status = Status(phase=phase) if self._monitor is None or not self._running else self._monitor.last
         self._say(text)

@@ -57,7 +57,7 @@ def recording_of(
     """Samples as a recording, laboratory frame; plates as far as any of these samples has them.
 
     Args:
-        subject: mass (kg) and height (m) as the source tells them.
+        subject: mass (kg) and height (m) as the source gives them.
 
     Raises:
         RecordingError: no samples, or no vertical axis to be found.
@@ -76,7 +76,7 @@ def recording_of(
 
 
 def _plate(name: str, wrench: np.ndarray, up: np.ndarray) -> Plate:
-    """A plate that lies in the floor, through the laboratory's origin: streams don't tell corners."""
+    """A plate that lies in the floor, through the laboratory's origin: streams give no corners."""
     floor = Surface(np.zeros(3), up)
     with np.errstate(invalid="ignore"):
         return plate_from_wrench(
@@ -90,9 +90,9 @@ def _plate(name: str, wrench: np.ndarray, up: np.ndarray) -> Plate:
         )
 
 
-def unknown_mass(model: Definition, told: Mapping[str, float], plates: bool) -> bool:
-    """Whether nobody tells the person's mass and nothing can weigh them."""
-    return not model.has_mass and "mass_kg" not in told and not plates
+def unknown_mass(model: Definition, subject: Mapping[str, float], plates: bool) -> bool:
+    """Whether the person's mass is not given and nothing can weigh them."""
+    return not model.has_mass and "mass_kg" not in subject and not plates
 
 
 def stands(recording: Recording) -> bool:
@@ -107,8 +107,8 @@ def quietest(recording: Recording) -> tuple[Recording, Recording | None, str]:
     end = float(recording.time[-1])
     window = standing_window(recording)
     if window is None:
-        present, told = _weighed(recording.window(end - _NOW_S, end), recording)
-        return present, None, f"the present posture is taken{told}."
+        present, weighed = _weighed(recording.window(end - _NOW_S, end), recording)
+        return present, None, f"the present posture is taken{weighed}."
     still = recording.time[window]
     quiet = recording.window(float(still[0]), float(still[-1]))
     return recording.window(end - _NOW_S, end), quiet, f"{still[-1] - still[0]:.1f} s of it are taken."
@@ -116,7 +116,7 @@ def quietest(recording: Recording) -> tuple[Recording, Recording | None, str]:
 
 def _weighed(present: Recording, whole: Recording) -> tuple[Recording, str]:
     """With the mass by the mean load of a movement that is long and steady enough (a moment alone weighs nobody), where
-    nothing else tells it, and words for that, or for why the load is no weight."""
+    nothing else gives it, and words for that, or for why the load is no weight."""
     if not whole.plates or "mass_kg" in present.subject:
         return present, ""
     try:
@@ -124,9 +124,9 @@ def _weighed(present: Recording, whole: Recording) -> tuple[Recording, str]:
     except RecordingError as error:
         mass, why = None, error.message
     if mass is None:
-        return present, f"; the plates weigh nobody: {why}"
-    told = f"; the plates' mean load, {mass:.1f} kg, is the mass where none is given"
-    return replace(present, subject={**present.subject, "mass_kg": mass}), told
+        return present, f"; the plates do not give the mass: {why}"
+    words = f"; the plates' mean load, {mass:.1f} kg, is the mass where none is given"
+    return replace(present, subject={**present.subject, "mass_kg": mass}), words
 
 
 def begin(

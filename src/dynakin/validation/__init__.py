@@ -1,4 +1,4 @@
-"""Methods beside each other on the same trials, judged by what was measured: the paper's Table II, parameters on
+"""Methods compared on the same trials, judged by what was measured: the paper's Table II, parameters on
 trials that they were not identified on, what the filter has not seen, and repetitions."""
 
 from dynakin.validation.coverage import block_coverage

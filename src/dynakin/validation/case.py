@@ -49,7 +49,7 @@ def case_of(
     """Read what a configuration names.
 
     Args:
-        presets: beside each other; none: the configuration's own. cutoff_hz: of the reference methods.
+        presets: to be compared; none: the configuration's own. cutoff_hz: of the reference methods.
         recording, static: that were read before.
 
     Raises:

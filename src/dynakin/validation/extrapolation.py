@@ -1,4 +1,4 @@
-"""What raw data foretell without any model: the last value held, and the last slope carried on."""
+"""What raw data predict without any model: the last value held, and the last slope carried on."""
 
 from __future__ import annotations
 

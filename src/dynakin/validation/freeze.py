@@ -28,7 +28,7 @@ def freeze(initial: CalibratedModel, values: Mapping[str, float], start: Mapping
     """The same model with lengths and inertia fixed.
 
     Marker places begin at ``values`` and stay in the state: their process noise is how the filter follows the skin,
-    which no calibration foretells. Everything else keeps its prior, noise and bounds.
+    which no calibration predicts. Everything else keeps its prior, noise and bounds.
 
     Args:
         values: lengths (m), marker places (m) and inertia (SI), by their names in the state; what is not there stays

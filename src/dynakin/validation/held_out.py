@@ -33,7 +33,7 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class IdentifyingTrial:
-    """What was learned on the identifying trial.
+    """What was identified on the identifying trial.
 
     initial: the model as measured there. estimates: by preset. static: the recording that lengths were measured on.
     wrench: (T, 6) N and N m, the plates', as `measured_wrench`; ground: of the same laboratory, given to the judging
@@ -147,8 +147,8 @@ def predict_blind(identified: IdentifyingTrial, recording: Recording) -> Blind:
 
 
 def judge(blind: Blind, recording: Recording) -> list[Row]:
-    """The predictions against the plates of the same trial, over its window, where they tell the whole wrench; rows by
-    component, then method.
+    """The predictions against the plates of the same trial, over its window, where they measure the whole wrench; rows
+    by component, then method.
 
     Raises:
         RecordingError: as `measured_wrench`.
@@ -164,14 +164,14 @@ def judge(blind: Blind, recording: Recording) -> list[Row]:
 
 
 def measured_wrench(recording: Recording, initial: CalibratedModel, plates: Mapping[str, str] | None = None) -> Array:
-    """The plates' total wrench (T, 6) N and N m about the ground origin; NaN where they do not tell all of it.
+    """The plates' total wrench (T, 6) N and N m about the ground origin; NaN where they do not measure all of it.
 
     Args:
         plates: plate -> foot, as `Estimator` takes it.
 
     Raises:
         RecordingError: there are no plates to identify on or to be judged by, they are refused, or in no frame do they
-            tell the whole wrench.
+            measure the whole wrench.
     """
     if not recording.plates:
         raise RecordingError(
@@ -182,7 +182,7 @@ def measured_wrench(recording: Recording, initial: CalibratedModel, plates: Mapp
     known_ground(recording, initial, marker_paths(recording, initial, initial.ground), wrench, plates)
     if not np.isfinite(wrench).all(axis=1).any():
         where = recording.path or recording.name
-        raise RecordingError(f"{where}: in no frame do the plates tell the whole wrench, expected a second of them")
+        raise RecordingError(f"{where}: in no frame do the plates measure the whole wrench, expected a second of them")
     return wrench
 
 
@@ -262,11 +262,11 @@ def _referred(identified: IdentifyingTrial, recording: Recording, start: Calibra
     setup, measured = identified.setup, identified.initial
     hertz = f"({setup.cutoff_hz:g} Hz)"
     at = reference_methods(recording, start, setup.definition, setup.cutoff_hz)
-    learnt = reference_methods(identified.recording, measured, setup.definition, setup.cutoff_hz, lengths="frame")
+    identifying = reference_methods(identified.recording, measured, setup.definition, setup.cutoff_hz, lengths="frame")
     fit = identify(
-        learnt.chain,
+        identifying.chain,
         measured.measured_plan(),
-        learnt.kinematics,
+        identifying.kinematics,
         identified.wrench,
         mass_kg=measured.mass_kg,
         bounds=setup.bounds,

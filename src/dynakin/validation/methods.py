@@ -176,18 +176,18 @@ def trial_of(
     definition: Definition,
     cutoff_hz: float = CUTOFF_HZ,
     *,
-    whatever: bool = False,
+    tolerant: bool = False,
 ) -> Trial:
-    """Estimates of one recording beside the reference methods on it; nothing is filtered again.
+    """Estimates of one recording against the reference methods on it; nothing is filtered again.
 
     Args:
         estimates: by the name of their preset, at least one. initial, definition: what they started from
             (`Estimator.initial`, `Estimator.model`).
-        whatever: let no reference method that fails stop anything: the notes say why it is left out. Else only a model
+        tolerant: a reference method that fails stops nothing: the notes say why it is left out. Else only a model
             that is no hinge chain in the plane is a note.
 
     Raises:
-        RecordingError: uneven time steps, or a cut-off that is not below half the rate; not with ``whatever``.
+        RecordingError: uneven time steps, or a cut-off that is not below half the rate; not with ``tolerant``.
     """
     methods = [_filtered(preset, estimate) for preset, estimate in estimates.items()]
     first = facing(next(iter(estimates.values())))
@@ -199,7 +199,7 @@ def trial_of(
             methods.append(_referred(kind, reference, initial))
             notes += [f"{kind}: {note}" for note in reference.notes]
     except DynakinError as error:
-        if not (whatever or isinstance(error, ModelError)):
+        if not (tolerant or isinstance(error, ModelError)):
             raise
         notes.append(f"AT and the classical method are left out: {error.message}")
     data = first.data
@@ -222,7 +222,7 @@ def trial_of(
 
 
 def how_estimated(estimates: Mapping[str, Estimate]) -> list[str]:
-    """Which filters are smoothed and which are as live, where they stand beside each other and differ."""
+    """Which filters are smoothed and which are as live, where they are shown together and differ."""
     if len({estimate.smoothed for estimate in estimates.values()}) < 2:
         return []
     return [

@@ -1,4 +1,4 @@
-"""What a comparison is made with: the model, the noise presets beside each other, and the reference's cut-off."""
+"""What a comparison is made with: the model, the noise presets to be compared, and the reference's cut-off."""
 
 from __future__ import annotations
 

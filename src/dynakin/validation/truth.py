@@ -1,4 +1,4 @@
-"""Methods by their error, where a simulation tells the truth."""
+"""Methods by their error against a simulation's truth."""
 
 from __future__ import annotations
 

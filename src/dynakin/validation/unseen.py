@@ -75,7 +75,7 @@ def unseen_figures(
     - Marker left out: from the end of the adaptation on, one marker is not given to the filter; its error there.
     - Ahead: from each frame's estimate the state is predicted ``horizon_s`` on, without an update.
 
-    Beside each: the last value held, and the last slope of the raw data carried on.
+    For each also: the last value held, and the last slope of the raw data carried on.
 
     Raises:
         ConfigError: the horizon is not within the trial. DynakinError: as `Estimator.run`.
@@ -111,7 +111,7 @@ class _Trial:
     recording: Recording
     initial: CalibratedModel
     markers: Array  # (T, M, 3) m, ground frame
-    wrench: Array  # (T, 6); NaN where the plates do not tell all of it: neither fed nor judged
+    wrench: Array  # (T, 6); NaN where the plates do not measure all of it: neither fed nor judged
 
     def marker_errors(self, yardstick: str, method: str, estimated: Array, columns: Sequence[int]) -> Figures:
         """RMS distance (mm) of some markers (T, M, 3), over the window."""

@@ -11,7 +11,7 @@ import pytest
 from dynakin import load_model
 from dynakin.bindings import _core
 from dynakin.errors import DynakinError, ModelError
-from dynakin.identification.observability.base import base_of, in_no_base_parameter, told_alone
+from dynakin.identification.observability.base import base_of, identified_alone, in_no_base_parameter
 from dynakin.identification.observability.element_words import base_words
 from dynakin.identification.observability.measured import MeasuredModel, tracker_of
 from dynakin.identification.observability.structure import structure_of
@@ -60,11 +60,11 @@ def test_parameters_with_the_same_base_parameters_give_the_same_wrench(measured:
         assert np.abs(_core.wrench(measured.core, other) - _core.wrench(measured.core, x)).max() > 1e-3
 
 
-def test_what_is_told_alone_is_what_no_hidden_change_touches(measured: MeasuredModel) -> None:
+def test_what_is_identified_alone_is_what_no_hidden_change_touches(measured: MeasuredModel) -> None:
     base = base_of(measured)
     null = np.linalg.svd(base.K)[2][base.rank :]
     untouched = {name for name, column in zip(base.over, np.abs(null).max(axis=0), strict=True) if column < 1e-9}
-    assert told_alone(base, measured) == untouched
+    assert identified_alone(base, measured) == untouched
     assert not any(name.endswith("/mass") for name in untouched)
     last = measured.initial.spec.segments[-1].name
     assert {f"inertia/{last}/{number}" for number in ("mx", "my", "izz")} <= untouched

@@ -10,7 +10,7 @@ import xarray as xr
 
 from dynakin.identification.observability.excitation import Bench
 from dynakin.pipeline.result import Result
-from dynakin.results.measures.posterior import judged, learned
+from dynakin.results.measures.posterior import judged, posterior_figures
 from support.identifiability import Told, estimated_squat
 
 
@@ -76,7 +76,8 @@ def test_covariances_are_kept_and_written(squat: Told, tmp_path: Path) -> None:
         assert read["final_covariance"].dims == ("element", "element_")
         np.testing.assert_array_equal(read["final_covariance"], estimate.data["final_covariance"])
     page = (folder / "report.html").read_text()
-    assert 'id="identifiability"' in page and "What would tell more" in page and "What no measurement sees" in page
+    assert 'id="identifiability"' in page and "Movements that would help" in page
+    assert "What no measurement observes" in page
 
 
 def test_the_block_of_the_metrics_agrees_with_the_estimate(squat: Told) -> None:
@@ -86,8 +87,8 @@ def test_the_block_of_the_metrics_agrees_with_the_estimate(squat: Told) -> None:
     for p in squat.estimate.parameters:
         if p.estimated and p.kind != "plates":
             entry = block["parameters"][p.name]
-            assert entry["share"] == pytest.approx(p.learnt_sd / p.prior_sd)
+            assert entry["share"] == pytest.approx(p.posterior_sd / p.prior_sd)
             assert entry["judgement"] == judged(entry["share"])
-    assert learned(squat.estimate)["verdict"] == block["verdict"]
+    assert posterior_figures(squat.estimate)["verdict"] == block["verdict"]
     counts = block["groups"]["lengths"]
     assert sum(counts.values()) == sum(p.kind == "length" and p.estimated for p in squat.estimate.parameters)

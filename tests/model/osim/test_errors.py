@@ -58,7 +58,7 @@ WRONG = {
     "a loop": (
         PIN.replace("<JointSet><objects>", '<JointSet><objects><WeldJoint name="extra"><socket_parent_frame>/ground'
         "</socket_parent_frame><socket_child_frame>/bodyset/tip</socket_child_frame></WeldJoint>"),
-        "'tip' hangs on joint 'extra' already",
+        "'tip' is a child of joint 'extra' already",
     ),
     "a lost body": (PIN.replace("<BodySet><objects>", '<BodySet><objects><Body name="lost"/>'), "no joint carries"),
 }  # fmt: skip

@@ -38,7 +38,7 @@ MASS_KG = 60.0
 
 def make_spatial(duration_s: float = 6.0, *, walk_m: float = 0.0) -> Estimate:
     """Squats; the right knee bends 80 degrees, the left 40; the neck is locked. From 1 to 2 s the left foot's contact
-    is not measured: what hangs on it is derived; from 2 to 2.5 s the hips' moments are not known.
+    is not measured: what depends on it is derived; from 2 to 2.5 s the hips' moments are not known.
 
     walk_m: how far everything moves forward over the trial.
     """

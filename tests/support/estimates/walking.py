@@ -1,4 +1,4 @@
-"""A made walker with two equal legs, of which some stances are beside the plates; nothing of it was filtered."""
+"""A made walker with two equal legs, of which some stances are off the plates; nothing of it was filtered."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ WRONG = 1.5
 def make_walker(withheld: tuple[int, ...] = (), *, absent: bool = False) -> Estimate:
     """Both legs do the same half a second apart; knees bear a tenth of their foot's force as a moment.
 
-    withheld: numbers of the left foot's stances beside the plates, derived then, or ``arrays``.
+    withheld: numbers of the left foot's stances off the plates, derived then, or ``arrays``.
     """
     made = make_estimate(3.0, gaps=False)
     time = made.time

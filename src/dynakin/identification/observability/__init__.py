@@ -1,21 +1,21 @@
-"""What can be told and what was: base parameters, gauges, posterior against prior, and what motion would tell more.
+"""Observability of the constants: base parameters, gauges, posterior against prior, movements that would help.
 
     estimator = dynakin.Estimator(model)
     estimate, tracker = estimator.track(recording)
     print("\\n".join(identifiability(tracker, estimate).advice))
 
-It stands beside the chain, as `comparison` does: it needs the core, the filter and the reference's base parameters.
+It stands apart from the chain, as `validation` does: it needs the core, the filter and the reference's base parameters.
 """
 
 from dynakin.identification.observability.advice import GAIN
 from dynakin.identification.observability.gauges import Gauge, Gauges
 from dynakin.identification.observability.measured import tracker_of
 from dynakin.identification.observability.structure import Structure, structure_of
-from dynakin.identification.observability.trial import BaseParameterTold, Identifiability, identifiability
+from dynakin.identification.observability.trial import BasePosterior, Identifiability, identifiability
 
 __all__ = [
     "GAIN",
-    "BaseParameterTold",
+    "BasePosterior",
     "Gauge",
     "Gauges",
     "Identifiability",

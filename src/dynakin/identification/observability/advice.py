@@ -1,4 +1,4 @@
-"""What would tell more, and why nothing would, in words."""
+"""Movements that would identify more, and why none would, in words."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def gains_of(
 
     Args:
         ended: (n,) standard deviations that the trial ended with. now: (n,) those of its own motion, measured exactly;
-            what the two disagree on hangs on the path that the estimate took, and nothing is promised of it.
+            what the two disagree on depends on the path that the estimate took, and nothing is promised of it.
         shares: posterior over prior of each constant.
 
     Returns:
@@ -57,7 +57,7 @@ def advice_in_words(
     shares: Mapping[str, float],
     alone: frozenset[str],
 ) -> list[str]:
-    """Sentences: each motion that tells more, then what no motion tells and why."""
+    """Sentences: each motion that would identify more, then what none identifies and why."""
     planar = is_planar([name for name in shares if name.startswith("inertia/")])
     said = []
     for excitation in tried:
@@ -79,14 +79,14 @@ def advice_in_words(
 
 
 def _silence(bench: Bench, silent: list[str], alone: frozenset[str], planar: bool) -> list[str]:
-    """The numbers that neither the trial nor any motion tells, by the reason."""
+    """The numbers that neither the trial nor any motion identifies, by the reason."""
     said = []
     turned = turns(bench)
     grounded = {s.name: s.parent == "ground" for s in bench.measured.initial.spec.segments}
     still = {s for s, deg in turned.items() if deg < STILL_DEG and any(element(n).owner == s for n in silent)}
     for segment in sorted(still, key=list(turned).index):
         numbers = [INERTIA[element(n).number] for n in silent if element(n).owner == segment]
-        why = "nor can any movement that leaves it on the ground tell them" if grounded[segment] else "it would have to"
+        why = "and no movement that leaves it there can identify them" if grounded[segment] else "it would have to"
         said.append(
             f"The data say nothing about the {words(segment)}'s {listed(numbers, 10)}: it does not move (it turns by "
             f"{turned[segment]:.1f} deg), {why}."
@@ -102,7 +102,7 @@ def _silence(bench: Bench, silent: list[str], alone: frozenset[str], planar: boo
         )
     if weak:
         names = listed([_called(n, planar) for n in weak], 20)
-        said.append(f"The data say nothing about {names}, and none of the movements tried tells much more.")
+        said.append(f"The data say nothing about {names}, and none of the movements tried would help much.")
     return said
 
 

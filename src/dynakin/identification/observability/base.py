@@ -1,4 +1,4 @@
-"""Base parameters of the wrench: what of the inertia the plates can tell at all, and what a trial told of it."""
+"""Base parameters of the wrench: what of the inertia plates can identify at all, and the posterior of a trial."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def base_of(measured: MeasuredModel, states: Array | None = None) -> BaseParamet
 
     The regressor is the core's derivative of the wrench with respect to the inertial numbers, in which it is linear
     (Ayusawa et al. 2013), its columns in units of the prior standard deviations; so the condition number says how
-    unevenly a motion tells what was not known before.
+    unevenly a motion identifies what was not known before.
 
     Args:
         states: (T, n).
@@ -42,16 +42,16 @@ def base_of(measured: MeasuredModel, states: Array | None = None) -> BaseParamet
 
 
 def in_no_base_parameter(base: BaseParameters, measured: MeasuredModel) -> list[str]:
-    """Names of the inertial numbers that the wrench does not depend on, whatever the motion that ``base`` is of."""
+    """Names of the inertial numbers that the wrench does not depend on in any motion like that of ``base``."""
     sd = np.sqrt(np.diag(measured.prior)[measured.block("inertia")])
     size = np.abs(base.K * sd).max(axis=0, initial=0.0) / sd
     return [name for name, value in zip(base.over, size, strict=True) if value < _NONE]
 
 
-def told_alone(base: BaseParameters, measured: MeasuredModel) -> set[str]:
-    """Names of the inertial numbers that some motion tells by themselves; of the others only sums can be told."""
+def identified_alone(base: BaseParameters, measured: MeasuredModel) -> set[str]:
+    """Names of the inertial numbers that some motion identifies by themselves; of the others only sums."""
     sd = np.sqrt(np.diag(measured.prior)[measured.block("inertia")])
-    rows = np.linalg.qr((base.K * sd).T)[0]  # (e, r): an orthonormal basis of what can be told
+    rows = np.linalg.qr((base.K * sd).T)[0]  # (e, r): an orthonormal basis of what can be identified
     left = 1.0 - (rows**2).sum(axis=1)
     return {name for name, value in zip(base.over, left, strict=True) if value < _NONE}
 

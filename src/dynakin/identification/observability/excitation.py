@@ -1,4 +1,4 @@
-"""Which motion would tell more: the filter's own covariance on the trial's motion with something added to it.
+"""Which motion would identify more: the filter's own covariance on the trial's motion with something added to it.
 
 Nothing is drawn at random and nothing is fitted: exact measurements of a motion are put through the same filter from
 the same prior, and the covariance at its end is read. So a gain counts all that the filter does not know either

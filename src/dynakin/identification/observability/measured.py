@@ -102,7 +102,7 @@ MASS_KG, HEIGHT_M = 70.0, 1.75
 def tracker_of(definition: Definition) -> Tracker:
     """A tracker of the model, calibrated on a simulated recording of somebody of that mass, height and sex.
 
-    Which lengths and places the markers have does not matter to ranks and gauges; the simulated bodies carry the
+    Which lengths and places the markers have does not matter to ranks and gauges; the simulated persons carry the
     built-in marker sets.
 
     Raises:

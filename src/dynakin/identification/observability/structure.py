@@ -1,4 +1,4 @@
-"""What a model's measurements can tell at all, whoever moves and however."""
+"""What a model's measurements can identify at all, whoever moves and however."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dynakin.filter.tracker import Tracker
-from dynakin.identification.observability.base import base_of, in_no_base_parameter, told_alone
+from dynakin.identification.observability.base import base_of, identified_alone, in_no_base_parameter
 from dynakin.identification.observability.element_words import base_words, gauges_in_words, inertia_words, is_planar
 from dynakin.identification.observability.gauges import Gauges, gauges_of
 from dynakin.identification.observability.measured import MeasuredModel
@@ -20,7 +20,7 @@ class Structure:
 
     Attributes:
         base: base parameters. base_in_words: each as the sum that it is.
-        in_none: inertial numbers that are in no base parameter. alone: those that some motion tells by themselves.
+        in_none: inertial numbers that are in no base parameter. alone: those that some motion identifies by themselves.
         gauges, gauges_in_words: what no measurement sees; the words put the skin's displacements together.
     """
 
@@ -35,9 +35,9 @@ class Structure:
         """Rank and what is in none of the base parameters, a sentence each."""
         base, planar = self.base, is_planar(self.base.over)
         said = [
-            f"{base.rank} of {len(base.over)} inertial numbers, as sums (base parameters), can be told from the ground "
-            f"reaction; condition number {base.condition:.2g} over random motion, each number in units of its prior "
-            "standard deviation."
+            f"{base.rank} of {len(base.over)} inertial numbers, as sums (base parameters), can be identified from the "
+            f"ground reaction; condition number {base.condition:.2g} over random motion, each number in units of its "
+            "prior standard deviation."
         ]
         if self.in_none:
             names = [inertia_words(name, planar=planar) for name in self.in_none]
@@ -69,7 +69,7 @@ def structure_of(tracker: Tracker) -> Structure:
         base,
         tuple(base_words(base, spec)),
         tuple(in_no_base_parameter(base, measured)),
-        frozenset(told_alone(base, measured)),
+        frozenset(identified_alone(base, measured)),
         gauges,
         tuple(gauges_in_words(gauges.found, spec)),
     )

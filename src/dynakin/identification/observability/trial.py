@@ -1,4 +1,4 @@
-"""What a trial told, what it could not tell, and what would."""
+"""Observability in one trial: posterior against prior, and movements that would identify more."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from dynakin.identification.observability.base import base_of, base_spread
 from dynakin.identification.observability.excitation import Bench, Excitation
 from dynakin.identification.observability.structure import Structure, structure_of
 from dynakin.results.estimate import Estimate
-from dynakin.results.measures.posterior import judged, learned, share_of
+from dynakin.results.measures.posterior import judged, posterior_figures, share_of
 from dynakin.validation.reference.base_parameters import BaseParameters
 
 Array = npt.NDArray[np.float64]
@@ -24,8 +24,8 @@ _MOST_FRAMES = 1000  # of the trial's motion for its condition number
 
 
 @dataclass(frozen=True, eq=False)
-class BaseParameterTold:
-    """One base parameter and what the trial told of it; value and standard deviations in its unit."""
+class BasePosterior:
+    """One base parameter, its value and its standard deviations before and after the trial, in its unit."""
 
     name: str
     words: str
@@ -41,20 +41,20 @@ class BaseParameterTold:
 
 @dataclass(frozen=True, eq=False)
 class Identifiability:
-    """Everything about what one trial tells.
+    """Observability of the constants in one trial.
 
     Attributes:
-        structure: what the model's measurements can tell at all.
+        structure: what the model's measurements can identify at all.
         condition: of the base parameters over the trial's motion.
-        base: base parameters as told. told: the block of `dynakin.results.measures.posterior`.
+        base: posterior of the base parameters. posterior: the block of `dynakin.results.measures.posterior`.
         tried: motions that were tried in place of the trial's, gains: factors on standard deviations (motion -> name).
         advice: sentences.
     """
 
     structure: Structure
     condition: float
-    base: tuple[BaseParameterTold, ...]
-    told: dict[str, Any]
+    base: tuple[BasePosterior, ...]
+    posterior: dict[str, Any]
     tried: tuple[Excitation, ...]
     gains: dict[str, dict[str, float]]
     advice: tuple[str, ...]
@@ -64,7 +64,7 @@ class Identifiability:
         known = [entry for entry in self.base if judged(entry.share) == "known"]
         nothing = [entry for entry in self.base if judged(entry.share) == "nothing"]
         return [
-            self.told["verdict"],
+            self.posterior["verdict"],
             f"Of {len(self.base)} base parameters {len(known)} are known from the data, "
             f"{len(self.base) - len(known) - len(nothing)} in part, and of {len(nothing)} the data say nothing; "
             f"condition number {self.condition:.2g} over this motion, {self.structure.base.condition:.2g} over random "
@@ -87,7 +87,7 @@ class Identifiability:
             for entry in self.base
         }
         return {
-            **self.told,
+            **self.posterior,
             "base_parameters": {
                 **structure,
                 "condition_random": structure["condition"],
@@ -107,7 +107,7 @@ class Identifiability:
 def identifiability(
     tracker: Tracker, estimate: Estimate, progress: Callable[[int, int], None] | None = None
 ) -> Identifiability:
-    """What a trial told of the constants, and what would tell more.
+    """Posterior of a trial's constants against their prior, and movements that would identify more.
 
     Args:
         tracker, estimate: as `Estimator.track` gave them.
@@ -122,15 +122,15 @@ def identifiability(
     return Identifiability(
         structure=structure,
         condition=base_of(bench.measured, states[:: max(1, len(states) // _MOST_FRAMES)]).condition,
-        base=_base_told(structure.base, structure.base_in_words, estimate),
-        told=learned(estimate),
+        base=_base_posterior(structure.base, structure.base_in_words, estimate),
+        posterior=posterior_figures(estimate),
         tried=tuple(tried),
         gains=gains,
         advice=tuple(advice_in_words(bench, tried, gains, shares, structure.alone)),
     )
 
 
-def _base_told(base: BaseParameters, words: tuple[str, ...], estimate: Estimate) -> tuple[BaseParameterTold, ...]:
+def _base_posterior(base: BaseParameters, words: tuple[str, ...], estimate: Estimate) -> tuple[BasePosterior, ...]:
     over = list(base.over)
     values = base.K @ estimate.data["state"].isel(time=-1).sel(element=over).values
     prior, after = (
@@ -138,6 +138,6 @@ def _base_told(base: BaseParameters, words: tuple[str, ...], estimate: Estimate)
         for when in ("initial", "final")
     )
     return tuple(
-        BaseParameterTold(*entry[:2], *(float(number) for number in entry[2:]))
+        BasePosterior(*entry[:2], *(float(number) for number in entry[2:]))
         for entry in zip(base.names, words, values, prior, after, strict=True)
     )

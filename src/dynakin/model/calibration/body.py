@@ -1,4 +1,4 @@
-"""Mass and height of the person where they are not told."""
+"""Mass and height of the person where they are not given."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _LEAST_S = 5.0
 over 5 s are 4 %."""
 _STEADY = 0.3
 """Part of its mean by which the load may vary: squats do by a quarter. Running, a seat that bears part of the weight,
-a step beside the plates or a box beside them do by more."""
+a step off the plates or onto a box does by more."""
 _BODY_MASS_INDEX = (10.0, 60.0)
 """kg/m2; what lies beyond is no weight of a person of that height who stood on the plates."""
 _OTHER_LEVEL_M = 0.08  # a heel that has left the floor, or a toe that dips, is nearer
@@ -57,9 +57,9 @@ def find_mass(subject: Subject, trials: Sequence[tuple[Recording, GroundFrame]])
             mass = float(check.mass_kg_from_plates)
             return mass, f"Mass {mass:.2f} kg: from the plates of {recording.name} while standing still."
     for recording, _ in trials:
-        told = recording.subject.get("mass_kg")
-        if told:
-            return told, f"Mass {told:.2f} kg: from the file {recording.name}."
+        mass_kg = recording.subject.get("mass_kg")
+        if mass_kg:
+            return mass_kg, f"Mass {mass_kg:.2f} kg: from the file {recording.name}."
     for mass, name in means:
         return mass, (
             f"Warning: mass {mass:.2f} kg from the mean vertical force of {name}, in which nobody stands still; wrong "
@@ -78,7 +78,7 @@ def steady_load(recording: Recording, ground: GroundFrame) -> tuple[float | None
     push = push[np.isfinite(push)]
     seconds = len(push) / recording.rate
     if seconds < _LEAST_S or not push.mean() > 0.0:
-        return None, f"{seconds:.1f} s of a movement on them weigh nobody, expected {_LEAST_S:g} s"
+        return None, f"{seconds:.1f} s of a movement on them are too short to weigh the person, expected {_LEAST_S:g} s"
     low, high = np.percentile(push, (5.0, 95.0)) / push.mean()
     if low < 1.0 - _STEADY or high > 1.0 + _STEADY:
         return None, f"their load goes from {100.0 * low:.0f} to {100.0 * high:.0f} % of its mean, which is no weight"
@@ -107,7 +107,7 @@ def check_body_mass(subject: Subject, mass_kg: float, height_m: float | None) ->
 
 
 def find_height(subject: Subject, recordings: list[Recording], trial: Trial) -> tuple[float | None, str]:
-    """Height (m) and where it comes from; None with the reason where nothing tells.
+    """Height (m) and where it comes from; None with the reason where nothing gives it.
 
     Estimated from the marker set's ``height_marker`` (the acromion) where it is highest over the lowest marker of the
     recording, divided by its fraction of the body height: a person who never stands upright comes out too small, and
@@ -117,9 +117,9 @@ def find_height(subject: Subject, recordings: list[Recording], trial: Trial) -> 
     if subject.height_m is not None:
         return subject.height_m, f"Height {subject.height_m:.2f} m: given."
     for recording in recordings:
-        told = recording.subject.get("height_m")
-        if told:
-            return told, f"Height {told:.2f} m: from the file {recording.name}."
+        height_m = recording.subject.get("height_m")
+        if height_m:
+            return height_m, f"Height {height_m:.2f} m: from the file {recording.name}."
     marker_set = trial.match.marker_set
     tops = [
         path
@@ -128,7 +128,7 @@ def find_height(subject: Subject, recordings: list[Recording], trial: Trial) -> 
     ]
     over = _over_the_foot(trial, tops) if tops else np.empty(0)
     if not len(over) or marker_set.height_fraction is None:
-        return None, f"height_m is not given and {marker_set.height_marker or 'no marker'} does not tell it."
+        return None, f"height_m is not given and {marker_set.height_marker or 'no marker'} does not show it."
     top, lowest = np.mean([np.nanpercentile(path[:, 1], 99.0) for path in tops]), "lowest marker"
     reach = float(top - np.nanmin([np.nanpercentile(path[:, 1], 1.0) for path in _seen(trial)]))
     if reach - np.percentile(over, 99.0) > _OTHER_LEVEL_M:
@@ -156,5 +156,5 @@ def _over_the_foot(trial: Trial, tops: list[Array]) -> Array:
     if len(time) < 2:
         return np.asarray(over[seen])
     speed = np.linalg.norm(np.gradient(places, time, axis=0), axis=2)[np.arange(len(time)), lowest]
-    still = seen & (speed < _STANDS_M_S)  # NaN beside a gap: not known to be still
+    still = seen & (speed < _STANDS_M_S)  # NaN next to a gap: not known to be still
     return np.asarray(over[still if still.any() else seen])

@@ -255,7 +255,7 @@ def off_sole(heel_to_toe: Array, flat: float | None) -> Array:
 
 
 _BENT = 10.0
-"""How much the plane of a bent limb counts beside the body's middle plane: it takes over from 6 deg of bend."""
+"""How much the plane of a bent limb counts against the body's middle plane: it takes over from 6 deg of bend."""
 
 
 def lateral(asis: Array, foot: Sequence[Array] | None, side: str) -> Array:

@@ -1,4 +1,4 @@
-"""Known things that a person carries: bodies of known mass fixed to a segment (a barbell, a rucksack)."""
+"""Known things that a person carries: rigid, of known mass, fixed to a segment (a barbell, a rucksack)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from dynakin.settings.subject import CarriedLoad
 
 
 def with_loads(initial: CalibratedModel, loads: Sequence[CarriedLoad]) -> CalibratedModel:
-    """The same model with these bodies welded to it, each a segment without joint and with fixed inertia.
+    """The same model with these loads welded to it, each a segment without joint and with fixed inertia.
 
     Nothing of the state changes: the person's own numbers, their bounds and priors stay the person's.
 

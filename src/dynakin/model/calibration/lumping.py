@@ -87,7 +87,7 @@ def place_parts(
         else:
             own = (segment.origin or "").removesuffix(SUFFIXES.get(segment.side or "", ""))
             if origin_G is None and part.origin.end == own:
-                origin_G = posture.origins[segment.name]  # its own joint, which nothing but the length tells of
+                origin_G = posture.origins[segment.name]  # its own joint, which nothing but the length gives
             if origin_G is None:
                 raise ModelError(f"{where}: part {name!r} starts at landmark {part.origin.end!r}, which is not known")
             origin = posture.to_local(segment.name, origin_G)
@@ -134,7 +134,7 @@ def segment_bodies(
     mass_kg: float,
     height_m: float,
 ) -> tuple[dict[str, RigidBody], dict[str, list[PlacedPart]]]:
-    """Bodies of all segments about their origins, and the parts in each."""
+    """Inertia of all segments about their origins, and the parts in each."""
     bodies: dict[str, RigidBody] = {}
     parts: dict[str, list[PlacedPart]] = {}
     for segment in model.segments:

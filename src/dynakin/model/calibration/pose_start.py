@@ -27,7 +27,7 @@ BAD_M = 0.060
 MIRROR_RATIO = 0.6
 """A mirror image that fits this much better, on a fit that is not good, is what was measured."""
 _UNITS = 3.0  # the markers' spread against the model's, beyond which the unit is wrong
-_REST = 1e-3  # m a radian: draws what no marker tells of to where it was, moves what one does by nothing
+_REST = 1e-3  # m a radian: draws what no marker observes to where it was, moves what one does by nothing
 _RESTARTS = 4
 _ARM = 0.3  # m, at which an angle counts as a distance
 
@@ -71,7 +71,7 @@ def start_posture(
         where: opens the messages (a file's name).
 
     Raises:
-        ModelError: fewer than three markers, or a bad fit; the message tells wrong units, swapped sides or the markers
+        ModelError: fewer than three markers, or a bad fit; the message names wrong units, swapped sides or the markers
             that are furthest off.
     """
     measured = np.asarray(markers, dtype=float)
@@ -309,7 +309,7 @@ def _paths(spec: _core.ModelSpec, order: dict[str, int]) -> tuple[list[list[int]
 
 
 def _refuse(body: _Body, fit: _Fit, bad_m: float, where: str) -> None:
-    """Raises a ModelError that tells what is wrong, where the fit is bad."""
+    """Raises a ModelError that says what is wrong, where the fit is bad."""
     if fit.rms < body.good_m:
         return
     found = f"{where}: the model fits the markers to {1000.0 * fit.rms:.0f} mm only (root mean square)"

@@ -1,4 +1,4 @@
-"""Finds the markers of a set in a recording, whatever prefix, case, dots or underscores its names have."""
+"""Finds the markers of a set in a recording, with any prefix, case, dots or underscores in its names."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class MarkerMatch:
 
     @property
     def facing_pairs(self) -> FacingPairs:
-        """The recorded names of the markers that tell where the person faces."""
+        """The recorded names of the markers that show where the person faces."""
         chosen = (self.marker_set.heel_toe, self.marker_set.pelvis_back_front)
         found = [
             tuple(

@@ -98,7 +98,7 @@ class Fraction(Strict):
 
 
 class Offset(Strict):
-    """A point beside another: a joint centre inward of the one marker that sits over it.
+    """A point offset from another: a joint centre inward of the one marker that sits over it.
 
     The direction is that of ``along``, or, with ``inward``, towards the body's middle plane: the mean of the line
     between the two ASIS and of the right angle to the foot (heel to toe), made square to ``square_to``; with ``bend``
@@ -142,7 +142,7 @@ class Recipe(Strict):
     """One way to find a landmark: mean of markers or landmarks, a regression, or a proportion of a line."""
 
     mean: tuple[str, ...] | None = None
-    sides: Literal["own", "both", "right", "left"] = "own"  # "right", "left": that side whatever side is used
+    sides: Literal["own", "both", "right", "left"] = "own"  # "right", "left": that side for either side
     pelvis: PelvisRegression | None = None
     polar: PolarRegression | None = None
     fraction: Fraction | None = None
@@ -181,12 +181,12 @@ class MarkerSetFile(Strict):
     schema_version: Literal[1]
     name: Name
     description: str = ""
-    heel_toe: tuple[str, str] | None = None  # markers that tell where the person faces: foot,
+    heel_toe: tuple[str, str] | None = None  # markers that show where the person faces: foot,
     pelvis_back_front: tuple[str, str] | None = None  # and pelvis
-    height_marker: str = ""  # marker whose height over the floor gives the body height if none is told
+    height_marker: str = ""  # marker whose height over the floor gives the body height if none is given
     height_fraction: Annotated[float, Field(gt=0.0, lt=1.5)] | None = None
     height_source: str = ""
-    markers: Annotated[tuple[Marker, ...], Field(min_length=1, max_length=1000)]  # what cameras tell apart
+    markers: Annotated[tuple[Marker, ...], Field(min_length=1, max_length=1000)]  # what cameras separate
     landmarks: Annotated[dict[str, tuple[Recipe, ...]], Field(max_length=300)]  # six times those of the largest set
     in_space: dict[str, tuple[Recipe, ...]] = Field(default={})  # landmarks of models in space
 

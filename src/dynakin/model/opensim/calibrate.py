@@ -23,7 +23,7 @@ Array = npt.NDArray[np.float64]
 
 _MOST = 0.9  # a first frame shows at least this part of the markers of the fullest one
 _A_TURN = 1e-3  # rad: files write pi with few digits
-_APART_M, _LEVEL_M = 0.08, 0.03  # of markers that show which way a body points; of markers that lie beside each other
+_APART_M, _LEVEL_M = 0.08, 0.03  # of markers that show which way a body points; of markers that lie side by side
 _FEET = ("calcn", "foot", "calc", "talus")  # bodies that stand on the ground, the first that a model has
 
 
@@ -70,7 +70,7 @@ def of_subject(
     try:
         mass, how = find_mass(subject, [(recording, ground) for recording in recordings])
     except ModelError:
-        messages.append(f"Mass {source.mass:.2f} kg: the OpenSim file's, as neither told nor measured.")
+        messages.append(f"Mass {source.mass:.2f} kg: the OpenSim file's, as it is neither given nor measured.")
         return source
     messages.append(how)
     messages.append(f"Masses and inertias of the OpenSim file ({source.mass:.2f} kg) times {mass / source.mass:.3f}.")
@@ -147,7 +147,7 @@ def facing_pairs(source: OpenSimModel, chosen: Sequence[tuple[Marker, str]]) -> 
 
 
 def feet_of(source: OpenSimModel) -> dict[str, str]:
-    """ "right" and "left" -> the body that stands on the ground, where the names tell."""
+    """ "right" and "left" -> the body that stands on the ground, where the names say so."""
     names = [body.name for body in source.bodies]
     for word in _FEET:
         pair = {

@@ -1,4 +1,4 @@
-"""An OpenSim model as plain data: what a file says, whatever its version; also what is written back."""
+"""An OpenSim model as plain data: what a file of any version says; also what is written back."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ def read_values(path: Path) -> dict[str, float]:
 
 
 def mass_of_run(parameters: Path) -> float | None:
-    """The mass (kg) in the run's ``config.toml`` beside its parameters, None where there is none.
+    """The mass (kg) in the run's ``config.toml`` next to its parameters, None where there is none.
 
     Raises:
         ModelError: that file is damaged.

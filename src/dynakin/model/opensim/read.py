@@ -114,7 +114,9 @@ def _in_order(model: Node, joints: list[tuple[Node, Joint]], bodies: list[str]) 
         if joint.child == GROUND:
             node.fail("its child is the ground; expected the ground as parent")
         if joint.child in hung:
-            node.fail(f"body {joint.child!r} hangs on joint {hung[joint.child]!r} already: loops are not supported")
+            node.fail(
+                f"body {joint.child!r} is a child of joint {hung[joint.child]!r} already: loops are not supported"
+            )
         hung[joint.child] = joint.name
     for body in model.objects("BodySet"):
         if body.name in bodies and body.name not in hung:
@@ -123,7 +125,7 @@ def _in_order(model: Node, joints: list[tuple[Node, Joint]], bodies: list[str]) 
     while waiting:
         ready = [joint for joint in waiting if joint.parent in done]
         if not ready:
-            model.fail(f"joint {waiting[0].name!r} hangs in a circle that does not reach the ground")
+            model.fail(f"joint {waiting[0].name!r} is in a loop that does not reach the ground")
         order.append(ready[0])  # one at a time, so that an order that will do is kept
         done.add(ready[0].child)
         waiting.remove(ready[0])

@@ -13,7 +13,7 @@ _SIDES = (("_r", "_l"), ("_right", "_left"), ("r_", "l_"), ("right_", "left_"), 
 
 
 def without_side(name: str, names: Iterable[str]) -> str:
-    """The name without its side where its mirror image is there too ("femur_r" beside "femur_l": "femur")."""
+    """The name without its side where its mirror image is there too ("femur_r" with "femur_l": "femur")."""
     there = set(names)
     for pair in _SIDES:
         for own, other in (pair, pair[::-1]):

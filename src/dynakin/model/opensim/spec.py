@@ -63,7 +63,7 @@ def to_spec(
         markers: those that are measured; all of the model's that sit on bodies where not given.
         estimate_inertia: bodies whose ten numbers are estimated.
         values: coordinates at the start, by name; the file's defaults where not given.
-        lock: coordinates that are locked beside those of the file.
+        lock: coordinates that are locked in addition to those of the file.
     """
     placed = placements(model, scales)
     parents = {joint.child: joint.parent for joint in model.joints}

@@ -34,7 +34,7 @@ BEFORE_S, AFTER_S = 0.05, 0.15
 
 @dataclass(frozen=True, eq=False)
 class FootContact:
-    """What the markers tell of one foot.
+    """What the markers show of one foot.
 
     Attributes:
         outline: (T, K, 2) m, horizontal places [X, Z of the ground] of its markers, NaN where not seen.
@@ -56,7 +56,7 @@ class FootContact:
     aloft: Flags
 
     def padded(self, stance: tuple[int, int], rate: float) -> slice:
-        """The frames in which this stance may bear load, as far as markers tell."""
+        """The frames in which this stance may bear load, as far as markers show."""
         before, after = round(BEFORE_S * rate), round(AFTER_S * rate)
         return slice(max(0, stance[0] - before), min(len(self.stands), stance[1] + after))
 

@@ -30,7 +30,7 @@ FOREIGN_N = 50.0
 NEAR_M = 0.10
 """How far a centre of pressure may lie from the outline of a foot's markers: a shoe is some cm wider than these."""
 BETWEEN_M = 0.03
-"""How far from both feet a centre of pressure lies that neither bears alone, where a plate's edges are not told."""
+"""How far from both feet a centre of pressure lies that neither bears alone, where a plate's edges are not known."""
 BEYOND_M = 0.04
 """How far a touching marker may lie beyond the plates' edges: it sits on the shoe, not on its sole."""
 MOST = 0.8
@@ -125,21 +125,21 @@ def foot_loads(
         foot: [name for name in DEFAULT_FOOT_MARKERS[foot] if "an" not in name.casefold()] for foot in ("right", "left")
     }
     feet = tuple(markers)
-    told = dict(assigned or {})
-    _check_assigned(told, recording, feet)
+    fixed = dict(assigned or {})
+    _check_assigned(fixed, recording, feet)
     contacts = {
         foot: found
         for foot, names in markers.items()
         if (found := foot_contact(recording, ground, list(names))) is not None
     }
     plates = [PlateLoad.of(plate, ground) for plate in recording.plates]
-    work = _Assignment(recording, feet, contacts, plates, told)
+    work = _Assignment(recording, feet, contacts, plates, fixed)
     return work.loads()
 
 
-def _check_assigned(told: dict[str, str], recording: Recording, feet: tuple[str, ...]) -> None:
+def _check_assigned(fixed: dict[str, str], recording: Recording, feet: tuple[str, ...]) -> None:
     names = [plate.name for plate in recording.plates]
-    for plate, foot in told.items():
+    for plate, foot in fixed.items():
         if plate not in names:
             raise ConfigError(f"plates: {plate!r} is not in {recording.name}; expected one of {', '.join(names)}")
         if foot not in feet:
@@ -212,7 +212,7 @@ def divided(
 
     Args:
         outlines: (T, K, 2) m of each foot's markers; None: the foot has none.
-        on: (T, F, P) this foot stands on this plate. off: (T, F) it may stand beside the plates. aloft: (T, F) it is
+        on: (T, F, P) this foot stands on this plate. off: (T, F) it may stand off the plates. aloft: (T, F) it is
             surely in the air.
     """
     n, F = off.shape
@@ -272,12 +272,12 @@ class _Assignment:
         feet: tuple[str, ...],
         contacts: dict[str, FootContact],
         plates: list[PlateLoad],
-        told: dict[str, str],
+        fixed: dict[str, str],
     ) -> None:
-        self.recording, self.feet, self.contacts, self.plates, self.told = recording, feet, contacts, plates, told
+        self.recording, self.feet, self.contacts, self.plates, self.fixed = recording, feet, contacts, plates, fixed
         n, F, P = recording.n_frames, len(feet), len(plates)
         self.on = np.zeros((n, F, P), dtype=bool)  # this foot stands on this plate
-        self.off = np.zeros((n, F), dtype=bool)  # it may stand beside the plates
+        self.off = np.zeros((n, F), dtype=bool)  # it may stand off the plates
         self.messages: list[str] = []
         self.reasons: list[str] = []
         for k, foot in enumerate(feet):
@@ -286,9 +286,9 @@ class _Assignment:
         for p, plate in enumerate(plates):
             self.presses(p, plate)
             self.on[:, :, p] = to_the_end(self.on[:, :, p], np.nan_to_num(plate.wrench[:, 1]) > EMPTY_N)
-            if plate.name in told:
+            if plate.name in fixed:
                 self.on[:, :, p] = False
-                self.on[:, feet.index(told[plate.name]), p] = np.nan_to_num(plate.wrench[:, 1]) > EMPTY_N
+                self.on[:, feet.index(fixed[plate.name]), p] = np.nan_to_num(plate.wrench[:, 1]) > EMPTY_N
         missing = [foot for foot in feet if foot not in contacts]
         if missing:
             self.messages.append(
@@ -303,7 +303,7 @@ class _Assignment:
             inside, reach = slice(*stance), foot.padded(stance, rate)
             mine = []
             for p, plate in enumerate(self.plates):
-                if self.told.get(plate.name, self.feet[k]) != self.feet[k]:
+                if self.fixed.get(plate.name, self.feet[k]) != self.feet[k]:
                     continue
                 loaded = plate.loaded[inside]
                 enough = 0.5 * max(int(np.count_nonzero(loaded)), 1)
@@ -330,7 +330,7 @@ class _Assignment:
         for first, end in runs(pressed):
             press = slice(first, end)
             loaded = plate.loaded[press]
-            if plate.name in self.told or self.on[press, :, p].any() or not loaded.any():
+            if plate.name in self.fixed or self.on[press, :, p].any() or not loaded.any():
                 continue
             for k, name in enumerate(self.feet):
                 foot = self.contacts.get(name)
@@ -352,7 +352,7 @@ class _Assignment:
         return np.asarray((distance_to_hull(cop, both) < BETWEEN_M) & apart & own.stands & other.stands)
 
     def upon(self, plate: PlateLoad, foot: FootContact, frames: slice) -> Flags:
-        """Frames in which all touching markers of a foot lie within a plate's edges; none where these are not told."""
+        """Frames in which all touching markers of a foot lie within a plate's edges; none where these are not known."""
         outline, touching = foot.outline[frames], foot.touching[frames]
         if plate.corners is None:
             return np.zeros(len(outline), dtype=bool)
@@ -361,7 +361,7 @@ class _Assignment:
         return np.asarray(touching.any(axis=1) & (inside | ~touching).all(axis=1))
 
     def beyond_edges(self, foot: FootContact, frames: slice) -> Flags:
-        """Frames in which a touching marker lies beyond the edges of all plates; none where edges are not told."""
+        """Frames in which a touching marker lies beyond the edges of all plates; none where edges are not known."""
         outline, touching = foot.outline[frames], foot.touching[frames]
         if not self.plates or any(plate.corners is None for plate in self.plates):
             return np.zeros(len(outline), dtype=bool)
@@ -401,7 +401,7 @@ class _Assignment:
         for k, foot in enumerate(self.feet):
             if owners[:, k].any():
                 spans = ", ".join(f"{time[a]:.2f} to {time[b - 1]:.2f} s" for a, b in runs(owners[:, k]))
-                how = "given" if plate.name in self.told else "by its centre of pressure"
+                how = "given" if plate.name in self.fixed else "by its centre of pressure"
                 self.messages.append(f"{plate.name} carries the {foot} foot ({how}): {spans}.")
         if len(both):
             self.messages.append(

@@ -28,7 +28,7 @@ _COMPUTED = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
 def read_c3d(path: Path, options: ReadOptions | None = None) -> Recording:
     """Read markers and force plates (types 1 to 4) of a C3D file.
 
-    Time begins at 0 at the first frame of the file; a note tells that frame's number in the capture. Points
+    Time begins at 0 at the first frame of the file; a note gives that frame's number in the capture. Points
     that no camera saw (negative residual, or exactly 0, 0, 0) are NaN; unlabelled points (``*12``) and what a
     model computed (angles, moments, ...) are left out, and the notes say so.
 
@@ -40,7 +40,7 @@ def read_c3d(path: Path, options: ReadOptions | None = None) -> Recording:
     layout_notes = check_c3d_file(path)
     try:
         data: Any = ezc3d.c3d(str(path))
-    except Exception as error:  # ezc3d raises whatever its C++ throws
+    except Exception as error:  # ezc3d raises anything its C++ throws
         raise RecordingError(f"{path}: cannot be read as C3D ({' '.join(str(error).split())})") from error
     try:
         return _recording(data, path, options or ReadOptions(), layout_notes)
@@ -115,7 +115,7 @@ def _markers(parameters: Parameters, n_points: int, path: Path) -> tuple[list[in
 
 
 def _subject(parameters: Parameters) -> dict[str, float]:
-    """Mass and height where the file tells (Vicon's PROCESSING group, or a SUBJECT(S) group)."""
+    """Mass and height where the file gives them (Vicon's PROCESSING group, or a SUBJECT(S) group)."""
     subject: dict[str, float] = {}
     for group in ("PROCESSING", "SUBJECTS", "SUBJECT"):
         for key in ("BODYMASS", "MASS", "WEIGHT"):

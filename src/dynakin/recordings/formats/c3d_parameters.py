@@ -1,4 +1,4 @@
-"""Parameters of a C3D file, found whatever the case of their names and whether they are there or not."""
+"""Parameters of a C3D file, found for any case of their names, and whether they are there or not."""
 
 from __future__ import annotations
 

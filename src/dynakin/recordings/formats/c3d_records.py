@@ -135,7 +135,7 @@ def _take(section: bytes, at: int, size: int, start: int, path: Path, what: str)
     return section[at : at + size]
 
 
-# The few bytes of a C3D file that tell whether it is one, and whether all of it is there.
+# The few bytes of a C3D file that show whether it is one, and whether all of it is there.
 #
 # Checked before ezc3d opens the file, which otherwise reads past the end of the file or of its own memory.
 # Layout: C3D user guide, header section (512 bytes; words of 2 bytes, numbered from 1) and parameter section.

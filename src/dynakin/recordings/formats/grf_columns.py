@@ -1,6 +1,6 @@
 """Names of ground-force columns in all the usual spellings, understood as plate, quantity and axis.
 
-Told apart are the force (``v`` or ``f``), its point of application (``p``) and the free moment (``m``, ``t``
+Distinguished are the force (``v`` or ``f``), its point of application (``p``) and the free moment (``m``, ``t``
 or the words torque, moment). What else the name holds, a number or a side anywhere in it, is the plate.
 Understood are thus ``ground_force_vx``, ``1_ground_force_vx``, ``ground_force_1_vx``, ``ground_force1_vx``,
 ``l_ground_force_vx``, ``R_ground_force_vx``, ``ground_force_vx_r``, ``ground_force_calcn_r_vx``, ``FP1_vx``,

@@ -55,7 +55,7 @@ class Table:
         """The same table with the columns named in ``rotations`` in radians; the others (translations) stay.
 
         Raises:
-            RecordingError: the header does not tell ``inDegrees``.
+            RecordingError: the header does not give ``inDegrees``.
         """
         if self.in_degrees is None:
             raise RecordingError(f"{self.path}: header has no inDegrees line, expected inDegrees=yes or inDegrees=no")

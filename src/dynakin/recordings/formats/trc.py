@@ -91,8 +91,8 @@ def _header(lines: list[str]) -> dict[str, str]:
     for keys, values in pairwise(filled):
         if any(key.casefold() in ("datarate", "units", "numframes") for key in keys):
             given = [value for value in values if value]  # some programs part them by two tabs
-            told = given if len(given) == len([key for key in keys if key]) else values
-            return {key.casefold(): value for key, value in zip(keys, told, strict=False) if key}
+            entries = given if len(given) == len([key for key in keys if key]) else values
+            return {key.casefold(): value for key, value in zip(keys, entries, strict=False) if key}
     return {}
 
 

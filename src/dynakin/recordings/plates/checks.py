@@ -20,7 +20,7 @@ LOADED_N = 50.0
 MASS_WARNING = 0.05
 """Relative difference between declared mass and the plates' from which it is said."""
 MASS_MEAN_RATIO = (0.6, 1.1)
-"""The same for the mean of a movement: steps beside the plates make it smaller, nothing makes it larger than
+"""The same for the mean of a movement: steps off the plates make it smaller, nothing makes it larger than
 m g."""
 MASS_RATIO_REFUSED = (0.2, 5.0)
 """Plates' mass over declared mass beyond which the units or plates must be wrong."""
@@ -91,7 +91,7 @@ def check_plates(
     only told.
 
     Args:
-        ground: tells the vertical; its origin does not matter.
+        ground: gives the vertical; its origin does not matter.
         mass_kg: declared body mass, None if it is to come from the plates.
         foot_markers: foot -> names of its markers; Plug-in-Gait's and OpenCap's where not given.
     """
@@ -231,7 +231,7 @@ def _check_pressure(
 
 
 def _check_together(one: Plate, other: Plate, recording: Recording, ground: GroundFrame, findings: _Findings) -> None:
-    """Whether two plates that stand beside each other have been exchanged: each one's forces at the other's place.
+    """Whether two plates that stand side by side have been exchanged: each one's forces at the other's place.
 
     With feet alike loaded, centres of pressure and total wrench hardly show it; that the feet are pushed apart does.
     """

@@ -11,7 +11,7 @@ from dynakin.recordings.recording import Array, Plate
 
 DEFAULT_THRESHOLD_N = 10.0
 """Push below which a plate counts as unloaded: a few times the noise of the usual plates (1 to 3 N), and
-small beside the errors that its centre of pressure has there (1 N m of noise moves it by 0.1 m)."""
+small against the errors that its centre of pressure has there (1 N m of noise moves it by 0.1 m)."""
 
 
 @dataclass(frozen=True)

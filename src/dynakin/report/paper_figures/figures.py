@@ -58,8 +58,8 @@ def save_figures(
     Args:
         folder: made where it is not there; files of the same names are replaced.
         formats: some of svg, pdf, png.
-        comparison: this estimate beside the reference methods (`dynakin.validation.trial_of`): classical angles (Figure
-            5), the table's wrench (6) and moments (7) and their mean curves are drawn too.
+        comparison: this estimate against the reference methods (`dynakin.validation.trial_of`): classical angles
+            (Figure 5), the table's wrench (6) and moments (7) and their mean curves are drawn too.
         sensitivity: a criterion over the gains (`read_sensitivity`): Figure 3 is drawn too.
         failures: takes the figures that fail; the others are drawn.
 

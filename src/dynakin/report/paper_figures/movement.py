@@ -87,7 +87,7 @@ def markers_figure(estimate: Estimate, comparison: Trial | None = None) -> Figur
 
 
 def angles_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure | None:
-    """Figure 5: every free coordinate with its band, right and left over each other, beside the classical method's."""
+    """Figure 5: every free coordinate with its band, right and left over each other, with the classical method's."""
     values, sd = values_of(estimate, "coordinates"), values_of(estimate, "coordinates_sd")
     joints = [joint for joint in joints_of(estimate) if np.any(sd[:, list(joint.columns.values())])]
     if not joints:

@@ -1,4 +1,4 @@
-"""The constants: lengths and masses over time, and what the recording tells of each, cannot tell, and what would."""
+"""The constants: lengths and masses over time, posterior against prior, and movements that would help."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from dynakin.report.sections.section import Page, Section
 from dynakin.report.styles import BAND, BOUND_LINE, ESTIMATED_LINE
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import Estimate
-from dynakin.results.measures.posterior import JUDGEMENT_WORDS, KNOWN, NOTHING, group_of, told_in_words
+from dynakin.results.measures.posterior import JUDGEMENT_WORDS, KNOWN, NOTHING, group_of, posterior_in_words
 from dynakin.results.naming import number, sentence, words
 from dynakin.results.records import Parameter
 
@@ -55,8 +55,8 @@ def mass_section(page: Page) -> Section:
     return Section(
         "masses",
         "Segment masses",
-        f"From the anthropometric table to what the plates and the movement suggest.{sides} Masses are hard to "
-        "tell apart from a squat alone: read them with their bands.",
+        f"From the anthropometric table to what the plates and the movement suggest.{sides} Masses are hard "
+        "to separate by a squat alone: read them with their bands.",
         [_path(page, p, words(p.segment), 1.0, "kg") for p in masses],
         lines=_KEY,
         band=BAND,
@@ -106,8 +106,8 @@ def observability_section(page: Page) -> Section | None:
     parts = [
         Section(f"identifiability-{anchor}", title, text, notes=tuple(sentence(note) for note in notes))
         for anchor, title, text, notes in (
-            ("advice", "What would tell more", _ADVICE, block.get("advice", [])),
-            ("gauges", "What no measurement sees", _GAUGES, block.get("gauges", {}).get("words", [])),
+            ("advice", "Movements that would help", _ADVICE, block.get("advice", [])),
+            ("gauges", "What no measurement observes", _GAUGES, block.get("gauges", {}).get("words", [])),
         )
         if notes
     ]
@@ -115,19 +115,19 @@ def observability_section(page: Page) -> Section | None:
         parts.insert(0, Section("identifiability-base", "Base parameters", _BASE, tables=[_base_table(base)]))
     return Section(
         "identifiability",
-        "What the recording tells",
-        "The standard deviation of each constant before the first frame is the whole line, what is left of it after "
-        f"the last frame the blue part. Up to the first mark ({KNOWN:g}) a value is the data’s, from the second "
+        "Observability",
+        "Posterior against prior: the whole line is each constant’s standard deviation before the first frame, the "
+        f"blue part that after the last. Up to the first mark ({KNOWN:g}) a value is the data’s, from the second "
         f"({NOTHING:g}) on it is the prior’s. A base parameter is named after one of the numbers in it.",
-        wide=[_panel(f"told-{k}", rows) for k, rows in enumerate((left, right)) if rows],
-        notes=(*told_in_words(estimate), *_base_sentence(block)),
+        wide=[_panel(f"posterior-{k}", rows) for k, rows in enumerate((left, right)) if rows],
+        notes=(*posterior_in_words(estimate), *_base_sentence(block)),
         parts=parts,
     )
 
 
 _BASE = (
     "The ground reaction depends on the segments’ inertia through these sums only: what leaves them as they are, no "
-    "movement can tell."
+    "movement can identify."
 )
 _ADVICE = (
     "Each motion was put through the same filter in place of this recording’s; a factor says how much smaller the "
@@ -205,7 +205,7 @@ def _base_table(base: Mapping[str, Mapping[str, Any]]) -> TextTable:
         numbers = (number(entry[key]) for key in ("value", "prior_sd", "sd"))
         unit = _base_unit(name).replace("m2", "m²")
         rows.append((sentence(entry["words"]), unit, *numbers, JUDGEMENT_WORDS[entry["judgement"]]))
-    headings = ("base parameter", "unit", "value", "sd before", "sd after", "")
+    headings = ("base parameter", "unit", "value", "prior sd", "posterior sd", "")
     return TextTable("The base parameters as the sums that they are", headings, rows, (2, 3, 4), folded=True)
 
 

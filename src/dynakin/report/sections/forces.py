@@ -77,7 +77,7 @@ def foot_section(page: Page) -> Section | None:
 def _adjustments(figures: dict[str, Any]) -> TextTable:
     each = {f"{sentence(foot)} foot, adjustment": rms for foot, rms in figures["adjustment_rms"].items()}
     if figures["remainder_rms"] is not None:
-        each[f"In flight, left over ({figures['flight_frames']} frames)"] = figures["remainder_rms"]
+        each[f"In flight, residual ({figures['flight_frames']} frames)"] = figures["remainder_rms"]
     rows = [
         (what, *("–" if rms is None else number(rms[name], digits=2) for name in COMPONENTS))
         for what, rms in each.items()

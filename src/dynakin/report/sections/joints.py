@@ -135,7 +135,7 @@ def _left_at_root(page: Page, source: np.ndarray) -> list[str]:
     if not known.size or not np.isfinite(known).any():
         return []
     most = float(np.nanmax(np.abs(known)))
-    left = "nothing" if most <= ROUNDING else f"at most {number(most, 'N or N m', digits=2)}"
+    left = "no residual" if most <= ROUNDING else f"a residual of at most {number(most, 'N or N m', digits=2)}"
     return [f"At the root {left} is left in the {len(known)} frames in which every contact is measured."]
 
 

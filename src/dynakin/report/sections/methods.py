@@ -86,7 +86,7 @@ def angle_part(trial: Trial, key: str) -> Section:
         panels.append(_overlaid(trial, sentence(words(name)), unit, lines, note))
     return Section(
         f"{key}-angles",
-        "Joint angles beside the classical method",
+        "Joint angles against the classical method",
         "A constant difference is mostly a matter of where zero is; what is left about the mean is the movement’s.",
         panels,
         lines=_key(trial, [method.name for method in methods]),
@@ -114,7 +114,7 @@ def moment_part(trial: Trial, key: str) -> Section:
     return Section(
         f"{key}-moments",
         "Joint moments against AT",
-        "Nothing measures a joint moment: the difference says how much hangs on the method.",
+        "Nothing measures a joint moment: the difference says how much depends on the method.",
         knees or others,
         folded=others if knees else [],
         folded_title="The other joints’ moments against AT",

@@ -70,7 +70,7 @@ def write_mass_centre(estimate: Estimate, path: Path) -> None:
 
 def write_centre_of_pressure(estimate: Estimate, path: Path) -> None:
     """``centre_of_pressure.sto``: ``total_px`` ... m and, where the feet's wrenches are known, ``right_px`` ...; NaN
-    below the threshold. What a planar model does not tell has no column."""
+    below the threshold. What a planar model does not give has no column."""
     names, columns = [], []
     for foot in (None, *estimate.foot_names):
         point, free = foot_pressure(estimate, foot)

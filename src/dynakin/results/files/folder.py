@@ -76,7 +76,7 @@ def check_output_writable(folder: str | Path, *, kind: FolderKind = RESULTS, ove
 
 
 def check_folder_writable(folder: str | Path) -> Path:
-    """The same for files that are added to ``folder``, whatever it holds.
+    """The same for files that are added to ``folder``, which may hold others.
 
     Raises:
         OutputError: it is a file, or cannot be written.

@@ -90,7 +90,7 @@ def constant_groups(parameters: Sequence[Parameter]) -> dict[str, list[Parameter
 def adaptation(estimate: Estimate) -> dict[str, Any]:
     """The block ``adaptation`` of ``metrics.json``: each constant and misfit, the latest of them, and a sentence.
 
-    Of a smoothed run there is nothing to tell: the sentence is empty.
+    Of a smoothed run there is nothing to say: the sentence is empty.
     """
     time = estimate.time
     short = bool(time[-1] - time[0] < SHORTEST_S)
@@ -101,7 +101,7 @@ def adaptation(estimate: Estimate) -> dict[str, Any]:
     found = {**constants, **{_misfit_title(name): settling.after_s for name, settling in misfits.items()}}
     times = [value["after_s"] if isinstance(value, dict) else value for value in found.values()]
     known = [value for value in times if value is not None]
-    nothing = "" if estimate.smoothed else "The recording is too short to tell an adaptation time."
+    nothing = "" if estimate.smoothed else "The recording is too short for an adaptation time."
     return {
         "what": f"s after the first frame from which on constants move by no more than {100.0 * BAND:g} % in all and "
         f"the running RMS misfit ({RUNNING_S:g} s) stays below {FACTOR:g} times that of the second half; null: not "
@@ -192,7 +192,7 @@ def _verdict(constants: dict[str, dict[str, Any]], misfits: dict[str, Settling])
 # A constant that still moves by more than that in the last quarter has not settled: over a recording as long again it
 # would move by several per cent.
 MOVING = BAND
-# A standard deviation that shrinks by less than this says that the recording told nothing about the constant.
+# A standard deviation that shrinks by less than this says that the recording held nothing about the constant.
 TAUGHT = 0.05
 
 Verdict = Literal["settled", "moving", "untaught"]
@@ -228,7 +228,7 @@ def _judge(estimate: Estimate, title: str, group: list[Parameter]) -> Convergenc
         # smoothed, a constant that moves does so by the drift it was given
         if not estimate.smoothed and np.ptp(late) > MOVING * abs(p.initial) and not p.at_bound:
             moving.append(p)
-        first = p.prior_sd or float(sd[0])  # a smoothed estimate knows at its first frame what it learnt later
+        first = p.prior_sd or float(sd[0])  # a smoothed estimate has at its first frame the posterior of all
         left.append(float(sd[-1]) / first if first > 0.0 else 1.0)
         largest = max(largest, abs(p.change_percent() or 0.0))
     sd_left = float(np.median(left))

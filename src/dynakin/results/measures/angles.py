@@ -16,7 +16,7 @@ Signs = Literal["opensim", "clinical"]
 
 
 class Convention(NamedTuple):
-    """Clinical name of a coordinate, its sign beside OpenSim's, and what its two directions are called."""
+    """Clinical name of a coordinate, its sign against OpenSim's, and what its two directions are called."""
 
     name: str
     sign: int

@@ -111,7 +111,7 @@ def _verdict(ratio: float | None, judgement: Judgement | None, markers: float | 
         )
     elif judgement == "conservative":
         text = (
-            "The standard deviations are larger than needed: the filter is too cautious, its innovations are "
+            "The filter is conservative, its standard deviations are larger than needed: its innovations are "
             f"{_times(1.0 / max(ratio, 1e-300))} times smaller than its covariances say. Q or R are larger than this "
             "recording needs."
         )
@@ -120,7 +120,7 @@ def _verdict(ratio: float | None, judgement: Judgement | None, markers: float | 
     slow = [name for name, value in (("marker", markers), ("wrench", wrench)) if value is not None and value > WHITE]
     if slow:
         text += (
-            f" The {' and '.join(slow)} innovations are not white: a frame's error foretells the next one's, so there "
+            f" The {' and '.join(slow)} innovations are not white: a frame's error predicts the next one's, so there "
             "is something in the recording that the model does not explain."
         )
     return text

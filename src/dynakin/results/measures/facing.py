@@ -22,7 +22,7 @@ PELVIS = ("pelvis_tilt", "pelvis_list", "pelvis_rotation")
 _SAME = 1e-6  # rad: how well these three turns must give the pelvis' axes to be what they are called
 _SINGULAR_DEG = 75.0
 """Beyond this of the middle one of three turns the outer two act about nearly one axis: a fourth of what each of them
-does is left to tell them apart."""
+does is left to separate them."""
 
 
 def facing(estimate: Estimate) -> Estimate:
@@ -81,7 +81,7 @@ def _pelvis(estimate: Estimate, turn: Array) -> Array | None:
 
 
 def nearly_singular(estimate: Estimate) -> list[str]:
-    """Says when the pelvis leans so far, against the laboratory's axes, that its turns can hardly be told apart."""
+    """Says when the pelvis leans so far, against the laboratory's axes, that its turns can hardly be separated."""
     if not set(PELVIS) <= root_coordinates(estimate):
         return []
     middle = np.degrees(estimate.data["coordinates"].sel(coordinate=PELVIS[1]).values)

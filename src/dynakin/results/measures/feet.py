@@ -112,7 +112,7 @@ def _words(figures: dict[str, Any], grounded: int, frames: int, weight_n: float)
     """What is said goes by the numbers: nothing is left only where nothing is."""
     left, text = figures["left_at_root"], []
     if left["grounded"] is None:
-        text.append("In no frame are all contacts with the ground measured: what is left at the root is not known.")
+        text.append("In no frame are all contacts with the ground measured: the residual at the root is not known.")
     else:
         where = f"in the {grounded} of {frames} frames in which every contact with the ground is measured"
         if max(left["grounded"].values()) <= ROUNDING:
@@ -123,22 +123,24 @@ def _words(figures: dict[str, Any], grounded: int, frames: int, weight_n: float)
                 if own is not None
             ]
             text.append(
-                f"Nothing is left at the root {where}: the plates' wrenches were changed instead, RMS of the component "
-                f"that was changed most: {', '.join(changed)}."
+                f"No residual is left at the root {where}: the plates' wrenches were changed instead, RMS of the "
+                f"component that was changed most: {', '.join(changed)}."
             )
         else:
-            text.append(f"{_up_to(left['grounded'])} are left at the root {where}: no contact accounts for them.")
+            text.append(
+                f"{_up_to(left['grounded'])} of residual are left at the root {where}: no contact accounts for them."
+            )
     if left["flight"] is not None:
         flight = plural(figures["flight_frames"], "frame")
         large = left["flight"]["force_n"] > weight_n > 0.0
         text.append(
-            f"{_up_to(left['flight'])} are left in flight ({flight} in which no foot touches the ground)"
+            f"{_up_to(left['flight'])} of residual are left in flight ({flight} in which no foot touches the ground)"
             + (": the model's error, or a contact that is not measured." if large else ".")
         )
     if count := figures["derived_frames"]:
-        text.append(f"In {count} of {frames} frames one contact was not measured: what hangs on it is derived.")
+        text.append(f"In {count} of {frames} frames one contact was not measured: what depends on it is derived.")
     if count := figures["unknown_frames"]:
-        text.append(f"In {count} of {frames} frames the force on a foot is not known: what hangs on it is absent.")
+        text.append(f"In {count} of {frames} frames the force on a foot is not known: what depends on it is absent.")
     return " ".join(text)
 
 

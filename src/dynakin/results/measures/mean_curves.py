@@ -20,7 +20,7 @@ Array = npt.NDArray[np.float64]
 
 PERCENT = np.linspace(0.0, 100.0, 101)
 MEASURED = "measured"
-"""Name of what the plates say, beside the methods."""
+"""Name of what the plates say, next to the methods."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from dynakin.results.measures.consistency import Consistency, consistency, misma
 from dynakin.results.measures.facing import facing
 from dynakin.results.measures.feet import foot_figures
 from dynakin.results.measures.fit import WrenchFit, marker_rms_mm, wrench_fit
-from dynakin.results.measures.posterior import learned
+from dynakin.results.measures.posterior import posterior_figures
 from dynakin.results.measures.power import work
 from dynakin.results.measures.soft_tissue import soft_tissue
 from dynakin.results.measures.sources import moment_figures
@@ -64,7 +64,7 @@ def compute_metrics(estimate: Estimate, failures: Failures | None = None) -> dic
         "adaptation": lambda: adaptation(estimate),
         "bounds": lambda: parameter_bounds(estimate, good),
         "soft_tissue": lambda: soft_tissue(estimate, good),
-        "identifiability": lambda: learned(estimate),
+        "identifiability": lambda: posterior_figures(estimate),
         "moments": lambda: moment_figures(estimate, lost_in_words(estimate)),
         "peak_moments_per_kg": lambda: _peak_moments(estimate, window),
         "work": lambda: work(estimate, window),

@@ -1,4 +1,4 @@
-"""What a recording told of each constant: the standard deviation at the end over that before the first frame."""
+"""Posterior of each constant against its prior: the standard deviation at the end over that before the first frame."""
 
 from __future__ import annotations
 
@@ -7,23 +7,20 @@ from typing import Any, Literal
 
 from dynakin.elements import element
 from dynakin.results.estimate import Estimate
-from dynakin.results.naming import INERTIA_WORDS, listed, words
+from dynakin.results.naming import INERTIA_WORDS, listed, sentence, words
 from dynakin.results.records import Parameter
 
 Judgement = Literal["known", "partly", "nothing"]
 
 KNOWN = 0.3
-"""Nine tenths of the prior variance are gone: the value is the data's, whatever the prior was."""
+"""Nine tenths of the prior variance are gone: the value is the data's, for any prior."""
 NOTHING = 0.9
 """Four fifths of the prior variance are left: the value is the prior's, within what tables differ by."""
 JUDGEMENT_WORDS: dict[Judgement, str] = {
     "known": "known from the data",
     "partly": "known in part",
-    "nothing": "the data say nothing",
+    "nothing": "not known from the data",
 }
-
-
-_TELLS: dict[Judgement, str] = {"known": "from the data", "partly": "in part", "nothing": "not at all"}
 
 
 def judged(share: float) -> Judgement:
@@ -35,7 +32,7 @@ def share_of(parameter: Parameter) -> float | None:
     """Standard deviation at the end over that before the first frame; None where it is not estimated."""
     if not parameter.estimated or not parameter.prior_sd:
         return None
-    return parameter.learnt_sd / parameter.prior_sd
+    return parameter.posterior_sd / parameter.prior_sd
 
 
 def group_of(parameter: Parameter) -> str | None:
@@ -58,8 +55,8 @@ def shares_of(parameters: Iterable[Parameter]) -> dict[str, dict[str, float]]:
     return {group: shares for group, shares in found.items() if shares}
 
 
-def learned(estimate: Estimate) -> dict[str, Any]:
-    """The block ``identifiability`` of ``metrics.json``, as far as an estimate alone tells it."""
+def posterior_figures(estimate: Estimate) -> dict[str, Any]:
+    """The block ``identifiability`` of ``metrics.json``, as far as it follows from an estimate alone."""
     groups = shares_of(estimate.parameters)
     by_name = {p.name: p for p in estimate.parameters}
     return {
@@ -76,17 +73,17 @@ def learned(estimate: Estimate) -> dict[str, Any]:
             for name, share in shares.items()
         },
         "groups": {group: counts(shares) for group, shares in groups.items()},
-        "verdict": " ".join(told_in_words(estimate)),
+        "verdict": " ".join(posterior_in_words(estimate)),
     }
 
 
-def told_in_words(estimate: Estimate) -> list[str]:
+def posterior_in_words(estimate: Estimate) -> list[str]:
     """A sentence on each group of constants."""
     return [_sentence(group, shares) for group, shares in shares_of(estimate.parameters).items()]
 
 
 def counts(shares: Mapping[str, float]) -> dict[Judgement, int]:
-    """How many are known, partly known, not told."""
+    """How many are known, partly known, not known."""
     judgements = [judged(share) for share in shares.values()]
     return {judgement: judgements.count(judgement) for judgement in JUDGEMENT_WORDS}
 
@@ -94,12 +91,12 @@ def counts(shares: Mapping[str, float]) -> dict[Judgement, int]:
 def _sentence(group: str, shares: Mapping[str, float]) -> str:
     number = counts(shares)
     found = []
-    for judgement, text in _TELLS.items():
+    for judgement, text in JUDGEMENT_WORDS.items():
         names = [name for name, share in shares.items() if judged(share) == judgement]
         if names:
             which = "" if group == "marker places" or len(names) == len(shares) else f" ({_which(names)})"
             found.append(f"{number[judgement]} {text}{which}")
-    return f"Of {len(shares)} {group} the recording tells {listed(found)}."
+    return f"{sentence(group)} ({len(shares)}): {listed(found)}."
 
 
 def _which(names: list[str]) -> str:

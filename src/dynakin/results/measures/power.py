@@ -38,7 +38,7 @@ def work_of(time: Array, power: Array) -> Work:
 
 
 def root_coordinates(estimate: Estimate) -> set[str]:
-    """Coordinates of the joints by which the body hangs on the ground; empty where an estimate does not tell."""
+    """Coordinates of the joints by which the body hangs on the ground; empty where an estimate does not hold them."""
     if "coordinate_segment" not in estimate.data.coords:
         return set()
     parents = estimate.data["joint_parent"].values

@@ -32,8 +32,8 @@ def centre_of_pressure(wrench: Array, height_m: float, threshold_n: float = LOAD
     point, free = recorded_pressure(filled[..., :3], filled[..., 3:], floor, threshold_n)
     in_plane, across = known[..., [0, 1, 5]].all(axis=-1), known[..., 1:4].all(axis=-1)
     pushed = known[..., 1] & (filled[..., 1] >= threshold_n)
-    told = np.stack([in_plane, known[..., 1], across], axis=-1) & pushed[..., None]
-    return np.where(told, point, np.nan), np.where(known.all(axis=-1) & pushed, free[..., 1], np.nan)
+    given = np.stack([in_plane, known[..., 1], across], axis=-1) & pushed[..., None]
+    return np.where(given, point, np.nan), np.where(known.all(axis=-1) & pushed, free[..., 1], np.nan)
 
 
 def foot_pressure(estimate: Estimate, foot: str | None = None) -> tuple[Array, Array]:

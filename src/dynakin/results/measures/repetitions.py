@@ -70,7 +70,7 @@ class Found:
 
 @dataclass(frozen=True, eq=False)
 class BodyPaths:
-    """What repetitions are told from, X forward and Y up, NaN where not known.
+    """What repetitions are found from, X forward and Y up, NaN where not known.
 
     time: (T,) s. pelvis: (T, 3) m. heels: by side, (T, 3) m each.
     """

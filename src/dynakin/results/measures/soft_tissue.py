@@ -1,4 +1,4 @@
-"""How far each marker moves on its segment, beside what skin and flesh are known to do there."""
+"""How far each marker moves on its segment, against what skin and flesh are known to do there."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from dynakin.results.naming import words
 # Published sizes are means over people at full squat; twice the size, measured from the marker's mean place, is more
 # than skin explains.
 EXCESS = 2.0
-# The least size that is compared with, whatever is declared (0 mm for a toe on the floor): cameras have noise too.
+# The least size that is compared with, even if less is declared (0 mm for a toe on the floor): cameras have noise too.
 FLOOR_MM = 3.0
 
 
@@ -96,7 +96,7 @@ def soft_tissue(estimate: Estimate, window: np.ndarray) -> dict[str, Any]:
         for name, d in displacements(estimate, window).items()
     }
     return {
-        "what": "distance of each marker from its mean place on its segment over the window, mm, beside the declared "
+        "what": "distance of each marker from its mean place on its segment over the window, mm, and the declared "
         "size; offset_mm: its mean place from where it was put at the start",
         "markers": markers,
         "verdict": excess_in_words(markers),

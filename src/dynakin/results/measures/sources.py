@@ -1,7 +1,8 @@
 """Where a moment or a force comes from: measured, derived from the motion, or absent; and what that says in words.
 
-A moment hangs on the ground's reaction at every contact that lies behind its joint. Where one of these is not measured,
-but all others are, it follows from the motion and is *derived*; where that cannot be said either, it is *absent* (NaN).
+A moment depends on the ground's reaction at every contact that lies behind its joint. Where one of these is not
+measured, but all others are, it follows from the motion and is *derived*; where that cannot be said either, it is
+*absent* (NaN).
 """
 
 from __future__ import annotations
@@ -49,7 +50,7 @@ def joint_sources(data: xr.Dataset) -> Codes:
 
 
 def wrench_sources(data: xr.Dataset) -> Codes:
-    """(T, 6) of the estimated total wrench: derived from the motion alone where the plates do not tell it."""
+    """(T, 6) of the estimated total wrench: derived from the motion alone where the plates do not measure it."""
     estimated = data["wrench_estimated"].transpose("time", "component").values
     codes = np.zeros(estimated.shape, dtype=np.uint8)
     if "wrench_measured" in data:
@@ -69,7 +70,7 @@ def measured_moments(data: xr.Dataset) -> Array:
 
 
 def measured_wrench(data: xr.Dataset) -> Array:
-    """(T, 6) N and N m: the estimated total wrench, NaN where the plates do not tell it."""
+    """(T, 6) N and N m: the estimated total wrench, NaN where the plates do not measure it."""
     return measured_only(data["wrench_estimated"].transpose("time", "component").values, wrench_sources(data))
 
 
@@ -77,7 +78,7 @@ def legs_of(data: xr.Dataset) -> list[str]:
     """(C,) name of the foot on whose leg each coordinate moves a segment, "" for trunk, arms and root.
 
     A leg reaches from its foot up to, but without, the first segment that all feet share, and holds what hangs on it.
-    Of a model whose feet are not told, legs are the sided limbs that hang on the root: ``thigh_r``, not ``humerus_r``.
+    Of a model whose feet are not known, legs are the sided limbs that hang on the root: ``thigh_r``, not ``humerus_r``.
     """
     if "coordinate_segment" not in data.coords or "joint_parent" not in data.coords:
         return [""] * data.sizes["coordinate"]
@@ -149,7 +150,7 @@ def moment_figures(estimate: Estimate, lost: str = "") -> dict[str, Any]:
 
 
 def _groups(data: xr.Dataset) -> dict[str, list[int]]:
-    """Columns by leg; all of a model whose legs are not told apart."""
+    """Columns by leg; all of a model whose legs are not distinguished."""
     legs = legs_of(data)
     groups = {leg: [k for k, own in enumerate(legs) if own == leg] for leg in dict.fromkeys(legs) if leg}
     return groups or {"": list(range(len(legs)))}

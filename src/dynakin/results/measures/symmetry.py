@@ -43,7 +43,7 @@ def paired(names: Sequence[str]) -> Iterator[tuple[str, int, int]]:
 def asymmetry(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str, Any] | None:
     """Symmetry indices over the frames ``window``; None in a model that has no left and right.
 
-    What hangs on the ground's reaction is compared where both sides are measured: who steps by the means over each
+    What depends on the ground's reaction is compared where both sides are measured: who steps by the means over each
     foot's whole measured stances (touch-down to toe-off), who stays on the feet, and arms, over the whole window. The
     impulse of a part of a stance, or a peak that may lie outside it, is never compared.
 

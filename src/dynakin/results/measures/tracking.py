@@ -35,7 +35,7 @@ come back sooner, or do not take a whole segment."""
 BRIDGED_S = 0.1
 """Good frames between lost ones for less than this are chance."""
 MOST_LOST = 0.10
-"""Part of the measured frames from which on the whole trial is lost: lengths and inertia have learnt from them too."""
+"""Part of the measured frames from which on the whole trial is lost: lengths and inertia come from them too."""
 
 _NO_ESTIMATE = ("doubtful", "lost", "restarted")
 _KEPT = ("_measured", "_covariance")
@@ -78,8 +78,8 @@ def without_lost(estimate: Estimate) -> Estimate:
                 continue
             empty = ABSENT if text in _SOURCES else 0 if variable.dtype.kind in "iu" else np.nan
             data[name] = variable.where(~data["lost"], empty).astype(variable.dtype)
-    told = [f"Warning: {in_words(estimate.time, found)}"] if found.lost.any() else []
-    return replace(estimate, data=data, messages=[*estimate.messages, *told], tracking=found)
+    warnings = [f"Warning: {in_words(estimate.time, found)}"] if found.lost.any() else []
+    return replace(estimate, data=data, messages=[*estimate.messages, *warnings], tracking=found)
 
 
 def lost_share(found: Tracking) -> float:

@@ -29,7 +29,7 @@ BACKWARD: Direction = (0.0, 0.0, 1.0)
 FORWARD: Direction = (0.0, 0.0, -1.0)
 
 _TOE_HEIGHT = 0.025  # of the toe landmark over the floor, of body height
-_FOOT_LATERAL = 0.115  # of each foot's middle beside the midline, of body height
+_FOOT_LATERAL = 0.115  # of each foot's middle from the midline, of body height
 _PLATE_BEHIND_TOE_M = 0.10
 
 

@@ -85,7 +85,7 @@ PLUG_IN_GAIT = MarkerList(
 )
 
 _PAIRED = ("thigh", "shank", "foot", "upper_arm", "forearm")
-_ON_KNEE, _ON_ANKLE, _ON_ELBOW = 0.0320, 0.0236, 0.0230  # beside the joint centre, over the height
+_ON_KNEE, _ON_ANKLE, _ON_ELBOW = 0.0320, 0.0236, 0.0230  # sideways of the joint centre, over the height
 # The length along which a segment's markers are spread, and its part of the height on which the rows rest.
 _SPREAD = {"shank": 0.246, "thigh": 0.245, "torso": 0.260, "upper_arm": 0.186, "forearm": 0.146}
 # Coordinate that moves a region's skin; those of limbs on the marker's own side.

@@ -68,7 +68,7 @@ def balanced_angle(tree: Sequence[Segment], path: PosturePath, levels: Array, ta
     """The balanced angle (K,) rad that brings the centre of mass to x = ``target`` (K,) m at ``levels`` (K,).
 
     All that hangs above one hinge turns with it, so the centre of mass lies at x = a + b cos q + c sin q: three
-    angles tell a, b and c, and of the two solutions that one is taken where flexing brings the trunk forward.
+    angles give a, b and c, and of the two solutions that one is taken where flexing brings the trunk forward.
 
     Raises:
         ConfigError: no angle does.

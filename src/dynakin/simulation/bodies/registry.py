@@ -1,4 +1,4 @@
-"""Which bodies there are by name, and what a body of a user's own must fulfil."""
+"""Which simulated persons there are by name, and what one of a user's own must fulfil."""
 
 from __future__ import annotations
 

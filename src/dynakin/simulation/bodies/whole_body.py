@@ -37,7 +37,7 @@ _SUBTALAR = np.array([0.78717961, 0.60474746, -0.12094949])
 # for the pelvis of the marker lists.
 _ASIS_FROM_HIPS = np.array([0.036, 0.053, 0.0])
 _SHOULDER_ON_TRUNK = 0.90  # the joint centre under the acromion, over the length to it
-_FOOT_LATERAL = 0.10  # of each foot beside the midline, of body height, where a motion does not say
+_FOOT_LATERAL = 0.10  # of each foot from the midline, of body height, where a motion does not say
 _TOE_HEIGHT = 0.025  # of the toe landmark over the floor, of body height
 # From the ankle, over the height: ends of the sole, and where the foot rolls over its heel and its ball.
 _SOLE = {"back": -0.045, "heel": -0.030, "ball": 0.080, "tip": 0.110}

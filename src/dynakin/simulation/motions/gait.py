@@ -82,7 +82,7 @@ def gait_movement(rng: np.random.Generator, body: SimulatedBody, duration_s: flo
 
 
 # Knee flexion over a stride from contact on (part of it, deg): as in Perry & Burnfield 2010, ch. 5, but not straighter
-# than 12 deg, where the height of the hip would hardly tell the knee's angle.
+# than 12 deg, where the height of the hip would hardly show the knee's angle.
 _KNEE = np.array([
     (0.00, 12.0), (0.08, 17.0), (0.15, 20.0), (0.25, 16.0), (0.35, 12.0), (0.42, 12.0), (0.50, 19.0), (0.61, 42.0),
     (0.72, 62.0), (0.80, 54.0), (0.90, 24.0), (0.96, 12.0), (1.00, 12.0),

@@ -53,7 +53,7 @@ class Movement:
         repetitions: where they are known.
         seat: what else than the feet carries the person.
         end_s: last time at which it is known, None where it has no end.
-        support: times (T,) s -> how the feet stand; None: as the body's contacts tell.
+        support: times (T,) s -> how the feet stand; None: as the body's contacts say.
         footings: the plates below them, where ``support`` is given.
     """
 

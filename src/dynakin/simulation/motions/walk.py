@@ -39,7 +39,7 @@ class Walk:
 
     Attributes:
         stride_s, step_m: duration of a stride and length of a step.
-        half_width_m: of the ankles beside the line of progression; toe_out, torsion: rad.
+        half_width_m: of the ankles from the line of progression; toe_out, torsion: rad.
         landing: pitch of the foot when it lands, rad.
         means_deg, waves: coordinates of pelvis and upper body that are not fitted; of arms those of the right side
             (the left one's half a stride later).

@@ -1,7 +1,7 @@
 """The recorder's own process: copies its standard input to a file, and on to the disk twice a second.
 
-Run as a script, with the standard library alone, so that it is there at once. Whatever happens to the session, what it
-has sent is written; whatever happens to this process, what it has written stays. Where the disk takes no more it ends
+Run as a script, with the standard library alone, so that it is there at once. If the session ends in any way, what it
+has sent is written; if this process ends in any way, what it has written stays. Where the disk takes no more it ends
 with `SYSTEM_ERROR` and the number of the system's error: Python itself ends with 1 where something else is wrong.
 """
 

@@ -84,7 +84,7 @@ class Sink:
     """Where estimates go; each method may be left out. None of them may block: the filter waits for it."""
 
     def begins(self, subject: Mapping[str, float], delay_s: float) -> None:
-        """A session begins: mass (kg) and height (m) as its sources tell them, and how long it waits for packets."""
+        """A session begins: mass (kg) and height (m) as its sources give them, and how long it waits for packets."""
 
     def opened(self, markers: StreamInfo, plates: StreamInfo | None) -> None:
         """The streams are known."""
@@ -99,7 +99,7 @@ class Sink:
         """A step was done."""
 
     def said(self, text: str, status: Status) -> None:
-        """Something is told to the user."""
+        """Something is said to the user."""
 
     def asked(self) -> list[str]:
         """What the user asked for through this sink: some of "restart", "recalibrate", "record", "stop"."""

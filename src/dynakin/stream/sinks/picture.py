@@ -93,11 +93,11 @@ class Picture:
 
 def status_text(status: Status) -> bytes:
     """A status as JSON of a bounded length (2 kB): of each list of names its count and the first few, shortened."""
-    told = asdict(status)
-    for key, value in told.items():
+    content = asdict(status)
+    for key, value in content.items():
         if isinstance(value, tuple):
-            told[key] = {"count": len(value), "first": [name[:_NAME] for name in value[:_NAMES]]}
-    return json.dumps(told).encode()
+            content[key] = {"count": len(value), "first": [name[:_NAME] for name in value[:_NAMES]]}
+    return json.dumps(content).encode()
 
 
 def in_words(names: Mapping[str, Any]) -> str:

@@ -71,8 +71,8 @@ class Recorder(Sink):
 
     def opened(self, markers: StreamInfo, plates: StreamInfo | None) -> None:
         """Writes what is needed to read the rest."""
-        told = {"markers": asdict(markers), "plates": None if plates is None else asdict(plates)}
-        self._queue.put(text_record({"streams": told, "settings": self.settings, **self._session, "version": 1}))
+        streams = {"markers": asdict(markers), "plates": None if plates is None else asdict(plates)}
+        self._queue.put(text_record({"streams": streams, "settings": self.settings, **self._session, "version": 1}))
 
     def packet(self, packet: Packet) -> None:
         """Writes it."""
@@ -160,7 +160,7 @@ def read_recorded(folder: str | Path) -> tuple[list[Fused], StreamInfo, StreamIn
             try:
                 fusion = fusion or _fusion(record)
             except (KeyError, TypeError, ValueError, AttributeError, ArithmeticError) as error:
-                raise RecordingError(f"{path}: its streams are not told as expected ({error!r})") from None
+                raise RecordingError(f"{path}: its streams are not described as expected ({error!r})") from None
             begun = begun or record
     if fusion is None:
         raise RecordingError(f"{path}: holds no recorded session")
@@ -200,8 +200,8 @@ def _fusion(record: Mapping[str, Any]) -> Fusion:
     return Fusion(streams["markers"], streams["plates"], delay_s=float(record.get("delay_s", DELAY_S)))
 
 
-def _info(told: dict[str, Any]) -> StreamInfo:
-    rate = float(told["rate_hz"])
+def _info(stream: dict[str, Any]) -> StreamInfo:
+    rate = float(stream["rate_hz"])
     if not SLOWEST_HZ <= rate <= FASTEST_HZ:
         raise ValueError(f"{rate:g} Hz, expected {SLOWEST_HZ:g} to {FASTEST_HZ:g} Hz")
-    return StreamInfo(tuple(map(str, told["names"])), rate, str(told["clock"]), bool(told.get("ordered")))
+    return StreamInfo(tuple(map(str, stream["names"])), rate, str(stream["clock"]), bool(stream.get("ordered")))

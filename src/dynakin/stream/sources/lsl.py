@@ -80,9 +80,9 @@ class LslSource:
         self._factors = np.array(
             [_factor(units[k], labels[k], self._plates, self.name) if k in used else 1.0 for k in range(len(labels))]
         )
-        told = StreamInfo(names, rate, self._clock, ordered=True)
+        info = StreamInfo(names, rate, self._clock, ordered=True)
         notes = (f"lsl:{self.name}: the sender's clock is {self._correction:+.4f} s away.",)
-        return Streams(None, told, notes) if self._plates else Streams(told, None, notes)
+        return Streams(None, info, notes) if self._plates else Streams(info, None, notes)
 
     def read(self, timeout_s: float) -> list[Packet] | None:
         """What came.
@@ -145,7 +145,7 @@ def _grouped(labels: list[str], pattern: re.Pattern[str], axes: tuple[str, ...])
 
 
 def _factor(unit: str, label: str, plates: bool, where: str) -> float:
-    """SI units per unit; metres, newtons and newton metres where none is told."""
+    """SI units per unit; metres, newtons and newton metres where none is given."""
     if not unit.strip():
         return 1.0
     if not plates:

@@ -14,7 +14,7 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True)
 class StreamInfo:
-    """What a source tells of one of its streams.
+    """What a source says of one of its streams.
 
     Attributes:
         names: of the markers, or of the plates.
@@ -37,7 +37,7 @@ class Streams:
     Attributes:
         notes: sentences for the user.
         paced: whether samples come when they are measured; False: as fast as they are read.
-        subject: "mass_kg" and "height_m" where the source tells them.
+        subject: "mass_kg" and "height_m" where the source gives them.
     """
 
     markers: StreamInfo | None = None
@@ -84,7 +84,7 @@ class Source(Protocol):
     """Where packets come from. It lives in a thread of its own, so it may block; it is opened again after an error."""
 
     def open(self, timeout_s: float) -> Streams:
-        """Connect and tell the streams.
+        """Connect and describe the streams.
 
         Raises:
             StreamError: nothing found within the timeout; it is tried again.

@@ -16,7 +16,7 @@ from dynakin.stream.sources.qtm_parameters import FRAMES, QtmParameters, parse_p
 
 _PORT = 22223  # the base port's little-endian one
 _VERSION = "1.18"  # servers speak every older version too
-_LEARN_FRAMES = 20
+_FIRST_FRAMES = 20
 _SAME_CLOCK_S = 0.25  # markers and plates that are further apart count time from different moments
 
 
@@ -103,19 +103,19 @@ class QtmSource:
             await self._connection.stream_frames("allframes", parts, self._on_packet)
         except (qtm_rt.QRTCommandException, TimeoutError) as error:
             raise StreamError(f"{self._where}: QTM refused to stream ({error})") from None
-        while not self._learnt() and time.monotonic() < deadline and not self._lost:
+        while not self._described() and time.monotonic() < deadline and not self._lost:
             await asyncio.sleep(0.02)
         return self._streams(timeout_s)
 
-    def _learnt(self) -> bool:
+    def _described(self) -> bool:
         assert self._parameters is not None
         frames = sum(isinstance(packet, MarkerPacket) for packet in self._packets)
         plates = any(isinstance(packet, PlatePacket) for packet in self._packets)
-        return frames >= _LEARN_FRAMES and (plates or not self._parameters.plates or frames >= 5 * _LEARN_FRAMES)
+        return frames >= _FIRST_FRAMES and (plates or not self._parameters.plates or frames >= 5 * _FIRST_FRAMES)
 
     def _streams(self, timeout_s: float) -> Streams:
-        told = self._parameters
-        assert told is not None
+        parameters = self._parameters
+        assert parameters is not None
         stamps = np.array([packet.time_s for packet in self._packets if isinstance(packet, MarkerPacket)])
         if len(stamps) < 2:
             raise StreamError(
@@ -123,17 +123,17 @@ class QtmSource:
                 "a file with real-time output"
             )
         rate = 1.0 / float(np.median(np.diff(stamps)))
-        notes = [f"{self._where}: {len(told.labels)} labels, up is {told.up or 'not told'}."]
-        markers = StreamInfo(told.labels, rate, "qtm", ordered=True)
-        if not told.plates:
+        notes = [f"{self._where}: {len(parameters.labels)} labels, up is {parameters.up or 'not given'}."]
+        markers = StreamInfo(parameters.labels, rate, "qtm", ordered=True)
+        if not parameters.plates:
             return Streams(markers, None, tuple(notes))
         counted = [packet.time_s[-1] for packet in self._packets if isinstance(packet, PlatePacket)]
         same = bool(counted) and abs(counted[-1] - stamps[-1]) < _SAME_CLOCK_S
         if not same:
             notes.append(f"{self._where}: plates count time from another moment; it is found from arrivals.")
         notes.append(f"{self._where}: forces are taken to be in the frame of the {self.frame} (forces=plate or lab).")
-        names = tuple(plate.name for plate in told.plates)
-        plates = StreamInfo(names, told.plates[0].rate_hz, "qtm" if same else "qtm-plates", ordered=True)
+        names = tuple(plate.name for plate in parameters.plates)
+        plates = StreamInfo(names, parameters.plates[0].rate_hz, "qtm" if same else "qtm-plates", ordered=True)
         return Streams(markers, plates, tuple(notes))
 
     async def _wait(self, timeout_s: float) -> None:
@@ -152,8 +152,8 @@ class QtmSource:
 
     def _on_packet(self, packet: Any) -> None:
         now = time.monotonic()
-        told = self._parameters
-        if told is None or self._came is None:
+        parameters = self._parameters
+        if parameters is None or self._came is None:
             return
         forces = packet.get_force()
         if forces is not None:
@@ -161,7 +161,7 @@ class QtmSource:
             if found is not None:
                 self._packets.append(found)
         markers = packet.get_3d_markers()
-        if markers is not None and len(markers[1]) == len(told.labels):
+        if markers is not None and len(markers[1]) == len(parameters.labels):
             positions = np.array(markers[1], float).reshape(-1, 3) / 1000.0
             self._packets.append(MarkerPacket(packet.timestamp * 1e-6, positions, now))
         self._came.set()

@@ -1,4 +1,4 @@
-"""What Qualisys Track Manager tells of its markers and plates, and its forces in the laboratory frame.
+"""What Qualisys Track Manager says of its markers and plates, and its forces in the laboratory frame.
 
 Source: QTM Real-time Server Protocol (Qualisys), "XML packet" and "Force components"; QTM user manual, "Force data
 information": forces are those on the plate, in the plate's frame (z into the floor) or in the laboratory's, as the

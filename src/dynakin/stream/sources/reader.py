@@ -17,7 +17,7 @@ _AGAIN_S = 0.5
 
 @dataclass(frozen=True)
 class Notice:
-    """Something to tell that happened to a source."""
+    """Something that happened to a source, to be said."""
 
     text: str
     fatal: DynakinError | None = None
@@ -44,32 +44,32 @@ class Reader:
         Raises:
             StreamError: a source that cannot be reached in time, or two sources of the same kind.
         """
-        told: list[Streams] = []
+        described: list[Streams] = []
         for source in self.sources:
-            told.append(source.open(self.wait_s))
-        markers = [streams.markers for streams in told if streams.markers]
-        plates = [streams.plates for streams in told if streams.plates]
-        if len(self.sources) > 1 and len(plates) > 1 and told[-1].plates and not told[-1].markers:
+            described.append(source.open(self.wait_s))
+        markers = [streams.markers for streams in described if streams.markers]
+        plates = [streams.plates for streams in described if streams.plates]
+        if len(self.sources) > 1 and len(plates) > 1 and described[-1].plates and not described[-1].markers:
             # A second source given for its plates takes the place of those that come with the markers.
-            told = [replace(streams, plates=None) for streams in told[:-1]] + [told[-1]]
+            described = [replace(streams, plates=None) for streams in described[:-1]] + [described[-1]]
             plates = plates[-1:]
         for kind, found in (("markers", markers), ("plates", plates)):
             if len(found) > 1:
                 raise StreamError(f"{len(found)} sources give {kind}, expected one")
-        for source, streams in zip(self.sources, told, strict=True):
+        for source, streams in zip(self.sources, described, strict=True):
             thread = threading.Thread(target=self._run, args=(source, streams), daemon=True)
             self._threads.append(thread)
         self._open = len(self._threads)
         for thread in self._threads:
             thread.start()
-        notes = tuple(note for streams in told for note in streams.notes)
-        subject = {key: value for streams in told for key, value in streams.subject.items()}
+        notes = tuple(note for streams in described for note in streams.notes)
+        subject = {key: value for streams in described for key, value in streams.subject.items()}
         return Streams(
             markers[0] if markers else None,
             plates[0] if plates else None,
             notes,
             subject,
-            all(streams.paced for streams in told),
+            all(streams.paced for streams in described),
         )
 
     def get(self, timeout_s: float) -> Packet | Notice | None:

@@ -1,6 +1,6 @@
 """Who may open the viewer's page: its own origin alone.
 
-Any page that a browser has open may connect to a websocket of this machine; the browser tells its Origin and leaves the
+Any page that a browser has open may connect to a websocket of this machine; the browser sends its Origin and leaves the
 judgement to the server. A page of another site may also be served under a name that is pointed at this machine later
 (DNS rebinding): then Origin and Host agree, but the Host is no name of ours.
 """

@@ -105,7 +105,7 @@ class Page:
             aspect=2.2,
         )
 
-    def tell(self, text: str, phase: str, tracking: str) -> None:
+    def say(self, text: str, phase: str, tracking: str) -> None:
         """Shows a sentence."""
         self.said.append(as_text(text))
         lines = [*list(self.said)[:-1], f"**{self.said[-1]}**"]
@@ -176,7 +176,7 @@ def _place_camera(client: viser.ClientHandle) -> None:
     for _ in range(50):
         try:
             narrow = client.camera.aspect < _NARROW
-        except (AssertionError, AttributeError):  # the page has not told its camera yet
+        except (AssertionError, AttributeError):  # the page has not sent its camera yet
             time.sleep(0.1)
             continue
         if narrow:
@@ -210,11 +210,11 @@ def main(host: str, port: int) -> None:
             line = lines.get()
             if line is None:
                 return
-            told = json.loads(line)
-            if "setup" in told:
-                page.begin(told["setup"])
+            message = json.loads(line)
+            if "setup" in message:
+                page.begin(message["setup"])
             else:
-                page.tell(told["said"], told["phase"], told["tracking"])
+                page.say(message["said"], message["phase"], message["tracking"])
         page.draw()
         time.sleep(max(0.002, _PERIOD_S - (time.monotonic() - began)))
 

@@ -56,7 +56,7 @@ class Viewer(Sink):
             start_new_session=True,
             text=True,
         )
-        self._threads = [threading.Thread(target=job, daemon=True) for job in (self._listen, self._tell)]
+        self._threads = [threading.Thread(target=job, daemon=True) for job in (self._listen, self._send_status)]
         for thread in self._threads:
             thread.start()
 
@@ -65,7 +65,7 @@ class Viewer(Sink):
         self._plates = len(plates.names) if plates is not None else 0
 
     def started(self, started: Started) -> None:
-        """Tells the page what it will show."""
+        """Describes to the page what it will show."""
         self._picture = Picture(started, self._plates)
         if self._latest is not None:
             self._latest.close()
@@ -86,7 +86,7 @@ class Viewer(Sink):
         self._latest.write(numbers, status_text(frame.status))
 
     def said(self, text: str, status: Status) -> None:
-        """Shows what is told."""
+        """Shows what is said."""
         self._lines.put(json.dumps({"said": text, "phase": status.phase, "tracking": status.tracking}))
 
     def asked(self) -> list[str]:
@@ -113,7 +113,7 @@ class Viewer(Sink):
         for line in self._process.stdout:
             self._wishes.put(line.strip())
 
-    def _tell(self) -> None:
+    def _send_status(self) -> None:
         assert self._process.stdin is not None
         while (line := self._lines.get()) is not None:
             try:

@@ -38,7 +38,7 @@ class Session:
 
 @dataclass(frozen=True)
 class Dataset:
-    """What a dataset's file names. presets: to be worked on beside each other; empty: each configuration's own."""
+    """What a dataset's file names. presets: to be compared; empty: each configuration's own."""
 
     path: Path
     output: Path
@@ -151,7 +151,7 @@ def _session(
     name = str(entry.pop("name", file.stem))
     _check_name(f"{where}, trial {entry_file!r}: name", name)
     content = keys | _run_keys(entry, (), f"{where}, trial {name!r}")
-    if "forces" in content:  # beside the trial; {trial} stands for its name
+    if "forces" in content:  # in the trial's folder; {trial} stands for its name
         content["forces"] = str(file.parent / str(content["forces"]).replace("{trial}", file.stem))
     for key in ("static", "parameters"):
         if key in content:

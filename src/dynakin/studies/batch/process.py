@@ -32,7 +32,7 @@ Fits = dict[tuple[str, str], SignalFit]
 
 @dataclass(frozen=True)
 class Options:
-    """How each trial is worked on. presets: beside each other; empty: each configuration's own. cutoff_hz: of the
+    """How each trial is worked on. presets: to be compared; empty: each configuration's own. cutoff_hz: of the
     reference methods. files: whether each trial's results are written too."""
 
     presets: tuple[str, ...] = ()
@@ -62,7 +62,7 @@ class Batch:
         return table2_of([_without_markers(fits) for fits in self.fits().values()])
 
     def table2_of_subjects(self) -> list[Row]:
-        """The same over subjects, each the mean of its trials: what tells of people who were not measured."""
+        """The same over subjects, each the mean of its trials: the figure for people who were not measured."""
         by_subject: dict[str, list[Fits]] = {}
         for name, fits in self.fits().items():
             by_subject.setdefault(name.split("/")[0], []).append(_without_markers(fits))
@@ -85,7 +85,7 @@ def work_on(options: Options, payload: Session) -> dict[str, Any]:
     case = case_of(config, options.presets, options.cutoff_hz)
     failures = Failures()
     estimates, lost, estimators = estimate_each(case.recording, case.setup, static=case.static, failures=failures)
-    result = judged(case, estimates, lost, estimators, failures, whatever=False, observability=False)
+    result = judged(case, estimates, lost, estimators, failures, tolerant=False, observability=False)
     if options.files:
         result.save(config.output, check=False)
     trial = result.comparison

@@ -1,4 +1,4 @@
-"""Many independent tasks over all cores or a cluster: the same rows whoever worked on them, and whatever was killed.
+"""Many independent tasks over all cores or a cluster: the same rows whoever worked on them, and if some were killed.
 
 It knows nothing of filters: a task is a function of something that all share and of something small of its own.
 """

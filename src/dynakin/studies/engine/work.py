@@ -1,4 +1,4 @@
-"""Tasks in, a table out: in the order of the keys, whoever worked, and whatever was done in an earlier run."""
+"""Tasks in, a table out: in the order of the keys, whoever worked, also where a part was done in an earlier run."""
 
 from __future__ import annotations
 

@@ -10,7 +10,7 @@ WORSE = 1.05
 
 
 def recommendation(fit: Fit) -> list[str]:
-    """Sentences: whether to use the fitted settings, which of them the recordings do not tell, what to look at."""
+    """Sentences: whether to use the fitted settings, which of them the recordings do not identify, what to look at."""
     found = []
     limit = [s.name for s in fit.settings if s.at_limit]
     if limit:
@@ -25,7 +25,7 @@ def recommendation(fit: Fit) -> list[str]:
         found.append(_whether(fit))
     unknown = [s.name for s in fit.settings if not s.known and not s.at_limit and s.low is not None]
     if unknown:
-        found.append(f"Not told by these recordings (interval wider than a factor 3): {', '.join(unknown)}.")
+        found.append(f"Not identified by these recordings (interval wider than a factor 3): {', '.join(unknown)}.")
     nis = fit.figures["fitted"]["nis_per_row"]
     if nis is not None and not CONSISTENT[0] <= nis <= CONSISTENT[1]:
         kind = "conservative" if nis < CONSISTENT[0] else "overconfident"
@@ -44,17 +44,17 @@ def _whether(fit: Fit) -> str:
     if any(fitted is None for fitted, _ in pairs):
         return "Keep the settings that you started from: with the fitted ones the filter diverges where it is held out."
     gains = [float("inf") if start is None else start - fitted for fitted, start in pairs]
-    told = ", ".join(f"{gain:+.3g}" for gain in gains).replace("-", "−")
+    listed_gains = ", ".join(f"{gain:+.3g}" for gain in gains).replace("-", "−")
     if min(gains) <= 0.0:
         return (
             f"Keep the settings that you started from: the fitted ones are not better in each held-out part ({name}: "
-            f"{told}{unit})."
+            f"{listed_gains}{unit})."
         )
     ahead = [(f.figures["fitted"]["ahead"], f.figures["start"]["ahead"]) for f in fit.folds]
     worse = [a / b for a, b in ahead if a is not None and b is not None and a > WORSE * b]
     if worse:
         return (
             f"Do not use the fitted settings without a look: they are better in each held-out part by {name} "
-            f"({told}{unit}), but 100 ms ahead up to {100.0 * (max(worse) - 1.0):.0f} % worse."
+            f"({listed_gains}{unit}), but 100 ms ahead up to {100.0 * (max(worse) - 1.0):.0f} % worse."
         )
-    return f"Use the fitted settings: they are better in each held-out part ({name}: {told}{unit})."
+    return f"Use the fitted settings: they are better in each held-out part ({name}: {listed_gains}{unit})."

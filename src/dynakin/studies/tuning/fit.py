@@ -66,7 +66,7 @@ class Fitted:
 
     @property
     def known(self) -> bool:
-        """Whether the recordings tell it."""
+        """Whether the recordings identify it."""
         return not self.at_limit and self.low is not None and self.value / self.low < KNOWN_WITHIN
 
 
@@ -117,7 +117,7 @@ def usual_names(noise: Noise, floating: Collection[bool] = (False,)) -> tuple[st
 
 
 def belongs_to_fit(shared: Shared) -> dict[str, Any]:
-    """All that the rows of a fit depend on beside their settings, for its journal."""
+    """All that the rows of a fit depend on in addition to their settings, for its journal."""
     return {
         "what": "fit",
         "dynakin": versions()["dynakin"],
@@ -131,7 +131,7 @@ class Fitter:
     """`fit` in steps.
 
     Args:
-        others: further presets to be judged beside the fitted settings and the start, by name.
+        others: further presets to be judged with the fitted settings and the start, by name.
     """
 
     shared: Shared
@@ -164,22 +164,22 @@ class Fitter:
         parts = shared.trials if len(shared.trials) > 1 else shared.trials[0].halves()
         folded = replace(shared, trials=tuple(parts))
         steps = 3 + len(parts)
-        self._tell(0, steps)
+        self._report(0, steps)
         everything = self._likelihood(shared)
         optimum = self._minimise(everything, np.zeros(len(self.names)))
-        self._tell(1, steps)
+        self._report(1, steps)
         hessian = curvature(everything.costs, optimum.point) if self.criterion == "nll" else None
-        self._tell(2, steps)
+        self._report(2, steps)
         settings = self._settings(everything, optimum, hessian)
         fitted = {s.name: s.value for s in settings}
         figures = self._figures(everything, fitted)
-        self._tell(3, steps)
+        self._report(3, steps)
         folds = []
         for k, part in enumerate(parts):
             rest = self._likelihood(folded, [n for n in range(len(parts)) if n != k])
             found = rest.settings(self._minimise(rest, optimum.point).point)
             folds.append(Fold(part.name, found, self._figures(self._likelihood(folded, [k]), found)))
-            self._tell(4 + k, steps)
+            self._report(4 + k, steps)
         return Fit(shared, self.criterion, settings, figures, tuple(folds), optimum, hessian)
 
     def only(self) -> tuple[Optimum, Noise]:
@@ -220,6 +220,6 @@ class Fitter:
         asked |= {name: noise.model_dump(mode="json") | mass for name, noise in self.others.items()}
         return dict(zip(asked, where.rows(list(asked.values())), strict=True))
 
-    def _tell(self, done: int, total: int) -> None:
+    def _report(self, done: int, total: int) -> None:
         if self.progress is not None:
             self.progress(done, total)

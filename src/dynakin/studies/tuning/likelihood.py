@@ -23,7 +23,7 @@ DECADE = float(np.log(10.0))
 REACH = 3.0 * DECADE
 """A setting is sought within a factor 1000 of where it starts."""
 PRIOR_SD = DECADE
-"""Standard deviation of the weak prior about the start: it holds what the data do not tell, and moves nothing else."""
+"""Standard deviation of the weak prior about the start: it holds what the data leave open, and moves nothing else."""
 SLIGHT = 1e-4
 """Share of that prior where the cost is no likelihood."""
 LOST = 1e9

@@ -50,7 +50,7 @@ def minimise(
 
     Args:
         settled: the search ends where ``PATIENCE`` gradients in a row bring less than this: a line search that looks
-            for more than the differences can tell would go on for long.
+            for more than the differences can show would go on for long.
     """
     count, idle = 1, 0
     best_point = np.array(start, dtype=float)

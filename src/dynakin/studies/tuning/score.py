@@ -101,8 +101,8 @@ def figures_from(sums: Mapping[str, Any], trial: TuningTrial, declared: Noise) -
         "nis_per_row": ratio,
         "n_rows": int(sums["n_rows"]),
         "log_likelihood": sums["log_likelihood"],
-        **_told("", estimated),
-        **_told("ahead_", ahead),
+        **_rms_columns("", estimated),
+        **_rms_columns("ahead_", ahead),
     }
 
 
@@ -166,7 +166,7 @@ def _parts(prefix: str) -> list[str]:
     return [f"{prefix}markers_mm", *(f"{prefix}{name}" for name in COMPONENTS)]
 
 
-def _told(prefix: str, rms: Array) -> dict[str, float | None]:
+def _rms_columns(prefix: str, rms: Array) -> dict[str, float | None]:
     values = [1000.0 * _nanmean(_distances(rms)), *rms[-6:]]
     return {
         name: float(value) if np.isfinite(value) else None for name, value in zip(_parts(prefix), values, strict=True)

@@ -52,7 +52,7 @@ def settings_text(fit: Fit) -> TextTable:
 
 
 def figures_text(fit: Fit) -> list[TextTable]:
-    """Criteria with the fitted settings beside other presets: on all, and held out."""
+    """Criteria with the fitted settings and other presets: on all, and held out."""
     parts = [("All", fit.figures), *((f"Held out: {fold.held_out}", fold.figures) for fold in fit.folds)]
     keys = {"nll": "nll", "ahead": "ahead", "nis_per_row": "NIS", "markers_mm": "mm"}
     keys |= {"ahead_markers_mm": "ahead, mm", "ahead_fy": "ahead FY, N"}

@@ -19,7 +19,7 @@ Array = npt.NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class BaseParameters:
-    """beta = K phi, the least-squares estimate of beta, and what tells how well it is excited.
+    """beta = K phi, the least-squares estimate of beta, and what says how well it is excited.
 
     Attributes:
         names: (r,) the parameter that each beta is named after; the others are added to these by K.

@@ -23,7 +23,7 @@ from dynakin.validation.reference.regressor import IN_PLANE, parameter_names, wr
 Array = npt.NDArray[np.float64]
 
 _TO_TABLE = 1e-4
-"""Pull to the table in units of each parameter's size, beside rows in sigma: decides only what no frame sees."""
+"""Pull to the table in units of each parameter's size, added to rows in sigma: decides only what no frame sees."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +115,7 @@ def predicted_wrench(chain: PlanarChain, kinematics: Kinematics, parameters: Arr
 
 
 def bodies_of(chain: PlanarChain, parameters: Array) -> dict[str, RigidBody]:
-    """Bodies with these parameters (p,), the numbers out of the plane as the table has them."""
+    """Rigid bodies with these parameters (p,), the numbers out of the plane as the table has them."""
     values = dict(zip(parameter_names(chain), parameters, strict=True))
     bodies = {}
     for link in chain.links:

@@ -36,7 +36,7 @@ _ROD = np.sqrt(12.0)  # length of a rod over its radius of gyration
 
 
 @dataclass(frozen=True)
-class BodyPriors:
+class InertialPriors:
     """Standard deviations about the table, a segment."""
 
     log_mass: float = 0.10
@@ -50,7 +50,7 @@ class BodyPriors:
 
 
 @dataclass(frozen=True, eq=False)
-class Bodies:
+class InertialParameters:
     """phi (K S,), K inertial numbers a segment, as a function of u (U,): each segment's own, or shared by a right and a
     left one.
 
@@ -73,8 +73,8 @@ class Bodies:
     inertia: tuple[str, ...] = INERTIA_NAMES
 
     @classmethod
-    def of(cls, initial: CalibratedModel, priors: BodyPriors | None = None) -> Bodies:
-        """The bodies of a calibrated model, in the plane or in space, by the numbers of each that it estimates; those
+    def of(cls, initial: CalibratedModel, priors: InertialPriors | None = None) -> InertialParameters:
+        """The segments of a calibrated model, in the plane or in space, by the numbers of each that it estimates; those
         that are held keep their mass.
 
         Raises:
@@ -83,7 +83,7 @@ class Bodies:
         """
         chosen = [segment for segment in initial.spec.segments if any(segment.inertia_estimated)]
         held = sum(float(s.inertia[0]) for s in initial.spec.segments if not any(s.inertia_estimated))
-        names, total, priors = tuple(s.name for s in chosen), initial.weighed_kg - held, priors or BodyPriors()
+        names, total, priors = tuple(s.name for s in chosen), initial.weighed_kg - held, priors or InertialPriors()
         flags = {tuple(segment.inertia_estimated) for segment in chosen}
         wanted = {name for flag in flags for name, on in zip(INERTIA_NAMES, flag, strict=True) if on}
         if len(flags) == 1 and wanted == set(PLANAR_INERTIA):
@@ -120,8 +120,8 @@ class Bodies:
         centre: Array,
         gyration: Array,
         reach: Array,
-        priors: BodyPriors,
-    ) -> Bodies:
+        priors: InertialPriors,
+    ) -> InertialParameters:
         """About a table of the plane: centre (S, 2) m, gyration and reach (S,) m, the segment's length."""
         sd = np.tile([priors.log_mass, 0.0, 0.0, priors.log_gyration], (len(names), 1))
         sd[:, 1:3] = (priors.centre_fraction * reach)[:, None]
@@ -137,8 +137,8 @@ class Bodies:
 
     @classmethod
     def in_space(
-        cls, names: tuple[str, ...], total: float, mass: Array, centre: Array, root: Array, priors: BodyPriors
-    ) -> Bodies:
+        cls, names: tuple[str, ...], total: float, mass: Array, centre: Array, root: Array, priors: InertialPriors
+    ) -> InertialParameters:
         """About a table of space: arguments as the attributes."""
         length = _ROD * np.sqrt(np.linalg.norm(root @ root.swapaxes(1, 2), ord=2, axis=(1, 2)))
         own = np.empty((len(names), len(PARTS)))
