@@ -189,7 +189,7 @@ def test_plates_upside_down_are_refused_with_the_number(trial: SimulatedTrial) -
 
 
 def test_noise_for_a_marker_that_is_not_used_is_refused(trial: SimulatedTrial) -> None:
-    with pytest.raises(ConfigError, match=r"noise\.marker: r_nose not among the markers used"):
+    with pytest.raises(ConfigError, match=r"noise\.marker_variance_m2: r_nose not among the markers used"):
         estimator(noise=dynakin.presets.paper().changed(marker_variance_m2={"r_nose": 1e-3})).run(trial.recording)
 
 

@@ -112,8 +112,9 @@ def playback(estimate: Estimate) -> Playback:
 
 
 def _seen(estimate: Estimate, points: Array) -> Array:
-    """Points (T, P, 3) in mm; those of a planar model lie in its plane."""
-    return np.asarray(1000.0 * np.where(estimate.modelled_axes(), points, 0.0))
+    """Points (T, P, 3) in mm, NaN where they are not known; those of a planar model lie in its plane."""
+    known = np.where(np.isfinite(points), points, np.nan)
+    return np.asarray(1000.0 * np.where(estimate.modelled_axes(), known, 0.0))
 
 
 def _view(estimate: Estimate, every: Array) -> tuple[dict[str, Any], Array]:
