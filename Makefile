@@ -4,7 +4,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 OUT ?= out/demo
-CORE := $(shell find cpp/include cpp/src src/dynakin/bindings -type f) CMakeLists.txt pyproject.toml \
+CORE := $(shell find cpp/include cpp/src src/dynakin/bindings -name '*.?pp') CMakeLists.txt pyproject.toml \
   $(shell find src/dynakin -name __init__.py)  # a new package must be made known to the editable install
 CPP_TESTS := $(shell find cpp/tests -type f)
 export PATH := $(CURDIR)/$(BIN):$(PATH)
@@ -74,7 +74,7 @@ test-cpp test-cpp-sanitize: $(VENV)/.dev
 	@$(BIN)/cmake -S . -B $(BUILD) -G Ninja -DDYNAKIN_PYTHON=OFF -DDYNAKIN_TESTS=ON \
 	  -DDYNAKIN_SANITIZE=$(if $(findstring sanitize,$@),ON,OFF) \
 	  -DCMAKE_PREFIX_PATH="$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" >/dev/null
-	@$(BIN)/cmake --build $(BUILD) >$(BUILD)/build.log || { cat $(BUILD)/build.log; exit 1; }
+	@MAKEFLAGS= $(BIN)/cmake --build $(BUILD) >$(BUILD)/build.log || { cat $(BUILD)/build.log; exit 1; }
 	@$(BIN)/ctest --test-dir $(BUILD) --output-on-failure
 
 # The core as others take it: installed, and examples/cpp built against that.
@@ -82,7 +82,7 @@ test-cpp-install: test-cpp
 	@rm -rf build/cpp-example && $(BIN)/cmake --install build/cpp-release --prefix build/cpp-example/prefix >/dev/null
 	@$(BIN)/cmake -S examples/cpp -B build/cpp-example -G Ninja -DCMAKE_BUILD_TYPE=Release \
 	  -DCMAKE_PREFIX_PATH="$(CURDIR)/build/cpp-example/prefix;$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" >/dev/null
-	@$(BIN)/cmake --build build/cpp-example >/dev/null
+	@MAKEFLAGS= $(BIN)/cmake --build build/cpp-example >/dev/null
 	@$(BIN)/ctest --test-dir build/cpp-example --output-on-failure
 
 # What editors and mypy know of the compiled module; committed, so lint checks that it is up to date.

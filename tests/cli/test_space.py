@@ -24,7 +24,9 @@ def saved(folder: Path, motion: str) -> list[str]:
     return [str(folder / "markers.trc"), "--forces", str(folder / "forces.mot")]
 
 
-@pytest.mark.parametrize("motion", TRIALS)
+@pytest.mark.parametrize(
+    "motion", [pytest.param(name, marks=pytest.mark.nightly if name == "gait" else ()) for name in TRIALS]
+)
 def test_compare_judges_a_body_in_space_by_what_it_has_not_seen(motion: str, tmp_path: Path) -> None:
     out = tmp_path / "out"
     assert main(["compare", *saved(tmp_path / "trial", motion), *SUBJECT, "--unseen", "-o", str(out)]) == 0

@@ -15,6 +15,7 @@ from dynakin.model.opensim.definition import load_opensim
 from dynakin.settings.subject import Subject
 
 
+@pytest.mark.nightly
 def test_squats_and_standing(data_dir: Path) -> None:
     folder = data_dir / "opencap_subject4"
     squats, standing = (dynakin.read(folder / f"{n}.trc", folder / f"{n}_grf.mot") for n in ("squats1", "static1"))

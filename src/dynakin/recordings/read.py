@@ -72,7 +72,8 @@ def read(
         "plate_filter_hz": plate_filter_hz,
         "force_threshold_n": force_threshold_n,
     }
-    return replace(recording, read_with={key: value for key, value in asked.items() if value is not None})
+    known = {key: value for key, value in asked.items() if value is not None}
+    return replace(recording, read_with=known) if known else recording
 
 
 def _check_unit(recording: Recording, path: Path) -> None:
