@@ -6,33 +6,32 @@
 
 namespace dynakin {
 
-ContactRecord::ContactRecord(const Model& model, const FeetTrial& of)
+ContactRecord::ContactRecord(const Model& model, const ContactTrial& of)
     : trial(of),
       moments(model, of.segments),
-      foot_wrench(of.wrench.size()),
-      foot_wrench_sd(of.wrench.size()),
-      foot_adjustment(of.wrench.size()),
+      wrench(of.wrench.size()),
+      wrench_sd(of.wrench.size()),
+      adjustment(of.wrench.size()),
       remainder(of.frames * 6),
       source(of.frames * model.coordinates().size()),
       loads_(of.segments.size()) {}
 
 void ContactRecord::report(std::size_t k, const StateRef& x, const KinematicState& state, const DynamicState& dynamics,
                            const Eigen::MatrixXd* P, double* moments_out, double* moments_sd) {
-  const std::size_t feet = trial.segments.size(), first = k * feet;
-  for (std::size_t i = 0; i < feet; ++i) {
-    loads_[i].contact = trial.contact[first + i];
-    loads_[i].wrench = Eigen::Map<const Vector6>(trial.wrench.data() + 6 * (first + i));
-    loads_[i].covariance = Eigen::Map<const Matrix6>(trial.covariance.data() + 36 * (first + i));
-  }
+  const std::size_t n = trial.segments.size(), first = k * n;
+  const auto size = static_cast<Eigen::Index>(6 * n);
+  std::copy_n(trial.contact.begin() + static_cast<std::ptrdiff_t>(first), n, loads_.contact.begin());
+  loads_.wrench = Eigen::Map<const Eigen::VectorXd>(trial.wrench.data() + 6 * first, size);
+  loads_.covariance = Eigen::Map<const Eigen::MatrixXd>(trial.covariance.data() + 36 * first * n, size, size);
   if (!moments.distribute(dynamics, loads_))
     throw std::invalid_argument("frame " + std::to_string(k) +
-                                ": the covariances of the feet's wrenches do not sum to a positive definite one");
+                                ": the covariance of the sum of the contacts' wrenches is not positive definite");
   const auto nc = static_cast<Eigen::Index>(moments.sources().size());
   moments.moments(state, dynamics, Eigen::Map<Eigen::VectorXd>(moments_out, nc));
-  if (P) moments.deviations(x, state, dynamics, *P, moments_sd, foot_wrench_sd.data() + 6 * first);
-  for (std::size_t i = 0; i < feet; ++i) {
-    Eigen::Map<Vector6>(foot_wrench.data() + 6 * (first + i)) = moments.wrenches()[i];
-    Eigen::Map<Vector6>(foot_adjustment.data() + 6 * (first + i)) = moments.adjustments()[i];
+  if (P) moments.deviations(x, state, dynamics, *P, moments_sd, wrench_sd.data() + 6 * first);
+  for (std::size_t i = 0; i < n; ++i) {
+    Eigen::Map<Vector6>(wrench.data() + 6 * (first + i)) = moments.wrenches()[i];
+    Eigen::Map<Vector6>(adjustment.data() + 6 * (first + i)) = moments.adjustments()[i];
   }
   Eigen::Map<Vector6>(remainder.data() + 6 * k) = moments.remainder();
   std::transform(moments.sources().begin(), moments.sources().end(),

@@ -9,106 +9,104 @@
 namespace dynakin {
 namespace {
 
-constexpr double k_nan = std::numeric_limits<double>::quiet_NaN();
-
 Force force_of(const Vector6& w) { return {w.head<3>(), w.tail<3>()}; }
 
 }  // namespace
 
-ContactMoments::ContactMoments(const Model& model, std::vector<int> feet)
+ContactLoads::ContactLoads(std::size_t contacts)
+    : contact(contacts, Contact::none),
+      wrench(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(6 * contacts))),
+      covariance(Eigen::MatrixXd::Identity(wrench.size(), wrench.size())) {}
+
+ContactMoments::ContactMoments(const Model& model, std::vector<int> segments)
     : model_(model),
-      feet_(std::move(feet)),
-      loads_(feet_.size()),
-      wrench_(feet_.size(), Vector6::Zero()),
+      segments_(std::move(segments)),
+      loads_(segments_.size()),
+      wrench_(segments_.size(), Vector6::Zero()),
       adjustment_(wrench_),
-      share_(feet_.size(), Matrix6::Zero()),
+      with_sum_(segments_.size(), Matrix6::Zero()),
+      share_(with_sum_),
       remainder_(Vector6::Zero()),
       source_(model.coordinates().size(), MomentSource::measured),
       external_(model.segments().size()),
       work_(model),
       variances_(static_cast<Eigen::Index>(model.coordinates().size()), model.state_size()) {
   const int n_segments = static_cast<int>(model.segments().size());
-  for (std::size_t i = 0; i < feet_.size(); ++i) {
-    if (feet_[i] < 0 || feet_[i] >= n_segments)
-      throw std::invalid_argument("feet: segment " + std::to_string(feet_[i]) + ", expected 0 to " +
+  for (const int segment : segments_)
+    if (segment < 0 || segment >= n_segments)
+      throw std::invalid_argument("contacts: segment " + std::to_string(segment) + ", expected 0 to " +
                                   std::to_string(n_segments - 1));
-    if (std::count(feet_.begin(), feet_.end(), feet_[i]) > 1)
-      throw std::invalid_argument("feet: segment '" + model.segments()[feet_[i]].name +
-                                  "' is given twice, expected different ones");
-  }
   const auto nc = static_cast<Eigen::Index>(model.coordinates().size());
-  lever_.assign(feet_.size(), Lever::Zero(nc, 6));
+  lever_.assign(segments_.size(), Lever::Zero(nc, 6));
   common_.setZero(nc, 6);
   wrench_J_.setZero(6, model.state_size());
   wrench_JP_ = wrench_J_;
   J_.setZero(nc, model.state_size());
 }
 
-bool ContactMoments::distribute(const DynamicState& dynamics, const std::vector<FootLoad>& loads) {
-  std::copy(loads.begin(), loads.end(), loads_.begin());
+bool ContactMoments::distribute(const DynamicState& dynamics, const ContactLoads& loads) {
+  const std::size_t n = segments_.size();
+  std::copy(loads.contact.begin(), loads.contact.end(), loads_.contact.begin());
+  loads_.wrench = loads.wrench;
+  loads_.covariance = loads.covariance;
   Vector6 missing = dynamics.wrench.vector();
   Matrix6 S = Matrix6::Zero();
-  int measured = 0, unmeasured = 0;
-  for (const FootLoad& load : loads_) {
-    unmeasured += load.contact == Contact::unmeasured;
-    if (load.contact != Contact::measured) continue;
-    ++measured;
-    missing -= load.wrench;
-    S += load.covariance;
+  bool any = false;
+  for (std::size_t i = 0; i < n; ++i) {
+    with_sum_[i].setZero();
+    if (!touches(i)) continue;
+    any = true;
+    missing -= loads_.wrench.segment<6>(static_cast<Eigen::Index>(6 * i));
+    for (std::size_t j = 0; j < n; ++j)
+      if (touches(j)) with_sum_[i] += block(i, j);
+    S += with_sum_[i];
   }
-  // Where one contact is not measured, it takes all that is missing; where several are, nobody knows who does.
-  const bool adjusts = measured > 0 && unmeasured == 0;
-  Eigen::LLT<Matrix6> factor;
-  if (adjusts && factor.compute(S).info() != Eigen::Success) return false;
+  const Eigen::LLT<Matrix6> factor(any ? S : Matrix6(Matrix6::Identity()));
+  if (factor.info() != Eigen::Success) return false;
   remainder_ = missing;
-  if (unmeasured > 1) remainder_.setConstant(k_nan);
   std::fill(external_.begin(), external_.end(), Force{});
-  for (std::size_t i = 0; i < feet_.size(); ++i) {
-    const Contact contact = loads_[i].contact;
+  for (std::size_t i = 0; i < n; ++i) {
     wrench_[i].setZero();
     adjustment_[i].setZero();
     share_[i].setZero();
-    if (contact == Contact::measured) {
-      if (adjusts) {
-        share_[i] = factor.solve(loads_[i].covariance).transpose();  // R_i S^-1
-        adjustment_[i] = share_[i] * missing;
-      }
-      wrench_[i] = loads_[i].wrench + adjustment_[i];
-    } else if (contact == Contact::unmeasured) {
-      share_[i].setIdentity();
-      wrench_[i] = missing;
-      if (unmeasured > 1) wrench_[i].setConstant(k_nan);
-    }
-    if (unmeasured <= 1) remainder_ -= share_[i] * missing;
-    if (wrench_[i].allFinite()) external_[feet_[i]] = force_of(wrench_[i]);
+    if (!touches(i)) continue;
+    share_[i] = factor.solve(with_sum_[i].transpose()).transpose();
+    adjustment_[i] = share_[i] * missing;
+    wrench_[i] = loads_.wrench.segment<6>(static_cast<Eigen::Index>(6 * i)) + adjustment_[i];
+    remainder_ -= adjustment_[i];
+    external_[segments_[i]] = external_[segments_[i]] + force_of(wrench_[i]);
   }
-  mark_sources(loads_, unmeasured > 1);
+  mark_sources();
   return true;
 }
 
-void ContactMoments::mark_sources(const std::vector<FootLoad>& loads, bool several) {
+void ContactMoments::mark_sources() {
   std::fill(source_.begin(), source_.end(), MomentSource::measured);
-  for (std::size_t i = 0; i < feet_.size(); ++i) {
-    if (loads[i].contact != Contact::unmeasured) continue;
-    for (int j = feet_[i]; j != k_none; j = model_.segments()[j].parent)
-      for (int a = model_.segments()[j].first_axis; a < model_.segments()[j].end_axis; ++a)
-        source_[model_.axes()[a].coordinate] = several ? MomentSource::unknown : MomentSource::derived;
+  const auto unmeasured = std::count(loads_.contact.begin(), loads_.contact.end(), Contact::unmeasured);
+  for (std::size_t i = 0; i < segments_.size(); ++i) {
+    const Contact contact = loads_.contact[i];
+    if (contact == Contact::none || contact == Contact::measured) continue;
+    const MomentSource source =
+        contact == Contact::shared || unmeasured > 1 ? MomentSource::prior : MomentSource::derived;
+    for (int j = segments_[i]; j != k_none; j = model_.segments()[j].parent)
+      for (int a = model_.segments()[j].first_axis; a < model_.segments()[j].end_axis; ++a) {
+        MomentSource& of = source_[model_.axes()[a].coordinate];
+        of = std::max(of, source);
+      }
   }
 }
 
 void ContactMoments::moments(const KinematicState& state, const DynamicState& dynamics,
                              Eigen::Ref<Eigen::VectorXd> out) const {
   joint_moments(model_, state, dynamics, &external_, out);
-  for (std::size_t c = 0; c < source_.size(); ++c)
-    if (source_[c] == MomentSource::unknown) out(static_cast<Eigen::Index>(c)) = k_nan;
 }
 
 void ContactMoments::levers(const KinematicState& state) {
   common_.setZero();
-  for (std::size_t i = 0; i < feet_.size(); ++i) {
+  for (std::size_t i = 0; i < segments_.size(); ++i) {
     Lever& G = lever_[i];
     G.setZero();
-    for (int j = feet_[i]; j != k_none; j = model_.segments()[j].parent)
+    for (int j = segments_[i]; j != k_none; j = model_.segments()[j].parent)
       for (int a = model_.segments()[j].first_axis; a < model_.segments()[j].end_axis; ++a) {
         const AxisState& axis = state.axes[a];
         auto row = G.row(model_.axes()[a].coordinate);
@@ -131,32 +129,31 @@ void ContactMoments::jacobian(const StateRef& x, const KinematicState& state, co
 
 void ContactMoments::deviations(const StateRef& x, const KinematicState& state, const DynamicState& dynamics,
                                 const Eigen::MatrixXd& P, double* moments_sd, double* wrench_sd) {
+  const std::size_t n = segments_.size();
   jacobian(x, state, dynamics, J_);
   variances_(J_, P, moments_sd);
   for (std::size_t c = 0; c < source_.size(); ++c) {
     const auto row = static_cast<Eigen::Index>(c);
-    for (std::size_t i = 0; i < feet_.size(); ++i) {
-      if (loads_[i].contact != Contact::measured) continue;
-      const Vector6 lever = (common_.row(row) - lever_[i].row(row)).transpose();
-      moments_sd[c] += lever.dot(loads_[i].covariance * lever);
+    for (std::size_t i = 0; i < n; ++i) {
+      if (!touches(i)) continue;
+      const Vector6 own = (common_.row(row) - lever_[i].row(row)).transpose();
+      for (std::size_t j = 0; j < n; ++j)
+        if (touches(j)) moments_sd[c] += own.dot(block(i, j) * (common_.row(row) - lever_[j].row(row)).transpose());
     }
-    moments_sd[c] = source_[c] == MomentSource::unknown ? k_nan : std::sqrt(std::max(moments_sd[c], 0.0));
+    moments_sd[c] = std::sqrt(std::max(moments_sd[c], 0.0));
   }
   wrench_JP_.setZero();
   for (const int c : model_.wrench_columns()) wrench_JP_.noalias() += wrench_J_.col(c) * P.col(c).transpose();
   Matrix6 needed = Matrix6::Zero();  // covariance of what the state needs
   for (const int c : model_.wrench_columns()) needed.noalias() += wrench_JP_.col(c) * wrench_J_.col(c).transpose();
-  for (std::size_t k = 0; k < feet_.size(); ++k) {
-    Matrix6 C = share_[k] * needed * share_[k].transpose();
-    for (std::size_t i = 0; i < feet_.size(); ++i) {
-      if (loads_[i].contact != Contact::measured) continue;
-      Matrix6 by = -share_[k];
-      if (i == k) by += Matrix6::Identity();
-      C += by * loads_[i].covariance * by.transpose();
-    }
+  for (std::size_t k = 0; k < n; ++k) {
     Eigen::Map<Vector6> sd(wrench_sd + 6 * k);
+    if (!touches(k)) {
+      sd.setZero();
+      continue;
+    }
+    const Matrix6 C = share_[k] * needed * share_[k].transpose() + block(k, k) - share_[k] * with_sum_[k].transpose();
     sd = C.diagonal().cwiseMax(0.0).cwiseSqrt();
-    if (!wrench_[k].allFinite()) sd.setConstant(k_nan);
   }
 }
 

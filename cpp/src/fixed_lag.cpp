@@ -19,7 +19,8 @@ FixedLag::FixedLag(Filter& filter, int lag, bool deviations)
 }
 
 // A frame that is refused counts as one in which nothing was measured.
-StepReport FixedLag::record(Frame& now, double dt, const MarkerRef& markers, const Vector6& wrench) {
+StepReport FixedLag::record(Frame& now, double dt, const MarkerRef& markers, const Vector6& wrench,
+                            const Matrix6* wrench_covariance) {
   const auto keep = [&] {
     filter_.record_to(nullptr);
     now.dt = dt;
@@ -28,7 +29,7 @@ StepReport FixedLag::record(Frame& now, double dt, const MarkerRef& markers, con
   now.tape.clear();
   filter_.record_to(&now.tape);
   try {
-    const StepReport report = filter_.update(markers, wrench);
+    const StepReport report = filter_.update(markers, wrench, wrench_covariance);
     keep();
     return report;
   } catch (...) {
@@ -37,11 +38,12 @@ StepReport FixedLag::record(Frame& now, double dt, const MarkerRef& markers, con
   }
 }
 
-StepReport FixedLag::step(double dt, const MarkerRef& markers, const Vector6& wrench) {
+StepReport FixedLag::step(double dt, const MarkerRef& markers, const Vector6& wrench,
+                          const Matrix6* wrench_covariance) {
   const bool first = frames_ == 0;
   if (!first) filter_.predict(dt);
   ++frames_;
-  const StepReport report = record(back(0), first ? 0.0 : dt, markers, wrench);
+  const StepReport report = record(back(0), first ? 0.0 : dt, markers, wrench, wrench_covariance);
   if (!ready() || report.diverged()) return report;
 
   pass_.start();

@@ -36,7 +36,8 @@ Measurement::Measurement(const Model& model, const FilterSettings& settings)
       late_state_(model.state_size()),
       predicted_(channel_count(model)),
       left_out_(model.markers().size() + 1) {
-  wrench_covariance_ = carried(settings.wrench_covariance, settings.reference_point, wrench_used_);
+  declared_covariance_ = carried(settings.wrench_covariance, settings.reference_point, wrench_used_);
+  wrench_covariance_ = declared_covariance_;
   wrench_scratch_.setZero();
   std::size_t widest = 0;
   for (std::size_t m = 0; m < model.markers().size(); ++m) {
@@ -82,6 +83,10 @@ void Measurement::evaluate(const Eigen::VectorXd& x) {
   for (int k = 0; k < 6; ++k)
     if (const int c = model_.offset_columns()[k]; c != k_none) wrench(k) += x(c);
   predicted_(3 * n_markers + 6) = dynamics_.mass;
+}
+
+void Measurement::expect(const Matrix6* wrench_covariance) {
+  wrench_covariance_ = wrench_covariance ? *wrench_covariance : declared_covariance_;
 }
 
 void Measurement::linearise(const Eigen::VectorXd& x, const MarkerRef& markers, const Vector6& wrench) {

@@ -8,11 +8,9 @@ namespace dynakin {
 
 namespace {
 
-StepReport step(Filter& filter, double dt, const Eigen::Map<const MarkerMatrix>& markers, const Vector6& wrench,
-                std::size_t frame) {
+StepReport step(Filter& filter, const Trial& trial, std::size_t frame) {
   try {
-    if (frame > 0) filter.predict(dt);
-    return filter.update(markers, wrench);
+    return trial.step(filter, frame);
   } catch (const std::invalid_argument& e) {
     throw std::invalid_argument("frame " + std::to_string(frame) + ": " + e.what());
   }
@@ -68,19 +66,17 @@ RunRecord::RunRecord(const Model& of, std::size_t frames, bool output_sd)
       tracking(frames),
       constraints_met(frames) {}
 
-void run_frames(Filter& filter, const double* time, const double* markers, const double* wrench, std::size_t first,
-                std::size_t end, RunRecord& record, ContactRecord* contacts) {
+void run_frames(Filter& filter, const Trial& trial, std::size_t first, std::size_t end, RunRecord& record,
+                ContactRecord* contacts) {
   using clock = std::chrono::steady_clock;
   const std::size_t m = 3 * filter.model().markers().size();
   filter.report_sensors(true);
   for (std::size_t k = first; k < end; ++k) {
-    const Eigen::Map<const MarkerMatrix> z(markers + k * m, 3, m / 3);
-    const Vector6 w = Eigen::Map<const Vector6>(wrench + 6 * k);
     const auto start = clock::now();
-    const StepReport report = step(filter, k == 0 ? 0.0 : time[k] - time[k - 1], z, w, k);
+    const StepReport report = step(filter, trial, k);
     record.step_us[k] = std::chrono::duration<double, std::micro>(clock::now() - start).count();
     if (report.diverged())
-      throw DivergenceError("the filter diverged at frame " + std::to_string(k) + " (" + std::to_string(time[k]) +
+      throw DivergenceError("the filter diverged at frame " + std::to_string(k) + " (" + std::to_string(trial.time[k]) +
                             " s): " + describe(report.status));
     record.nis[k] = report.nis;
     record.log_likelihood[k] = report.log_likelihood;

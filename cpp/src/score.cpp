@@ -51,18 +51,16 @@ Score::Score(const Model& model, std::size_t frames, const ScoreOptions& options
       state(options.trace ? frames * model.state_size() : 0, std::nan("")),
       moments(options.trace ? frames * model.coordinates().size() : 0, std::nan("")) {}
 
-Score score_trial(Filter& filter, const double* time, const double* markers, const double* wrench, std::size_t frames,
-                  const ScoreOptions& options) {
+Score score_trial(Filter& filter, const Trial& trial, const ScoreOptions& options) {
   const Model& model = filter.model();
-  const std::size_t m = 3 * model.markers().size(), n = model.state_size(), nc = model.coordinates().size();
-  const std::size_t end = std::min(frames, options.end);
-  Score score(model, frames, options);
+  const std::size_t n_markers = model.markers().size(), m = 3 * n_markers, n = model.state_size(), nc = model.coordinates().size();
+  const std::size_t end = std::min(trial.frames, options.end);
+  Score score(model, trial.frames, options);
   int lost = 0;
   for (std::size_t k = 0; k < end; ++k) {
-    const Frame z(markers + k * m, 3, static_cast<Eigen::Index>(m / 3));
-    const double* w = wrench + 6 * k;
-    if (k > 0) filter.predict(time[k] - time[k - 1]);
-    const StepReport report = filter.update(z, Eigen::Map<const Vector6>(w));
+    const Frame z = trial.markers_at(k, n_markers);
+    const double* w = trial.wrench + 6 * k;
+    const StepReport report = trial.step(filter, k);
     if (report.diverged()) {
       score.divergence = describe(report.status);
       return score;
@@ -94,10 +92,10 @@ Score score_trial(Filter& filter, const double* time, const double* markers, con
     }
     const std::size_t then = k + options.ahead;
     if (options.ahead == 0 || then < options.first || then >= end) continue;
-    const Measurement& foreseen = filter.foresee(time[then] - time[k]);
-    add_markers(model, Frame(markers + then * m, 3, static_cast<Eigen::Index>(m / 3)), foreseen.predicted().data(),
+    const Measurement& foreseen = filter.foresee(trial.time[then] - trial.time[k]);
+    add_markers(model, trial.markers_at(then, n_markers), foreseen.predicted().data(),
                 score.ahead);
-    add_wrench(model, wrench + 6 * then, foreseen.dynamics().wrench.vector(), score.ahead);
+    add_wrench(model, trial.wrench + 6 * then, foreseen.dynamics().wrench.vector(), score.ahead);
   }
   return score;
 }

@@ -15,16 +15,12 @@ std::size_t stretch_of(std::size_t frames, std::size_t asked) {
 
 }  // namespace
 
-Smoother::Smoother(Filter& filter, const double* time, const double* markers, const double* wrench, std::size_t frames,
-                   std::size_t stretch)
+Smoother::Smoother(Filter& filter, const Trial& trial, std::size_t stretch)
     : filter_(filter),
-      time_(time),
-      markers_(markers),
-      wrench_(wrench),
-      frames_(frames),
-      stretch_(stretch_of(frames, stretch)),
-      left_(frames),
-      checkpoints_((frames + stretch_ - 1) / stretch_ + 1),
+      trial_(trial),
+      stretch_(stretch_of(trial.frames, stretch)),
+      left_(trial.frames),
+      checkpoints_((trial.frames + stretch_ - 1) / stretch_ + 1),
       pass_(filter.model(), filter.settings(), filter.tape_rows(), true),
       kinematics_(filter.model()),
       dynamics_(filter.model()) {
@@ -35,26 +31,23 @@ void Smoother::forward(std::size_t first, std::size_t end, RunRecord& record, Co
   while (first < end) {
     if (first % stretch_ == 0) filter_.save(checkpoints_[first / stretch_]);
     const std::size_t next = std::min(end, (first / stretch_ + 1) * stretch_);
-    run_frames(filter_, time_, markers_, wrench_, first, next, record, contacts);
+    run_frames(filter_, trial_, first, next, record, contacts);
     first = next;
   }
-  if (end == frames_) filter_.save(checkpoints_.back());
+  if (end == trial_.frames) filter_.save(checkpoints_.back());
 }
 
 // The same steps once more from their checkpoint, taped.
 void Smoother::replay(std::size_t first, std::size_t end, const RunRecord& record) {
   const Model& model = filter_.model();
   const auto n = static_cast<std::size_t>(model.state_size());
-  const std::size_t m = model.markers().size();
   while (replayed_.size() < end - first) replayed_.push_back({{}, FrameTape(model.state_size(), filter_.tape_rows())});
   filter_.restore(checkpoints_[first / stretch_]);
   filter_.report_sensors(false);
   for (std::size_t k = first; k < end; ++k) {
     Frame& frame = replayed_[k - first];
     filter_.record_to(&frame.tape);
-    if (k > 0) filter_.predict(time_[k] - time_[k - 1]);
-    filter_.update(Eigen::Map<const MarkerMatrix>(markers_ + 3 * m * k, 3, m),
-                   Eigen::Map<const Vector6>(wrench_ + 6 * k));
+    trial_.step(filter_, k);
     frame.filtered = filter_.belief();
     const Eigen::VectorXd& x = frame.filtered.x;
     if (!std::equal(x.begin(), x.end(), record.state.begin() + static_cast<std::ptrdiff_t>(k * n)))
@@ -78,7 +71,7 @@ std::size_t Smoother::backward(const RunRecord& record, SmoothRecord& out, Conta
     forward_kinematics(filter_.model(), smoothed_.x, kinematics_);
     subtree_dynamics(filter_.model(), smoothed_.x, kinematics_, dynamics_);
     out.report(k, smoothed_.x, smoothed_.P, kinematics_, dynamics_, contacts);
-    pass_.undo(frame.tape, k > 0 ? time_[k] - time_[k - 1] : 0.0);
+    pass_.undo(frame.tape, trial_.dt(k));
     out.backward_us[k] = std::chrono::duration<double, std::micro>(clock::now() - start).count();
   }
   left_ = first;

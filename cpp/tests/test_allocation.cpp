@@ -190,13 +190,12 @@ void check_contacts_allocate_nothing(const dynakin::ModelSpec& spec) {
   forward_kinematics(model, x, kinematics);
   subtree_dynamics(model, x, kinematics, dynamics);
   ContactMoments contacts(model, {0, static_cast<int>(model.segments().size()) - 1});
-  std::vector<FootLoad> loads(2);
+  ContactLoads loads(2);
   Eigen::VectorXd moments(model.coordinates().size());
   std::vector<double> moments_sd(model.coordinates().size()), wrench_sd(12);
   std::vector<Force> joints(model.segments().size());
-  for (const Contact first : {Contact::none, Contact::measured, Contact::unmeasured}) {
-    loads[0].contact = first;
-    loads[1].contact = Contact::measured;
+  for (const Contact first : {Contact::none, Contact::measured, Contact::unmeasured, Contact::shared}) {
+    loads.contact = {first, Contact::measured};
     const long before = allocations;
     CHECK(contacts.distribute(dynamics, loads));
     contacts.moments(kinematics, dynamics, moments);

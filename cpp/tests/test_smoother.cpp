@@ -8,8 +8,8 @@ using namespace dynakin;
 namespace {
 
 // A trial in which the markers wave about and one is lost for a while, with some lengths held by their bounds.
-struct Trial {
-  explicit Trial(const ModelSpec& spec, int frames = 23) : model(spec), settings(settings_for(model)) {
+struct Made {
+  explicit Made(const ModelSpec& spec, int frames = 23) : model(spec), settings(settings_for(model)) {
     settings.constraint = ConstraintKind::projection;
     const Block& lengths = model.layout().block("lengths");
     settings.upper.segment(lengths.offset, lengths.size) =
@@ -26,7 +26,7 @@ struct Trial {
   }
   SmoothRecord smoothed(std::size_t stretch) const {
     Filter f(model, settings, model.initial_state(), prior_for(model));
-    Smoother smoother(f, time.data(), markers.data(), wrench.data(), time.size(), stretch);
+    Smoother smoother(f, {time.data(), markers.data(), wrench.data(), time.size()}, stretch);
     RunRecord record(model, time.size());
     smoother.forward(0, 7, record);
     smoother.forward(7, time.size(), record);
@@ -52,7 +52,7 @@ struct Trial {
 
 TEST(smoothing_gives_the_same_bits_with_any_checkpoints) {
   for (const ModelSpec& spec : {planar_chain(), spatial_tree()}) {
-    const Trial trial(spec);
+    const Made trial(spec);
     const SmoothRecord whole = trial.smoothed(1000);
     for (std::size_t stretch : {0, 1, 4, 22}) {
       const SmoothRecord out = trial.smoothed(stretch);
@@ -63,7 +63,7 @@ TEST(smoothing_gives_the_same_bits_with_any_checkpoints) {
 }
 
 TEST(a_fixed_lag_ends_where_the_smoother_does) {
-  const Trial trial(spatial_tree());
+  const Made trial(spatial_tree());
   const SmoothRecord out = trial.smoothed(0);
   Filter f(trial.model, trial.settings, trial.model.initial_state(), prior_for(trial.model));
   FixedLag lag(f, 6, true);

@@ -1,5 +1,6 @@
-// Joint moments that leave no residual at the root: the feet's wrenches, changed as little as their uncertainty allows
-// so that they sum to what the state's mechanics needs (docs/derivations.md, section 15).
+// The wrenches of contacts and the joint moments that they leave: each contact has an expected wrench and a covariance
+// (a plate's with its errors, or a prior where no plate measures), and all are changed as little as these allow so that
+// they sum to what the state's mechanics needs (docs/derivations.md, section 15).
 #pragma once
 
 #include <cstdint>
@@ -11,71 +12,77 @@
 namespace dynakin {
 
 enum class Contact : std::uint8_t {
-  none,       // in the air: its wrench is zero, for sure
-  measured,   // on a plate
-  unmeasured  // on something that has no plate
+  none,        // nothing touches: its wrench is zero, for sure
+  measured,    // on a plate of its own
+  unmeasured,  // on something that has no plate: what is known of its wrench is a prior
+  shared       // on a plate that bears another contact too: the sum is measured, its parts are a prior's
 };
 
-// Where a coordinate's moment comes from.
+// Where a coordinate's moment comes from; the worst of the contacts that lie behind it.
 enum class MomentSource : std::uint8_t {
-  measured,  // no unmeasured contact lies behind the coordinate
+  measured,  // no unmeasured contact lies behind the coordinate, nor one that shares a plate with another
   derived,   // the only unmeasured one does: its wrench is what the motion leaves for it
-  unknown    // one of several does; the moment is NaN
+  prior      // one of several does, or one that shares a plate: how they divide the load is a prior's
 };
 
-// What is known of a foot's wrench, ground on person, about the ground origin. wrench and covariance (positive
-// definite) count where the contact is measured.
-struct FootLoad {
-  Contact contact = Contact::none;
-  Vector6 wrench = Vector6::Zero();
-  Matrix6 covariance = Matrix6::Identity();
+// What is known of the contacts' wrenches in a frame, on the person, about the ground origin. Where nothing touches,
+// wrench and covariance do not count. What covariances of different contacts share stands beside the diagonal: two
+// feet on one plate have a sum that is known better than its parts.
+struct ContactLoads {
+  explicit ContactLoads(std::size_t contacts);
+  std::vector<Contact> contact;
+  Eigen::VectorXd wrench;      // (6 contacts)
+  Eigen::MatrixXd covariance;  // (6 contacts, 6 contacts), symmetric; that of the sum is positive definite
 };
 
 // Allocated once for a model. distribute comes first; what follows is of the same state and loads.
 class ContactMoments {
  public:
-  // feet: a segment each, all different. Throws std::invalid_argument otherwise.
-  ContactMoments(const Model& model, std::vector<int> feet);
+  // segments: of the contacts, valid numbers. Throws std::invalid_argument otherwise.
+  ContactMoments(const Model& model, std::vector<int> segments);
 
-  int feet() const { return static_cast<int>(feet_.size()); }
+  int contacts() const { return static_cast<int>(segments_.size()); }
 
-  // loads: one a foot. False, and nothing else is defined, where the sum of the measured ones' covariances is not
-  // positive definite.
-  bool distribute(const DynamicState& dynamics, const std::vector<FootLoad>& loads);
+  // False, and nothing else is defined, where the covariance of the wrenches' sum is not positive definite.
+  bool distribute(const DynamicState& dynamics, const ContactLoads& loads);
 
-  // Of each foot: its wrench as used, and how far that is from the measured one (zero where it is not measured). NaN
-  // where it is not known.
+  // Of each contact: its wrench as used, and how far that is from the expected one.
   const std::vector<Vector6>& wrenches() const { return wrench_; }
   const std::vector<Vector6>& adjustments() const { return adjustment_; }
-  // What the state needs less the sum of the wrenches: zero if anything touches, what is left in flight, else NaN.
+  // What the state needs less the sum of the wrenches: zero, unless nothing touches.
   const Vector6& remainder() const { return remainder_; }
   const std::vector<MomentSource>& sources() const { return source_; }  // a coordinate each
 
   // (coordinates), N m or N, locked ones too.
   void moments(const KinematicState& state, const DynamicState& dynamics, Eigen::Ref<Eigen::VectorXd> out) const;
-  // d moments / dx (coordinates, n), the distribution changing with x; without meaning where the source is unknown.
+  // d moments / dx (coordinates, n), the distribution changing with x.
   void jacobian(const StateRef& x, const KinematicState& state, const DynamicState& dynamics,
                 Eigen::Ref<Eigen::MatrixXd> out);
-  // Standard deviations by the covariance of x and those of the measured wrenches: moments_sd (coordinates),
-  // wrench_sd (feet, 6).
+  // Standard deviations by the covariance of x and that of the expected wrenches: moments_sd (coordinates), wrench_sd
+  // (contacts, 6).
   void deviations(const StateRef& x, const KinematicState& state, const DynamicState& dynamics,
                   const Eigen::MatrixXd& P, double* moments_sd, double* wrench_sd);
 
  private:
-  void mark_sources(const std::vector<FootLoad>& loads, bool several);
+  void mark_sources();
   void levers(const KinematicState& state);
+  bool touches(std::size_t i) const { return loads_.contact[i] != Contact::none; }
+  auto block(std::size_t i, std::size_t j) const {
+    return loads_.covariance.block<6, 6>(static_cast<Eigen::Index>(6 * i), static_cast<Eigen::Index>(6 * j));
+  }
 
   const Model& model_;
-  std::vector<int> feet_;
-  std::vector<FootLoad> loads_;
+  std::vector<int> segments_;
+  ContactLoads loads_;
   std::vector<Vector6> wrench_, adjustment_;
-  std::vector<Matrix6> share_;  // A_i: what foot i takes of what the sum lacks
+  std::vector<Matrix6> with_sum_;  // C_i: covariance of contact i's wrench with the sum
+  std::vector<Matrix6> share_;     // A_i = C_i S^-1: what contact i takes of what the sum lacks
   Vector6 remainder_;
   std::vector<MomentSource> source_;
   std::vector<Force> external_;  // a segment each
   MomentWorkspace work_;
   using Lever = Eigen::Matrix<double, Eigen::Dynamic, 6>;
-  std::vector<Lever> lever_;  // G_i: d (power of foot i's wrench) / d speed of each coordinate
+  std::vector<Lever> lever_;  // G_i: d (power of contact i's wrench) / d speed of each coordinate
   Lever common_;              // D = sum of G_i A_i
   Eigen::Matrix<double, 6, Eigen::Dynamic> wrench_J_, wrench_JP_;
   Eigen::MatrixXd J_;

@@ -50,6 +50,9 @@ class Measurement {
 
   // Kinematics, dynamics and h(x), no derivatives.
   void evaluate(const Eigen::VectorXd& x);
+  // The wrench's covariance about the ground origin, positive definite, in the frames to come: where what bears the
+  // person changes from frame to frame. nullptr: as the settings have it.
+  void expect(const Matrix6* wrench_covariance);
   // Fills the blocks for what this frame measures. wrench: ground on person, about the ground origin; NaN missing.
   void linearise(const Eigen::VectorXd& x, const MarkerRef& markers, const Vector6& wrench);
 
@@ -61,7 +64,7 @@ class Measurement {
 
   const Model& model_;
   const FilterSettings& settings_;
-  Matrix6 wrench_covariance_;  // about the ground origin
+  Matrix6 wrench_covariance_, declared_covariance_;  // about the ground origin: of this frame, of the settings
   std::array<bool, 6> wrench_used_{};
   std::vector<std::vector<int>> slot_;  // a marker: state column -> place in its list
   MarkerMatrix marker_scratch_;

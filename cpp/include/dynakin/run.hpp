@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "dynakin/contact_record.hpp"
-#include "dynakin/filter.hpp"
+#include "dynakin/trial.hpp"
 #include "dynakin/output_sd.hpp"
 
 namespace dynakin {
@@ -44,7 +44,7 @@ struct RunRecord : StateRecord {
 // Frames first to end - 1, with a report on the sensors; frame 0 is an update only, the others step by the difference
 // of their times. With contacts, moments (and their deviations) are those that the feet's wrenches leave. Throws
 // DivergenceError naming the frame and its time.
-void run_frames(Filter& filter, const double* time, const double* markers, const double* wrench, std::size_t first,
-                std::size_t end, RunRecord& record, ContactRecord* contacts = nullptr);
+void run_frames(Filter& filter, const Trial& trial, std::size_t first, std::size_t end, RunRecord& record,
+                ContactRecord* contacts = nullptr);
 
 }  // namespace dynakin

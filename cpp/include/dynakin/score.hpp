@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "dynakin/filter.hpp"
+#include "dynakin/trial.hpp"
 
 namespace dynakin {
 
@@ -39,9 +39,7 @@ struct Score {
   std::vector<double> state, moments;  // (frames, n), (frames, coordinates), with `trace`
 };
 
-// time (frames,), markers (frames, M, 3), wrench (frames, 6) as for run_frames. Divergence is an outcome here, not an
-// exception, and ends the run.
-Score score_trial(Filter& filter, const double* time, const double* markers, const double* wrench, std::size_t frames,
-                  const ScoreOptions& options);
+// Divergence is an outcome here, not an exception, and ends the run.
+Score score_trial(Filter& filter, const Trial& trial, const ScoreOptions& options);
 
 }  // namespace dynakin

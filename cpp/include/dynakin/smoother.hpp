@@ -20,11 +20,9 @@ struct SmoothRecord : StateRecord {
 // where the run left it.
 class Smoother {
  public:
-  // Of all frames: time, markers (frames, M, 3) and wrench (frames, 6), which must outlive it. stretch: frames between
-  // checkpoints, 0: sqrt(frames). Throws std::invalid_argument where constraints are kept in a way that has no
-  // smoother.
-  Smoother(Filter& filter, const double* time, const double* markers, const double* wrench, std::size_t frames,
-           std::size_t stretch = 0);
+  // stretch: frames between checkpoints, 0: sqrt(frames). Throws std::invalid_argument where constraints are kept in a
+  // way that has no smoother.
+  Smoother(Filter& filter, const Trial& trial, std::size_t stretch = 0);
   ~Smoother() { filter_.record_to(nullptr); }
   Smoother(const Smoother&) = delete;
   Smoother& operator=(const Smoother&) = delete;
@@ -42,8 +40,8 @@ class Smoother {
   void replay(std::size_t first, std::size_t end, const RunRecord& record);
 
   Filter& filter_;
-  const double *time_, *markers_, *wrench_;
-  std::size_t frames_, stretch_, left_;
+  Trial trial_;
+  std::size_t stretch_, left_;
   std::vector<Filter::Checkpoint> checkpoints_;  // before each stretch and, last, after the run
   std::vector<Frame> replayed_;
   BackwardPass pass_;

@@ -8,14 +8,13 @@
 #include <optional>
 
 #include "arrays.hpp"
-#include "feet.hpp"
+#include "contacts.hpp"
 #include "module.hpp"
 
 using namespace dynakin;
 
 namespace {
 
-using Array4 = nb::ndarray<const double, nb::ndim<4>, nb::c_contig, nb::device::cpu>;
 using Codes = nb::ndarray<const std::uint8_t, nb::ndim<2>, nb::c_contig, nb::device::cpu>;
 
 std::string shape(std::initializer_list<std::size_t> sizes) {
@@ -24,24 +23,23 @@ std::string shape(std::initializer_list<std::size_t> sizes) {
   return text + ")";
 }
 
-FootLoads foot_loads(std::vector<std::string> segments, const Array3& wrench, const Array4& covariance,
-                     const Codes& contact) {
-  const std::size_t feet = segments.size(), frames = wrench.shape(0);
-  if (wrench.shape(1) != feet || wrench.shape(2) != 6)
-    throw std::invalid_argument("wrench: expected " + shape({frames, feet, 6}));
-  if (covariance.shape(0) != frames || covariance.shape(1) != feet || covariance.shape(2) != 6 ||
-      covariance.shape(3) != 6)
-    throw std::invalid_argument("covariance: expected " + shape({frames, feet, 6, 6}));
-  if (contact.shape(0) != frames || contact.shape(1) != feet)
-    throw std::invalid_argument("contact: expected " + shape({frames, feet}));
-  FootLoads out;
+PyContactLoads contact_loads(std::vector<std::string> segments, const Array3& wrench, const Array3& covariance,
+                             const Codes& contact) {
+  const std::size_t n = segments.size(), frames = wrench.shape(0);
+  if (wrench.shape(1) != n || wrench.shape(2) != 6)
+    throw std::invalid_argument("wrench: expected " + shape({frames, n, 6}));
+  if (covariance.shape(0) != frames || covariance.shape(1) != 6 * n || covariance.shape(2) != 6 * n)
+    throw std::invalid_argument("covariance: expected " + shape({frames, 6 * n, 6 * n}));
+  if (contact.shape(0) != frames || contact.shape(1) != n)
+    throw std::invalid_argument("contact: expected " + shape({frames, n}));
+  PyContactLoads out;
   out.names = std::move(segments);
   out.trial.frames = frames;
   out.trial.wrench.assign(wrench.data(), wrench.data() + wrench.size());
   out.trial.covariance.assign(covariance.data(), covariance.data() + covariance.size());
   for (std::size_t i = 0; i < contact.size(); ++i) {
-    if (contact.data()[i] > 2)
-      throw std::invalid_argument("contact: expected 0 (none), 1 (measured) or 2 (unmeasured), found " +
+    if (contact.data()[i] > static_cast<std::uint8_t>(Contact::shared))
+      throw std::invalid_argument("contact: expected 0 (none), 1 (measured), 2 (unmeasured) or 3 (shared), found " +
                                   std::to_string(contact.data()[i]));
     out.trial.contact.push_back(static_cast<Contact>(contact.data()[i]));
   }
@@ -63,26 +61,26 @@ struct At {
   DynamicState dynamics;
 };
 
-void check_frame(const FootLoads& loads, std::size_t frame) {
+void check_frame(const PyContactLoads& loads, std::size_t frame) {
   if (frame >= loads.trial.frames)
     throw std::invalid_argument("frame: " + std::to_string(frame) + ", expected less than " +
                                 std::to_string(loads.trial.frames));
 }
 
-nb::dict contact_moments(const Model& model, const StateRef& x, const FootLoads& loads, std::size_t frame,
+nb::dict contact_moments(const Model& model, const StateRef& x, const PyContactLoads& loads, std::size_t frame,
                          const std::optional<Eigen::MatrixXd>& P) {
   const At at(model, x);
   check_frame(loads, frame);
   if (P && (P->rows() != x.size() || P->cols() != x.size()))
     throw std::invalid_argument("covariance: expected " + shape({std::size_t(x.size()), std::size_t(x.size())}));
-  FeetTrial one = loads.of(model);
+  ContactTrial one = loads.of(model);
   const std::size_t feet = one.segments.size(), nc = model.coordinates().size();
   const auto keep = [&](auto& values, std::size_t each) {
     values.assign(values.begin() + static_cast<std::ptrdiff_t>(frame * each),
                   values.begin() + static_cast<std::ptrdiff_t>((frame + 1) * each));
   };
   keep(one.wrench, 6 * feet);
-  keep(one.covariance, 36 * feet);
+  keep(one.covariance, 36 * feet * feet);
   keep(one.contact, feet);
   one.frames = 1;
   ContactRecord record(model, one);
@@ -93,13 +91,13 @@ nb::dict contact_moments(const Model& model, const StateRef& x, const FootLoads&
   nb::dict out;
   out["moments"] = owned(std::move(moments), {nc});
   out["jacobian"] = RowMatrix(J);
-  out["foot_wrench"] = owned(std::move(record.foot_wrench), {feet, 6});
-  out["foot_adjustment"] = owned(std::move(record.foot_adjustment), {feet, 6});
+  out["foot_wrench"] = owned(std::move(record.wrench), {feet, 6});
+  out["foot_adjustment"] = owned(std::move(record.adjustment), {feet, 6});
   out["remainder"] = owned(std::move(record.remainder), {6});
   out["moment_source"] = owned(std::move(record.source), {nc});
   if (P) {
     out["moments_sd"] = owned(std::move(moments_sd), {nc});
-    out["foot_wrench_sd"] = owned(std::move(record.foot_wrench_sd), {feet, 6});
+    out["foot_wrench_sd"] = owned(std::move(record.wrench_sd), {feet, 6});
   }
   return out;
 }
@@ -124,9 +122,10 @@ nb::dict whole_body(const Model& model, const Array2& states, const std::vector<
       Eigen::Map<Vector3>(centre.data() + 3 * k) = c.position;
       Eigen::Map<Vector3>(velocity.data() + 3 * k) = c.velocity;
       mass[k] = at.dynamics.mass;
+      std::fill(external.begin(), external.end(), Force{});
       for (std::size_t i = 0; i < feet.size(); ++i) {
         const double* w = wrench->data() + 6 * (k * feet.size() + i);
-        external[feet[i]] = {Eigen::Map<const Vector3>(w), Eigen::Map<const Vector3>(w + 3)};
+        external[feet[i]] += {Eigen::Map<const Vector3>(w), Eigen::Map<const Vector3>(w + 3)};
       }
       joint_loads(model, at.kinematics, at.dynamics, &external, joints);
       for (std::size_t i = 0; i < ns; ++i) {
@@ -166,23 +165,24 @@ std::vector<int> segment_indices(const Model& model, const std::vector<std::stri
 }
 
 void bind_contacts(nb::module_& m) {
-  nb::class_<FootLoads>(m, "FootLoads", "Wrenches of the feet over a trial, how sure they are, and what touches.")
+  nb::class_<PyContactLoads>(m, "ContactLoads", "Wrenches of contacts over a trial as they are expected, how sure that is, and what touches.")
       .def(
           "__init__",
-          [](FootLoads* self, std::vector<std::string> segments, const Array3& wrench, const Array4& covariance,
+          [](PyContactLoads* self, std::vector<std::string> segments, const Array3& wrench, const Array3& covariance,
              const Codes& contact) {
-            new (self) FootLoads(foot_loads(std::move(segments), wrench, covariance, contact));
+            new (self) PyContactLoads(contact_loads(std::move(segments), wrench, covariance, contact));
           },
           nb::arg("segments"), nb::arg("wrench"), nb::arg("covariance"), nb::arg("contact"),
-          "segments: a name a foot. wrench (T, F, 6) N and N m, ground on person, about the ground origin; covariance "
-          "(T, F, 6, 6) of each, positive definite; contact (T, F) uint8: 0 in the air, 1 measured, 2 not measured. "
-          "wrench and covariance count where 1. Raises ValueError for other shapes or codes.");
+          "segments: a name a contact. wrench (T, C, 6) N and N m, on the person, about the ground origin; covariance "
+          "(T, 6 C, 6 C), that of the sum positive definite; contact (T, C) uint8: 0 nothing touches, 1 on a plate, 2 "
+          "not measured, 3 on a plate with another contact. Raises ValueError for other shapes or codes.");
   m.def("contact_moments", &contact_moments, nb::arg("model"), nb::arg("x"), nb::arg("loads"), nb::arg("frame") = 0,
         nb::arg("covariance") = nb::none(),
-        "Joint moments with the feet's wrenches of one frame, changed as little as their covariances allow to give the "
-        "wrench that x needs. A dict: moments (C,), N m or N; jacobian, d moments / dx (C, n); foot_wrench (F, 6) as "
-        "used; foot_adjustment (F, 6), its change; remainder (6,) that no foot gives; moment_source (C,): 0 measured, "
-        "1 derived from the motion, 2 unknown (NaN); with the covariance (n, n) of x also moments_sd, foot_wrench_sd.");
+        "Joint moments with the contacts' wrenches of one frame, changed as little as their covariance allows to give "
+        "the wrench that x needs. A dict: moments (J,), N m or N; jacobian, d moments / dx (J, n); foot_wrench (C, 6) "
+        "as used; foot_adjustment (C, 6), its change; remainder (6,) that no contact gives; moment_source (J,): 0 "
+        "measured, 1 derived from the motion, 2 divided by a prior; with the covariance (n, n) of x also moments_sd, "
+        "foot_wrench_sd.");
   m.def(
       "whole_body", &whole_body, nb::arg("model"), nb::arg("states"), nb::arg("segments") = std::vector<std::string>(),
       nb::arg("foot_wrench") = nb::none(),

@@ -135,17 +135,20 @@ void bind_filter(nb::module_& m) {
       .def("predict", &Filter::predict, nb::arg("dt"), "Moves the state by dt seconds.")
       .def(
           "update",
-          [](Filter& f, const Array2& markers, const Vector6& wrench) {
-            return f.update(marker_map(markers, f.model()), wrench);
+          [](Filter& f, const Array2& markers, const Vector6& wrench, const std::optional<Matrix6>& wrench_covariance) {
+            return f.update(marker_map(markers, f.model()), wrench, wrench_covariance ? &*wrench_covariance : nullptr);
           },
-          nb::arg("markers"), nb::arg("wrench"),
-          "Corrects with markers (M, 3), m, and wrench (6,), N and N m about the ground origin; NaN: missing.")
+          nb::arg("markers"), nb::arg("wrench"), nb::arg("wrench_covariance") = nb::none(),
+          "Corrects with markers (M, 3), m, and wrench (6,), N and N m about the ground origin; NaN: missing. "
+          "wrench_covariance (6, 6), about the ground origin, takes the place of the settings' in this frame.")
       .def(
           "step",
-          [](Filter& f, double dt, const Array2& markers, const Vector6& wrench) {
-            return f.step(dt, marker_map(markers, f.model()), wrench);
+          [](Filter& f, double dt, const Array2& markers, const Vector6& wrench,
+             const std::optional<Matrix6>& wrench_covariance) {
+            return f.step(dt, marker_map(markers, f.model()), wrench, wrench_covariance ? &*wrench_covariance : nullptr);
           },
-          nb::arg("dt"), nb::arg("markers"), nb::arg("wrench"), "predict(dt), then update(markers, wrench).");
+          nb::arg("dt"), nb::arg("markers"), nb::arg("wrench"), nb::arg("wrench_covariance") = nb::none(),
+          "predict(dt), then update(markers, wrench, wrench_covariance).");
   bind_run(filter);
   bind_score(filter);
 }

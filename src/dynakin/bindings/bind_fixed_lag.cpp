@@ -1,5 +1,8 @@
 #include <nanobind/eigen/dense.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/optional.h>
+
+#include <optional>
 
 #include "arrays.hpp"
 #include "dynakin/fixed_lag.hpp"
@@ -31,11 +34,13 @@ void bind_fixed_lag(nb::module_& m) {
            "proportion to the lag; with deviations much more.")
       .def(
           "step",
-          [](FixedLag& lag, double dt, const Array2& markers, const Vector6& wrench) {
-            return lag.step(dt, marker_map(markers, lag.filter().model()), wrench);
+          [](FixedLag& lag, double dt, const Array2& markers, const Vector6& wrench,
+             const std::optional<Matrix6>& wrench_covariance) {
+            return lag.step(dt, marker_map(markers, lag.filter().model()), wrench,
+                            wrench_covariance ? &*wrench_covariance : nullptr);
           },
-          nb::arg("dt"), nb::arg("markers"), nb::arg("wrench"),
-          "dt s since the frame before (the first frame is an update only), markers (M, 3), wrench (6,).")
+          nb::arg("dt"), nb::arg("markers"), nb::arg("wrench"), nb::arg("wrench_covariance") = nb::none(),
+          "As of Filter.step: dt s since the frame before (the first frame is an update only), markers (M, 3), wrench (6,).")
       .def_prop_ro("lag", &FixedLag::lag, "frames")
       .def_prop_ro("ready", &FixedLag::ready, "whether there is a smoothed frame yet")
       .def_prop_ro("delay_s", &FixedLag::delay, "how far the smoothed frame lies back")

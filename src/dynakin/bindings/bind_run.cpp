@@ -6,7 +6,7 @@
 
 #include "arrays.hpp"
 #include "dynakin/smoother.hpp"
-#include "feet.hpp"
+#include "contacts.hpp"
 #include "module.hpp"
 #include "trial.hpp"
 
@@ -60,7 +60,7 @@ nb::dict arrays_of(RunRecord&& record, std::size_t frames) {
 
 // What a run needs of the feet, where there are any.
 struct Feet {
-  Feet(const Model& model, const FootLoads* loads, std::size_t frames) {
+  Feet(const Model& model, const PyContactLoads* loads, std::size_t frames) {
     if (!loads) return;
     if (loads->trial.frames != frames)
       throw std::invalid_argument("feet: loads of " + std::to_string(loads->trial.frames) + " frames, expected " +
@@ -76,26 +76,26 @@ struct Feet {
     if (!record) return;
     const std::size_t frames = trial.frames, feet = trial.segments.size(), nc = model.coordinates().size();
     const auto key = [&](const char* name) { return nb::str((prefix + name).c_str()); };
-    out[key("foot_wrench")] = owned(std::move(record->foot_wrench), {frames, feet, 6});
-    out[key("foot_adjustment")] = owned(std::move(record->foot_adjustment), {frames, feet, 6});
+    out[key("foot_wrench")] = owned(std::move(record->wrench), {frames, feet, 6});
+    out[key("foot_adjustment")] = owned(std::move(record->adjustment), {frames, feet, 6});
     out[key("remainder")] = owned(std::move(record->remainder), {frames, 6});
     out[key("moment_source")] = owned(std::move(record->source), {frames, nc});
-    if (deviations) out[key("foot_wrench_sd")] = owned(std::move(record->foot_wrench_sd), {frames, feet, 6});
+    if (deviations) out[key("foot_wrench_sd")] = owned(std::move(record->wrench_sd), {frames, feet, 6});
   }
-  FeetTrial trial;
+  ContactTrial trial;
   std::optional<ContactRecord> record;
 };
 
 nb::dict run(Filter& filter, const Array1& time, const Array3& markers, const Array2& wrench, nb::object progress,
-             bool output_sd, const FootLoads* loads) {
-  const Trial trial(filter, time, markers, wrench);
+             bool output_sd, const PyContactLoads* loads, const std::optional<Array3>& wrench_covariance) {
+  const Trial trial = trial_of(filter, time, markers, wrench, wrench_covariance);
   Feet feet(filter.model(), loads, trial.frames);
   RunRecord record(filter.model(), trial.frames, output_sd);
   for (std::size_t first = 0; first < trial.frames; first += k_stretch) {
     const std::size_t end = std::min(trial.frames, first + k_stretch);
     {
       nb::gil_scoped_release release;
-      run_frames(filter, trial.time, trial.markers, trial.wrench, first, end, record, feet.pointer());
+      run_frames(filter, trial, first, end, record, feet.pointer());
     }
     look_up(progress, end, trial.frames);
   }
@@ -105,11 +105,12 @@ nb::dict run(Filter& filter, const Array1& time, const Array3& markers, const Ar
 }
 
 nb::dict run_smoothed(Filter& filter, const Array1& time, const Array3& markers, const Array2& wrench,
-                      nb::object progress, bool output_sd, std::size_t stretch, const FootLoads* loads) {
-  const Trial trial(filter, time, markers, wrench);
+                      nb::object progress, bool output_sd, std::size_t stretch, const PyContactLoads* loads,
+                      const std::optional<Array3>& wrench_covariance) {
+  const Trial trial = trial_of(filter, time, markers, wrench, wrench_covariance);
   Feet feet(filter.model(), loads, trial.frames), smoothed_feet(filter.model(), loads, trial.frames);
   const std::size_t frames = trial.frames;
-  Smoother smoother(filter, trial.time, trial.markers, trial.wrench, frames, stretch);
+  Smoother smoother(filter, trial, stretch);
   RunRecord record(filter.model(), frames, output_sd);
   for (std::size_t first = 0; first < frames; first += k_stretch) {
     const std::size_t end = std::min(frames, first + k_stretch);
@@ -140,16 +141,16 @@ nb::dict run_smoothed(Filter& filter, const Array1& time, const Array3& markers,
 void bind_run(nb::class_<Filter>& filter) {
   filter
       .def("run", &run, nb::arg("time"), nb::arg("markers"), nb::arg("wrench"), nb::arg("progress") = nb::none(),
-           nb::arg("output_sd") = false, nb::arg("feet") = nb::none(),
+           nb::arg("output_sd") = false, nb::arg("feet") = nb::none(), nb::arg("wrench_covariance") = nb::none(),
            "Runs over time (T,), markers (T, M, 3) and wrench (T, 6); the first frame is an update only. Returns "
-           "arrays by name; with output_sd also markers_sd, wrench_sd (of the body's own wrench) and moments_sd. "
+           "arrays by name; wrench_covariance (T, 6, 6), about the ground origin, takes the place of the settings'; with output_sd also markers_sd, wrench_sd (of the body's own wrench) and moments_sd. "
            "With feet the moments are those of contact_moments, and foot_wrench, foot_adjustment, remainder, "
            "moment_source "
            "(and foot_wrench_sd) come with them. "
            "Raises DivergenceError naming the frame. progress(done, total) is called now and then.")
       .def("run_smoothed", &run_smoothed, nb::arg("time"), nb::arg("markers"), nb::arg("wrench"),
            nb::arg("progress") = nb::none(), nb::arg("output_sd") = false, nb::arg("stretch") = 0,
-           nb::arg("feet") = nb::none(),
+           nb::arg("feet") = nb::none(), nb::arg("wrench_covariance") = nb::none(),
            "run, then backwards over the same frames: the arrays of run, and smoothed_state, _markers, _wrench and "
            "_moments, each also with _sd, and backward_us. The filter then stands where run would have left it; after "
            "an interruption it stands anywhere. progress counts both ways: total is twice the frames. Memory beside "

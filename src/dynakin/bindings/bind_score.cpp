@@ -20,7 +20,7 @@ void add_sums(ChannelSums&& sums, const std::string& name, nb::dict& out) {
 
 nb::dict score(Filter& filter, const Array1& time, const Array3& markers, const Array2& wrench, std::size_t first,
                std::size_t end, std::size_t ahead, double lost_m, bool trace) {
-  const Trial trial(filter, time, markers, wrench);
+  const Trial trial = trial_of(filter, time, markers, wrench);
   const Model& model = filter.model();
   ScoreOptions options;
   options.first = first;
@@ -30,7 +30,7 @@ nb::dict score(Filter& filter, const Array1& time, const Array3& markers, const 
   options.trace = trace;
   Score found = [&] {
     nb::gil_scoped_release release;
-    return score_trial(filter, trial.time, trial.markers, trial.wrench, trial.frames, options);
+    return score_trial(filter, trial, options);
   }();
   nb::dict out;
   add_sums(std::move(found.estimated), "estimated", out);

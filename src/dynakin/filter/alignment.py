@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.filter.closure import plates_misfit
-from dynakin.filter.foot_wrenches import FootWrenches
+from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.samples import in_step
 from dynakin.filter.tracker import Progress, Tracker
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -42,7 +42,7 @@ def run_in_step(
     markers: Array,
     wrench: Array,
     progress: Progress | None = None,
-    feet: FootWrenches | None = None,
+    feet: ContactLoads | None = None,
     passes: int = PASSES,
 ) -> InStep:
     """`Tracker.run_arrays`, again (``passes`` times at most) with the plates brought into step where they turn out to

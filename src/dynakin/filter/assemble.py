@@ -12,10 +12,10 @@ import xarray as xr
 from dynakin.arrays import finite
 from dynakin.bindings import _core
 from dynakin.filter.events import events_of
-from dynakin.filter.foot_wrenches import FootWrenches
+from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.parameters import parameters_of
 from dynakin.filter.sources import with_sources
-from dynakin.filter.total_wrench import ELSEWHERE
+from dynakin.filter.contacts import RESIDUAL
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.contact import ON_PLATE
 from dynakin.recordings.recording import Recording
@@ -35,7 +35,7 @@ def assemble(
     config: dict[str, Any],
     notes: Sequence[str],
     covariances: tuple[Array, Array],
-    feet: FootWrenches | None = None,
+    feet: ContactLoads | None = None,
     undeclared: npt.NDArray[np.bool_] | None = None,
 ) -> Estimate:
     """Label what `Filter.run` returned and keep what is needed to judge it.
@@ -52,7 +52,7 @@ def assemble(
     data = _dataset(arrays, model, initial, recording, measured, feet)
     data = with_sources(data, feet, np.zeros(len(recording.time), dtype=bool) if undeclared is None else undeclared)
     if feet is not None:
-        data = data.isel(foot=[name != ELSEWHERE for name in feet.names])
+        data = data.isel(foot=[name != RESIDUAL for name in feet.names])
     for name, covariance in zip(("initial_covariance", "final_covariance"), covariances, strict=True):
         data[name] = (("element", "element_"), covariance)
     prior_sd = np.sqrt(np.diag(covariances[0]))
@@ -103,7 +103,7 @@ def _dataset(
     initial: CalibratedModel,
     recording: Recording,
     measured: tuple[Array, Array],
-    feet: FootWrenches | None,
+    feet: ContactLoads | None,
 ) -> xr.Dataset:
     spec = initial.spec
     axes = np.array(spec.markers[0].measured)
@@ -171,10 +171,10 @@ def _sensors(arrays: Mapping[str, Array]) -> dict[str, Any]:
     return data
 
 
-def _feet(arrays: Mapping[str, Array], feet: FootWrenches) -> dict[str, Any]:
+def _feet(arrays: Mapping[str, Array], feet: ContactLoads) -> dict[str, Any]:
     per_foot = ("time", "foot", "component")
     measured = np.where((feet.contact == ON_PLATE)[..., None], feet.wrench, np.nan)
-    others = [k for k, name in enumerate(feet.names) if name == ELSEWHERE]
+    others = [k for k, name in enumerate(feet.names) if name == RESIDUAL]
     no_feet = arrays["remainder"] + np.asarray(arrays["foot_wrench"])[:, others].sum(axis=1)  # a seat's, say
     return {
         "foot_contact": (("time", "foot"), feet.contact),
@@ -205,7 +205,7 @@ def _coordinate_blocks(arrays: Mapping[str, Array], model: _core.Model) -> dict[
 
 
 def _body(
-    arrays: Mapping[str, Array], model: _core.Model, axes: Array, modelled: Array, feet: FootWrenches | None
+    arrays: Mapping[str, Array], model: _core.Model, axes: Array, modelled: Array, feet: ContactLoads | None
 ) -> dict[str, Any]:
     """Joint centres, centre of mass and loads of the joints; out of a model's plane they are NaN."""
     on_feet = () if feet is None else (list(feet.segments), np.ascontiguousarray(arrays["foot_wrench"]))

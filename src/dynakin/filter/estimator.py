@@ -13,9 +13,10 @@ from dynakin.errors import ConfigError, RecordingError
 from dynakin.filter.alignment import PASSES, run_in_step
 from dynakin.filter.assemble import assemble
 from dynakin.filter.augment import initial_covariance
-from dynakin.filter.foot_wrenches import FootWrenches
+from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.samples import in_step, recording_arrays
-from dynakin.filter.total_wrench import Ground, doubtful_mass, foot_wrenches, known_ground
+from dynakin.filter.expected import expected_loads, root_path
+from dynakin.filter.total_wrench import Ground, doubtful_mass, known_ground
 from dynakin.filter.tracker import Progress, Tracker, whether_to_smooth
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.loads import with_loads
@@ -32,7 +33,7 @@ from dynakin.settings.strict import nearest
 from dynakin.settings.subject import CarriedLoad
 
 Array = npt.NDArray[np.float64]
-Feet = Callable[[CalibratedModel], FootWrenches | None]
+Feet = Callable[[CalibratedModel], ContactLoads | None]
 
 LARGEST_LAG = 1000
 """Frames. Each step goes back over all of them and each keeps its covariance: a whole body's take half a gigabyte, and
@@ -206,7 +207,7 @@ class Estimator:
         if feet is not None:
             on_feet = feet(calibrated)
         elif ground.loads is not None:
-            on_feet = foot_wrenches(ground.loads, calibrated, self.noise)
+            on_feet = expected_loads(ground.loads, calibrated, self.noise, root_path(calibrated, markers), ground.undeclared)
         try:
             doubt = doubtful_mass(wrench, calibrated.weighed_kg, ground.load_ratio)
             passes = 0 if doubt else PASSES

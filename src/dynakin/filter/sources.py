@@ -6,15 +6,15 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
-from dynakin.filter.foot_wrenches import FootWrenches
-from dynakin.recordings.feet.contact import UNMEASURED
-from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED
+from dynakin.filter.contacts import ContactLoads
+from dynakin.recordings.feet.contact import SHARED_PLATE, UNMEASURED
+from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, PRIOR
 
 Flags = npt.NDArray[np.bool_]
 Codes = npt.NDArray[np.uint8]
 
 
-def with_sources(data: xr.Dataset, feet: FootWrenches | None, undeclared: Flags) -> xr.Dataset:
+def with_sources(data: xr.Dataset, feet: ContactLoads | None, undeclared: Flags) -> xr.Dataset:
     """The dataset of an estimate with ``moment_source`` and ``joint_source``, and NaN where a source is unknown.
 
     A load that depends on one unmeasured contact is derived from the motion, on several it is not known. Where
@@ -56,11 +56,12 @@ def with_sources(data: xr.Dataset, feet: FootWrenches | None, undeclared: Flags)
 def _behind(contact: Codes, at: list[int], parents: npt.NDArray[np.int_]) -> Codes:
     """(T, J) codes of the joints' loads by the unmeasured contacts (T, F) that lie behind each."""
     lacks = contact == UNMEASURED
-    code = np.where(lacks.sum(axis=1) > 1, ABSENT, DERIVED)
+    code = np.where(lacks, np.where(lacks.sum(axis=1) > 1, PRIOR, DERIVED)[:, None], MEASURED)
+    code = np.where(contact == SHARED_PLATE, PRIOR, code)
     joints = np.zeros((len(contact), len(parents)), dtype=np.uint8)
     for k, segment in enumerate(at):
         while segment >= 0:
-            joints[lacks[:, k], segment] = code[lacks[:, k]]
+            joints[:, segment] = np.maximum(joints[:, segment], code[:, k])
             segment = int(parents[segment])
     return joints
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from dynakin.arrays import runs
 from dynakin.errors import RecordingError
 from dynakin.filter.closure import EXCESS, Closure, closure
-from dynakin.filter.foot_wrenches import FootWrenches
+from dynakin.filter.contacts import ContactLoads
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet import loads as on_plates
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED, distance_to_hull
@@ -50,7 +50,7 @@ _SHARED_REACH_M = 0.1
 """How far, as an arm of that force, its point may err."""
 
 
-def foot_wrenches(loads: FootLoads, initial: CalibratedModel, noise: Noise) -> FootWrenches:
+def foot_wrenches(loads: FootLoads, initial: CalibratedModel, noise: Noise) -> ContactLoads:
     """Each foot's wrench with its uncertainty: the plates' noise at the foot's centre of pressure. Last comes the
     contact `ELSEWHERE`, not measured in the frames in which something else may bear the person.
 
@@ -69,7 +69,7 @@ def foot_wrenches(loads: FootLoads, initial: CalibratedModel, noise: Noise) -> F
     moment = np.hypot(np.sqrt(noise.moment_variance_n2_m2 / 2.0), _SHARED_REACH_M * shared[..., None])
     root = next(s.name for s in initial.spec.segments if s.parent == "ground")
     names, segments = (*loads.feet, ELSEWHERE), [*(initial.feet[foot] for foot in loads.feet), root]
-    return FootWrenches.of(names, segments, wrench, contact, force, moment, pressure)
+    return ContactLoads.of(names, segments, wrench, contact, force, moment, pressure)
 
 
 @dataclass(frozen=True, eq=False)

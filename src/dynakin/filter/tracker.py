@@ -11,7 +11,7 @@ import numpy.typing as npt
 from dynakin.bindings import _core
 from dynakin.errors import ConfigError, DivergenceError, RecordingError
 from dynakin.filter.core_filter import core_filter
-from dynakin.filter.foot_wrenches import FootWrenches
+from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.samples import Sample, sample_arrays
 from dynakin.filter.step import Labelled, Labels, StepEstimate, deviations_of, step_estimate
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -50,7 +50,7 @@ class Tracker:
         self._labels = Labels.of(self.core_model)
         self._time: float | None = None
         self._latest: StepEstimate | None = None
-        self._stepped: deque[tuple[float, _core.FootLoads | None]] = deque(maxlen=lag + 1)
+        self._stepped: deque[tuple[float, _core.ContactLoads | None]] = deque(maxlen=lag + 1)
 
     def fresh(self) -> Tracker:
         """Another one, at the start of the same model."""
@@ -85,7 +85,7 @@ class Tracker:
             self._latest = step_estimate(self.core_model, self._labels, time, self.state, None)
         return self._latest
 
-    def step(self, sample: Sample, feet: FootWrenches | None = None) -> StepEstimate:
+    def step(self, sample: Sample, feet: ContactLoads | None = None) -> StepEstimate:
         """Take one sample; samples come in the order of their times.
 
         The six rows of the wrench are the sum of the sample's plates. For a model with a floating root give plates
@@ -108,12 +108,15 @@ class Tracker:
         if dt < 0.0:
             raise RecordingError(f"sample at {sample.time_s} s: older than the one before, at {self._time} s")
         loads = self._loads(feet)
+        covariance = None
+        if feet is not None:
+            wrench, covariance = (values[0] for values in feet.total())
         if self._lag is not None:
-            report = self._lag.step(dt, markers, wrench)
+            report = self._lag.step(dt, markers, wrench, covariance)
         else:
             if self._time is not None:
                 self._filter.predict(dt)
-            report = self._filter.update(markers, wrench)
+            report = self._filter.update(markers, wrench, covariance)
         if report.diverged:
             raise DivergenceError(f"the filter diverged at {sample.time_s} s: {report.status}")
         self._time = sample.time_s
@@ -155,7 +158,7 @@ class Tracker:
         markers: Array,
         wrench: Array,
         progress: Progress | None = None,
-        feet: FootWrenches | None = None,
+        feet: ContactLoads | None = None,
     ) -> dict[str, Array]:
         """Go on over arrays, from the present state.
 
@@ -171,7 +174,10 @@ class Tracker:
             DivergenceError: the filter lost its estimate; the message names the frame.
         """
         time, markers, wrench = (np.ascontiguousarray(values) for values in (time, markers, wrench))
-        arrays = self._filter.run(time, markers, wrench, progress, output_sd=True, feet=self._loads(feet))
+        wrench, covariance = (wrench, None) if feet is None else feet.total()
+        arrays = self._filter.run(
+            time, markers, wrench, progress, output_sd=True, feet=self._loads(feet), wrench_covariance=covariance
+        )
         self._time, self._latest = float(time[-1]), None
         return arrays
 
@@ -181,7 +187,7 @@ class Tracker:
         markers: Array,
         wrench: Array,
         progress: Progress | None = None,
-        feet: FootWrenches | None = None,
+        feet: ContactLoads | None = None,
     ) -> dict[str, Array]:
         """`run_arrays`, then backwards over the same frames: the smoothed arrays take the places of the filtered.
 
@@ -190,11 +196,14 @@ class Tracker:
         """
         check_can_smooth(self.noise)
         time, markers, wrench = (np.ascontiguousarray(values) for values in (time, markers, wrench))
-        arrays = self._filter.run_smoothed(time, markers, wrench, progress, feet=self._loads(feet))
+        wrench, covariance = (wrench, None) if feet is None else feet.total()
+        arrays = self._filter.run_smoothed(
+            time, markers, wrench, progress, feet=self._loads(feet), wrench_covariance=covariance
+        )
         self._time, self._latest = float(time[-1]), None
         return smoothed(arrays)
 
-    def _loads(self, feet: FootWrenches | None) -> _core.FootLoads | None:
+    def _loads(self, feet: ContactLoads | None) -> _core.ContactLoads | None:
         if feet is None:
             return None
         feet.check(self.core_model)

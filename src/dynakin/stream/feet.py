@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.bindings import _core
-from dynakin.filter.foot_wrenches import FootWrenches
+from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.total_wrench import foot_wrenches
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.contact import AFTER_S, ALOFT_M, NEAR_FLOOR_M, SLOW_M_S, distance_to_hull
@@ -67,7 +67,7 @@ class LiveFeet:
 
     def look(
         self, model: _core.Model, state: Array, time_s: float, wrenches: Array | None
-    ) -> tuple[FootWrenches, bool]:
+    ) -> tuple[ContactLoads, bool]:
         """The feet's wrenches at a time (T = 1), and whether the sum of the plates is the total wrench.
 
         Args:

@@ -16,7 +16,7 @@ from dynakin.recordings.standing import marker_speeds
 
 Flags = npt.NDArray[np.bool_]
 
-NO_CONTACT, ON_PLATE, UNMEASURED = range(3)
+NO_CONTACT, ON_PLATE, UNMEASURED, SHARED_PLATE = range(4)
 """Status of a contact, which is a segment that something may push (a foot), in a frame: nothing touches it and its
 wrench is zero; plates bear it; it touches something that measures nothing. Codes of ``foot_contact``."""
 NEAR_FLOOR_M = 0.025

@@ -19,13 +19,14 @@ from dynakin.results.naming import listed, sentence, words
 Array = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.uint8]
 
-MEASURED, DERIVED, ABSENT = range(3)
+MEASURED, DERIVED, PRIOR, ABSENT = range(4)
 """Codes of ``moment_source`` and ``joint_source``."""
-MEANINGS = ("measured", "derived", "absent")
+MEANINGS = ("measured", "derived", "prior", "absent")
 NOTES = (
     "0 measured: the ground's reaction behind it is measured, or there is none (a foot in the air, an arm).",
     "1 derived: from the motion, because one contact behind it is not measured.",
-    "2 absent: not known, the value is nan.",
+    "2 prior: several contacts behind it are not measured each on its own; how they divide the load is assumed.",
+    "3 absent: not known, the value is nan.",
 )
 """What the codes say, for the headers of files."""
 _JOINTS = {"hip": "hip", "knee": "knee", "tibia": "knee", "ankle": "ankle", "subtalar": "ankle"}

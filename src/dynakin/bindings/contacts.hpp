@@ -1,4 +1,4 @@
-// The feet's loads as Python hands them in: segments by name.
+// The contacts' loads as Python hands them in: segments by name.
 #pragma once
 
 #include <string>
@@ -11,12 +11,12 @@ using RowMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::R
 // Throws std::invalid_argument naming the segment that is not there, and those that are.
 std::vector<int> segment_indices(const dynakin::Model& model, const std::vector<std::string>& names);
 
-struct FootLoads {
-  dynakin::FeetTrial of(const dynakin::Model& model) const {
-    dynakin::FeetTrial out = trial;
+struct PyContactLoads {
+  dynakin::ContactTrial of(const dynakin::Model& model) const {
+    dynakin::ContactTrial out = trial;
     out.segments = segment_indices(model, names);
     return out;
   }
   std::vector<std::string> names;
-  dynakin::FeetTrial trial;  // its segments still empty
+  dynakin::ContactTrial trial;  // its segments still empty
 };

@@ -1,0 +1,133 @@
+"""What is known of each contact's wrench in each frame: what the filter's total and the moments are made of."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.bindings import _core
+from dynakin.errors import ModelError
+from dynakin.filter.samples import in_step
+from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
+
+Array = npt.NDArray[np.float64]
+Codes = npt.NDArray[np.uint8]
+Flags = npt.NDArray[np.bool_]
+
+RESIDUAL = "residual"
+"""Name of the contact that is none: what the model does not explain, on the root (docs/design.md)."""
+
+
+@dataclass(frozen=True, eq=False)
+class ContactLoads:
+    """Expected wrenches of C contacts over T frames, on the person, ground frame, about the ground's origin.
+
+    Attributes:
+        names: of the contacts ("right", "left", "seat").
+        segments: of the model, one a contact.
+        wrench: (T, C, 6) N and N m: what the plates measured, or what is expected where none does; 0 where nothing
+            touches.
+        covariance: (T, 6 C, 6 C) of their errors; those of contacts that share a plate go together.
+        contact: (T, C) NO_CONTACT, ON_PLATE, UNMEASURED or SHARED_PLATE.
+        known: (T,) frames in which these contacts are all that acts on the person: in others the filter takes nothing
+            from their sum.
+    """
+
+    names: tuple[str, ...]
+    segments: tuple[str, ...]
+    wrench: Array
+    covariance: Array
+    contact: Codes
+    known: Flags
+
+    @classmethod
+    def of(
+        cls,
+        names: Sequence[str],
+        segments: Sequence[str],
+        wrench: Array,
+        contact: npt.ArrayLike,
+        force_sd: npt.ArrayLike,
+        moment_sd: npt.ArrayLike,
+        reference: npt.ArrayLike,
+    ) -> ContactLoads:
+        """With independent errors that are given about a reference point: 20 N there are 20 N m at a metre's distance.
+
+        Args:
+            force_sd: N, of each component; moment_sd: N m, about the reference point. Both broadcast to (T, C, 3).
+            reference: m, ground frame, broadcast to (T, C, 3): the plate's middle, say.
+        """
+        codes = np.ascontiguousarray(contact, dtype=np.uint8)
+        shape = (*codes.shape, 3)
+        force, moment, point = (np.broadcast_to(np.asarray(a, float), shape) for a in (force_sd, moment_sd, reference))
+        variance = np.concatenate([force, moment], axis=-1) ** 2
+        each = about_origin(variance[..., None] * np.eye(6), point)
+        known = np.where((codes == NO_CONTACT)[..., None], 0.0, wrench)
+        return cls(tuple(names), tuple(segments), known, _joint(each), codes, np.ones(len(codes), dtype=bool))
+
+    def check(self, model: _core.Model) -> None:
+        """
+        Raises:
+            ModelError: a segment that the model does not have; an expected wrench that is NaN.
+        """
+        for name, segment in zip(self.names, self.segments, strict=True):
+            if segment not in model.segment_names:
+                raise ModelError(
+                    f"contact {name!r}: segment {segment!r} is not in the model, expected one of "
+                    f"{', '.join(model.segment_names)}"
+                )
+        bad = np.argwhere((self.contact != NO_CONTACT) & ~np.isfinite(self.wrench).all(axis=2))
+        if len(bad):
+            frame, contact = bad[0]
+            raise ModelError(
+                f"contact {self.names[contact]!r}: in frame {frame + 1} its wrench is {self.wrench[frame, contact]}, "
+                "expected numbers"
+            )
+
+    def core(self) -> _core.ContactLoads:
+        """As the core takes them."""
+        return _core.ContactLoads(
+            list(self.segments),
+            np.ascontiguousarray(self.wrench),
+            np.ascontiguousarray(self.covariance),
+            np.ascontiguousarray(self.contact),
+        )
+
+    def total(self) -> tuple[Array, Array]:
+        """Sum (T, 6) of the wrenches, NaN where it is not all that acts, and its covariance (T, 6, 6)."""
+        touches = self.contact != NO_CONTACT
+        frames, count = touches.shape
+        blocks = self.covariance.reshape(frames, count, 6, count, 6)
+        both = touches[:, :, None, None, None] & touches[:, None, None, :, None]
+        total = np.where(self.known[:, None], self.wrench.sum(axis=1), np.nan)
+        return total, np.where(both, blocks, 0.0).sum(axis=(1, 3))
+
+    def in_step(self, time: Array, delay_s: float) -> ContactLoads:
+        """What belongs to each time (T,) s where the plates lag by ``delay_s``; contacts by the nearest frame."""
+        if delay_s == 0.0:
+            return self
+        wrench = np.stack([in_step(time, self.wrench[:, k], delay_s) for k in range(len(self.names))], axis=1)
+        nearest = np.clip(np.searchsorted(time, time + delay_s - 0.5 * np.median(np.diff(time))), 0, len(time) - 1)
+        contact = self.contact[nearest]
+        wrench = np.where((contact == NO_CONTACT)[..., None], 0.0, wrench)
+        return replace(self, wrench=wrench, covariance=self.covariance[nearest], contact=contact, known=self.known[nearest])
+
+
+def about_origin(covariance: Array, point: Array) -> Array:
+    """Covariances (..., 6, 6) of wrenches about points (..., 3) m, carried to the ground's origin: n += point x f."""
+    carry = np.zeros((*point.shape[:-1], 6, 6))
+    carry[..., :, :] = np.eye(6)
+    carry[..., 3:, :3] = np.cross(point[..., None, :], np.eye(3)).swapaxes(-1, -2)
+    return np.asarray(carry @ covariance @ np.swapaxes(carry, -1, -2))
+
+
+def _joint(each: Array) -> Array:
+    """(T, 6 C, 6 C) of independent covariances (T, C, 6, 6)."""
+    frames, count = each.shape[:2]
+    joint = np.zeros((frames, count, 6, count, 6))
+    for k in range(count):
+        joint[:, k, :, k] = each[:, k]
+    return joint.reshape(frames, 6 * count, 6 * count)
