@@ -23,6 +23,7 @@ from dynakin.recordings.feet.loads import (
     PlateLoad,
     divided,
 )
+from dynakin.recordings.feet.soles import EARLY_S, PASSING_S, FootShape, Soles, smooth_step
 from dynakin.settings.noise import Noise
 
 Array = npt.NDArray[np.float64]
@@ -58,6 +59,10 @@ class LiveFeet:
         self._marked = np.array([len(markers) > 0 for markers in own], dtype=bool)
         self._standing, self._floor = np.full(M, np.inf), np.full(M, np.inf)
         self._time = -np.inf
+        self._shapes: list[FootShape] = []
+        self._since = np.full(F, np.nan)  # when the stance began
+        self._forward = initial.ground.vectors_to_ground(initial.ground.forward)[[0, 2]]
+        self._floor_m = float(initial.ground.points_to_ground(np.zeros(3))[1])  # streams put plates there, too
         self._touched = np.full(F, -np.inf)  # when the foot last stood
         self._near, self._loaded = np.zeros((F, P), dtype=int), np.zeros((F, P), dtype=int)  # frames of this stance
         self._owners = np.zeros((F, P), dtype=bool)  # of the plates that are pressed
@@ -88,7 +93,8 @@ class LiveFeet:
             self._owners[:], off = False, bears
         on = self._owners[:, : len(plates)]
         seen = [None if (own == len(self._floor)).all() else outlines[[f]] for f, own in enumerate(self._own)]
-        loads = divided(self.feet, plates, seen, on[None], off[None], aloft[None])
+        soles = self._soles(outlines, bears, time_s)
+        loads = divided(self.feet, plates, seen, on[None], off[None], aloft[None], soles)
         known = bool(loads.total_known[0])
         for p in np.flatnonzero(on.sum(axis=0) > 1) if (loads.reason == SHARED).any() else ():
             self._say(
@@ -100,6 +106,25 @@ class LiveFeet:
                 "at the end of its range): the total wrench is left out for as long as that is so."
             )
         return foot_wrenches(loads, self.initial, self.noise), known
+
+    def _soles(self, outlines: Array, bears: Flags, time_s: float) -> Soles:
+        """Soles of this moment (T = 1). Their sizes and places among the markers are those that were seen first. When
+        a stance that goes on will end is not known yet."""
+        F = len(self.feet)
+        if not self._shapes:
+            for f, own in enumerate(self._own):
+                points = outlines[[f]][:, own < len(self._floor)]
+                self._shapes.append(FootShape.of(points, self._forward))
+        self._since = np.where(bears, np.fmin(self._since, time_s), np.nan)
+        middle, half = np.full((1, F, 3), np.nan), np.stack([shape.half_m for shape in self._shapes])
+        for f in np.flatnonzero(self._marked).tolist():
+            own = self._own[f] < len(self._floor)
+            x, z = self._shapes[f].middle(outlines[[f]][:, own])[0]
+            middle[0, f] = x, self._floor_m, z
+        since, left = time_s - self._since, time_s - self._touched
+        weight = smooth_step(np.fmin((since + EARLY_S) / PASSING_S, 1.0 - left / AFTER_S))
+        weight = np.where(self._marked, np.where(bears, weight, 0.0), 1.0)
+        return Soles(middle, half, (bears | ~self._marked)[None], weight[None])
 
     def news(self) -> list[str]:
         """Sentences, each said once."""

@@ -11,6 +11,7 @@ import numpy.typing as npt
 from dynakin.arrays import runs
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.landmarks import find_marker
+from dynakin.recordings.plates.surfaces import floor_height
 from dynakin.recordings.recording import Array, Recording
 from dynakin.recordings.standing import marker_speeds
 
@@ -38,6 +39,7 @@ class FootContact:
 
     Attributes:
         outline: (T, K, 2) m, horizontal places [X, Z of the ground] of its markers, NaN where not seen.
+        support_m: (T,) height of what it stands on, or stood on last.
         touching: (T, K) markers that are near the floor and slow.
         stands: (T,) in a stance; short gaps closed.
         stances: frames [first, end) of each stance, not padded.
@@ -48,6 +50,7 @@ class FootContact:
     """
 
     outline: Array
+    support_m: Array
     touching: Flags
     stands: Flags
     stances: tuple[tuple[int, int], ...]
@@ -59,6 +62,13 @@ class FootContact:
         """The frames in which this stance may bear load, as far as markers show."""
         before, after = round(BEFORE_S * rate), round(AFTER_S * rate)
         return slice(max(0, stance[0] - before), min(len(self.stands), stance[1] + after))
+
+    def bears(self, rate: float) -> Flags:
+        """(T,) frames in which one of its stances may bear load."""
+        found = np.zeros(len(self.stands), dtype=bool)
+        for stance in self.stances:
+            found[self.padded(stance, rate)] = True
+        return found
 
 
 def foot_contact(recording: Recording, ground: GroundFrame, names: list[str]) -> FootContact | None:
@@ -80,7 +90,8 @@ def foot_contact(recording: Recording, ground: GroundFrame, names: list[str]) ->
     aloft = np.asarray(moves & (high | ~seen).all(axis=1))
     gap = max(1, round(GAP_S * recording.rate)) if recording.n_frames > 1 else 1
     stands = _closed(np.asarray(touching.any(axis=1)), gap)
-    return FootContact(places[:, :, [0, 2]], touching, stands, tuple(runs(stands)), low, moves, aloft)
+    support = np.full(recording.n_frames, floor_height(recording, ground))
+    return FootContact(places[:, :, [0, 2]], support, touching, stands, tuple(runs(stands)), low, moves, aloft)
 
 
 def _closed(flags: Flags, gap: int) -> Flags:

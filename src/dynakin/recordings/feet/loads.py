@@ -16,6 +16,7 @@ import numpy.typing as npt
 from dynakin.arrays import runs
 from dynakin.errors import ConfigError
 from dynakin.recordings.feet.contact import DEFAULT_FOOT_MARKERS, FootContact, distance_to_hull, foot_contact
+from dynakin.recordings.feet.soles import Soles
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Array, Plate, Recording
 
@@ -59,6 +60,11 @@ class FootLoads:
         elsewhere: (T,) frames in which something else may bear the person: no plate measures at all, a plate carries
             what no foot puts on it, or (`with_undeclared`) the motion needs what the plates do not have.
         aloft: (T, F) feet that are surely in the air, by their markers alone.
+        sole: (T, F, 3) m, middle of each foot's sole at the height of what it stands on, ground frame; NaN where the
+            foot is not seen.
+        sole_half_m: (F, 2) half the sole's length and half its width.
+        bears: (T, F) the foot may bear load, by its markers and what supports it alone.
+        stance: (T, F) from 0 at touch-down to 1 and back to 0 at toe-off, smooth.
         messages: sentences with times. reasons: those of them that say why something is not measured.
     """
 
@@ -69,6 +75,10 @@ class FootLoads:
     all_measured: Flags
     elsewhere: Flags
     aloft: Flags
+    sole: Array
+    sole_half_m: Array
+    bears: Flags
+    stance: Array
     messages: tuple[str, ...] = ()
     reasons: tuple[str, ...] = ()
 
@@ -133,7 +143,7 @@ def foot_loads(
         if (found := foot_contact(recording, ground, list(names))) is not None
     }
     plates = [PlateLoad.of(plate, ground) for plate in recording.plates]
-    work = _Assignment(recording, feet, contacts, plates, fixed)
+    work = _Assignment(recording, ground, feet, contacts, plates, fixed)
     return work.loads()
 
 
@@ -207,6 +217,7 @@ def divided(
     on: Flags,
     off: Flags,
     aloft: Flags,
+    soles: Soles,
 ) -> FootLoads:
     """The plates' wrenches given to the feet that stand on them.
 
@@ -243,7 +254,19 @@ def divided(
     total_known &= ~off.any(axis=1)
     wrench[(reason == OFF_PLATE) | (reason == UNKNOWN)] = np.nan
     all_measured = total_known & (reason != SHARED).all(axis=1)
-    loads = FootLoads(feet, wrench, reason, total_known, all_measured, np.zeros(n, dtype=bool), aloft)
+    loads = FootLoads(
+        feet,
+        wrench,
+        reason,
+        total_known,
+        all_measured,
+        np.zeros(n, dtype=bool),
+        aloft,
+        soles.middle,
+        soles.half_m,
+        soles.bears,
+        soles.stance,
+    )
     return loads.with_undeclared(elsewhere)
 
 
@@ -269,11 +292,13 @@ class _Assignment:
     def __init__(
         self,
         recording: Recording,
+        ground: GroundFrame,
         feet: tuple[str, ...],
         contacts: dict[str, FootContact],
         plates: list[PlateLoad],
         fixed: dict[str, str],
     ) -> None:
+        self.ground = ground
         self.recording, self.feet, self.contacts, self.plates, self.fixed = recording, feet, contacts, plates, fixed
         n, F, P = recording.n_frames, len(feet), len(plates)
         self.on = np.zeros((n, F, P), dtype=bool)  # this foot stands on this plate
@@ -376,7 +401,10 @@ class _Assignment:
         for p, plate in enumerate(self.plates):
             self.say(plate, ~plate.known, np.flatnonzero(self.on[:, :, p].sum(axis=1) > 1), self.on[:, :, p])
         outlines = [self.contacts[foot].outline if foot in self.contacts else None for foot in self.feet]
-        loads = divided(self.feet, self.plates, outlines, self.on, self.off, self.aloft())
+        forward = self.ground.vectors_to_ground(self.ground.forward)[[0, 2]]
+        contacts = [self.contacts.get(foot) for foot in self.feet]
+        soles = Soles.of(contacts, forward, self.recording.rate, self.recording.n_frames)
+        loads = divided(self.feet, self.plates, outlines, self.on, self.off, self.aloft(), soles)
         return replace(loads, messages=(*self.messages, *self.reasons), reasons=tuple(self.reasons))
 
     def aloft(self) -> Flags:

@@ -1,0 +1,183 @@
+"""Where the sole of each foot is, how large it is, and how the load may pass from foot to foot."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.arrays import runs
+from dynakin.recordings.feet.contact import FootContact
+from dynakin.recordings.recording import Array
+
+Flags = npt.NDArray[np.bool_]
+
+HALF_LENGTH_M, HALF_WIDTH_M = 0.13, 0.05
+"""Of a grown person's shoe, where the markers do not show it."""
+BACK_M, SIDE_M = 0.015, 0.015
+"""How far a shoe reaches beyond the marker at its heel, and beyond those at its sides."""
+TO_THE_BALL = 0.72
+"""Part of a foot's length from its heel to the heads of the metatarsals, where most marker sets have their toe."""
+LONGEST_M = 0.28
+"""Markers that far apart, or nearly, are at the heel and at the tip of the toes."""
+LEAST_M = 0.10
+"""Markers nearer to each other than that do not show a foot's length."""
+BRIDGED_S = 0.25
+"""Gap in all of a foot's markers over which its sole is drawn on by a straight line."""
+EARLY_S, LATE_S = 0.02, 0.06
+"""How long before a foot's markers are slow and low the plates are touched, and how long after they are left: means of
+the walks and the landing at hand, by their plates."""
+PASSING_S = 0.12
+"""How long a foot takes to load and to unload: the double support of a walk, or the edges of a run's stance."""
+
+
+@dataclass(frozen=True, eq=False)
+class Soles:
+    """Of F feet over T frames, by markers and support alone.
+
+    Attributes:
+        middle: (T, F, 3) m, of the sole at the height of what the foot stands on, ground frame; NaN where it is not
+            seen.
+        half_m: (F, 2) half its length and half its width.
+        bears: (T, F) the foot may bear load.
+        stance: (T, F) from 0 at touch-down to 1, and to 0 at toe-off.
+    """
+
+    middle: Array
+    half_m: Array
+    bears: Flags
+    stance: Array
+
+    @classmethod
+    def of(cls, contacts: list[FootContact | None], forward: Array, rate: float, frames: int) -> Soles:
+        """
+        Args:
+            contacts: of each foot; None: nobody sees it, so that it may bear load at any time.
+            forward: (2,) the way the person faces, X and Z of the ground.
+            rate: Hz.
+        """
+        F = len(contacts)
+        middle, half = np.full((frames, F, 3), np.nan), np.tile([HALF_LENGTH_M, HALF_WIDTH_M], (F, 1))
+        bears, stance = np.ones((frames, F), dtype=bool), np.ones((frames, F))
+        for k, foot in enumerate(contacts):
+            if foot is None:
+                continue
+            place, half[k] = _sole(foot, forward, rate)
+            middle[:, k] = np.stack([place[:, 0], foot.support_m, place[:, 1]], axis=1)
+            bears[:, k] = foot.bears(rate)
+            stance[:, k] = stance_weights(foot.stances, rate, frames)
+        return cls(middle, half, bears, stance)
+
+
+def stance_weights(stances: Sequence[tuple[int, int]], rate: float, frames: int) -> Array:
+    """(T,) weights of stances, frames [first, end): each rises from 0 to 1 over `PASSING_S` from its touch-down and
+    falls to 0 as long before its toe-off; one that the recording cuts off does not rise, or fall, there."""
+    found = np.zeros(frames)
+    if frames < 2:
+        found[[first for first, _ in stances]] = 1.0
+        return found
+    at = np.arange(frames)
+    for first, end in stances:
+        up = np.inf if first == 0 else (at - first) / rate + EARLY_S
+        down = np.inf if end == frames else (end - 1 - at) / rate + LATE_S
+        found = np.maximum(found, smooth_step(np.minimum(up, down) * np.ones(frames) / PASSING_S))
+    return found
+
+
+def smooth_step(part: Array) -> Array:
+    """From 0 at 0 to 1 at 1, level at both ends."""
+    x = np.clip(part, 0.0, 1.0)
+    return np.asarray(x * x * (3.0 - 2.0 * x))
+
+
+@dataclass(frozen=True, eq=False)
+class FootShape:
+    """A sole among its foot's markers.
+
+    Attributes:
+        ends: the markers at its back and at its front; None: its markers do not show its length.
+        ahead, aside: where its middle lies: that part of the way from the one to the other, that far to the right of it
+            over that way.
+        half_m: (2,) half its length and half its width.
+    """
+
+    ends: tuple[int, int] | None
+    ahead: float
+    aside: float
+    half_m: Array
+
+    @classmethod
+    def of(cls, points: Array, forward: Array) -> FootShape:
+        """From places (T, K, 2) m of its markers while it stands flat, all seen; T may be 0."""
+        default = cls(None, 0.0, 0.0, np.array([HALF_LENGTH_M, HALF_WIDTH_M]))
+        if not len(points) or points.shape[1] < 2:
+            return default
+        apart = np.median(np.linalg.norm(points[:, :, None] - points[:, None], axis=3), axis=0)
+        one, other = np.unravel_index(int(np.argmax(apart)), apart.shape)
+        reach = float(apart[one, other])
+        if reach < LEAST_M:
+            return default
+        faces = float(np.median((points[:, other] - points[:, one]) @ forward)) >= 0.0
+        back, front = (int(one), int(other)) if faces else (int(other), int(one))
+        along = points[:, front] - points[:, back]
+        right = np.stack([-along[:, 1], along[:, 0]], axis=1) / np.linalg.norm(along, axis=1, keepdims=True)
+        sides = np.median(np.einsum("tkc,tc->tk", points - points[:, [back]], right), axis=0)
+        length = max(reach + 2.0 * BACK_M, min(reach / TO_THE_BALL, LONGEST_M))
+        both = sides.min() < -SIDE_M and sides.max() > SIDE_M  # else the line from heel to toe is the middle
+        aside = 0.5 * float(sides.max() + sides.min()) / reach if both else 0.0
+        half_width = 0.5 * float(np.ptp(sides)) + SIDE_M if both else HALF_WIDTH_M
+        ahead = (0.5 * length - BACK_M) / reach
+        return cls((back, front), ahead, aside, np.array([0.5 * length, half_width]))
+
+    def middle(self, points: Array) -> Array:
+        """(T, 2) m of the sole among markers (T, K, 2), NaN where its own two are missing."""
+        if self.ends is None:
+            return _mean(points)
+        along = points[:, self.ends[1]] - points[:, self.ends[0]]
+        right = np.stack([-along[:, 1], along[:, 0]], axis=1)
+        return np.asarray(points[:, self.ends[0]] + self.ahead * along + self.aside * right)
+
+
+def _sole(foot: FootContact, forward: Array, rate: float) -> tuple[Array, Array]:
+    """Middle (T, 2) m of the sole on the level, NaN where the foot is not seen for long; half length and width."""
+    seen = np.isfinite(foot.outline).all(axis=(1, 2))
+    flat = seen & foot.stands if (seen & foot.stands).any() else seen
+    shape = FootShape.of(foot.outline[flat], forward)
+    return _drawn_on(_by_the_others(shape.middle(foot.outline), foot.outline), rate), shape.half_m
+
+
+def _mean(points: Array) -> Array:
+    seen = np.asarray(np.isfinite(points).all(axis=2))
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.where(seen[..., None], points, 0.0).sum(axis=1) / seen.sum(axis=1, keepdims=True))
+
+
+def _by_the_others(middle: Array, points: Array) -> Array:
+    """The middle (T, 2) also where one of its two markers is missing: as far from those seen as before and after."""
+    known: Flags = np.asarray(np.isfinite(middle).all(axis=1))
+    seen: Flags = np.asarray(np.isfinite(points).all(axis=2))
+    gaps: Flags = ~known & seen.any(axis=1)
+    if not gaps.any():
+        return middle
+    frames, offset = np.arange(len(middle)), middle[:, None] - points
+    guess = np.full_like(points, np.nan)
+    for m in range(points.shape[1]):
+        have: Flags = known & seen[:, m]
+        if have.any():
+            drawn = [np.interp(frames, frames[have], offset[have, m, c]) for c in (0, 1)]
+            guess[:, m] = points[:, m] + np.stack(drawn, axis=1)
+    return np.where(gaps[:, None], _mean(guess), middle)
+
+
+def _drawn_on(middle: Array, rate: float) -> Array:
+    """The same with short gaps bridged by straight lines; nothing is said before the first frame or after the last."""
+    middle = middle.copy()
+    known: Flags = np.asarray(np.isfinite(middle).all(axis=1))
+    frames = np.arange(len(middle))
+    for first, end in runs(~known):
+        if first > 0 and end < len(middle) and end - first <= BRIDGED_S * rate:
+            for c in (0, 1):
+                middle[first:end, c] = np.interp(frames[first:end], frames[known], middle[known, c])
+    return middle

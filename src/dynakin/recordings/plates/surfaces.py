@@ -1,0 +1,35 @@
+"""How high the plates' surfaces are, and the floor."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynakin.recordings.frame import GroundFrame
+from dynakin.recordings.recording import Plate, Recording
+
+UNDER_MARKERS_M = 0.02
+"""How far below its lowest marker a shoe's sole is at least: half a marker and its base."""
+SHOE_M = 0.12
+"""How far above the floor the lowest marker of a foot that stands may be: on a boot, or on an ankle."""
+
+
+def surface_height(plate: Plate, ground: GroundFrame) -> float | None:
+    """Height (m, ground frame) of a plate's surface: its corners' mean, else the median of its centres of pressure;
+    None where neither is known."""
+    points = plate.cop if plate.corners is None else plate.corners
+    heights = ground.points_to_ground(points)[:, 1]
+    return float(np.nanmedian(heights)) if np.isfinite(heights).any() else None
+
+
+def floor_height(recording: Recording, ground: GroundFrame) -> float:
+    """Height (m, ground frame) of the floor, the one that a run has: that of its lowest plate; without plates the
+    laboratory's zero, which is where laboratories put it. Where markers say that it cannot be (they go lower, or never
+    come near it), it is a little below the lowest of them."""
+    plates = [height for plate in recording.plates if (height := surface_height(plate, ground)) is not None]
+    floor = min(plates) if plates else float(ground.points_to_ground(np.zeros(3))[1])
+    heights = ground.points_to_ground(recording.markers)[..., 1]
+    if not np.isfinite(heights).any():
+        return floor
+    lowest = float(np.nanpercentile(np.nanmin(np.where(np.isfinite(heights), heights, np.inf), axis=1), 5.0))
+    near = -UNDER_MARKERS_M <= lowest - floor <= (np.inf if plates else SHOE_M)
+    return floor if near else lowest - UNDER_MARKERS_M
