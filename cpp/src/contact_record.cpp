@@ -23,7 +23,9 @@ void ContactRecord::report(std::size_t k, const StateRef& x, const KinematicStat
   std::copy_n(trial.contact.begin() + static_cast<std::ptrdiff_t>(first), n, loads_.contact.begin());
   loads_.wrench = Eigen::Map<const Eigen::VectorXd>(trial.wrench.data() + 6 * first, size);
   loads_.covariance = Eigen::Map<const Eigen::MatrixXd>(trial.covariance.data() + 36 * first * n, size, size);
-  if (!moments.distribute(dynamics, loads_))
+  using Effects = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::RowMajor>;
+  loads_.effects = Eigen::Map<const Effects>(trial.effects.data() + 36 * first, 6, size);
+  if (!moments.distribute(x, dynamics, loads_))
     throw std::invalid_argument("frame " + std::to_string(k) +
                                 ": the covariance of the sum of the contacts' wrenches is not positive definite");
   const auto nc = static_cast<Eigen::Index>(moments.sources().size());

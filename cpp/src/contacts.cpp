@@ -16,7 +16,8 @@ Force force_of(const Vector6& w) { return {w.head<3>(), w.tail<3>()}; }
 ContactLoads::ContactLoads(std::size_t contacts)
     : contact(contacts, Contact::none),
       wrench(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(6 * contacts))),
-      covariance(Eigen::MatrixXd::Identity(wrench.size(), wrench.size())) {}
+      covariance(Eigen::MatrixXd::Identity(wrench.size(), wrench.size())),
+      effects(Eigen::MatrixXd::Zero(6, wrench.size())) {}
 
 ContactMoments::ContactMoments(const Model& model, std::vector<int> segments)
     : model_(model),
@@ -31,6 +32,9 @@ ContactMoments::ContactMoments(const Model& model, std::vector<int> segments)
       external_(model.segments().size()),
       work_(model),
       variances_(static_cast<Eigen::Index>(model.coordinates().size()), model.state_size()) {
+  if (model.contacts() > 0 && model.contacts() != contacts())
+    throw std::invalid_argument("contacts: " + std::to_string(contacts()) + " segments, expected one for each of the " +
+                                std::to_string(model.contacts()) + " that the model has states of");
   const int n_segments = static_cast<int>(model.segments().size());
   for (const int segment : segments_)
     if (segment < 0 || segment >= n_segments)
@@ -44,11 +48,12 @@ ContactMoments::ContactMoments(const Model& model, std::vector<int> segments)
   J_.setZero(nc, model.state_size());
 }
 
-bool ContactMoments::distribute(const DynamicState& dynamics, const ContactLoads& loads) {
+bool ContactMoments::distribute(const StateRef& x, const DynamicState& dynamics, const ContactLoads& loads) {
   const std::size_t n = segments_.size();
   std::copy(loads.contact.begin(), loads.contact.end(), loads_.contact.begin());
   loads_.wrench = loads.wrench;
   loads_.covariance = loads.covariance;
+  loads_.effects = loads.effects;
   Vector6 missing = dynamics.wrench.vector();
   Matrix6 S = Matrix6::Zero();
   bool any = false;
@@ -56,7 +61,10 @@ bool ContactMoments::distribute(const DynamicState& dynamics, const ContactLoads
     with_sum_[i].setZero();
     if (!touches(i)) continue;
     any = true;
-    missing -= loads_.wrench.segment<6>(static_cast<Eigen::Index>(6 * i));
+    wrench_[i] = loads_.wrench.segment<6>(static_cast<Eigen::Index>(6 * i));
+    if (const int c = model_.contact_column(static_cast<int>(i)); c != k_none)
+      wrench_[i].noalias() += effects(i) * x.segment<6>(c);
+    missing -= wrench_[i];
     for (std::size_t j = 0; j < n; ++j)
       if (touches(j)) with_sum_[i] += block(i, j);
     S += with_sum_[i];
@@ -66,14 +74,17 @@ bool ContactMoments::distribute(const DynamicState& dynamics, const ContactLoads
   remainder_ = missing;
   std::fill(external_.begin(), external_.end(), Force{});
   for (std::size_t i = 0; i < n; ++i) {
-    wrench_[i].setZero();
     adjustment_[i].setZero();
     share_[i].setZero();
-    if (!touches(i)) continue;
+    if (!touches(i)) {
+      wrench_[i].setZero();
+      continue;
+    }
     share_[i] = factor.solve(with_sum_[i].transpose()).transpose();
-    adjustment_[i] = share_[i] * missing;
-    wrench_[i] = loads_.wrench.segment<6>(static_cast<Eigen::Index>(6 * i)) + adjustment_[i];
-    remainder_ -= adjustment_[i];
+    const Vector6 change = share_[i] * missing;
+    wrench_[i] += change;
+    remainder_ -= change;
+    adjustment_[i] = wrench_[i] - loads_.wrench.segment<6>(static_cast<Eigen::Index>(6 * i));
     external_[segments_[i]] = external_[segments_[i]] + force_of(wrench_[i]);
   }
   mark_sources();
@@ -124,6 +135,15 @@ void ContactMoments::jacobian(const StateRef& x, const KinematicState& state, co
   moment_jacobian(model_, x, state, dynamics, &external_, work_, out);
   wrench_jacobian(model_, state, dynamics, wrench_J_);
   levers(state);
+  for (std::size_t i = 0; model_.contacts() > 0 && i < segments_.size(); ++i) {
+    const int c = model_.contact_column(static_cast<int>(i));
+    for (int k = 0; k < 6; ++k) {  // of a contact that nothing touches the states add nothing
+      wrench_J_.col(c + k).setZero();
+      if (!touches(i)) continue;
+      wrench_J_.col(c + k) = -effects(i).col(k);
+      out.col(c + k) -= lever_[i].lazyProduct(effects(i).col(k));
+    }
+  }
   for (const int c : model_.wrench_columns()) out.col(c) -= common_.lazyProduct(wrench_J_.col(c));
 }
 
@@ -152,7 +172,11 @@ void ContactMoments::deviations(const StateRef& x, const KinematicState& state, 
       sd.setZero();
       continue;
     }
-    const Matrix6 C = share_[k] * needed * share_[k].transpose() + block(k, k) - share_[k] * with_sum_[k].transpose();
+    Matrix6 C = share_[k] * needed * share_[k].transpose() + block(k, k) - share_[k] * with_sum_[k].transpose();
+    if (const int c = model_.contact_column(static_cast<int>(k)); c != k_none) {
+      const Matrix6 own = effects(k), with_need = share_[k] * wrench_JP_.middleCols<6>(c) * own.transpose();
+      C += with_need + with_need.transpose() + own * P.block<6, 6>(c, c) * own.transpose();
+    }
     sd = C.diagonal().cwiseMax(0.0).cwiseSqrt();
   }
 }

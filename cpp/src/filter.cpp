@@ -62,19 +62,17 @@ void Filter::predict(double dt) {
   if (carried < dt) decay(model_, settings_, dt - carried, correction_.scratch, x, P);
 }
 
-StepReport Filter::update(const MarkerRef& markers, const Vector6& wrench, const Matrix6* wrench_covariance) {
+StepReport Filter::update(const MarkerRef& markers, const Vector6& wrench, const WrenchModel* how) {
   if (markers.cols() != static_cast<Eigen::Index>(model_.markers().size()))
     throw std::invalid_argument("markers: expected " + std::to_string(model_.markers().size()) + " columns, found " +
                                 std::to_string(markers.cols()));
   if (markers.array().isInf().any() || wrench.array().isInf().any())
     throw std::invalid_argument("markers or wrench: infinite, expected a number, or NaN where nothing is measured");
-  if (wrench_covariance && !wrench_covariance->allFinite())
-    throw std::invalid_argument("wrench_covariance: not finite");
   if (last_.diverged()) return last_;
   StepReport report;
   if (correction_.tape) correction_.tape->clear();
   recovery_.hold();
-  correction_.measurement.expect(wrench_covariance);
+  correction_.measurement.expect(how);
   correction_.measure(markers, wrench);
   predicted_ = correction_.measurement.predicted();
   report.tracking = recovery_.correct(markers, wrench);

@@ -20,7 +20,7 @@ FixedLag::FixedLag(Filter& filter, int lag, bool deviations)
 
 // A frame that is refused counts as one in which nothing was measured.
 StepReport FixedLag::record(Frame& now, double dt, const MarkerRef& markers, const Vector6& wrench,
-                            const Matrix6* wrench_covariance) {
+                            const WrenchModel* how) {
   const auto keep = [&] {
     filter_.record_to(nullptr);
     now.dt = dt;
@@ -29,7 +29,7 @@ StepReport FixedLag::record(Frame& now, double dt, const MarkerRef& markers, con
   now.tape.clear();
   filter_.record_to(&now.tape);
   try {
-    const StepReport report = filter_.update(markers, wrench, wrench_covariance);
+    const StepReport report = filter_.update(markers, wrench, how);
     keep();
     return report;
   } catch (...) {
@@ -39,11 +39,11 @@ StepReport FixedLag::record(Frame& now, double dt, const MarkerRef& markers, con
 }
 
 StepReport FixedLag::step(double dt, const MarkerRef& markers, const Vector6& wrench,
-                          const Matrix6* wrench_covariance) {
+                          const WrenchModel* how) {
   const bool first = frames_ == 0;
   if (!first) filter_.predict(dt);
   ++frames_;
-  const StepReport report = record(back(0), first ? 0.0 : dt, markers, wrench, wrench_covariance);
+  const StepReport report = record(back(0), first ? 0.0 : dt, markers, wrench, how);
   if (!ready() || report.diverged()) return report;
 
   pass_.start();

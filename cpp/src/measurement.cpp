@@ -1,6 +1,8 @@
 #include "dynakin/measurement.hpp"
 
 #include <cmath>
+#include <stdexcept>
+#include <string>
 
 namespace dynakin {
 namespace {
@@ -37,7 +39,7 @@ Measurement::Measurement(const Model& model, const FilterSettings& settings)
       predicted_(channel_count(model)),
       left_out_(model.markers().size() + 1) {
   declared_covariance_ = carried(settings.wrench_covariance, settings.reference_point, wrench_used_);
-  wrench_covariance_ = declared_covariance_;
+  wrench_model_ = {declared_covariance_, Eigen::MatrixXd::Zero(6, 6 * model.contacts())};
   wrench_scratch_.setZero();
   std::size_t widest = 0;
   for (std::size_t m = 0; m < model.markers().size(); ++m) {
@@ -82,11 +84,23 @@ void Measurement::evaluate(const Eigen::VectorXd& x) {
   }
   for (int k = 0; k < 6; ++k)
     if (const int c = model_.offset_columns()[k]; c != k_none) wrench(k) += x(c);
+  if (model_.contacts() > 0)
+    wrench.noalias() -= wrench_model_.effects * x.segment(model_.contact_column(0), 6 * model_.contacts());
   predicted_(3 * n_markers + 6) = dynamics_.mass;
 }
 
-void Measurement::expect(const Matrix6* wrench_covariance) {
-  wrench_covariance_ = wrench_covariance ? *wrench_covariance : declared_covariance_;
+void Measurement::expect(const WrenchModel* wrench) {
+  if (!wrench) {
+    wrench_model_.covariance = declared_covariance_;
+    wrench_model_.effects.setZero();
+    return;
+  }
+  if (wrench->effects.cols() != wrench_model_.effects.cols())
+    throw std::invalid_argument("wrench model: effects of " + std::to_string(wrench->effects.cols()) +
+                                " columns, expected " + std::to_string(wrench_model_.effects.cols()));
+  if (!wrench->covariance.allFinite() || !wrench->effects.allFinite())
+    throw std::invalid_argument("wrench model: not finite");
+  wrench_model_ = *wrench;
 }
 
 void Measurement::linearise(const Eigen::VectorXd& x, const MarkerRef& markers, const Vector6& wrench) {
@@ -138,6 +152,8 @@ void Measurement::wrench_rows(const Vector6& measured) {
     delayed_jacobian();
   for (int k = 0; k < 6; ++k)
     if (const int c = model_.offset_columns()[k]; c != k_none) wrench_scratch_.col(c) = Vector6::Unit(k);
+  if (model_.contacts() > 0)
+    wrench_scratch_.middleCols(model_.contact_column(0), 6 * model_.contacts()) = -wrench_model_.effects;
   const std::vector<int>& columns = *block.columns;
   for (std::size_t c = 0; c < columns.size(); ++c)
     for (int r = 0; r < block.rows; ++r) block.H(r, c) = wrench_scratch_(component[r], columns[c]);
@@ -145,7 +161,7 @@ void Measurement::wrench_rows(const Vector6& measured) {
   for (int r = 0; r < block.rows; ++r) {
     block.v(r) = measured(component[r]) - predicted(component[r]);
     block.channel[r] = 3 * n_markers + component[r];
-    for (int s = 0; s < block.rows; ++s) block.R(r, s) = wrench_covariance_(component[r], component[s]);
+    for (int s = 0; s < block.rows; ++s) block.R(r, s) = wrench_model_.covariance(component[r], component[s]);
   }
 }
 

@@ -46,6 +46,7 @@ Vector3 unit(const Vector3& direction, const std::string& where) {
 }
 
 constexpr const char* axis_names[3] = {"x", "y", "z"};
+constexpr const char* component_names[6] = {"fx", "fy", "fz", "mx", "my", "mz"};
 
 std::vector<int> sorted(const std::set<int>& columns) {
   std::vector<int> list;
@@ -69,6 +70,7 @@ Model::Model(const ModelSpec& spec) : spec_(spec) {
   compile_soft_tissue();
   compile_segments();
   compile_plates();
+  compile_contacts();
   compile_columns();
 }
 
@@ -125,8 +127,15 @@ void Model::compile_soft_tissue() {
   layout_.append("soft_tissue", names);
 }
 
+void Model::compile_contacts() {
+  std::vector<std::string> names;
+  if (!spec_.contacts.empty()) contacts_column_ = layout_.size();
+  for (const std::string& contact : spec_.contacts)
+    for (const char* component : component_names) names.push_back("contact/" + contact + "/" + component);
+  layout_.append("contacts", names);
+}
+
 void Model::compile_plates() {
-  static constexpr const char* component_names[6] = {"fx", "fy", "fz", "mx", "my", "mz"};
   std::vector<std::string> names;
   for (int k = 0; k < 6; ++k) {
     offset_columns_[k] = spec_.wrench_offset[k] ? layout_.size() + static_cast<int>(names.size()) : k_none;
@@ -210,6 +219,7 @@ void Model::compile_columns() {
   }
   wrench.insert(offset_columns_.begin(), offset_columns_.end());
   wrench.insert(delay_column_);
+  for (int k = 0; k < 6 * contacts(); ++k) wrench.insert(contacts_column_ + k);
   wrench_columns_ = sorted(wrench);
   for (const Marker& m : markers_) {
     std::set<int> columns = geometry[m.segment];

@@ -8,9 +8,9 @@ namespace dynakin {
 
 namespace {
 
-StepReport step(Filter& filter, const Trial& trial, std::size_t frame) {
+StepReport step(Filter& filter, const Trial& trial, std::size_t frame, WrenchModel& how) {
   try {
-    return trial.step(filter, frame);
+    return trial.step(filter, frame, how);
   } catch (const std::invalid_argument& e) {
     throw std::invalid_argument("frame " + std::to_string(frame) + ": " + e.what());
   }
@@ -71,9 +71,10 @@ void run_frames(Filter& filter, const Trial& trial, std::size_t first, std::size
   using clock = std::chrono::steady_clock;
   const std::size_t m = 3 * filter.model().markers().size();
   filter.report_sensors(true);
+  WrenchModel how;
   for (std::size_t k = first; k < end; ++k) {
     const auto start = clock::now();
-    const StepReport report = step(filter, trial, k);
+    const StepReport report = step(filter, trial, k, how);
     record.step_us[k] = std::chrono::duration<double, std::micro>(clock::now() - start).count();
     if (report.diverged())
       throw DivergenceError("the filter diverged at frame " + std::to_string(k) + " (" + std::to_string(trial.time[k]) +

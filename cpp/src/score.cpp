@@ -57,10 +57,11 @@ Score score_trial(Filter& filter, const Trial& trial, const ScoreOptions& option
   const std::size_t end = std::min(trial.frames, options.end);
   Score score(model, trial.frames, options);
   int lost = 0;
+  WrenchModel how;
   for (std::size_t k = 0; k < end; ++k) {
     const Frame z = trial.markers_at(k, n_markers);
     const double* w = trial.wrench + 6 * k;
-    const StepReport report = trial.step(filter, k);
+    const StepReport report = trial.step(filter, k, how);
     if (report.diverged()) {
       score.divergence = describe(report.status);
       return score;

@@ -34,10 +34,11 @@ void FilterSettings::check(const Model& model) const {
          {std::pair{"process_variance", process_variance(i)}, {"process_density", process_density(i)}})
       if (!(value >= 0.0) || std::isinf(value))
         fail(name, "of '" + names[i] + "' is " + std::to_string(value) + ", expected 0 or more");
-    const bool may_decay = holds(model.layout().block("soft_tissue"), i) || holds(model.layout().block("plates"), i);
+    const auto in = [&](const char* block) { return holds(model.layout().block(block), i); };
+    const bool may_decay = in("soft_tissue") || in("plates") || in("contacts");
     if (!(decay_rate(i) >= 0.0) || std::isinf(decay_rate(i)) || (decay_rate(i) > 0.0 && !may_decay))
       fail("decay_rate", "of '" + names[i] + "' is " + std::to_string(decay_rate(i)) +
-                             (may_decay ? ", expected 0 or more" : ", expected 0: only soft tissue and plates decay"));
+                             (may_decay ? ", expected 0 or more" : ", expected 0: only soft tissue, plates and contacts decay"));
     if (!(lower(i) <= upper(i)))
       fail("bounds", "of '" + names[i] + "' are " + std::to_string(lower(i)) + " and " + std::to_string(upper(i)) +
                          ", expected lower <= upper");

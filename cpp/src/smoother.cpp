@@ -44,10 +44,11 @@ void Smoother::replay(std::size_t first, std::size_t end, const RunRecord& recor
   while (replayed_.size() < end - first) replayed_.push_back({{}, FrameTape(model.state_size(), filter_.tape_rows())});
   filter_.restore(checkpoints_[first / stretch_]);
   filter_.report_sensors(false);
+  WrenchModel how;
   for (std::size_t k = first; k < end; ++k) {
     Frame& frame = replayed_[k - first];
     filter_.record_to(&frame.tape);
-    trial_.step(filter_, k);
+    trial_.step(filter_, k, how);
     frame.filtered = filter_.belief();
     const Eigen::VectorXd& x = frame.filtered.x;
     if (!std::equal(x.begin(), x.end(), record.state.begin() + static_cast<std::ptrdiff_t>(k * n)))

@@ -197,7 +197,7 @@ void check_contacts_allocate_nothing(const dynakin::ModelSpec& spec) {
   for (const Contact first : {Contact::none, Contact::measured, Contact::unmeasured, Contact::shared}) {
     loads.contact = {first, Contact::measured};
     const long before = allocations;
-    CHECK(contacts.distribute(dynamics, loads));
+    CHECK(contacts.distribute(x, dynamics, loads));
     contacts.moments(kinematics, dynamics, moments);
     contacts.deviations(x, kinematics, dynamics, P, moments_sd.data(), wrench_sd.data());
     joint_loads(model, kinematics, dynamics, nullptr, joints);

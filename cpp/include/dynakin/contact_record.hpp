@@ -14,6 +14,7 @@ struct ContactTrial {
   std::size_t frames = 0;
   std::vector<double> wrench;      // (frames, contacts, 6)
   std::vector<double> covariance;  // (frames, contacts, 6, contacts, 6)
+  std::vector<double> effects;     // (frames, 6, contacts, 6)
   std::vector<Contact> contact;    // (frames, contacts)
 };
 

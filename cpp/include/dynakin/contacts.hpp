@@ -33,6 +33,8 @@ struct ContactLoads {
   std::vector<Contact> contact;
   Eigen::VectorXd wrench;      // (6 contacts)
   Eigen::MatrixXd covariance;  // (6 contacts, 6 contacts), symmetric; that of the sum is positive definite
+  // (6, 6 contacts): what a contact's six states add to its wrench, where the model has the states.
+  Eigen::Matrix<double, 6, Eigen::Dynamic> effects;
 };
 
 // Allocated once for a model. distribute comes first; what follows is of the same state and loads.
@@ -44,9 +46,9 @@ class ContactMoments {
   int contacts() const { return static_cast<int>(segments_.size()); }
 
   // False, and nothing else is defined, where the covariance of the wrenches' sum is not positive definite.
-  bool distribute(const DynamicState& dynamics, const ContactLoads& loads);
+  bool distribute(const StateRef& x, const DynamicState& dynamics, const ContactLoads& loads);
 
-  // Of each contact: its wrench as used, and how far that is from the expected one.
+  // Of each contact: its wrench as used, and how far that is from the one expected without its states.
   const std::vector<Vector6>& wrenches() const { return wrench_; }
   const std::vector<Vector6>& adjustments() const { return adjustment_; }
   // What the state needs less the sum of the wrenches: zero, unless nothing touches.
@@ -67,6 +69,7 @@ class ContactMoments {
   void mark_sources();
   void levers(const KinematicState& state);
   bool touches(std::size_t i) const { return loads_.contact[i] != Contact::none; }
+  auto effects(std::size_t i) const { return loads_.effects.middleCols<6>(static_cast<Eigen::Index>(6 * i)); }
   auto block(std::size_t i, std::size_t j) const {
     return loads_.covariance.block<6, 6>(static_cast<Eigen::Index>(6 * i), static_cast<Eigen::Index>(6 * j));
   }

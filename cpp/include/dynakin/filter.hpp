@@ -46,12 +46,12 @@ class Filter {
   void predict(double dt);
   // markers (3, M) m and wrench (N, N m about the ground origin), NaN where missing. After a step that diverged the
   // state is not to be used; further updates report the same until reset().
-  // wrench_covariance: of this frame, as in Measurement::expect.
-  StepReport update(const MarkerRef& markers, const Vector6& wrench, const Matrix6* wrench_covariance = nullptr);
+  // how: the wrench of this frame is measured, see Measurement::expect.
+  StepReport update(const MarkerRef& markers, const Vector6& wrench, const WrenchModel* how = nullptr);
   StepReport step(double dt, const MarkerRef& markers, const Vector6& wrench,
-                  const Matrix6* wrench_covariance = nullptr) {
+                  const WrenchModel* how = nullptr) {
     predict(dt);
-    return update(markers, wrench, wrench_covariance);
+    return update(markers, wrench, how);
   }
   void reset(const Eigen::VectorXd& x, const Eigen::MatrixXd& P);
 

@@ -23,7 +23,7 @@ class FixedLag {
 
   // dt since the frame before; the first frame is an update only.
   StepReport step(double dt, const MarkerRef& markers, const Vector6& wrench,
-                  const Matrix6* wrench_covariance = nullptr);
+                  const WrenchModel* how = nullptr);
 
   const Filter& filter() const { return filter_; }
   int lag() const { return lag_; }
@@ -42,7 +42,7 @@ class FixedLag {
     FrameTape tape;
   };
   StepReport record(Frame& now, double dt, const MarkerRef& markers, const Vector6& wrench,
-                    const Matrix6* wrench_covariance);
+                    const WrenchModel* how);
   Frame& back(int by) { return ring_[static_cast<std::size_t>((frames_ - 1 - by) % (lag_ + 1))]; }
 
   Filter& filter_;

@@ -24,6 +24,13 @@ struct RowBlock {
   int rows = 0;  // of these, how many are measured in this frame
 };
 
+// How the total wrench of a frame is measured, where what bears the person changes from frame to frame: about the ground
+// origin, measured = body's wrench - effects * (states of the contacts) + white errors.
+struct WrenchModel {
+  Matrix6 covariance;                              // of the white errors, positive definite
+  Eigen::Matrix<double, 6, Eigen::Dynamic> effects;  // (6, 6 contacts) of the model
+};
+
 class Measurement {
  public:
   Measurement(const Model& model, const FilterSettings& settings);
@@ -50,9 +57,9 @@ class Measurement {
 
   // Kinematics, dynamics and h(x), no derivatives.
   void evaluate(const Eigen::VectorXd& x);
-  // The wrench's covariance about the ground origin, positive definite, in the frames to come: where what bears the
-  // person changes from frame to frame. nullptr: as the settings have it.
-  void expect(const Matrix6* wrench_covariance);
+  // For the frames to come; nullptr: the covariance is the settings', and the contacts' states have no effect. Throws
+  // std::invalid_argument for a model of other contacts, or numbers that are not finite.
+  void expect(const WrenchModel* wrench);
   // Fills the blocks for what this frame measures. wrench: ground on person, about the ground origin; NaN missing.
   void linearise(const Eigen::VectorXd& x, const MarkerRef& markers, const Vector6& wrench);
 
@@ -64,7 +71,8 @@ class Measurement {
 
   const Model& model_;
   const FilterSettings& settings_;
-  Matrix6 wrench_covariance_, declared_covariance_;  // about the ground origin: of this frame, of the settings
+  Matrix6 declared_covariance_;  // of the settings, about the ground origin
+  WrenchModel wrench_model_;
   std::array<bool, 6> wrench_used_{};
   std::vector<std::vector<int>> slot_;  // a marker: state column -> place in its list
   MarkerMatrix marker_scratch_;

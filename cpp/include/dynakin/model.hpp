@@ -81,6 +81,9 @@ class Model {
   // Columns of the plates' slow error and of their delay, k_none where they are not estimated.
   const std::array<int, 6>& offset_columns() const { return offset_columns_; }
   int delay_column() const { return delay_column_; }
+  // Column of the first of six numbers of a contact, k_none where the spec names none.
+  int contact_column(int contact) const { return contacts_column_ == k_none ? k_none : contacts_column_ + 6 * contact; }
+  int contacts() const { return static_cast<int>(spec_.contacts.size()); }
 
   int coordinate_column(int coordinate) const { return coordinates_[coordinate].index; }
   int speed_column(int coordinate) const { return shifted(coordinate, n_free_); }
@@ -99,6 +102,7 @@ class Model {
   void compile_markers();
   void compile_soft_tissue();
   void compile_plates();
+  void compile_contacts();
   void compile_columns();
 
   ModelSpec spec_;
@@ -112,7 +116,7 @@ class Model {
   std::vector<std::vector<int>> marker_columns_;
   std::vector<int> wrench_columns_, mass_columns_;
   std::array<int, 6> offset_columns_{};
-  int delay_column_ = k_none;
+  int delay_column_ = k_none, contacts_column_ = k_none;
 };
 
 }  // namespace dynakin

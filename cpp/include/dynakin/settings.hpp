@@ -32,7 +32,7 @@ struct FilterSettings {
   Eigen::VectorXd process_variance;  // (n,) Q of (4), added at each step, SI units squared
   Eigen::VectorXd process_density;   // (n,) continuous white noise on each element's rate, SI units squared per s; of
                                      // an acceleration: its jerk
-  Eigen::VectorXd decay_rate;        // (n,) 1/s, of soft tissue and plates: 0 for a constant or a random walk
+  Eigen::VectorXd decay_rate;        // (n,) 1/s, of soft tissue, plates, contacts: 0 for a constant or a random walk
   Eigen::VectorXd marker_variance;   // (markers,) m^2 on each measured axis; infinite: the marker is not used
   Matrix6 wrench_covariance = Matrix6::Identity();  // [N, N m] about reference_point; an infinite variance: not used
   Vector3 reference_point = Vector3::Zero();        // m, ground frame

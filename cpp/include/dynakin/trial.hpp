@@ -13,19 +13,25 @@ struct Trial {
   const double* markers;                      // (frames, M, 3) m
   const double* wrench;                       // (frames, 6) N, N m about the ground origin
   std::size_t frames;
-  const double* wrench_covariance = nullptr;  // (frames, 6, 6) about the ground origin; nullptr: the settings'
+  // WrenchModel of each frame: (frames, 6, 6), symmetric, and (frames, 6, 6 C); nullptr: the settings' covariance.
+  const double* wrench_covariance = nullptr;
+  const double* wrench_effects = nullptr;
 
   double dt(std::size_t k) const { return k == 0 ? 0.0 : time[k] - time[k - 1]; }
   Eigen::Map<const MarkerMatrix> markers_at(std::size_t k, std::size_t n_markers) const {
     return {markers + 3 * n_markers * k, 3, static_cast<Eigen::Index>(n_markers)};
   }
-  // One step of a filter; frame 0 is an update only.
-  StepReport step(Filter& filter, std::size_t k) const {
+  // One step of a filter; frame 0 is an update only. how: room for a WrenchModel.
+  StepReport step(Filter& filter, std::size_t k, WrenchModel& how) const {
     if (k > 0) filter.predict(dt(k));
-    Matrix6 R;
-    if (wrench_covariance) R = Eigen::Map<const Matrix6>(wrench_covariance + 36 * k);
+    if (wrench_covariance) {
+      using Effects = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::RowMajor>;
+      const Eigen::Index columns = 6 * filter.model().contacts();
+      how.covariance = Eigen::Map<const Matrix6>(wrench_covariance + 36 * k);
+      how.effects = Eigen::Map<const Effects>(wrench_effects + 6 * columns * k, 6, columns);
+    }
     return filter.update(markers_at(k, filter.model().markers().size()), Eigen::Map<const Vector6>(wrench + 6 * k),
-                         wrench_covariance ? &R : nullptr);
+                         wrench_covariance ? &how : nullptr);
   }
 };
 

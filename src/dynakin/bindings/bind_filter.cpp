@@ -9,6 +9,7 @@
 #include "arrays.hpp"
 #include "dynakin/filter.hpp"
 #include "module.hpp"
+#include "trial.hpp"
 
 using namespace dynakin;
 
@@ -135,19 +136,23 @@ void bind_filter(nb::module_& m) {
       .def("predict", &Filter::predict, nb::arg("dt"), "Moves the state by dt seconds.")
       .def(
           "update",
-          [](Filter& f, const Array2& markers, const Vector6& wrench, const std::optional<Matrix6>& wrench_covariance) {
-            return f.update(marker_map(markers, f.model()), wrench, wrench_covariance ? &*wrench_covariance : nullptr);
+          [](Filter& f, const Array2& markers, const Vector6& wrench, const std::optional<Matrix6>& wrench_covariance,
+             const std::optional<Eigen::MatrixXd>& wrench_effects) {
+            return f.update(marker_map(markers, f.model()), wrench, GivenWrenchModel(f.model(), wrench_covariance, wrench_effects));
           },
           nb::arg("markers"), nb::arg("wrench"), nb::arg("wrench_covariance") = nb::none(),
+          nb::arg("wrench_effects") = nb::none(),
           "Corrects with markers (M, 3), m, and wrench (6,), N and N m about the ground origin; NaN: missing. "
           "wrench_covariance (6, 6), about the ground origin, takes the place of the settings' in this frame.")
       .def(
           "step",
           [](Filter& f, double dt, const Array2& markers, const Vector6& wrench,
-             const std::optional<Matrix6>& wrench_covariance) {
-            return f.step(dt, marker_map(markers, f.model()), wrench, wrench_covariance ? &*wrench_covariance : nullptr);
+             const std::optional<Matrix6>& wrench_covariance,
+             const std::optional<Eigen::MatrixXd>& wrench_effects) {
+            return f.step(dt, marker_map(markers, f.model()), wrench, GivenWrenchModel(f.model(), wrench_covariance, wrench_effects));
           },
           nb::arg("dt"), nb::arg("markers"), nb::arg("wrench"), nb::arg("wrench_covariance") = nb::none(),
+          nb::arg("wrench_effects") = nb::none(),
           "predict(dt), then update(markers, wrench, wrench_covariance).");
   bind_run(filter);
   bind_score(filter);

@@ -31,6 +31,7 @@ class ContactLoads:
         wrench: (T, C, 6) N and N m: what the plates measured, or what is expected where none does; 0 where nothing
             touches.
         covariance: (T, 6 C, 6 C) of their errors; those of contacts that share a plate go together.
+        effects: (T, 6, 6 C): what the six states of each contact, of unit variance, add to its wrench.
         contact: (T, C) NO_CONTACT, ON_PLATE, UNMEASURED or SHARED_PLATE.
         known: (T,) frames in which these contacts are all that acts on the person: in others the filter takes nothing
             from their sum.
@@ -40,6 +41,7 @@ class ContactLoads:
     segments: tuple[str, ...]
     wrench: Array
     covariance: Array
+    effects: Array
     contact: Codes
     known: Flags
 
@@ -66,7 +68,7 @@ class ContactLoads:
         variance = np.concatenate([force, moment], axis=-1) ** 2
         each = about_origin(variance[..., None] * np.eye(6), point)
         known = np.where((codes == NO_CONTACT)[..., None], 0.0, wrench)
-        return cls(tuple(names), tuple(segments), known, _joint(each), codes, np.ones(len(codes), dtype=bool))
+        return cls(tuple(names), tuple(segments), known, _joint(each), np.zeros((len(codes), 6, 6 * len(names))), codes, np.ones(len(codes), dtype=bool))
 
     def check(self, model: _core.Model) -> None:
         """
@@ -94,16 +96,18 @@ class ContactLoads:
             np.ascontiguousarray(self.wrench),
             np.ascontiguousarray(self.covariance),
             np.ascontiguousarray(self.contact),
+            np.ascontiguousarray(self.effects),
         )
 
-    def total(self) -> tuple[Array, Array]:
+    def total(self) -> tuple[Array, Array, Array]:
         """Sum (T, 6) of the wrenches, NaN where it is not all that acts, and its covariance (T, 6, 6)."""
         touches = self.contact != NO_CONTACT
         frames, count = touches.shape
         blocks = self.covariance.reshape(frames, count, 6, count, 6)
         both = touches[:, :, None, None, None] & touches[:, None, None, :, None]
         total = np.where(self.known[:, None], self.wrench.sum(axis=1), np.nan)
-        return total, np.where(both, blocks, 0.0).sum(axis=(1, 3))
+        covariance = np.where(both, blocks, 0.0).sum(axis=(1, 3))
+        return total, covariance, np.where(np.repeat(touches, 6, axis=1)[:, None], self.effects, 0.0)
 
     def in_step(self, time: Array, delay_s: float) -> ContactLoads:
         """What belongs to each time (T,) s where the plates lag by ``delay_s``; contacts by the nearest frame."""
@@ -113,15 +117,21 @@ class ContactLoads:
         nearest = np.clip(np.searchsorted(time, time + delay_s - 0.5 * np.median(np.diff(time))), 0, len(time) - 1)
         contact = self.contact[nearest]
         wrench = np.where((contact == NO_CONTACT)[..., None], 0.0, wrench)
-        return replace(self, wrench=wrench, covariance=self.covariance[nearest], contact=contact, known=self.known[nearest])
+        return replace(self, wrench=wrench, covariance=self.covariance[nearest], effects=self.effects[nearest], contact=contact, known=self.known[nearest])
+
+
+def carry(point: Array) -> Array:
+    """(..., 6, 6) that takes a wrench about a point (..., 3) m to the ground's origin: n += point x f."""
+    found = np.zeros((*point.shape[:-1], 6, 6))
+    found[..., :, :] = np.eye(6)
+    found[..., 3:, :3] = np.cross(point[..., None, :], np.eye(3)).swapaxes(-1, -2)
+    return found
 
 
 def about_origin(covariance: Array, point: Array) -> Array:
-    """Covariances (..., 6, 6) of wrenches about points (..., 3) m, carried to the ground's origin: n += point x f."""
-    carry = np.zeros((*point.shape[:-1], 6, 6))
-    carry[..., :, :] = np.eye(6)
-    carry[..., 3:, :3] = np.cross(point[..., None, :], np.eye(3)).swapaxes(-1, -2)
-    return np.asarray(carry @ covariance @ np.swapaxes(carry, -1, -2))
+    """Covariances (..., 6, 6) of wrenches about points (..., 3) m, carried to the ground's origin."""
+    X = carry(point)
+    return np.asarray(X @ covariance @ np.swapaxes(X, -1, -2))
 
 
 def _joint(each: Array) -> Array:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.filter.contacts import RESIDUAL, ContactLoads, about_origin
+from dynakin.filter.contacts import RESIDUAL, ContactLoads, about_origin, carry
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet import loads as on_plates
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
@@ -21,7 +21,7 @@ from dynakin.units import GRAVITY_M_S2
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 import os, json
-P = dict(pf=2.0, pm=0.5, gain=0.01, turn=0.005, shift=0.002, rf=15.0, rm=5.0, vs=0.4, v0=0.05, h=0.12, sole=0.5, nm=0.01, elsewhere=3.0, arm=0.5)
+P = dict(pf=2.0, pm=0.5, gain=0.01, turn=0.005, shift=0.002, rf=15.0, rm=5.0, vs=0.4, v0=0.05, h=0.12, sole=0.5, nm=0.01, elsewhere=3.0, arm=0.5, wf=5.0, wm=2.0, rwf=3.0, rwm=1.0)
 P.update(json.loads(os.environ.get("SPIKE", "{}")))
 
 _CONTACT = {
@@ -37,39 +37,38 @@ def expected_loads(loads: FootLoads, initial: CalibratedModel, noise: Noise, roo
     weight = initial.weighed_kg * GRAVITY_M_S2
     contact = np.vectorize(_CONTACT.get, otypes=[np.uint8])(loads.reason)
     T, F = contact.shape
-    wrench = np.nan_to_num(np.where((contact == NO_CONTACT)[..., None], 0.0, loads.wrench))
-    each = np.zeros((T, F, 6, 6))
-    each[:] = np.eye(6)
-    measured = contact == ON_PLATE
-    push = np.maximum(np.abs(wrench[..., 1]), on_plates.LOADED_N)
-    pressure = np.stack([wrench[..., 5] / push, np.zeros_like(push), -wrench[..., 3] / push], axis=-1)
+    C = F + 1
+    wrench = np.zeros((T, C, 6))
+    wrench[:, :F] = np.nan_to_num(np.where((contact == NO_CONTACT)[..., None], 0.0, loads.wrench))
+    white = np.zeros((T, C, 6, C, 6))
+    effects = np.zeros((T, 6, C, 6))
+    push = np.maximum(np.abs(wrench[:, :F, 1]), on_plates.LOADED_N)
+    pressure = np.stack([wrench[:, :F, 5] / push, np.zeros_like(push), -wrench[:, :F, 3] / push], axis=-1)
     plate = _plate_errors(push, pressure)
-    each[measured] = plate[measured]
-    priors_used = P.get('use', 1)
-    priors = (contact == UNMEASURED) | (contact == SHARED_PLATE)
-    if priors.any() and hasattr(loads, "sole"):
-        mean, covariance = _of_feet(loads, weight, root)
-        mean_u = np.where((contact == UNMEASURED)[..., None], mean, wrench)
-        wrench_prior = np.where(priors[..., None], mean, wrench)
-        each[priors] = covariance[priors]
-    joint = np.zeros((T, F + 1, 6, F + 1, 6))
+    mean, spread = _of_feet(loads, weight, root)
     for k in range(F):
-        joint[:, k, :, k] = each[:, k]
-    total = np.concatenate([wrench, np.zeros((T, 1, 6))], axis=1)
-    if priors.any() and hasattr(loads, "sole"):
-        total[:, :F] = np.where((contact == UNMEASURED)[..., None], mean, wrench)
-        frames = np.flatnonzero((contact == SHARED_PLATE).any(axis=1))
-        if len(frames):
-            _divide(total, joint, frames, contact, mean, plate)
-    residual = np.diag([P["rf"] ** 2] * 3 + [P["rm"] ** 2] * 3)
-    r = np.where(undeclared[:, None, None], np.diag([(P["elsewhere"] * weight) ** 2] * 6), residual)
-    joint[:, F, :, F] = about_origin(r, root)
+        off = contact[:, k] == UNMEASURED
+        white[:, k, :, k] = plate[:, k]
+        white[off, k, :, k] = about_origin(np.diag([P["wf"] ** 2] * 3 + [P["wm"] ** 2] * 3), loads_sole(loads, root)[off, k])
+        wrench[off, k] = mean[off, k]
+        effects[off, :, k] = spread[off, k]
+    frames = np.flatnonzero((contact == SHARED_PLATE).any(axis=1))
+    if len(frames):
+        each = spread @ np.swapaxes(spread, -1, -2)
+        _divide(wrench, white, frames, contact, mean, each, plate)
+    X = carry(root)
+    size = np.where(undeclared[:, None], P["elsewhere"] * weight, [P["rf"]] * 3 + [P["rm"]] * 3)
+    effects[:, :, F] = X * size[:, None, :]
+    white[:, F, :, F] = X @ np.diag([P["rwf"] ** 2] * 3 + [P["rwm"] ** 2] * 3) @ np.swapaxes(X, -1, -2)
     names = (*loads.feet, RESIDUAL)
     pelvis = next(s.name for s in initial.spec.segments if s.parent == "ground")
     segments = (*(initial.feet[foot] for foot in loads.feet), pelvis)
-    if not hasattr(loads,'sole'): each
     codes = np.column_stack([contact, np.full(T, ON_PLATE, dtype=np.uint8)])
-    return ContactLoads(names, segments, total, joint.reshape(T, 6 * F + 6, 6 * F + 6), codes, ~undeclared & (True if priors_used else loads.total_known))
+    return ContactLoads(names, segments, wrench, white.reshape(T, 6 * C, 6 * C), effects.reshape(T, 6, 6 * C), codes, ~undeclared)
+
+
+def loads_sole(loads: FootLoads, root: Array) -> Array:
+    return np.where(np.isfinite(loads.sole), loads.sole, root[:, None] * [1.0, 0.0, 1.0])
 
 
 def _plate_errors(push: Array, pressure: Array) -> Array:
@@ -81,7 +80,7 @@ def _plate_errors(push: Array, pressure: Array) -> Array:
 
 
 def _of_feet(loads: FootLoads, weight: float, root: Array) -> tuple[Array, Array]:
-    sole = np.where(np.isfinite(loads.sole), loads.sole, root[:, None] * [1.0, 0.0, 1.0])
+    sole = loads_sole(loads, root)
     to_root = root[:, None] - sole
     slope = to_root[..., [0, 2]] / np.maximum(to_root[..., [1]], 0.3)
     share = loads.stance / np.maximum(loads.stance.sum(axis=1, keepdims=True), 1.0)
@@ -94,27 +93,27 @@ def _of_feet(loads: FootLoads, weight: float, root: Array) -> tuple[Array, Array
     load = v / (P["vs"] + P["v0"])
     n = arm * load
     free = P["nm"] * load
-    own = np.stack([h, np.zeros_like(h), h, n, free, n], axis=-1) ** 2
-    covariance = v[..., None, None] ** 2 * direction[..., :, None] * direction[..., None, :] + own[..., None] * np.eye(6)
+    spread = np.zeros((*push.shape, 6, 6))
+    spread[..., 1] = v[..., None] * direction
+    spread[..., 0, 0] = spread[..., 2, 2] = h
+    L = np.linalg.cholesky(loads.cov)
+    spread[..., 3, 3], spread[..., 5, 3] = -load * L[..., 1, 0], load * L[..., 0, 0]
+    spread[..., 3, 5], spread[..., 5, 5] = -load * L[..., 1, 1], load * L[..., 0, 1]
+    spread[..., 4, 4] = free
     mean = push[..., None] * direction
-    covariance = about_origin(covariance, sole)
     mean[..., 3:] += np.cross(sole, mean[..., :3])
-    return mean, covariance
+    return mean, carry(sole) @ spread
 
 
-def _divide(total: Array, joint: Array, frames: npt.NDArray[np.intp], contact: npt.NDArray[np.uint8], mean: Array, plate: Array) -> None:
-    F = contact.shape[1]
+def _divide(wrench: Array, white: Array, frames: npt.NDArray[np.intp], contact: npt.NDArray[np.uint8], mean: Array, each: Array, plate: Array) -> None:
     for t in frames:
         own = np.flatnonzero(contact[t] == SHARED_PLATE)
-        measured = total[t, own].sum(axis=0)
-        S = joint[t, own, :, own].sum(axis=0) + plate[t, own].max(axis=0)
-        lack = measured - mean[t, own].sum(axis=0)
-        blocks = joint[t, own, :, own].copy()
-        solved = np.linalg.solve(S, blocks.transpose(1, 0, 2).reshape(6, -1)).reshape(6, len(own), 6)
-        for a, i in enumerate(own):
-            total[t, i] = mean[t, i] + blocks[a] @ np.linalg.solve(S, lack)
-            for b, j in enumerate(own):
-                joint[t, i, :, j] -= blocks[a] @ solved[:, b]
+        S = each[t, own].sum(axis=0) + plate[t, own].max(axis=0)
+        lack = wrench[t, own].sum(axis=0) - mean[t, own].sum(axis=0)
+        for i in own:
+            wrench[t, i] = mean[t, i] + each[t, i] @ np.linalg.solve(S, lack)
+            for j in own:
+                white[t, i, :, j] = (each[t, i] if i == j else 0.0) - each[t, i] @ np.linalg.solve(S, each[t, j])
 
 
 def root_path(initial: CalibratedModel, markers: Array) -> Array:

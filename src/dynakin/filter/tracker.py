@@ -108,15 +108,15 @@ class Tracker:
         if dt < 0.0:
             raise RecordingError(f"sample at {sample.time_s} s: older than the one before, at {self._time} s")
         loads = self._loads(feet)
-        covariance = None
+        covariance = effects = None
         if feet is not None:
-            wrench, covariance = (values[0] for values in feet.total())
+            wrench, covariance, effects = (values[0] for values in feet.total())
         if self._lag is not None:
-            report = self._lag.step(dt, markers, wrench, covariance)
+            report = self._lag.step(dt, markers, wrench, covariance, effects)
         else:
             if self._time is not None:
                 self._filter.predict(dt)
-            report = self._filter.update(markers, wrench, covariance)
+            report = self._filter.update(markers, wrench, covariance, effects)
         if report.diverged:
             raise DivergenceError(f"the filter diverged at {sample.time_s} s: {report.status}")
         self._time = sample.time_s
@@ -174,9 +174,9 @@ class Tracker:
             DivergenceError: the filter lost its estimate; the message names the frame.
         """
         time, markers, wrench = (np.ascontiguousarray(values) for values in (time, markers, wrench))
-        wrench, covariance = (wrench, None) if feet is None else feet.total()
+        wrench, covariance, effects = (wrench, None, None) if feet is None else feet.total()
         arrays = self._filter.run(
-            time, markers, wrench, progress, output_sd=True, feet=self._loads(feet), wrench_covariance=covariance
+            time, markers, wrench, progress, output_sd=True, feet=self._loads(feet), wrench_covariance=covariance, wrench_effects=effects
         )
         self._time, self._latest = float(time[-1]), None
         return arrays
@@ -196,9 +196,9 @@ class Tracker:
         """
         check_can_smooth(self.noise)
         time, markers, wrench = (np.ascontiguousarray(values) for values in (time, markers, wrench))
-        wrench, covariance = (wrench, None) if feet is None else feet.total()
+        wrench, covariance, effects = (wrench, None, None) if feet is None else feet.total()
         arrays = self._filter.run_smoothed(
-            time, markers, wrench, progress, feet=self._loads(feet), wrench_covariance=covariance
+            time, markers, wrench, progress, feet=self._loads(feet), wrench_covariance=covariance, wrench_effects=effects
         )
         self._time, self._latest = float(time[-1]), None
         return smoothed(arrays)
