@@ -32,6 +32,8 @@ PRESSED_N = 100.0
 EMPTY_N = 5.0
 """Vertical force up to which it bears none."""
 NORMAL_95 = 1.96
+NORMAL_MEDIAN = 1.4826
+"""Deviation of a normal error over the median of its size."""
 ALOFT = "aloft"
 """What the program calls a contact of which it says that nothing touches it: its wrench is then zero, for sure."""
 FORCES = ("vertical", "along", "across")
@@ -88,7 +90,8 @@ class Score:
         frames, of: frames in which it is called so, of those that are judged.
         rms, bias: of the error: N, m, N m; None where nothing is given. given: frames in which it is.
         inside: part of these within 1.96 standard deviations. sd_over_error: RMS of the deviation over that of the
-            error. median_ratio: median of the deviation over that of the error's size. None: without deviations.
+            error; 1 is right, 2 means intervals twice too wide. median_ratio: the same of medians. None: without
+            deviations.
     """
 
     contact: str
@@ -154,6 +157,19 @@ def judge(found: Found, reference: Reference) -> list[Score]:
     ]
 
 
+def judge_moments(found: Found, reference: Reference) -> list[Score]:
+    """Every coordinate whose true moment is known, in all judged frames; ``contact`` is the coordinate's name."""
+    data, codes = found.data, moment_sources(found.data)
+    scores: list[Score] = []
+    for k, name in enumerate(str(name) for name in data["coordinate"].values):
+        if name in reference.moments:
+            own, true = data.sel(coordinate=name), reference.moments[name]
+            called = np.array(MEANINGS)[codes[:, k]]
+            frames = reference.judged & np.isfinite(true)
+            scores += _scores(name, "moment", own["moments"].values - true, own["moments_sd"].values, called, frames)
+    return scores
+
+
 def _contact(found: Found, reference: Reference, name: str, load: Load) -> Iterator[Score]:
     data, ground = found.data.sel(foot=name), found.ground
     true = ground.wrench_to_ground(load.wrench)
@@ -216,7 +232,7 @@ def _scores(
                 s = sd[given]
                 inside = float(np.mean(np.abs(e) <= NORMAL_95 * s))
                 ratio = _rms(s) / rms if rms > 0.0 else None
-                size = float(np.median(np.abs(e)))
+                size = NORMAL_MEDIAN * float(np.median(np.abs(e)))
                 middle = float(np.median(s)) / size if size > 0.0 else None
         yield Score(contact, quantity, meaning, int(here.sum()), of, int(given.sum()), rms, bias, inside, ratio, middle)
 
