@@ -20,7 +20,8 @@ from dynakin.validation.case import case_of
 from dynakin.validation.methods import estimate_each
 from recordings import _source as source_digest
 
-VARIABLES = ("moments", "moments_sd", "moment_source", "foot_contact", "foot_wrench", "foot_wrench_sd")
+KEPT_STEMS = ("moment", "foot_")
+"""How the variables of an estimate begin that are kept."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,5 +74,5 @@ def _estimate(recording: Recording, static: Recording | None, settings: Mapping[
     except DynakinError as error:
         return Run(None, error.message, [], 0.0)
     (estimate,) = estimates.values()
-    data = estimate.data[[name for name in VARIABLES if name in estimate.data]].load()
+    data = estimate.data[[name for name in estimate.data if str(name).startswith(KEPT_STEMS)]].load()
     return Run(Found(data, estimate.ground), "", list(estimate.messages), 0.0)

@@ -16,9 +16,8 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 from kept_runs import Run, kept_run
-from withheld_judge import HEAD, JOINTS, WORDS, Score, cells, judge, judge_moments, of_truth
+from withheld_judge import HEAD, JOINTS, WORDS, Score, cells, judge, judge_moments, of_truth, pool
 
 from dynakin.errors import ConfigError
 from dynakin.simulation.trial import simulate
@@ -111,18 +110,13 @@ def moments_table(found: Sequence[Judged]) -> Iterator[str]:
 
 
 def _pooled(scores: Sequence[Score], called: str) -> str:
-    own = [s for s in scores if s.called == called]
-    of = sum({s.contact: s.of for s in scores}.values())
-    if not own:
+    found = pool(scores, called)
+    if found is None:
         return "–"
-    text = f"{100.0 * sum(s.frames for s in own) / of:.0f} %"
-    known = [s for s in own if s.rms is not None]
-    if not known:
-        return text
-    given = sum(s.given for s in known)
-    rms = float(np.sqrt(sum(s.given * s.rms**2 for s in known if s.rms is not None) / given))
-    inside = sum(s.given * (s.inside or 0.0) for s in known) / given
-    return f"{text}; {rms:.1f} ({100.0 * inside:.0f})"
+    share = f"{100.0 * found.frames / found.of:.0f} %"
+    if found.rms is None or found.inside is None:
+        return share
+    return f"{share}; {found.rms:.1f} ({100.0 * found.inside:.0f})"
 
 
 def main() -> None:

@@ -14,7 +14,7 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -23,8 +23,8 @@ from kept_runs import Run, kept_run
 from withheld_judge import (
     FORCES,
     HEAD,
-    IN_AIR,
     JOINTS,
+    QUANTITIES,
     WORDS,
     Reference,
     Score,
@@ -33,6 +33,7 @@ from withheld_judge import (
     measured_moments,
     of_plates,
     of_truth,
+    pool,
     within,
 )
 
@@ -48,6 +49,7 @@ from recordings import DATA, PAGE, ROOT, TRIALS
 KEPT = ROOT / "build" / "withheld"
 MARKS = ("<!-- withheld: begin -->", "<!-- withheld: end -->")
 NOTHING, ALL, RIGHT, LEFT, SHARED = ARMS = ("nothing", "all", "right", "left", "shared")
+POOLED = {NOTHING: (NOTHING,), ALL: (ALL,), "one of two": (RIGHT, LEFT), SHARED: (SHARED,)}
 Spans = tuple[tuple[float, float], ...]
 
 
@@ -58,31 +60,35 @@ class Case:
     Attributes:
         spans: seconds in which the plates together carry the person, so that no other contact is in doubt.
         owners: plates of each foot by their names; simulated: found by their load.
+        kind: of movement, by which trials are pooled.
         cut_s: only that part of the recording is run. seed: of a simulated one.
     """
 
     name: str
     spans: Spans
     owners: dict[str, tuple[str, ...]]
+    kind: str
     cut_s: tuple[float, float] | None = None
     seed: int | None = None
 
 
 _OPENCAP = {"right": ("plate 1",), "left": ("plate 2",)}
+WALK, STILL, FAST = "walks", "standing, squats", "run, drop jump"
+WALKING, SQUAT = "simulated walks", "simulated squats"
 _STANDING_UP = ((1.07, 2.26), (3.74, 4.89), (6.36, 7.46))
 """Of STS1: while the feet alone carry the body (README of the recordings)."""
 CASES = (
-    Case("opencap_subject4/squats1", ((0.5, 8.0),), _OPENCAP, cut_s=(0.0, 8.0)),
-    Case("opencap_subject4/walking1", ((0.15, 1.20),), _OPENCAP),
-    Case("opencap_subject4/STS1", _STANDING_UP, _OPENCAP, cut_s=(0.0, 8.0)),
-    Case("opencap_subject4/DJ1", ((1.42, 2.68),), _OPENCAP),
-    Case("rajagopal/motion_capture_walk", ((0.45, 1.80),), {"right": ("plate r",), "left": ("plate l",)}),
-    Case("rajagopal/motion_capture_run", ((0.40, 5.20),), {"right": ("plate r",), "left": ("plate l",)}),
-    Case("gait2354/subject01_walk1", ((0.20, 2.45),), {"right": ("plate",), "left": ("plate 1",)}),
-    Case("plugin_gait/GaitNormal_1", ((0.30, 1.90),), {"right": ("plate 1", "plate 3"), "left": ("plate 2",)}),
-    Case("plugin_gait/S1_StandingRef", ((0.20, 0.99),), {"right": ("plate 2",), "left": ("plate 1",)}),
-    *(Case("simulated squat", ((0.5, 7.0),), {}, cut_s=(0.0, 7.0), seed=seed) for seed in (1, 2)),
-    *(Case("simulated walk", ((0.0, 4.0),), {}, cut_s=(0.0, 4.0), seed=seed) for seed in (1, 2, 3)),
+    Case("opencap_subject4/squats1", ((0.5, 8.0),), _OPENCAP, STILL, cut_s=(0.0, 8.0)),
+    Case("opencap_subject4/walking1", ((0.15, 1.20),), _OPENCAP, WALK),
+    Case("opencap_subject4/STS1", _STANDING_UP, _OPENCAP, STILL, cut_s=(0.0, 8.0)),
+    Case("opencap_subject4/DJ1", ((1.42, 2.68),), _OPENCAP, FAST),
+    Case("rajagopal/motion_capture_walk", ((0.45, 1.80),), {"right": ("plate r",), "left": ("plate l",)}, WALK),
+    Case("rajagopal/motion_capture_run", ((0.40, 5.20),), {"right": ("plate r",), "left": ("plate l",)}, FAST),
+    Case("gait2354/subject01_walk1", ((0.20, 2.45),), {"right": ("plate",), "left": ("plate 1",)}, WALK),
+    Case("plugin_gait/GaitNormal_1", ((0.30, 1.90),), {"right": ("plate 1", "plate 3"), "left": ("plate 2",)}, WALK),
+    Case("plugin_gait/S1_StandingRef", ((0.20, 0.99),), {"right": ("plate 2",), "left": ("plate 1",)}, STILL),
+    *(Case("simulated squat", ((0.5, 7.0),), {}, SQUAT, cut_s=(0.0, 7.0), seed=seed) for seed in (1, 2)),
+    *(Case("simulated walk", ((0.0, 4.0),), {}, WALKING, cut_s=(0.0, 4.0), seed=seed) for seed in (1, 2, 3)),
 )
 _MOTIONS = {"simulated squat": "squat", "simulated walk": "gait"}
 
@@ -238,19 +244,50 @@ def table(all_judged: Sequence[Judged]) -> Iterator[str]:
                         yield f"{where}| {foot} | {called} | {' | '.join(cells(own, each.mass_kg))} |"
 
 
+def summary(all_judged: Sequence[Judged]) -> Iterator[str]:
+    """By kind of movement, pooled over trials and the feet whose plates were withheld; cells as those of `table`."""
+    head = f"| movement (trials) | withheld | called | frames, % | {HEAD} |"
+    yield head
+    yield "|" + "---|" * (head.count("|") - 1)
+    for kind in dict.fromkeys(each.case.kind for each in all_judged):
+        of_kind = [each for each in all_judged if each.case.kind == kind]
+        for words, arms in POOLED.items():
+            if words == NOTHING and of_kind[0].case.seed is None:
+                continue
+            scores = [
+                _per_kg(score, each.mass_kg)
+                for each in of_kind
+                for arm in arms
+                for score in each.scores.get(arm, [])
+                if len(arms) == 1 or score.contact == arm
+            ]
+            for called in WORDS:
+                pooled = {q: pool([s for s in scores if s.quantity == q], called) for q in QUANTITIES}
+                own = {q: found for q, found in pooled.items() if found is not None}
+                if any(q in own for q in (*FORCES, *JOINTS)):
+                    yield f"| {kind} ({len(of_kind)}) | {words} | {called} | {' | '.join(cells(own, 1.0))} |"
+
+
+def _per_kg(score: Score, mass_kg: float) -> Score:
+    """With a vertical force over the person's mass, so that trials of several people can be pooled."""
+    if score.quantity != "vertical" or score.rms is None or score.bias is None:
+        return score
+    return replace(score, rms=score.rms / mass_kg, bias=score.bias / mass_kg)
+
+
 def rows(all_judged: Sequence[Judged]) -> Iterator[dict[str, Any]]:
     """Every score, for the JSON file; in SI."""
     for each in all_judged:
         for arm, scores in each.scores.items():
             for score in scores:
-                if score.quantity == IN_AIR or score.frames:
-                    yield {
-                        "trial": title(each.case),
-                        "model": each.model,
-                        "withheld": arm,
-                        "mass_kg": each.mass_kg,
-                        **asdict(score),
-                    }
+                yield {
+                    "trial": title(each.case),
+                    "kind": each.case.kind,
+                    "model": each.model,
+                    "withheld": arm,
+                    "mass_kg": each.mass_kg,
+                    **asdict(score),
+                }
 
 
 def main() -> None:
@@ -263,7 +300,7 @@ def main() -> None:
     asked = parser.parse_args()
     chosen = [c for c in CASES if not asked.names or any(part in title(c) for part in asked.names)]
     found = [judged(c, asked.live, asked.model == "fullbody", lambda t: print(t, flush=True)) for c in chosen]
-    lines = list(table(found))
+    lines = [*summary(found), "", *table(found)]
     print("\n".join(lines))
     kind = ("_live" if asked.live else "") + ("_fullbody" if asked.model == "fullbody" else "")
     output = asked.output or KEPT / f"withheld{kind}.json"

@@ -7,18 +7,19 @@ any trial with a wrench of each contact: withheld plates, or a simulation's trut
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from dynakin.recordings.feet.contact import NO_CONTACT, UNMEASURED
+from dynakin.recordings.feet.contact import NO_CONTACT
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Plate
+from dynakin.results.measures.feet import foot_sources
 from dynakin.results.measures.pressure import centre_of_pressure
-from dynakin.results.measures.sources import ABSENT, DERIVED, MEANINGS, MEASURED, moment_sources
+from dynakin.results.measures.sources import ABSENT, MEANINGS, MEASURED, moment_sources
 from dynakin.simulation.truth import Truth
 from dynakin.units import GRAVITY_M_S2
 
@@ -175,8 +176,7 @@ def _contact(found: Found, reference: Reference, name: str, load: Load) -> Itera
     true = ground.wrench_to_ground(load.wrench)
     wrench, sd = (data[key].transpose("time", "component").values for key in ("foot_wrench", "foot_wrench_sd"))
     touches = data["foot_contact"].values
-    codes = np.where(touches == UNMEASURED, DERIVED, MEASURED)
-    codes = _names(np.where(np.isfinite(wrench).all(axis=1), codes, ABSENT), touches)
+    codes = _names(foot_sources(found.data)[:, list(found.data["foot"].values).index(name)], touches)
     push = true[:, 1]
     with np.errstate(invalid="ignore"):
         loaded, pressed, empty = (
@@ -235,6 +235,33 @@ def _scores(
                 size = NORMAL_MEDIAN * float(np.median(np.abs(e)))
                 middle = float(np.median(s)) / size if size > 0.0 else None
         yield Score(contact, quantity, meaning, int(here.sum()), of, int(given.sum()), rms, bias, inside, ratio, middle)
+
+
+def pool(scores: Sequence[Score], called: str) -> Score | None:
+    """One score of all that are called so, of one quantity over contacts and trials: every frame counts the same.
+
+    Args:
+        scores: each with its fellows that are called otherwise, so that the frames add up.
+    """
+    own = [score for score in scores if score.called == called]
+    if not own:
+        return None
+    of = sum(score.frames for score in scores)
+    given = sum(score.given for score in own)
+    first = replace(own[0], frames=sum(score.frames for score in own), of=of, given=given, median_ratio=None)
+    known = [score for score in own if score.given]
+    if not known:
+        return first
+    weights = np.array([score.given for score in known], dtype=float)
+
+    def mean(values: Sequence[float | None]) -> float | None:
+        return None if any(v is None for v in values) else float(np.average(np.array(values, float), weights=weights))
+
+    rms = float(np.sqrt(np.average([(score.rms or 0.0) ** 2 for score in known], weights=weights)))
+    variance = mean([None if s.sd_over_error is None else (s.sd_over_error * (s.rms or 0.0)) ** 2 for s in known])
+    ratio = None if variance is None or rms == 0.0 else float(np.sqrt(variance)) / rms
+    inside, bias = mean([score.inside for score in known]), mean([score.bias for score in known])
+    return replace(first, rms=rms, bias=bias, inside=inside, sd_over_error=ratio)
 
 
 def _rms(values: Array) -> float:
