@@ -281,7 +281,7 @@ WORDS = (*MEANINGS, ALOFT)
 def cells(own: Mapping[str, Score], mass_kg: float) -> Iterator[str]:
     """Scores by quantity of one contact and one word as cells of a table: share of the frames (force, or force / hip /
     knee / ankle), then for each quantity RMS error (percent of it within 1.96 deviations; deviation over error)."""
-    shares = [_share(own.get(quantity)) for quantity in ("vertical", *JOINTS)]
+    shares = [_share(own.get(quantity)) for quantity in ("vertical", *JOINTS) if quantity in own] or ["0"]
     yield shares[0] if len(set(shares)) == 1 else " / ".join(shares)
     yield _cell(own.get("vertical"), 100.0 / (mass_kg * GRAVITY_M_S2), 1)
     yield _cell(own.get("along"), 1.0, 0)
