@@ -276,9 +276,10 @@ def summary(all_judged: Sequence[Judged]) -> Iterator[str]:
 
 def _per_kg(score: Score, mass_kg: float) -> Score:
     """With a vertical force over the person's mass, so that trials of several people can be pooled."""
-    if score.quantity != "vertical" or score.rms is None or score.bias is None:
+    if score.quantity != "vertical":
         return score
-    return replace(score, rms=score.rms / mass_kg, bias=score.bias / mass_kg)
+    rms, bias, sd = (None if value is None else value / mass_kg for value in (score.rms, score.bias, score.sd))
+    return replace(score, rms=rms, bias=bias, sd=sd)
 
 
 def rows(all_judged: Sequence[Judged]) -> Iterator[dict[str, Any]]:
@@ -293,6 +294,7 @@ def rows(all_judged: Sequence[Judged]) -> Iterator[dict[str, Any]]:
                     "withheld": arm,
                     "mass_kg": each.mass_kg,
                     **asdict(score),
+                    "sd_over_error": score.sd_over_error,
                 }
 
 

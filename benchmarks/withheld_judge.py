@@ -90,9 +90,8 @@ class Score:
     Attributes:
         frames, of: frames in which it is called so, of those that are judged.
         rms, bias: of the error: N, m, N m; None where nothing is given. given: frames in which it is.
-        inside: part of these within 1.96 standard deviations. sd_over_error: RMS of the deviation over that of the
-            error; 1 is right, 2 means intervals twice too wide. median_ratio: the same of medians. None: without
-            deviations.
+        inside: part of these within 1.96 standard deviations. sd: RMS of the deviation. median_ratio: median of the
+            deviation over that of a normal error of the same median size. None: without deviations.
     """
 
     contact: str
@@ -104,8 +103,13 @@ class Score:
     rms: float | None
     bias: float | None
     inside: float | None
-    sd_over_error: float | None
+    sd: float | None
     median_ratio: float | None
+
+    @property
+    def sd_over_error(self) -> float | None:
+        """RMS of the deviation over that of the error: 1 is right, 2 means intervals twice too wide."""
+        return None if self.sd is None or not self.rms else self.sd / self.rms
 
 
 def of_plates(plates: Mapping[str, list[Plate]]) -> dict[str, Load]:
@@ -224,17 +228,19 @@ def _scores(
         if not here.any():
             continue
         given = here & np.isfinite(error)
-        rms = bias = inside = ratio = middle = None
+        rms = bias = inside = spread = middle = None
         if given.any():
             e = error[given]
             rms, bias = _rms(e), float(e.mean())
             if sd is not None and np.isfinite(sd[given]).all():
                 s = sd[given]
                 inside = float(np.mean(np.abs(e) <= NORMAL_95 * s))
-                ratio = _rms(s) / rms if rms > 0.0 else None
+                spread = _rms(s)
                 size = NORMAL_MEDIAN * float(np.median(np.abs(e)))
                 middle = float(np.median(s)) / size if size > 0.0 else None
-        yield Score(contact, quantity, meaning, int(here.sum()), of, int(given.sum()), rms, bias, inside, ratio, middle)
+        yield Score(
+            contact, quantity, meaning, int(here.sum()), of, int(given.sum()), rms, bias, inside, spread, middle
+        )
 
 
 def pool(scores: Sequence[Score], called: str) -> Score | None:
@@ -257,11 +263,16 @@ def pool(scores: Sequence[Score], called: str) -> Score | None:
     def mean(values: Sequence[float | None]) -> float | None:
         return None if any(v is None for v in values) else float(np.average(np.array(values, float), weights=weights))
 
-    rms = float(np.sqrt(np.average([(score.rms or 0.0) ** 2 for score in known], weights=weights)))
-    variance = mean([None if s.sd_over_error is None else (s.sd_over_error * (s.rms or 0.0)) ** 2 for s in known])
-    ratio = None if variance is None or rms == 0.0 else float(np.sqrt(variance)) / rms
     inside, bias = mean([score.inside for score in known]), mean([score.bias for score in known])
-    return replace(first, rms=rms, bias=bias, inside=inside, sd_over_error=ratio)
+    rms, sd = (
+        None if square is None else float(np.sqrt(square))
+        for square in (mean([_square(score.rms) for score in known]), mean([_square(score.sd) for score in known]))
+    )
+    return replace(first, rms=rms, bias=bias, inside=inside, sd=sd)
+
+
+def _square(value: float | None) -> float | None:
+    return None if value is None else value**2
 
 
 def _rms(values: Array) -> float:
