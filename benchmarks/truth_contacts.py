@@ -26,7 +26,11 @@ from recordings import ROOT
 KEPT = ROOT / "build" / "truth_contacts"
 START_S, END_S = 0.5, 0.1
 """Seconds left out at either end."""
-GROUPS = {**JOINTS, "trunk": ("lumbar", "neck"), "arms": ("arm_", "elbow", "pro_sup", "wrist")}
+GROUPS: dict[str, str | tuple[str, ...]] = {
+    **JOINTS,
+    "trunk": ("lumbar", "neck"),
+    "arms": ("arm_", "elbow", "pro_sup", "wrist"),
+}
 """Joints by how their coordinates begin."""
 
 

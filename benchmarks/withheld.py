@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -68,7 +68,7 @@ class Case:
 
     name: str
     spans: Spans
-    owners: dict[str, tuple[str, ...]]
+    owners: Mapping[str, tuple[str, ...]]
     kind: str
     weighed_kg: float | None = None
     cut_s: tuple[float, float] | None = None
