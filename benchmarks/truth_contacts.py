@@ -55,9 +55,11 @@ CASES = (
     _case("belt", 5.0),
     _case("belt", 5.0, ", shared plate", plates="shared"),
     _case("belt", 5.0, ", rail 0.1", rail=0.1),
-    _case("sit-to-stand", 8.0, ", seat not measured"),
-    _case("sit-to-stand", 8.0, ", seat on a plate", plates="all"),
-    _case("jump", 3.0),
+    _case("sit", 8.0, ", seat not measured"),
+    _case("sit", 8.0, ", seat on a plate", plates="all"),
+    _case("steps", 4.0),
+    _case("steps-down", 4.0),
+    _case("drop-jump", 3.0),
 )
 
 

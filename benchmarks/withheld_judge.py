@@ -52,7 +52,8 @@ class Load:
     Attributes:
         wrench: (T, 6) N and N m, ground on person, laboratory axes, about the laboratory's origin; NaN where it is not
             known.
-        surface_L: (3,) m, a point of the level surface on which its centre of pressure is judged; None: it is not.
+        surface_L: (3,) or (T, 3) m, a point of the level surface on which its centre of pressure is judged; None: it is
+            not.
     """
 
     wrench: Array
@@ -135,8 +136,10 @@ def of_truth(truth: Truth, judged: Flags) -> Reference:
         about_ground = data["contact_wrench"].sel(contact=name).transpose("time", "component").values
         force = about_ground[:, :3]
         wrench = np.hstack([force, about_ground[:, 3:] + np.cross(origin, force)])
-        foot = str(name).endswith(" foot")
-        loads[str(name).removesuffix(" foot")] = Load(wrench, np.array([0.0, 0.0, 0.0]) if foot else None)
+        surface = None
+        if str(name).endswith(" foot"):  # on steps, floors differ
+            surface = origin if "contact_point" not in data else data["contact_point"].sel(contact=name).values + origin
+        loads[str(name).removesuffix(" foot")] = Load(wrench, surface)
     moments = data["moments"].transpose("time", "coordinate").values
     names = [str(name) for name in data["coordinate"].values]
     return Reference(loads, {name: moments[:, k] for k, name in enumerate(names)}, judged, truth.subject.mass_kg)
@@ -191,8 +194,7 @@ def _contact(found: Found, reference: Reference, name: str, load: Load) -> Itera
         yield from _scores(name, quantity, wrench[:, k] - true[:, k], sd[:, k], codes, loaded)
     yield from _scores(name, IN_AIR, wrench[:, 1] - push, sd[:, 1], codes, empty)
     if load.surface_L is not None:
-        height = float(ground.points_to_ground(load.surface_L)[1])
-        off = centre_of_pressure(wrench, height)[0] - centre_of_pressure(true, height)[0]
+        off = _pressure(wrench, ground, load.surface_L) - _pressure(true, ground, load.surface_L)
         for quantity, k in zip(PRESSURES, (along, across), strict=True):
             yield from _scores(name, quantity, off[:, k], None, codes, pressed)
     sources = moment_sources(found.data)
@@ -205,6 +207,14 @@ def _contact(found: Found, reference: Reference, name: str, load: Load) -> Itera
         known = loaded & np.isfinite(reference.moments[coordinate])
         error = own["moments"].values - reference.moments[coordinate]
         yield from _scores(name, joint, error, own["moments_sd"].values, _names(sources[:, at], touches), known)
+
+
+def _pressure(wrench: Array, ground: GroundFrame, surface_L: Array) -> Array:
+    """Centre of pressure (T, 3) m on level surfaces through points, at any height there."""
+    up = np.zeros((len(wrench), 3))
+    up[:, 1] = ground.points_to_ground(surface_L)[..., 1]
+    about = np.hstack([wrench[:, :3], wrench[:, 3:] - np.cross(up, wrench[:, :3])])
+    return centre_of_pressure(np.where(np.isfinite(up[:, [1]]), about, np.nan), 0.0)[0]
 
 
 def _axes(ground: GroundFrame) -> tuple[int, int]:
