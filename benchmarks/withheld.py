@@ -258,7 +258,7 @@ def summary(all_judged: Sequence[Judged]) -> Iterator[str]:
     yield head
     yield "|" + "---|" * (head.count("|") - 1)
     for kind in dict.fromkeys(each.case.kind for each in all_judged):
-        of_kind = [each for each in all_judged if each.case.kind == kind]
+        of_kind = [each for each in all_judged if each.case.kind == kind and each.scores]
         for words, arms in POOLED.items():
             scores = [
                 _per_kg(score, each.mass_kg)
