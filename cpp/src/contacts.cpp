@@ -13,16 +13,16 @@ Force force_of(const Vector6& w) { return {w.head<3>(), w.tail<3>()}; }
 
 }  // namespace
 
-ContactLoads::ContactLoads(std::size_t contacts)
+ContactLoads::ContactLoads(std::size_t contacts, std::size_t states)
     : contact(contacts, Contact::none),
       wrench(Eigen::VectorXd::Zero(static_cast<Eigen::Index>(6 * contacts))),
       covariance(Eigen::MatrixXd::Identity(wrench.size(), wrench.size())),
-      effects(Eigen::MatrixXd::Zero(6, wrench.size())) {}
+      effects(Eigen::MatrixXd::Zero(6, static_cast<Eigen::Index>(6 * states))) {}
 
 ContactMoments::ContactMoments(const Model& model, std::vector<int> segments)
     : model_(model),
       segments_(std::move(segments)),
-      loads_(segments_.size()),
+      loads_(segments_.size(), static_cast<std::size_t>(model.contacts())),
       wrench_(segments_.size(), Vector6::Zero()),
       adjustment_(wrench_),
       with_sum_(segments_.size(), Matrix6::Zero()),
@@ -32,7 +32,7 @@ ContactMoments::ContactMoments(const Model& model, std::vector<int> segments)
       external_(model.segments().size()),
       work_(model),
       variances_(static_cast<Eigen::Index>(model.coordinates().size()), model.state_size()) {
-  if (model.contacts() > 0 && model.contacts() != contacts())
+  if (model.contacts() > contacts())
     throw std::invalid_argument("contacts: " + std::to_string(contacts()) + " segments, expected one for each of the " +
                                 std::to_string(model.contacts()) + " that the model has states of");
   const int n_segments = static_cast<int>(model.segments().size());
@@ -62,8 +62,7 @@ bool ContactMoments::distribute(const StateRef& x, const DynamicState& dynamics,
     if (!touches(i)) continue;
     any = true;
     wrench_[i] = loads_.wrench.segment<6>(static_cast<Eigen::Index>(6 * i));
-    if (const int c = model_.contact_column(static_cast<int>(i)); c != k_none)
-      wrench_[i].noalias() += effects(i) * x.segment<6>(c);
+    if (const int c = column(i); c != k_none) wrench_[i].noalias() += effects(i) * x.segment<6>(c);
     missing -= wrench_[i];
     for (std::size_t j = 0; j < n; ++j)
       if (touches(j)) with_sum_[i] += block(i, j);
@@ -135,8 +134,8 @@ void ContactMoments::jacobian(const StateRef& x, const KinematicState& state, co
   moment_jacobian(model_, x, state, dynamics, &external_, work_, out);
   wrench_jacobian(model_, state, dynamics, wrench_J_);
   levers(state);
-  for (std::size_t i = 0; model_.contacts() > 0 && i < segments_.size(); ++i) {
-    const int c = model_.contact_column(static_cast<int>(i));
+  for (std::size_t i = 0; column(i) != k_none; ++i) {
+    const int c = column(i);
     for (int k = 0; k < 6; ++k) {  // of a contact that nothing touches the states add nothing
       wrench_J_.col(c + k).setZero();
       if (!touches(i)) continue;
@@ -173,7 +172,7 @@ void ContactMoments::deviations(const StateRef& x, const KinematicState& state, 
       continue;
     }
     Matrix6 C = share_[k] * needed * share_[k].transpose() + block(k, k) - share_[k] * with_sum_[k].transpose();
-    if (const int c = model_.contact_column(static_cast<int>(k)); c != k_none) {
+    if (const int c = column(k); c != k_none) {
       const Matrix6 own = effects(k), with_need = share_[k] * wrench_JP_.middleCols<6>(c) * own.transpose();
       C += with_need + with_need.transpose() + own * P.block<6, 6>(c, c) * own.transpose();
     }

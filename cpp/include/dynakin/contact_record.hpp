@@ -14,12 +14,13 @@ struct ContactTrial {
   std::size_t frames = 0;
   std::vector<double> wrench;      // (frames, contacts, 6)
   std::vector<double> covariance;  // (frames, contacts, 6, contacts, 6)
-  std::vector<double> effects;     // (frames, 6, contacts, 6)
+  std::size_t states = 0;          // how many contacts, the first ones, have states
+  std::vector<double> effects;     // (frames, 6, states, 6)
   std::vector<Contact> contact;    // (frames, contacts)
 };
 
 struct ContactRecord {
-  // The trial must outlive it.
+  // The trial must outlive it. Throws std::invalid_argument where the model has states of other contacts.
   ContactRecord(const Model& model, const ContactTrial& trial);
 
   // Frame k: its moments (coordinates) and, where asked, their standard deviations. Throws std::invalid_argument where

@@ -29,18 +29,20 @@ enum class MomentSource : std::uint8_t {
 // wrench and covariance do not count. What covariances of different contacts share stands beside the diagonal: two
 // feet on one plate have a sum that is known better than its parts.
 struct ContactLoads {
-  explicit ContactLoads(std::size_t contacts);
+  // states: how many contacts, the first ones, have states.
+  explicit ContactLoads(std::size_t contacts, std::size_t states = 0);
   std::vector<Contact> contact;
   Eigen::VectorXd wrench;      // (6 contacts)
   Eigen::MatrixXd covariance;  // (6 contacts, 6 contacts), symmetric; that of the sum is positive definite
-  // (6, 6 contacts): what a contact's six states add to its wrench, where the model has the states.
+  // (6, 6 states): what the six states of a contact that has them add to its wrench.
   Eigen::Matrix<double, 6, Eigen::Dynamic> effects;
 };
 
 // Allocated once for a model. distribute comes first; what follows is of the same state and loads.
 class ContactMoments {
  public:
-  // segments: of the contacts, valid numbers. Throws std::invalid_argument otherwise.
+  // segments: of the contacts, valid numbers; those that the model has states of come first. Throws
+  // std::invalid_argument otherwise.
   ContactMoments(const Model& model, std::vector<int> segments);
 
   int contacts() const { return static_cast<int>(segments_.size()); }
@@ -68,6 +70,7 @@ class ContactMoments {
  private:
   void mark_sources();
   void levers(const KinematicState& state);
+  int column(std::size_t i) const { return model_.contact_column(static_cast<int>(i)); }
   bool touches(std::size_t i) const { return loads_.contact[i] != Contact::none; }
   auto effects(std::size_t i) const { return loads_.effects.middleCols<6>(static_cast<Eigen::Index>(6 * i)); }
   auto block(std::size_t i, std::size_t j) const {

@@ -81,8 +81,8 @@ class Model {
   // Columns of the plates' slow error and of their delay, k_none where they are not estimated.
   const std::array<int, 6>& offset_columns() const { return offset_columns_; }
   int delay_column() const { return delay_column_; }
-  // Column of the first of six numbers of a contact, k_none where the spec names none.
-  int contact_column(int contact) const { return contacts_column_ == k_none ? k_none : contacts_column_ + 6 * contact; }
+  // Column of the first of six numbers of a contact, k_none of one that the spec does not name.
+  int contact_column(int contact) const { return contact < contacts() ? contacts_column_ + 6 * contact : k_none; }
   int contacts() const { return static_cast<int>(spec_.contacts.size()); }
 
   int coordinate_column(int coordinate) const { return coordinates_[coordinate].index; }

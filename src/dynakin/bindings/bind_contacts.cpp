@@ -32,14 +32,15 @@ PyContactLoads contact_loads(std::vector<std::string> segments, const Array3& wr
     throw std::invalid_argument("covariance: expected " + shape({frames, 6 * n, 6 * n}));
   if (contact.shape(0) != frames || contact.shape(1) != n)
     throw std::invalid_argument("contact: expected " + shape({frames, n}));
-  if (effects && (effects->shape(0) != frames || effects->shape(1) != 6 || effects->shape(2) != 6 * n))
-    throw std::invalid_argument("effects: expected " + shape({frames, 6, 6 * n}));
+  const std::size_t states = effects ? effects->shape(2) / 6 : 0;
+  if (effects && (effects->shape(0) != frames || effects->shape(1) != 6 || effects->shape(2) != 6 * states || states > n))
+    throw std::invalid_argument("effects: expected " + shape({frames, 6, 6 * n}) + " or fewer columns, six a contact");
   PyContactLoads out;
   out.names = std::move(segments);
   out.trial.frames = frames;
   out.trial.wrench.assign(wrench.data(), wrench.data() + wrench.size());
   out.trial.covariance.assign(covariance.data(), covariance.data() + covariance.size());
-  out.trial.effects.assign(36 * n * frames, 0.0);
+  out.trial.states = states;
   if (effects) out.trial.effects.assign(effects->data(), effects->data() + effects->size());
   for (std::size_t i = 0; i < contact.size(); ++i) {
     if (contact.data()[i] > static_cast<std::uint8_t>(Contact::shared))
@@ -85,7 +86,7 @@ nb::dict contact_moments(const Model& model, const StateRef& x, const PyContactL
   };
   keep(one.wrench, 6 * feet);
   keep(one.covariance, 36 * feet * feet);
-  keep(one.effects, 36 * feet);
+  keep(one.effects, 36 * one.states);
   keep(one.contact, feet);
   one.frames = 1;
   ContactRecord record(model, one);
@@ -181,8 +182,8 @@ void bind_contacts(nb::module_& m) {
           nb::arg("effects") = nb::none(),
           "segments: a name a contact. wrench (T, C, 6) N and N m, on the person, about the ground origin; covariance "
           "(T, 6 C, 6 C), that of the sum positive definite; contact (T, C) uint8: 0 nothing touches, 1 on a plate, 2 "
-          "not measured, 3 on a plate with another contact; effects (T, 6, 6 C): what the six states of each contact add to "
-          "its wrench, where the model has them. Raises ValueError for other shapes or codes.");
+          "not measured, 3 on a plate with another contact; effects (T, 6, 6 K): what the six states of each of the first K "
+          "contacts add to its wrench, where the model has them. Raises ValueError for other shapes or codes.");
   m.def("contact_moments", &contact_moments, nb::arg("model"), nb::arg("x"), nb::arg("loads"), nb::arg("frame") = 0,
         nb::arg("covariance") = nb::none(),
         "Joint moments with the contacts' wrenches of one frame, changed as little as their covariance allows to give "

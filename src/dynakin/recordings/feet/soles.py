@@ -167,8 +167,8 @@ def _rolled(foot: FootContact, forward: Array, half: Array, rate: float) -> tupl
     unit = np.nan_to_num(along / np.linalg.norm(along, axis=1, keepdims=True))
     side = np.stack([-unit[:, 1], unit[:, 0]], axis=1)
     tilt = foot.height[:, b] - foot.height[:, f]
-    at = np.nan_to_num(np.tanh((tilt + q.get("t0", 0.003)) / q.get("tilt", 0.012)))
-    sd = half[0] * q.get("cop", 1.0) * (0.12 + 0.2 * (1 - at**2))
+    at = np.nan_to_num(np.tanh((tilt + q.get("t0", 0.006)) / q.get("tilt", 0.012)))
+    sd = half[0] * q.get("cop", 1.0) * (q.get("c0",0.3) + q.get("c1",0.375) * (1 - at**2))
     wide = q.get("cop", 1.0) * 0.3 * half[1] * np.ones(T)
     C = sd[:, None, None]**2 * unit[:, :, None] * unit[:, None, :] + wide[:, None, None]**2 * side[:, :, None] * side[:, None, :]
     C = C + 1e-6 * np.eye(2)
