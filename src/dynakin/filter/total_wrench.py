@@ -165,7 +165,6 @@ def known_ground(
             )
     if loads is not None:
         before, loads = loads, loads.with_undeclared(undeclared).without(beside)
-        object.__setattr__(loads, 'cov', before.cov)
         for k, foot in enumerate(loads.feet):
             light = (loads.reason[:, k] != before.reason[:, k]) & (before.reason[:, k] == on_plates.MEASURED)
             if (light & ~beside[:, k]).any():

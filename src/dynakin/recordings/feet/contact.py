@@ -57,7 +57,6 @@ class FootContact:
     low: Flags
     moves: Flags
     aloft: Flags
-    height: Array
 
     def padded(self, stance: tuple[int, int], rate: float) -> slice:
         """The frames in which this stance may bear load, as far as markers show."""
@@ -92,7 +91,7 @@ def foot_contact(recording: Recording, ground: GroundFrame, names: list[str]) ->
     gap = max(1, round(GAP_S * recording.rate)) if recording.n_frames > 1 else 1
     stands = _closed(np.asarray(touching.any(axis=1)), gap)
     support = np.full(recording.n_frames, floor_height(recording, ground))
-    return FootContact(places[:, :, [0, 2]], support, touching, stands, tuple(runs(stands)), low, moves, aloft, height)
+    return FootContact(places[:, :, [0, 2]], support, touching, stands, tuple(runs(stands)), low, moves, aloft)
 
 
 def _closed(flags: Flags, gap: int) -> Flags:

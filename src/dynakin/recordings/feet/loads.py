@@ -267,10 +267,7 @@ def divided(
         soles.bears,
         soles.stance,
     )
-    object.__setattr__(loads, 'cov', getattr(soles, 'cov', None))
-    out = loads.with_undeclared(elsewhere)
-    object.__setattr__(out, 'cov', getattr(soles, 'cov', None))
-    return out
+    return loads.with_undeclared(elsewhere)
 
 
 def _shares(plate: PlateLoad, frames: npt.NDArray[np.intp], owners: Flags, outlines: Sequence[Array | None]) -> Array:
@@ -408,9 +405,7 @@ class _Assignment:
         contacts = [self.contacts.get(foot) for foot in self.feet]
         soles = Soles.of(contacts, forward, self.recording.rate, self.recording.n_frames)
         loads = divided(self.feet, self.plates, outlines, self.on, self.off, self.aloft(), soles)
-        out = replace(loads, messages=(*self.messages, *self.reasons), reasons=tuple(self.reasons))
-        object.__setattr__(out, 'cov', loads.cov)
-        return out
+        return replace(loads, messages=(*self.messages, *self.reasons), reasons=tuple(self.reasons))
 
     def aloft(self) -> Flags:
         """(T, F) feet that are surely in the air: high and moving between two stances of their own, or moving while

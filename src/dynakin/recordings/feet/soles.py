@@ -61,19 +61,14 @@ class Soles:
         F = len(contacts)
         middle, half = np.full((frames, F, 3), np.nan), np.tile([HALF_LENGTH_M, HALF_WIDTH_M], (F, 1))
         bears, stance = np.ones((frames, F), dtype=bool), np.ones((frames, F))
-        cov = np.tile(0.01*np.eye(2), (frames, F, 1, 1))
         for k, foot in enumerate(contacts):
             if foot is None:
                 continue
             place, half[k] = _sole(foot, forward, rate)
-            roll, cov[:, k] = _rolled(foot, forward, half[k], rate)
-            place = place + roll
             middle[:, k] = np.stack([place[:, 0], foot.support_m, place[:, 1]], axis=1)
             bears[:, k] = foot.bears(rate)
             stance[:, k] = stance_weights(foot.stances, rate, frames)
-        out = cls(middle, half, bears, stance)
-        object.__setattr__(out, 'cov', cov)
-        return out
+        return cls(middle, half, bears, stance)
 
 
 def stance_weights(stances: Sequence[tuple[int, int]], rate: float, frames: int) -> Array:
@@ -151,28 +146,6 @@ def _sole(foot: FootContact, forward: Array, rate: float) -> tuple[Array, Array]
     flat = seen & foot.stands if (seen & foot.stands).any() else seen
     shape = FootShape.of(foot.outline[flat], forward)
     return _drawn_on(_by_the_others(shape.middle(foot.outline), foot.outline), rate), shape.half_m
-
-
-def _rolled(foot: FootContact, forward: Array, half: Array, rate: float) -> tuple[Array, Array]:
-    import os, json
-    q = json.loads(os.environ.get("SPIKE", "{}"))
-    T = len(foot.outline)
-    seen = np.isfinite(foot.outline).all(axis=(1, 2))
-    flat = seen & foot.stands if (seen & foot.stands).any() else seen
-    shape = FootShape.of(foot.outline[flat], forward)
-    if shape.ends is None:
-        return np.zeros((T, 2)), np.tile((0.6*half[0])**2*np.eye(2), (T, 1, 1))
-    b, f = shape.ends
-    along = foot.outline[:, f] - foot.outline[:, b]
-    unit = np.nan_to_num(along / np.linalg.norm(along, axis=1, keepdims=True))
-    side = np.stack([-unit[:, 1], unit[:, 0]], axis=1)
-    tilt = foot.height[:, b] - foot.height[:, f]
-    at = np.nan_to_num(np.tanh((tilt + q.get("t0", 0.006)) / q.get("tilt", 0.012)))
-    sd = half[0] * q.get("cop", 1.0) * (q.get("c0",0.3) + q.get("c1",0.375) * (1 - at**2))
-    wide = q.get("cop", 1.0) * 0.3 * half[1] * np.ones(T)
-    C = sd[:, None, None]**2 * unit[:, :, None] * unit[:, None, :] + wide[:, None, None]**2 * side[:, :, None] * side[:, None, :]
-    C = C + 1e-6 * np.eye(2)
-    return 0.55 * half[0] * at[:, None] * unit, C
 
 
 def _mean(points: Array) -> Array:
