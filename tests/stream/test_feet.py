@@ -10,8 +10,8 @@ import pytest
 import dynakin
 from dynakin.bindings import _core
 from dynakin.filter.foot_wrenches import FootWrenches
+from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
-from dynakin.recordings.feet.loads import foot_loads
 from dynakin.settings import presets
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.trial import simulate
@@ -113,7 +113,8 @@ def test_walking_leaves_out_what_offline_leaves_out(seed: int) -> None:
     walk = simulate("fullbody", "gait", seed)
     live, frames, said = session(Replay(walk.recording, speed=0.0), standing_s=0.3)
     begin = int(np.searchsorted(walk.recording.time, frames[0].estimate.time_s - 1e-6))
-    offline = foot_loads(walk.recording, live.tracker.calibrated.ground).total_known[begin:]
+    initial = live.tracker.calibrated
+    offline = foot_loads(walk.recording, initial.ground, initial.foot_markers).total_known[begin:]
     now = np.array([f.status.plates == "used" for f in frames])
     assert {f.status.plates for f in frames} == {"used", "incomplete"} and np.count_nonzero(offline) > 100
     assert np.count_nonzero(now & ~offline) <= 6 and np.count_nonzero(offline & ~now) <= 14

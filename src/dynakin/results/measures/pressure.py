@@ -5,14 +5,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.recordings.plates.pressure import Surface
+from dynakin.recordings.plates.pressure import LOADED_N, Surface
 from dynakin.recordings.plates.pressure import centre_of_pressure as recorded_pressure
 from dynakin.results.estimate import Estimate
 
 Array = npt.NDArray[np.float64]
-
-LOADED_N = 20.0
-"""Vertical force from which a centre of pressure is given: below, 1 N m of error moves it by more than 5 cm."""
 
 
 def centre_of_pressure(wrench: Array, height_m: float, threshold_n: float = LOADED_N) -> tuple[Array, Array]:

@@ -1,0 +1,159 @@
+"""What is wrong with plates that only the feet show: one beside its place, two exchanged, one that drifts.
+
+Each is said in one sentence, with what to do. Nothing is put right here: a load that lies under no foot is left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.arrays import runs
+from dynakin.recordings.feet.contact import NEAR_M, FootContact
+from dynakin.recordings.feet.soles import Soles
+from dynakin.recordings.hull import distance_to_hull
+from dynakin.recordings.plates.ground_plate import GroundPlate
+from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N
+from dynakin.recordings.recording import Array
+
+Flags = npt.NDArray[np.bool_]
+
+BESIDE_M = 0.06
+"""Distance of centres of pressure from a foot's markers that is kept for three quarters of its load: no shoe is so
+wide. Ours stay within 0.05, those with two markers a foot among them."""
+TOGETHER = 0.7
+"""Part of a press in which a foot must stand, and the other way round, for the two to belong together."""
+FITS, MISFITS = 0.8, 0.3
+"""Part of a plate's load that must lie under feet once plates are exchanged, and may at most before."""
+CLEAR_M = 0.3
+"""How far a foot must be from a plate to be surely not on it: its own length."""
+
+Contacts = Sequence[FootContact | None]
+
+
+def plate_findings(
+    time: Array, feet: Sequence[str], contacts: Contacts, plates: Sequence[GroundPlate], soles: Soles, on: Flags
+) -> list[str]:
+    """Sentences.
+
+    Args:
+        time: (T,) s. on: (T, F, P) feet on plates, as they were assigned.
+    """
+    if any(contact is None for contact in contacts):
+        return []
+    said, exchanged = list[str](), set[int]()
+    for p, q in combinations(range(len(plates)), 2):
+        if text := _exchanged(plates[p], plates[q], contacts, on[:, :, p], on[:, :, q]):
+            said.append(text)
+            exchanged |= {p, q}
+    for p, plate in enumerate(plates):
+        if p not in exchanged and (text := _beside(plate, feet, contacts, soles, on, p)):
+            said.append(text)
+        if text := _drift(time, plate, soles, on[:, :, p]):
+            said.append(text)
+    return said
+
+
+def _exchanged(one: GroundPlate, other: GroundPlate, contacts: Contacts, on_one: Flags, on_other: Flags) -> str | None:
+    """Whether each one's data were measured where the other lies: two feet that step on them one after the other."""
+    if one.corners is None or other.corners is None:
+        return None
+    parts = []
+    for plate, place, owners in ((one, other, on_one), (other, one, on_other)):
+        judged: Flags = np.asarray(plate.push > JUDGED_N)
+        if not judged.any() or owners[judged].any(axis=1).mean() > MISFITS:
+            return None
+        cop = _carried_over(plate.cop, np.asarray(plate.corners), np.asarray(place.corners))
+        under = [distance_to_hull(cop, foot.outline) < NEAR_M for foot in contacts if foot is not None]
+        stands = [foot.stands for foot in contacts if foot is not None]
+        parts.append(float((np.array(under) & np.array(stands))[:, judged].any(axis=0).mean()))
+    if min(parts) < FITS:
+        return None
+    return (
+        f"Warning: {one.name} and {other.name} have been exchanged: at the other's place {100.0 * min(parts):.0f} % of "
+        "each one's load lies under a foot that stands, at its own next to none. Exchange the two in the file (their "
+        "channels or their corners); their loads are left out."
+    )
+
+
+def _carried_over(points: Array, source: Array, target: Array) -> Array:
+    """Points (T, 2) as they lie on a plate of corners (4, 2), at the same place of another one."""
+
+    def axes(corners: Array) -> tuple[Array, Array]:
+        x = corners[0] - corners[1]
+        x = x / np.linalg.norm(x)
+        return corners.mean(axis=0), np.stack([x, [-x[1], x[0]]])
+
+    (a, turn_a), (b, turn_b) = axes(source), axes(target)
+    return np.asarray((points - a) @ turn_a.T @ turn_b + b)
+
+
+def _beside(plate: GroundPlate, feet: Sequence[str], contacts: Contacts, soles: Soles, on: Flags, p: int) -> str | None:
+    """Whether a plate's load comes and goes with a foot, but lies beside it."""
+    offsets: dict[int, list[Array]] = {}
+    for first, end in runs(plate.push > JUDGED_N):
+        press = slice(first, end)
+        for k, foot in enumerate(contacts):
+            assert foot is not None
+            others = np.delete(on, p, axis=2)[press, k].any()
+            shared = np.delete(on[press, :, p], k, axis=1).any()
+            with_it = foot.stands[press]
+            if others or shared or with_it.mean() < TOGETHER or not _covers(foot, first, end):
+                continue
+            away = distance_to_hull(plate.cop[press], foot.outline[press])[with_it]
+            if np.isfinite(away).any() and np.nanpercentile(away, 25.0) > BESIDE_M:
+                offsets.setdefault(k, []).append((plate.cop[press] - soles.middle[press, k][:, [0, 2]])[with_it])
+    if len(offsets) != 1:
+        return None
+    k, found = next(iter(offsets.items()))
+    x, z = np.nanmedian(np.concatenate(found), axis=0)
+    return (
+        f"Warning: {plate.name} lies beside its place: its centre of pressure is {np.hypot(x, z):.2f} m (X {x:+.2f}, "
+        f"Z {z:+.2f} m of the ground frame) from the middle of the {feet[k]} foot's sole while its load comes and goes "
+        "with that foot. Correct the plate's place (its corners or origin) in the file."
+    )
+
+
+def _covers(foot: FootContact, first: int, end: int) -> bool:
+    """Whether one stance of a foot goes on for about as long as a press."""
+    inside = [min(b, end) - max(a, first) for a, b in foot.stances if min(b, end) > max(a, first)]
+    lengths = [b - a for a, b in foot.stances if min(b, end) > max(a, first)]
+    return bool(inside) and max(inside) > TOGETHER * max(lengths)
+
+
+def _drift(time: Array, plate: GroundPlate, soles: Soles, owners: Flags) -> str | None:
+    """Whether a plate reads something while no foot is near it."""
+    place = plate.corners if plate.corners is not None else _pressed_at(plate)
+    if place is None:
+        return None
+    away = np.stack(
+        [
+            distance_to_hull(soles.middle[:, k][:, [0, 2]], np.broadcast_to(place, (len(time), *place.shape)))
+            for k in range(owners.shape[1])
+        ],
+        axis=1,
+    )
+    clear = (np.nan_to_num(away, nan=0.0) > CLEAR_M).all(axis=1) & plate.known
+    if np.count_nonzero(clear) < 10:
+        return None
+    read = plate.wrench[clear, 1]
+    low, middle, high = np.percentile(read, (5.0, 50.0, 95.0))
+    if not UNLOADED_N < abs(middle) < 2.0 * JUDGED_N:
+        return None
+    return (
+        f"Warning: {plate.name} reads {low:.0f} to {high:.0f} N while no foot is near it, between {time[clear][0]:.2f} "
+        f"and {time[clear][-1]:.2f} s: zero it before the trial, or take it off with plate_loads."
+    )
+
+
+def _pressed_at(plate: GroundPlate) -> Array | None:
+    """(K, 2) the corners of what its centres of pressure span; None of a plate that is never loaded."""
+    judged = plate.cop[plate.push > JUDGED_N]
+    judged = judged[np.isfinite(judged).all(axis=1)]
+    if not len(judged):
+        return None
+    (x0, z0), (x1, z1) = np.percentile(judged, (5.0, 95.0), axis=0)
+    return np.array([[x0, z0], [x1, z0], [x1, z1], [x0, z1]])
