@@ -12,6 +12,7 @@ from dynakin.bindings import _core
 from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
+from dynakin.recordings.feet.soles import FootShape
 from dynakin.settings import presets
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.trial import simulate
@@ -135,9 +136,12 @@ class Standing:
         self.frame = 0
         places = _core.marker_positions(self.model, self.state)
         segments = [marker.segment for marker in self.initial.spec.markers]
-        self.middles = [
-            places[[s == self.initial.feet[foot] for s in segments]].mean(axis=0) for foot in self.initial.feet
-        ]
+        forward = self.initial.ground.vectors_to_ground(self.initial.ground.forward)[[0, 2]]
+        self.middles = []
+        for foot in self.initial.feet.values():
+            own = places[None, [s == foot for s in segments]][:, :, [0, 2]]
+            x, z = FootShape.of(own, forward).middle(own)[0]
+            self.middles.append(np.array([x, 0.0, z]))
 
     def look(self, push: float, point: np.ndarray) -> tuple[FootWrenches, bool]:
         """A vertical force in N at a point of the ground frame."""

@@ -127,7 +127,7 @@ def foot_markers_of(recording: Recording) -> dict[str, list[str]]:
     """Side -> markers on its foot by the built-in set that fits a recording best; none where none fits."""
     try:
         chosen = choose_marker_set(recording.marker_names)
-        seen = np.asarray(np.isfinite(recording.markers)).any(axis=(0, 2)).tolist()
+        seen = [bool(np.isfinite(recording.marker(name)).all(axis=1).any()) for name in recording.marker_names]
         return match_markers(chosen, recording.marker_names, seen, recording.name).foot_markers
     except ModelError:
         return {"right": [], "left": []}

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from dynakin.arrays import runs
 from dynakin.errors import ConfigError
-from dynakin.recordings.feet.contact import GAP_S, SAME_LEVEL_M, FootContact, foot_contacts
+from dynakin.recordings.feet.contact import GAP_S, FootContact, foot_contacts
 from dynakin.recordings.feet.findings import plate_findings
 from dynakin.recordings.feet.loads import FootLoads, divided
 from dynakin.recordings.feet.soles import Soles
@@ -24,6 +24,7 @@ from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import GroundPlate
 from dynakin.recordings.plates.pressure import JUDGED_N
+from dynakin.recordings.plates.surfaces import SAME_LEVEL_M
 from dynakin.recordings.recording import Array, Recording
 
 Flags = npt.NDArray[np.bool_]
@@ -166,7 +167,8 @@ class _Assignment:
 
     def unseen(self, k: int, foot: FootContact) -> None:
         """While nobody sees a foot: the plate that it stood on last, or stands on next, for as long as that is pressed
-        without a break. What else it does is not known, but in a gap too short for a step."""
+        without a break, and one that is pressed while all other feet are elsewhere. What else it does is not known, but
+        in a gap too short for a step."""
         pressed = [runs(plate.pressed) for plate in self.plates]
         for first, end in runs(~foot.seen):
             held = np.zeros(end - first, dtype=bool)
@@ -174,11 +176,23 @@ class _Assignment:
                 for start, stop in pressed[p]:
                     before = start < first <= stop and self.on[first - 1, k, p]
                     after = start <= end < stop and self.on[end, k, p]
-                    if before or after:
+                    if before or after or (stop > first and start < end and self.elsewhere(k, p, start, stop)):
                         self.on[max(start, first) : min(stop, end), k, p] = True
                 held |= self.on[first:end, k, p]
             if end - first > GAP_S * self.recording.rate:
                 self.hidden[first:end, k] |= ~held
+
+    def elsewhere(self, k: int, p: int, start: int, stop: int) -> bool:
+        """Whether a press that is nobody's is only to be had by a foot that nobody sees: it is judged, and all others
+        are seen, and not at its centre of pressure."""
+        press = slice(start, stop)
+        if self.on[press, :, p].any() or not (self.plates[p].push[press] > JUDGED_N).any():
+            return False
+        if (self.contacts[self.feet[k]].seen[press] & self.plates[p].loaded[press]).any():
+            return False
+        seen = [foot.seen[press].all() for at, foot in self.contacts.items() if at != self.feet[k]]
+        near = np.delete(self.under[press, :, p], k, axis=1)
+        return len(seen) == len(self.feet) - 1 and all(seen) and not near.any()
 
     def between(self, k: int, p: int) -> Flags:
         """Frames in which a plate's centre of pressure lies between two standing feet, and under neither."""

@@ -18,7 +18,7 @@ from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.landmarks import find_marker
 from dynakin.recordings.plates.ground_plate import GroundPlate
-from dynakin.recordings.plates.surfaces import SHOE_M, UNDER_MARKERS_M, floor_height
+from dynakin.recordings.plates.surfaces import SAME_LEVEL_M, SHOE_M, UNDER_MARKERS_M, floor_height
 from dynakin.recordings.recording import Array, Recording
 from dynakin.recordings.standing import marker_velocities
 
@@ -45,9 +45,6 @@ LEVEL_M_S, RESTS_S = 0.15, 0.15
 a jump, it does for 0.05 s."""
 NEAR_M = 0.10
 """How far a centre of pressure may lie from the outline of a foot's markers: a shoe is some cm wider than these."""
-SAME_LEVEL_M = 0.05
-"""Supports whose heights differ by less are on one level: a foot's markers show its support to some cm. Steps of stairs
-are 0.15 m and more."""
 
 
 @dataclass(frozen=True, eq=False)

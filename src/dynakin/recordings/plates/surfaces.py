@@ -11,6 +11,9 @@ UNDER_MARKERS_M = 0.02
 """How far below its lowest marker a shoe's sole is at least: half a marker and its base."""
 SHOE_M = 0.12
 """How far above the floor the lowest marker of a foot that stands may be: on a boot, or on an ankle."""
+SAME_LEVEL_M = 0.05
+"""Supports whose heights differ by less are on one level: a foot's markers show its support to some cm. Steps of stairs
+are 0.15 m and more."""
 
 
 def surface_height(plate: Plate, ground: GroundFrame) -> float | None:
