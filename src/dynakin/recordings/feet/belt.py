@@ -45,7 +45,7 @@ def belt_velocity(velocity: Array, low: Flags, body: Array, time: Array) -> Arra
 
 
 def one_velocity(velocity: Array, low: Flags, body: Array, time: Array) -> Array | None:
-    """(2,) of one stretch; None where no marker is low in it."""
+    """(2,) of one stretch, 0 where low markers stand still; None where neither that nor a belt is to be seen."""
     level, known = velocity[..., [0, 2]], np.asarray(np.isfinite(velocity).all(axis=2)) & low
     if not known.any():
         return None
@@ -60,10 +60,9 @@ def one_velocity(velocity: Array, low: Flags, body: Array, time: Array) -> Array
     size = float(np.linalg.norm(mode))
     if size < STILL_M_S or still > 0.5 * alike[best]:
         return np.zeros(2)
-    moves = np.linalg.norm(np.nanmedian(np.where(np.isfinite(body), body, np.nan), axis=0)[[0, 2]])
-    if not moves < BODY * size or not _carries(level, known, mode, time):
-        return np.zeros(2)
-    return np.asarray(mode)
+    seen = np.isfinite(body).all(axis=1)
+    moves = np.linalg.norm(body[seen].mean(axis=0)[[0, 2]]) if seen.any() else np.inf
+    return np.asarray(mode) if moves < BODY * size and _carries(level, known, mode, time) else None
 
 
 def _carries(level: Array, known: Flags, mode: Array, time: Array) -> bool:

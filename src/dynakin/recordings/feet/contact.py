@@ -109,10 +109,7 @@ def foot_contacts(
         foot: _Foot(places, velocity[:, columns], body, recording, floor, plates)
         for foot, (columns, places) in foot_places(recording, ground, markers).items()
     }
-    for _ in range(2):  # a foot that rests higher bears the person where the others do not
-        others = {name: [other.stands for at, other in feet.items() if at != name] for name in feet}
-        for name, foot in feet.items():
-            foot.rest(np.any(others[name], axis=0) if others[name] else np.zeros(recording.n_frames, dtype=bool))
+    _settle(list(feet.values()))
     return {name: foot.contact() for name, foot in feet.items()}
 
 
@@ -128,6 +125,23 @@ def foot_places(
         if columns:
             found[foot] = (columns, ground.points_to_ground(recording.markers[:, columns]))
     return found
+
+
+def _settle(feet: list[_Foot]) -> None:
+    """Believe that feet rest on what is higher than the floor: where a plate carries one; then, the longest first, where
+    no other one stands for a while, or one stands that is on a level with it."""
+    for foot in feet:
+        for rest in [one for one in foot.waiting if foot.carried(one[0])]:
+            foot.believe(rest)
+    while True:
+        waiting = [(rest[0].stop - rest[0].start, k, rest) for k, foot in enumerate(feet) for rest in foot.waiting]
+        for _, k, rest in sorted(waiting, key=lambda one: -one[0]):
+            others = [foot for at, foot in enumerate(feet) if at != k]
+            if feet[k].alone(rest[0], others) or feet[k].level_with(rest, others):
+                feet[k].believe(rest)
+                break
+        else:
+            return
 
 
 def _middle_velocity(velocity: Array) -> Array:
@@ -194,22 +208,29 @@ class _Foot:
                 found.append((slice(first, end), float(np.nanpercentile(self.lift[first:end], 10.0))))
         return found
 
-    def rest(self, others: Flags) -> None:
-        """Believe those stretches in which a plate carries the foot, or in which no other one stands (T,)."""
-        left = []
-        for frames, lift in self.waiting:
-            alone = max((end - first for first, end in runs(~others[frames])), default=0)
-            if alone < RESTS_S * self.rate and not self._carried(frames):
-                left.append((frames, lift))
-                continue
-            with np.errstate(invalid="ignore"):
-                on = self.slow & (np.abs(self.rise - lift) < NEAR_SUPPORT_M)
-            grown = _around(np.asarray(on.any(axis=1)), frames)
-            self.touching[grown] |= on[grown]
-            self.level[grown] = np.where(on[grown].any(axis=1), lift, self.level[grown])
-        self.waiting = left
+    def believe(self, rest: tuple[slice, float]) -> None:
+        """That it stands in these frames, so much higher than its lowest place."""
+        self.waiting = [one for one in self.waiting if one is not rest]
+        frames, lift = rest
+        with np.errstate(invalid="ignore"):
+            on = self.slow & (np.abs(self.rise - lift) < NEAR_SUPPORT_M)
+        grown = _around(np.asarray(on.any(axis=1)), frames)
+        self.touching[grown] |= on[grown]
+        self.level[grown] = np.where(on[grown].any(axis=1), lift, self.level[grown])
 
-    def _carried(self, frames: slice) -> bool:
+    def alone(self, frames: slice, others: Sequence[_Foot]) -> bool:
+        """Whether no other foot stands for a while in these frames."""
+        stand = np.any([foot.stands[frames] for foot in others], axis=0) if others else np.zeros(1, dtype=bool)
+        lasts = [end - first for first, end in runs(np.asarray(~stand))]
+        return not others or max(lasts, default=0) >= RESTS_S * self.rate
+
+    def level_with(self, rest: tuple[slice, float], others: Sequence[_Foot]) -> bool:
+        """Whether a foot that stands in these frames does so at the same height."""
+        own = float(np.min(self.flat)) + rest[1]
+        heights = [float(np.min(foot.flat)) + foot.level[rest[0]] for foot in others]
+        return any(bool((np.abs(height - own) < SAME_LEVEL_M).any()) for height in heights)
+
+    def carried(self, frames: slice) -> bool:
         """Whether a plate is loaded under the foot for most of these frames."""
         return any(
             np.count_nonzero(near[frames] & plate.loaded[frames]) > 0.5 * (frames.stop - frames.start)
