@@ -33,6 +33,8 @@ BETWEEN_M = 0.03
 """How far from both feet a centre of pressure lies that neither bears alone, where a plate's edges are not known."""
 BEYOND_M = 0.04
 """How far a touching marker may lie beyond the plates' edges: it sits on the shoe, not on its sole."""
+STEP_S = 0.25
+"""How long a foot may press a plate before its markers show that it stands, and after they show that it left."""
 MOST = 0.8
 """Part of a press for which a moving foot must be low and near the centre of pressure to be what presses."""
 
@@ -107,7 +109,8 @@ class _Assignment:
         aloft = self.aloft()
         for p, plate in enumerate(plates):
             self.presses(p, plate)
-            self.on[:, :, p] |= to_the_end(self.on[:, :, p], plate.pressed) & ~aloft
+            self.on[:, :, p] |= to_the_end(self.on[:, :, p], plate.pressed) & self.steps() & ~aloft
+            self.on[:, :, p] &= ~aloft | (plate.push > JUDGED_N)[:, None]
         for k, foot in enumerate(feet):
             if foot in contacts:
                 self.unseen(k, contacts[foot])
@@ -193,6 +196,20 @@ class _Assignment:
         seen = [foot.seen[press].all() for at, foot in self.contacts.items() if at != self.feet[k]]
         near = np.delete(self.under[press, :, p], k, axis=1)
         return len(seen) == len(self.feet) - 1 and all(seen) and not near.any()
+
+    def steps(self) -> Flags:
+        """(T, F) frames in which a foot stands, sets down or leaves; all where nobody sees it, or where it never
+        stands."""
+        found = np.ones(self.off.shape, dtype=bool)
+        half = round(STEP_S * self.recording.rate) if len(found) > 1 else 0
+        for k, name in enumerate(self.feet):
+            foot = self.contacts.get(name)
+            if foot is not None and foot.stances:
+                near = np.zeros(len(found), dtype=bool)
+                for first, end in foot.stances:
+                    near[max(0, first - half) : end + half] = True
+                found[:, k] = near | ~foot.seen
+        return found
 
     def between(self, k: int, p: int) -> Flags:
         """Frames in which a plate's centre of pressure lies between two standing feet, and under neither."""

@@ -128,8 +128,8 @@ def foot_places(
 
 
 def _settle(feet: list[_Foot]) -> None:
-    """Believe that feet rest on what is higher than the floor: where a plate carries one; then, the longest first, where
-    no other one stands for a while, or one stands that is on a level with it."""
+    """Believe that feet rest on what is higher than the floor: where a plate carries one; then, the longest first,
+    where no other one stands for a while, or one stands that is on a level with it."""
     for foot in feet:
         for rest in [one for one in foot.waiting if foot.carried(one[0])]:
             foot.believe(rest)

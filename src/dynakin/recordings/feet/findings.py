@@ -46,7 +46,7 @@ def plate_findings(
         return []
     said, exchanged = list[str](), set[int]()
     for p, q in combinations(range(len(plates)), 2):
-        if text := _exchanged(plates[p], plates[q], contacts, on[:, :, p], on[:, :, q]):
+        if text := _exchanged(plates[p], plates[q], contacts):
             said.append(text)
             exchanged |= {p, q}
     for p, plate in enumerate(plates):
@@ -57,19 +57,16 @@ def plate_findings(
     return said
 
 
-def _exchanged(one: GroundPlate, other: GroundPlate, contacts: Contacts, on_one: Flags, on_other: Flags) -> str | None:
+def _exchanged(one: GroundPlate, other: GroundPlate, contacts: Contacts) -> str | None:
     """Whether each one's data were measured where the other lies: two feet that step on them one after the other."""
     if one.corners is None or other.corners is None:
         return None
     parts = []
-    for plate, place, owners in ((one, other, on_one), (other, one, on_other)):
-        judged: Flags = np.asarray(plate.push > JUDGED_N)
-        if not judged.any() or owners[judged].any(axis=1).mean() > MISFITS:
+    for plate, place in ((one, other), (other, one)):
+        if not (plate.push > JUDGED_N).any() or _under_feet(plate, plate.cop, contacts) > MISFITS:
             return None
-        cop = _carried_over(plate.cop, np.asarray(plate.corners), np.asarray(place.corners))
-        under = [distance_to_hull(cop, foot.outline) < NEAR_M for foot in contacts if foot is not None]
-        stands = [foot.stands for foot in contacts if foot is not None]
-        parts.append(float((np.array(under) & np.array(stands))[:, judged].any(axis=0).mean()))
+        there = _carried_over(plate.cop, np.asarray(plate.corners), np.asarray(place.corners))
+        parts.append(_under_feet(plate, there, contacts))
     if min(parts) < FITS:
         return None
     return (
@@ -77,6 +74,12 @@ def _exchanged(one: GroundPlate, other: GroundPlate, contacts: Contacts, on_one:
         "each one's load lies under a foot that stands, at its own next to none. Exchange the two in the file (their "
         "channels or their corners); their loads are left out."
     )
+
+
+def _under_feet(plate: GroundPlate, cop: Array, contacts: Contacts) -> float:
+    """Part of a plate's load that lies under feet that stand, were its centres of pressure at (T, 2) m."""
+    under = [(distance_to_hull(cop, foot.outline) < NEAR_M) & foot.stands for foot in contacts if foot is not None]
+    return float(np.any(under, axis=0)[plate.push > JUDGED_N].mean())
 
 
 def _carried_over(points: Array, source: Array, target: Array) -> Array:
