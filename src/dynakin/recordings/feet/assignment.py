@@ -17,7 +17,7 @@ import numpy.typing as npt
 from dynakin.arrays import runs
 from dynakin.errors import ConfigError
 from dynakin.recordings.feet.contact import GAP_S, FootContact, foot_contacts
-from dynakin.recordings.feet.findings import plate_findings
+from dynakin.recordings.feet.findings import exchanged, plate_findings
 from dynakin.recordings.feet.loads import FootLoads, divided
 from dynakin.recordings.feet.soles import Soles
 from dynakin.recordings.frame import GroundFrame
@@ -73,8 +73,9 @@ def _check_assigned(fixed: dict[str, str], recording: Recording, feet: tuple[str
             raise ConfigError(f"plates: {plate!r} is given to {foot!r}, expected one of {', '.join(feet)}")
 
 
-def to_the_end(owners: Flags, pressed: Flags) -> Flags:
-    """Owners (T, F) of a plate, each kept from the first to the last frame of a press (T,) that has owners at all.
+def to_the_end(owners: Flags, pressed: Flags, steps: list[list[tuple[int, int]]]) -> Flags:
+    """Owners (T, F) of a plate, each kept from the first to the last frame of a press (T,) that has owners at all, as
+    long as a step of that foot, frames [first, end), lasts.
 
     A centre of pressure is far off while a foot sets down or leaves; what the plate carries there is still that foot's.
     """
@@ -82,9 +83,14 @@ def to_the_end(owners: Flags, pressed: Flags) -> Flags:
     owned: Flags = np.asarray(owners.any(axis=1))
     for first, end in runs(pressed):
         inside = np.flatnonzero(owned[first:end]) + first
-        if len(inside):
-            owners[first : inside[0]] = owners[inside[0]]
-            owners[inside[-1] + 1 : end] = owners[inside[-1]]
+        if not len(inside):
+            continue
+        for k in range(owners.shape[1]):
+            for start, stop in steps[k]:
+                if start <= inside[0] < stop and owners[inside[0], k]:
+                    owners[max(first, start) : inside[0], k] = True
+                if start <= inside[-1] < stop and owners[inside[-1], k]:
+                    owners[inside[-1] + 1 : min(end, stop), k] = True
     return owners
 
 
@@ -106,15 +112,19 @@ class _Assignment:
         for k, foot in enumerate(feet):
             if foot in contacts:
                 self.stances(k, contacts[foot])
-        aloft = self.aloft()
+        aloft, steps = self.aloft(), self.steps()
         for p, plate in enumerate(plates):
             self.presses(p, plate)
-            self.on[:, :, p] |= to_the_end(self.on[:, :, p], plate.pressed) & self.steps() & ~aloft
+            self.on[:, :, p] |= to_the_end(self.on[:, :, p], plate.pressed, steps) & ~aloft
             self.on[:, :, p] &= ~aloft | (plate.push > JUDGED_N)[:, None]
         for k, foot in enumerate(feet):
             if foot in contacts:
                 self.unseen(k, contacts[foot])
+        swapped = exchanged([contacts.get(foot) for foot in feet], plates)
         for p, plate in enumerate(plates):
+            self.doubtful(p, plate)
+            if any(p in pair for pair in swapped):
+                self.on[:, :, p] = False
             if plate.name in fixed:
                 self.on[:, :, p] = False
                 self.on[:, feet.index(fixed[plate.name]), p] = plate.pressed
@@ -168,6 +178,15 @@ class _Assignment:
                 if np.count_nonzero(near & loaded) > MOST * np.count_nonzero(loaded):
                     self.on[press, k, p] = True
 
+    def doubtful(self, p: int, plate: GroundPlate) -> None:
+        """A press most of whose load is nobody's is nobody's at all: a foot that steps near its centre of pressure at
+        its end is not what pressed."""
+        for first, end in runs(plate.pressed):
+            judged = plate.push[first:end] > JUDGED_N
+            owned = np.asarray(self.on[first:end, :, p].any(axis=1) | self.hidden[first:end].any(axis=1))
+            if judged.any() and owned[judged].mean() < 0.5:
+                self.on[first:end, :, p] = False
+
     def unseen(self, k: int, foot: FootContact) -> None:
         """While nobody sees a foot: the plate that it stood on last, or stands on next, for as long as that is pressed
         without a break, and one that is pressed while all other feet are elsewhere. What else it does is not known, but
@@ -179,8 +198,10 @@ class _Assignment:
                 for start, stop in pressed[p]:
                     before = start < first <= stop and self.on[first - 1, k, p]
                     after = start <= end < stop and self.on[end, k, p]
-                    if before or after or (stop > first and start < end and self.elsewhere(k, p, start, stop)):
+                    if before or after:
                         self.on[max(start, first) : min(stop, end), k, p] = True
+                    elif stop > first and start < end and self.elsewhere(k, p, start, stop):
+                        self.on[start:stop, k, p] = True
                 held |= self.on[first:end, k, p]
             if end - first > GAP_S * self.recording.rate:
                 self.hidden[first:end, k] |= ~held
@@ -191,24 +212,25 @@ class _Assignment:
         press = slice(start, stop)
         if self.on[press, :, p].any() or not (self.plates[p].push[press] > JUDGED_N).any():
             return False
-        if (self.contacts[self.feet[k]].seen[press] & self.plates[p].loaded[press]).any():
+        here = self.contacts[self.feet[k]].seen[press] & self.plates[p].loaded[press]
+        if (here & ~self.under[press, k, p]).any():
             return False
         seen = [foot.seen[press].all() for at, foot in self.contacts.items() if at != self.feet[k]]
         near = np.delete(self.under[press, :, p], k, axis=1)
         return len(seen) == len(self.feet) - 1 and all(seen) and not near.any()
 
-    def steps(self) -> Flags:
-        """(T, F) frames in which a foot stands, sets down or leaves; all where nobody sees it, or where it never
-        stands."""
-        found = np.ones(self.off.shape, dtype=bool)
-        half = round(STEP_S * self.recording.rate) if len(found) > 1 else 0
-        for k, name in enumerate(self.feet):
+    def steps(self) -> list[list[tuple[int, int]]]:
+        """Frames [first, end) of each foot's stances with its setting down and leaving; all of them where nobody sees
+        it, or where it never stands."""
+        n, found = len(self.off), []
+        half = round(STEP_S * self.recording.rate) if n > 1 else 0
+        for name in self.feet:
             foot = self.contacts.get(name)
-            if foot is not None and foot.stances:
-                near = np.zeros(len(found), dtype=bool)
-                for first, end in foot.stances:
-                    near[max(0, first - half) : end + half] = True
-                found[:, k] = near | ~foot.seen
+            stances = () if foot is None else foot.stances
+            unseen = [] if foot is None else runs(~foot.seen)
+            found.append(
+                [(max(0, a - half), min(n, b + half)) for a, b in (*stances, *unseen)] if stances else [(0, n)]
+            )
         return found
 
     def between(self, k: int, p: int) -> Flags:

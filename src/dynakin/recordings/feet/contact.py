@@ -83,8 +83,9 @@ class FootContact:
         return slice(max(0, stance[0] - before), min(len(self.stands), stance[1] + after))
 
     def bears(self, rate: float) -> Flags:
-        """(T,) frames in which one of its stances may bear load, or nobody sees it."""
-        found = ~self.seen
+        """(T,) frames in which one of its stances may bear load, or nobody sees it, or just before or after that."""
+        around = 2 * round(2.0 * BEFORE_S * rate) + 1 if len(self.seen) > 1 else 1
+        found: Flags = np.asarray(np.convolve(~self.seen, np.ones(around), "same") > 0.5)
         for stance in self.stances:
             found[self.padded(stance, rate)] = True
         return found
@@ -180,6 +181,7 @@ class _Foot:
         self.lift = np.where(np.isfinite(lowest), lowest, np.nan)  # (T,) of the foot's lowest part
         self.outline = filled_by_others(places[:, :, [0, 2]])
         self.near = [distance_to_hull(plate.cop, self.outline) < NEAR_M for plate in plates]
+        self.seen = np.asarray(np.isfinite(self.lift))
         self.touching, self.level = np.zeros_like(base), np.full(n, np.nan)
         self.waiting: list[tuple[slice, float]] = []  # frames in which it may rest, and its lift there
         if float(np.min(self.flat)) - floor_m < SHOE_M:
@@ -190,7 +192,7 @@ class _Foot:
 
     @property
     def stands(self) -> Flags:
-        return _closed(np.asarray(self.touching.any(axis=1)), self.frames(GAP_S))
+        return _closed(np.asarray(self.touching.any(axis=1)), self.frames(GAP_S), self.seen)
 
     def _higher(self) -> list[tuple[slice, float]]:
         """Stretches in which the foot keeps a height over its lowest place, slow."""
@@ -243,14 +245,13 @@ class _Foot:
             high, fast = self.rise > ALOFT_M, self.speed > SLOW_M_S
             low = np.asarray((self.rise < ALOFT_M).any(axis=1))
         unseen = ~np.isfinite(self.rise)
-        seen = np.asarray(~unseen.all(axis=1))
-        moves = np.asarray(seen & (fast | unseen).all(axis=1))
+        moves = np.asarray(self.seen & (fast | unseen).all(axis=1))
         aloft = np.asarray(moves & (high | unseen).all(axis=1))
         stances = tuple(runs(stands))
         under = np.stack(self.near, axis=1) if self.near else np.zeros((len(stands), 0), dtype=bool)
         support = self._support(stances)
         return FootContact(
-            self.outline, seen, under, support, self.belt, self.touching, stands, stances, low, moves, aloft
+            self.outline, self.seen, under, support, self.belt, self.touching, stands, stances, low, moves, aloft
         )
 
     def _support(self, stances: Sequence[tuple[int, int]]) -> Array:
@@ -313,11 +314,13 @@ def _around(flags: Flags, frames: slice) -> slice:
     return slice(first, end)
 
 
-def _closed(flags: Flags, gap: int) -> Flags:
-    """Flags with short gaps closed, and then short stretches dropped, but for those at either end."""
+def _closed(flags: Flags, gap: int, seen: Flags | None = None) -> Flags:
+    """Flags with short gaps closed, and then short stretches dropped, but for those at either end, or next to frames
+    that are not seen (T,)."""
     flags = flags.copy()
     for value in (True, False):
         for first, end in runs(flags != value):
-            if end - first < gap and first > 0 and end < len(flags):
+            whole = first > 0 and end < len(flags) and (seen is None or value or bool(seen[first - 1] and seen[end]))
+            if end - first < gap and whole:
                 flags[first:end] = value
     return flags

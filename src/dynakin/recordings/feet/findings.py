@@ -28,6 +28,8 @@ TOGETHER = 0.7
 """Part of a press in which a foot must stand, and the other way round, for the two to belong together."""
 FITS, MISFITS = 0.8, 0.3
 """Part of a plate's load that must lie under feet once plates are exchanged, and may at most before."""
+CLEAR_S = 0.5
+"""How long no foot must be near a plate for a drift to be said."""
 CLEAR_M = 0.3
 """How far a foot must be from a plate to be surely not on it: its own length."""
 
@@ -44,36 +46,40 @@ def plate_findings(
     """
     if any(contact is None for contact in contacts):
         return []
-    said, exchanged = list[str](), set[int]()
-    for p, q in combinations(range(len(plates)), 2):
-        if text := _exchanged(plates[p], plates[q], contacts):
-            said.append(text)
-            exchanged |= {p, q}
+    swapped = exchanged(contacts, plates)
+    said = [
+        f"Warning: {plates[p].name} and {plates[q].name} have been exchanged: each one's load lies under a foot that "
+        "stands once it is put at the other's place, and next to none of it at its own. Exchange the two in the file "
+        "(their channels or their corners); their loads are left out."
+        for p, q in swapped
+    ]
     for p, plate in enumerate(plates):
-        if p not in exchanged and (text := _beside(plate, feet, contacts, soles, on, p)):
+        if not any(p in pair for pair in swapped) and (text := _beside(plate, feet, contacts, soles, on, p)):
             said.append(text)
         if text := _drift(time, plate, soles, on[:, :, p]):
             said.append(text)
     return said
 
 
-def _exchanged(one: GroundPlate, other: GroundPlate, contacts: Contacts) -> str | None:
-    """Whether each one's data were measured where the other lies: two feet that step on them one after the other."""
+def exchanged(contacts: Contacts, plates: Sequence[GroundPlate]) -> list[tuple[int, int]]:
+    """Pairs of plates each of whose data were measured where the other lies."""
+    if any(contact is None for contact in contacts):
+        return []
+    pairs = combinations(range(len(plates)), 2)
+    return [(p, q) for p, q in pairs if _are_exchanged(plates[p], plates[q], contacts)]
+
+
+def _are_exchanged(one: GroundPlate, other: GroundPlate, contacts: Contacts) -> bool:
+    """Whether two feet that step on them one after the other say so."""
     if one.corners is None or other.corners is None:
-        return None
+        return False
     parts = []
     for plate, place in ((one, other), (other, one)):
         if not (plate.push > JUDGED_N).any() or _under_feet(plate, plate.cop, contacts) > MISFITS:
-            return None
+            return False
         there = _carried_over(plate.cop, np.asarray(plate.corners), np.asarray(place.corners))
         parts.append(_under_feet(plate, there, contacts))
-    if min(parts) < FITS:
-        return None
-    return (
-        f"Warning: {one.name} and {other.name} have been exchanged: at the other's place {100.0 * min(parts):.0f} % of "
-        "each one's load lies under a foot that stands, at its own next to none. Exchange the two in the file (their "
-        "channels or their corners); their loads are left out."
-    )
+    return min(parts) > FITS
 
 
 def _under_feet(plate: GroundPlate, cop: Array, contacts: Contacts) -> float:
@@ -101,8 +107,8 @@ def _beside(plate: GroundPlate, feet: Sequence[str], contacts: Contacts, soles: 
         press = slice(first, end)
         for k, foot in enumerate(contacts):
             assert foot is not None
-            others = np.delete(on, p, axis=2)[press, k].any()
-            shared = np.delete(on[press, :, p], k, axis=1).any()
+            others = np.delete(on, p, axis=2)[press, k].any(axis=1).mean() > 1.0 - TOGETHER
+            shared = np.delete(on[press, :, p], k, axis=1).any(axis=1).mean() > 1.0 - TOGETHER
             with_it = foot.stands[press]
             if others or shared or with_it.mean() < TOGETHER or not _covers(foot, first, end):
                 continue
@@ -140,7 +146,7 @@ def _drift(time: Array, plate: GroundPlate, soles: Soles, owners: Flags) -> str 
         axis=1,
     )
     clear = (np.nan_to_num(away, nan=0.0) > CLEAR_M).all(axis=1) & plate.known
-    if np.count_nonzero(clear) < 10:
+    if len(time) < 2 or np.count_nonzero(clear) * float(np.median(np.diff(time))) < CLEAR_S:
         return None
     read = plate.wrench[clear, 1]
     low, middle, high = np.percentile(read, (5.0, 50.0, 95.0))
