@@ -23,7 +23,7 @@ from dynakin.recordings.feet.contact import (
     RESTS_S,
     SLOW_M_S,
 )
-from dynakin.recordings.feet.loads import SHARED, divided
+from dynakin.recordings.feet.loads import SHARED, FootLoads, divided
 from dynakin.recordings.feet.soles import EARLY_S, PASSING_S, FootShape, Soles, smooth_step
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import FLAT_FRAMES, GroundPlate
@@ -41,8 +41,9 @@ _DT_S = (0.001, 0.05)  # how far ahead the feet are predicted
 class LiveFeet:
     """Gives each plate to the feet that stand on it, frame by frame, from the estimate before the step.
 
-    Offline (`recordings.feet.loads`) whole stances are seen; here a stance is what has been seen of it so far, with the
-    same thresholds: a foot stands where a marker is near its lowest place and slow, and for a while after (push-off). A
+    Offline (`recordings.feet.assignment`) whole stances are seen; here a stance is what has been seen of it so far,
+    with the same thresholds: a foot stands where a marker is near its lowest place, or keeps a height that something
+    must hold it at, and is slow against the floor, or the belt of the last seconds; and for a while after (push-off). A
     stance that no plate has carried yet is off the plates.
 
     Args:
@@ -90,7 +91,21 @@ class LiveFeet:
             state: (n,) before the step. wrenches: (P, 6) N and N m, laboratory frame, or None.
         """
         dt = float(np.clip(time_s - self._time, *_DT_S))
-        outlines, low, moves = self._move(model, state, time_s, dt)
+        offset, size = model.layout.blocks["coordinates"]
+        speeds, _ = model.layout.blocks["speeds"]
+        ahead = state.copy()
+        ahead[offset : offset + size] += dt * state[speeds : speeds + size]
+        before, places = _core.marker_positions(model, state), _core.marker_positions(model, ahead)
+        loads = self.loads(time_s, places, (places - before) / dt, wrenches)
+        return foot_wrenches(loads, self.initial, self.noise), bool(loads.total_known[0])
+
+    def loads(self, time_s: float, places: Array, velocity: Array, wrenches: Array | None) -> FootLoads:
+        """The same as loads (T = 1).
+
+        Args:
+            places: (M, 3) m of the model's markers, ground frame. velocity: (M, 3) m/s. wrenches: as above.
+        """
+        outlines, low, moves = self._move(places, velocity, time_s)
         bears = time_s - self._touched <= AFTER_S
         stands = self._touched == time_s
         aloft = moves & ~bears & (stands.sum() > stands)  # high alone may be a pedal: no later stance is known yet
@@ -106,17 +121,16 @@ class LiveFeet:
         soles = self._soles(outlines, bears, time_s)
         seen_none = np.zeros_like(off)  # the model shows all of them
         loads = divided(self.feet, plates, soles, self._marked, on[None], off[None], seen_none[None], aloft[None])
-        known = bool(loads.total_known[0])
         for p in np.flatnonzero(on.sum(axis=0) > 1) if (loads.reason == SHARED).any() else ():
             self._say(
                 f"Both feet stand on {self.plates[p]}: its wrench is divided between them by its centre of pressure."
             )
-        if plates and not known:
+        if plates and not loads.total_known[0]:
             self._say(
                 "The plates do not carry all of the person (a foot off the plates, a load where nobody stands, a plate "
                 "at the end of its range): the total wrench is left out for as long as that is so."
             )
-        return foot_wrenches(loads, self.initial, self.noise), known
+        return loads
 
     def _soles(self, outlines: Array, bears: Flags, time_s: float) -> Soles:
         """Soles of this moment (T = 1). Their sizes and places among the markers are those that were seen first. When
@@ -127,12 +141,13 @@ class LiveFeet:
                 points = outlines[[f]][:, own < len(self._floor)]
                 self._shapes.append(FootShape.of(points, self._forward))
         self._since = np.where(bears, np.fmin(self._since, time_s), np.nan)
+        lowest = float(np.append(self._standing, np.inf)[self._own].min())
         middle, half = np.full((1, F, 3), np.nan), np.stack([shape.half_m for shape in self._shapes])
         for f in np.flatnonzero(self._marked).tolist():
             own = self._own[f] < len(self._floor)
             x, z = self._shapes[f].middle(outlines[[f]][:, own])[0]
-            sunk = float((self._floor - self._standing)[self._own[f][own]].min())  # since the start: steps down
-            middle[0, f] = x, self._floor_m + sunk + self._level[f], z
+            over = float(self._floor[self._own[f][own]].min()) - lowest  # steps down are below where the feet began
+            middle[0, f] = x, self._floor_m + over + self._level[f], z
         since, left = time_s - self._since, time_s - self._touched
         weight = smooth_step(np.fmin((since + EARLY_S) / PASSING_S, 1.0 - left / AFTER_S))
         weight = np.where(self._marked, np.where(bears, weight, 0.0), 1.0)
@@ -148,17 +163,11 @@ class LiveFeet:
             self._said.add(text)
             self._to_say.append(text)
 
-    def _move(self, model: _core.Model, state: Array, time_s: float, dt: float) -> tuple[Array, Flags, Flags]:
-        """Outlines (F, K, 2) of the feet, predicted, whether each is low, and whether all of it moves; keeps when it
-        last stood."""
-        offset, size = model.layout.blocks["coordinates"]
-        speeds, _ = model.layout.blocks["speeds"]
-        ahead = state.copy()
-        ahead[offset : offset + size] += dt * state[speeds : speeds + size]
-        before, places = _core.marker_positions(model, state), _core.marker_positions(model, ahead)
-        velocity = (places - before) / dt
+    def _move(self, places: Array, velocity: Array, time_s: float) -> tuple[Array, Flags, Flags]:
+        """Outlines (F, K, 2) of the feet, whether each is low, and whether all of it moves; keeps when it stood."""
         if not np.isfinite(self._time):
-            self._standing = before[:, 1].copy()
+            self._standing = places[:, 1].copy()
+        dt = float(np.clip(time_s - self._time, *_DT_S))
         self._floor = np.minimum(np.minimum(self._floor + _RISE_M_S * dt, self._standing), places[:, 1])
         self._time = time_s
         height = places[:, 1] - self._floor
