@@ -155,7 +155,8 @@ def known_ground(
         reasons += loads.reasons
     found = closure(initial, recording.time, markers, wrench, claimed)
     if found is None:
-        foreign = _foreign_load(check, wrench, claimed, initial, tolerance)
+        flight = np.zeros(n, dtype=bool) if loads is None else loads.aloft.all(axis=1)  # which weighs nobody
+        foreign = _foreign_load(check, wrench, claimed & ~flight, initial, tolerance)
         undeclared |= foreign is not None
         reasons += [foreign] if foreign else []
         notes.append(UNJUDGED)
