@@ -13,9 +13,9 @@ import dynakin
 from dynakin import Estimate, Estimator, Subject, load_model
 from dynakin.filter.closure import closure
 from dynakin.filter.total_wrench import Ground
+from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
 from dynakin.recordings.feet.loads import UNKNOWN as FOOT_UNKNOWN
-from dynakin.recordings.feet.loads import foot_loads
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.results.measures.sources import ABSENT, DERIVED
@@ -246,7 +246,8 @@ def test_a_foot_on_a_pedal_is_not_in_the_air() -> None:
             names.append(side + marker)
             paths.append(np.stack([x + 0.17 * np.cos(turn), 0.4 + 0.17 * np.sin(turn), np.full(600, z)], axis=1))
     ground = GroundFrame(np.eye(3), np.zeros(3), "+Y", np.array([1.0, 0.0, 0.0]))
-    loads = foot_loads(Recording("bicycle", None, time, tuple(names), np.stack(paths, axis=1), ()), ground)
+    markers = {"right": ["RHEE", "RTOE"], "left": ["LHEE", "LTOE"]}
+    loads = foot_loads(Recording("bicycle", None, time, tuple(names), np.stack(paths, axis=1), ()), ground, markers)
     assert (loads.reason == FOOT_UNKNOWN).all() and np.isnan(loads.wrench).all()
 
 

@@ -11,7 +11,7 @@ from dynakin import Estimator, Subject, load_model
 from dynakin.errors import ModelError
 from dynakin.filter.samples import Sample, recording_arrays
 from dynakin.filter.total_wrench import foot_wrenches
-from dynakin.recordings.feet.loads import foot_loads
+from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.recording import Recording
 from dynakin.simulation.trial import simulate
 
@@ -21,7 +21,7 @@ def test_step_by_step_moments_bands_and_the_delayed_are_those_of_the_run() -> No
     model = load_model("fullbody", Subject(mass_kg=70.0, height_m=1.75, sex="male"))
     live = Estimator(model, lag=4).start(recording)
     initial = live.calibrated
-    feet = foot_wrenches(foot_loads(recording, initial.ground), initial, live.noise)
+    feet = foot_wrenches(foot_loads(recording, initial.ground, initial.foot_markers), initial, live.noise)
     for k, sample in enumerate(_samples(recording)):
         part = replace(feet, **{name: getattr(feet, name)[k : k + 1] for name in ("wrench", "covariance", "contact")})
         now = live.step(sample, part)

@@ -10,14 +10,18 @@ import pytest
 
 from dynakin import read
 from dynakin.errors import ConfigError
-from dynakin.recordings.feet.loads import MEASURED, OFF_PLATE, REASONS, SHARED, SWING, foot_loads, saturated
+from dynakin.model.markers.marker_set import foot_markers_of
+from dynakin.recordings.feet.assignment import foot_loads
+from dynakin.recordings.feet.loads import MEASURED, OFF_PLATE, REASONS, SHARED, SWING
 from dynakin.recordings.frame import GroundFrame, find_ground_frame
+from dynakin.recordings.plates.ground_plate import saturated
 from dynakin.recordings.recording import Plate, Recording
 
 LABORATORY = GroundFrame(np.eye(3), np.zeros(3), "+Y", np.array([1.0, 0.0, 0.0]))
 T = 400
 TIME = np.arange(T) / 100.0
 FEET = {"R": 0.1, "L": -0.1}
+MARKERS = {"right": ["RHEE", "RTOE"], "left": ["LHEE", "LTOE"]}
 CORNERS = np.array([[-0.3, 0.0, 0.4], [0.3, 0.0, 0.4], [0.3, 0.0, 0.0], [-0.3, 0.0, 0.0]])
 
 
@@ -54,7 +58,7 @@ def test_each_plate_goes_to_the_foot_under_which_it_lies_and_swing_is_zero() -> 
     right, left = np.full(T, 300.0), np.full(T, 300.0)
     right[lifted], left[lifted] = 0.0, 600.0
     recording = walker({"R": (100, 200)}, (plate("a", left, at(0.0, -0.1)), plate("b", right, at(0.02, 0.12))))
-    loads = foot_loads(recording, LABORATORY)
+    loads = foot_loads(recording, LABORATORY, MARKERS)
     assert loads.feet == ("right", "left")
     assert loads.total_known.all() and loads.all_measured.all()
     np.testing.assert_allclose(loads.wrench[:, 0, 1], right, atol=0.11)
@@ -70,7 +74,7 @@ def test_a_step_beside_the_plates_leaves_the_total_out_while_it_may_bear_load() 
     recording = walker(
         {"R": (100, 160)}, (plate("a", left, at(0.0, -0.1)), plate("b", right, at(0.0, 0.1))), forward=0.8
     )
-    loads = foot_loads(recording, LABORATORY)
+    loads = foot_loads(recording, LABORATORY, MARKERS)
     assert loads.total_known[:140].all() and not loads.total_known[165:].any()
     assert (loads.reason[170:, 0] == OFF_PLATE).all() and np.isnan(loads.wrench[170:, 0]).all()
     assert np.isfinite(loads.wrench[:, 1]).all()
@@ -83,17 +87,17 @@ def test_a_heel_beyond_the_edge_of_its_plate_is_off_it() -> None:
     recording = walker(
         {}, (plate("a", both, at(0.0, 0.1), shifted), plate("b", both, at(0.0, -0.1), CORNERS * [1, 1, -1]))
     )
-    loads = foot_loads(recording, LABORATORY)
+    loads = foot_loads(recording, LABORATORY, MARKERS)
     assert not loads.total_known.any() and (loads.reason[:, 0] == OFF_PLATE).all()
     inside = walker(
         {}, (plate("a", both, at(0.0, 0.1), CORNERS), plate("b", both, at(0.0, -0.1), CORNERS * [1, 1, -1]))
     )
-    assert foot_loads(inside, LABORATORY).total_known.all()
+    assert foot_loads(inside, LABORATORY, MARKERS).total_known.all()
 
 
 def test_two_feet_on_one_plate_share_it_and_their_sum_is_what_was_measured() -> None:
     recording = walker({}, (plate("a", np.full(T, 600.0), at(0.01, 0.05)),))
-    loads = foot_loads(recording, LABORATORY)
+    loads = foot_loads(recording, LABORATORY, MARKERS)
     assert loads.total_known.all() and not loads.all_measured.any()
     assert (loads.reason == SHARED).all()
     total = LABORATORY.wrench_to_ground(recording.total_wrench())
@@ -111,7 +115,7 @@ def test_flight_is_measured_as_nothing_and_a_saturated_plate_is_not_measured() -
     recording = walker(
         {"R": (100, 160), "L": (100, 160)}, (plate("a", jump, at(0.0, -0.1)), plate("b", clipped, at(0.0, 0.1)))
     )
-    loads = foot_loads(recording, LABORATORY)
+    loads = foot_loads(recording, LABORATORY, MARKERS)
     assert loads.total_known[100:160].all() and not loads.wrench[110:150].any()
     assert not loads.total_known[200:220].any() and loads.total_known[220:].all()
     np.testing.assert_array_equal(saturated(clipped), clipped == 900.0)
@@ -121,32 +125,32 @@ def test_flight_is_measured_as_nothing_and_a_saturated_plate_is_not_measured() -
 def test_a_user_knows_better_and_a_load_where_nobody_stands_is_said() -> None:
     push = np.full(T, 300.0)
     plates = (plate("a", push, at(0.0, -0.1)), plate("b", push, at(0.0, 0.1)), plate("c", push, at(2.0, 0.1)))
-    loads = foot_loads(walker({}, plates), LABORATORY)
+    loads = foot_loads(walker({}, plates), LABORATORY, MARKERS)
     assert not loads.total_known.any()
     assert any(text.startswith("Warning: c carries up to 300 N") for text in loads.messages)
-    told = foot_loads(walker({}, plates), LABORATORY, assigned={"c": "right"})
+    told = foot_loads(walker({}, plates), LABORATORY, MARKERS, assigned={"c": "right"})
     assert told.total_known.all()
     np.testing.assert_allclose(told.wrench[:, 0, 1], 600.0, rtol=1e-3)
     with pytest.raises(ConfigError, match="'d' is not in walker; expected one of a, b, c"):
-        foot_loads(walker({}, plates), LABORATORY, assigned={"d": "right"})
+        foot_loads(walker({}, plates), LABORATORY, MARKERS, assigned={"d": "right"})
 
 
 def test_real_plates(data_dir: Path) -> None:
     folder = data_dir / "opencap_subject4"
     squat = read(folder / "squats1.trc", folder / "squats1_grf.mot")
-    loads = foot_loads(squat, find_ground_frame(squat))
+    loads = foot_loads(squat, find_ground_frame(squat), foot_markers_of(squat))
     assert loads.all_measured.all()
     assert any("plate 1 carries the right foot" in text for text in loads.messages)
     walk = read(folder / "walking1.trc", folder / "walking1_grf.mot")
-    loads = foot_loads(walk, find_ground_frame(walk))
+    loads = foot_loads(walk, find_ground_frame(walk), foot_markers_of(walk))
     assert not loads.total_known[walk.time < 0.1].any()  # the left foot still pushes, off the plates
     assert loads.total_known[(walk.time > 0.25) & (walk.time < 1.2)].all()
     gait = read(data_dir / "plugin_gait" / "GaitNormal_1.c3d")
     ground = find_ground_frame(gait)
-    loads = foot_loads(gait, ground)
+    loads = foot_loads(gait, ground, foot_markers_of(gait))
     known = loads.total_known
     assert known[(gait.time > 0.45) & (gait.time < 1.8)].all() and not known[gait.time < 0.3].any()
     total = ground.wrench_to_ground(gait.total_wrench())
     assert np.abs(loads.wrench.sum(axis=1) - total)[known].max() < 10.0  # an empty plate's noise is nobody's
     turned = replace(gait, plates=tuple(replace(p, corners=None) for p in gait.plates))
-    assert foot_loads(turned, ground).total_known[(gait.time > 0.45) & (gait.time < 1.8)].all()
+    assert foot_loads(turned, ground, foot_markers_of(turned)).total_known[(gait.time > 0.45) & (gait.time < 1.8)].all()

@@ -10,15 +10,17 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dynakin.errors import RecordingError
-from dynakin.recordings.feet.contact import distance_to_hull
+from dynakin.recordings.checks import check_plates
 from dynakin.recordings.frame import find_ground_frame
-from dynakin.recordings.plates.checks import check_plates
+from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.recording import Recording
 from support.made_recordings import standing
 
+FEET = {"left": ["LHEE", "LTOE"], "right": ["RHEE", "RTOE"]}
+
 
 def check(recording: Recording, mass_kg: float | None = None):  # type: ignore[no-untyped-def]
-    return check_plates(recording, find_ground_frame(recording, vertical="+Y"), mass_kg)
+    return check_plates(recording, find_ground_frame(recording, vertical="+Y"), mass_kg, FEET)
 
 
 def test_a_good_recording_is_ok_and_gives_the_mass() -> None:

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from dynakin.errors import RecordingError
+from dynakin.recordings.checks import check_plates
 from dynakin.recordings.frame import find_ground_frame
-from dynakin.recordings.plates.checks import check_plates
 from dynakin.recordings.plates.limits import beyond_limits
 from dynakin.recordings.plates.pressure import Surface, plate_from_wrench
 from dynakin.recordings.recording import Plate, Recording

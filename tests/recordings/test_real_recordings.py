@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 from dynakin.errors import RecordingError
+from dynakin.model.markers.marker_set import foot_markers_of
+from dynakin.recordings.checks import check_plates
 from dynakin.recordings.frame import find_ground_frame
-from dynakin.recordings.plates.checks import check_plates
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.resampling import low_pass
@@ -31,7 +32,7 @@ def test_opencap_standing_weighs_60_05_kg(data_dir: Path) -> None:
     frame = find_ground_frame(recording)
     assert frame.vertical == "+Y"
     assert frame.forward @ [1, 0, 0] > 0.995
-    found = check_plates(recording, frame, 60.05)
+    found = check_plates(recording, frame, 60.05, foot_markers_of(recording))
     assert found.ok
     assert found.mass_kg_from_plates == pytest.approx(60.05, abs=0.05)
     said = " ".join(found.messages)
@@ -66,7 +67,7 @@ def test_s1_standing(data_dir: Path) -> None:
     assert frame.vertical == "+Z"
     assert any("Y_SCREEN says -Z" in sentence for sentence in frame.how)
     assert np.degrees(np.arctan2(frame.forward[1], frame.forward[0])) == pytest.approx(-61, abs=3)
-    found = check_plates(recording, frame, 78.6)
+    found = check_plates(recording, frame, 78.6, foot_markers_of(recording))
     assert found.ok
     assert found.mass_kg_from_plates == pytest.approx(81.3, abs=0.1)
     for plate, foot in zip(recording.plates, ("left", "right"), strict=True):
@@ -79,7 +80,7 @@ def test_s1_flywheel_squat_is_a_warning_with_numbers(data_dir: Path) -> None:
     assert np.isnan(recording.marker("RSHO")).any()
     frame = find_ground_frame(recording)
     assert frame.vertical == "+Z"
-    found = check_plates(recording, frame, 78.6)
+    found = check_plates(recording, frame, 78.6, foot_markers_of(recording))
     assert found.refusal is None
     assert any("129.00 kg" in text and text.startswith("Warning") for text in found.messages)
     ground = frame.wrench_to_ground(recording.total_wrench())
@@ -92,7 +93,7 @@ def test_gait_with_three_plates(data_dir: Path) -> None:
     frame = find_ground_frame(recording)
     assert frame.vertical == "+Y"
     assert frame.forward @ [1, 0, 0] > 0.99
-    found = check_plates(recording, frame, 66.0)
+    found = check_plates(recording, frame, 66.0, foot_markers_of(recording))
     assert found.refusal is None
     for k, foot in enumerate(("right", "left", "right")):
         assert any(f"plate {k + 1}: centre of pressure under the {foot} foot" in text for text in found.messages)

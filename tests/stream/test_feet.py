@@ -10,8 +10,9 @@ import pytest
 import dynakin
 from dynakin.bindings import _core
 from dynakin.filter.foot_wrenches import FootWrenches
+from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
-from dynakin.recordings.feet.loads import foot_loads
+from dynakin.recordings.feet.soles import FootShape
 from dynakin.settings import presets
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.trial import simulate
@@ -113,7 +114,8 @@ def test_walking_leaves_out_what_offline_leaves_out(seed: int) -> None:
     walk = simulate("fullbody", "gait", seed)
     live, frames, said = session(Replay(walk.recording, speed=0.0), standing_s=0.3)
     begin = int(np.searchsorted(walk.recording.time, frames[0].estimate.time_s - 1e-6))
-    offline = foot_loads(walk.recording, live.tracker.calibrated.ground).total_known[begin:]
+    initial = live.tracker.calibrated
+    offline = foot_loads(walk.recording, initial.ground, initial.foot_markers).total_known[begin:]
     now = np.array([f.status.plates == "used" for f in frames])
     assert {f.status.plates for f in frames} == {"used", "incomplete"} and np.count_nonzero(offline) > 100
     assert np.count_nonzero(now & ~offline) <= 6 and np.count_nonzero(offline & ~now) <= 14
@@ -134,9 +136,12 @@ class Standing:
         self.frame = 0
         places = _core.marker_positions(self.model, self.state)
         segments = [marker.segment for marker in self.initial.spec.markers]
-        self.middles = [
-            places[[s == self.initial.feet[foot] for s in segments]].mean(axis=0) for foot in self.initial.feet
-        ]
+        forward = self.initial.ground.vectors_to_ground(self.initial.ground.forward)[[0, 2]]
+        self.middles = []
+        for foot in self.initial.feet.values():
+            own = places[None, [s == foot for s in segments]][:, :, [0, 2]]
+            x, z = FootShape.of(own, forward).middle(own)[0]
+            self.middles.append(np.array([x, 0.0, z]))
 
     def look(self, push: float, point: np.ndarray) -> tuple[FootWrenches, bool]:
         """A vertical force in N at a point of the ground frame."""

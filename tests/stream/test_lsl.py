@@ -14,7 +14,7 @@ import pytest
 
 import dynakin
 from dynakin.errors import StreamError
-from dynakin.recordings.plates.pressure import DEFAULT_THRESHOLD_N
+from dynakin.recordings.plates.pressure import UNLOADED_N
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.resampling import CausalLowPass, latest_before
 from dynakin.simulation.trial import simulate_squat
@@ -172,7 +172,7 @@ def test_live_equals_offline_on_the_same_samples(data_dir: Path) -> None:
     filtered = (
         CausalLowPass(1000.0, 0.4 * recording.rate).push(loads.reshape(len(loads), -1)).reshape(len(loads), -1, 6)
     )
-    filtered[np.linalg.norm(filtered[:, :, :3], axis=2) < DEFAULT_THRESHOLD_N] = 0.0
+    filtered[np.linalg.norm(filtered[:, :, :3], axis=2) < UNLOADED_N] = 0.0
     stamps = np.concatenate([block.time_s for block in blocks]) + live.fusion.clock_offset_s
     frames = kept.frames
     times = np.array([f.estimate.time_s for f in frames])

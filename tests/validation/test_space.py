@@ -8,7 +8,7 @@ import pytest
 import dynakin
 from dynakin.filter.estimator import Estimator
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.recordings.feet.loads import foot_loads
+from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import COMPONENTS
 from dynakin.results.measures.metrics import evaluation_window
@@ -39,7 +39,7 @@ def initial(walk: Recording, estimator: Estimator) -> CalibratedModel:
 
 @pytest.fixture(scope="module")
 def known(walk: Recording, initial: CalibratedModel) -> np.ndarray:
-    found = foot_loads(walk, initial.ground).total_known
+    found = foot_loads(walk, initial.ground, initial.foot_markers).total_known
     judged = found[evaluation_window(walk.time)]
     assert judged.any() and not judged.all()
     return found

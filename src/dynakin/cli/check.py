@@ -17,11 +17,11 @@ from dynakin.cli.options import OF_A_MODEL, OF_THE_LABORATORY, Given, with_setti
 from dynakin.errors import DynakinError
 from dynakin.filter.build import definition_of
 from dynakin.model.definition import available_models
-from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
+from dynakin.model.markers.marker_set import available_marker_sets, foot_markers_of, load_marker_set
 from dynakin.model.markers.schema import MarkerSetFile
+from dynakin.recordings.checks import check_plates
 from dynakin.recordings.frame import GroundFrame, find_ground_frame
 from dynakin.recordings.landmarks import plain_name
-from dynakin.recordings.plates.checks import check_plates
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.standing import standing_window
@@ -60,7 +60,9 @@ def check(
                 vertical=settings.vertical,
                 forward=settings.forward,
             )
-            plates = check_plates(recording, found.ground, found.mass_kg if definition.planar else None)
+            plates = check_plates(
+                recording, found.ground, found.mass_kg if definition.planar else None, found.foot_markers
+            )
             if recording.plates and plates.refusal:
                 raise DynakinError(plates.refusal)
         except DynakinError as error:
@@ -133,7 +135,7 @@ def _print_ground(
 def _print_plate_check(console: Console, recording: Recording, ground: GroundFrame, mass: float | None) -> None:
     if not recording.plates:
         return
-    found = check_plates(recording, ground, mass)
+    found = check_plates(recording, ground, mass, foot_markers_of(recording))
     console.print("Plates' check", style="bold")
     _sentences(console, list(found.messages))
     if found.refusal:

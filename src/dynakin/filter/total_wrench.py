@@ -13,10 +13,13 @@ from dynakin.errors import RecordingError
 from dynakin.filter.closure import EXCESS, Closure, closure
 from dynakin.filter.contacts import ContactLoads
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.recordings.checks import PlateCheck, check_plates
 from dynakin.recordings.feet import loads as on_plates
-from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED, distance_to_hull
-from dynakin.recordings.feet.loads import LOADED_N, NEAR_M, FootLoads, foot_loads
-from dynakin.recordings.plates.checks import PlateCheck, check_plates
+from dynakin.recordings.feet.assignment import foot_loads
+from dynakin.recordings.feet.contact import NEAR_M, NO_CONTACT, ON_PLATE, UNMEASURED
+from dynakin.recordings.feet.loads import FootLoads
+from dynakin.recordings.hull import distance_to_hull
+from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.recordings.recording import Recording
 from dynakin.settings.noise import Noise
 from dynakin.units import GRAVITY_M_S2
@@ -100,6 +103,8 @@ def foot_markers(initial: CalibratedModel) -> dict[str, list[str]]:
     def on(segment: str, foot: str) -> bool:
         return segment == foot or (segment in parents and on(parents[segment], foot))
 
+    if not initial.feet:
+        return initial.foot_markers
     pairs = list(zip(initial.recorded_markers, initial.spec.markers, strict=True))
     return {side: [name for name, m in pairs if on(m.segment, foot)] for side, foot in initial.feet.items()}
 
@@ -126,7 +131,7 @@ def known_ground(
     n = recording.n_frames
     loads = None
     if initial.feet:
-        loads = foot_loads(recording, initial.ground, foot_markers=foot_markers(initial), assigned=assigned)
+        loads = foot_loads(recording, initial.ground, foot_markers(initial), assigned=assigned)
     if not recording.plates:
         text = (
             "No force plates: the ground reaction is not known, so the moments of a leg that may stand are absent; "
@@ -134,7 +139,7 @@ def known_ground(
         )
         return Ground(loads, np.zeros(n, dtype=bool), False, None, (text,), (text,))
     # steps off the plates: their mean load is no mass
-    mass, feet = (None, foot_markers(initial)) if initial.feet else (initial.weighed_kg, None)
+    mass, feet = (None if initial.feet else initial.weighed_kg), foot_markers(initial)
     check = check_plates(recording, initial.ground, mass, feet)
     if check.refusal:
         raise RecordingError(f"{recording.path or recording.name}: {check.refusal}")
@@ -150,7 +155,8 @@ def known_ground(
         reasons += loads.reasons
     found = closure(initial, recording.time, markers, wrench, claimed)
     if found is None:
-        foreign = _foreign_load(check, wrench, claimed, initial, tolerance)
+        flight = np.zeros(n, dtype=bool) if loads is None else loads.aloft.all(axis=1)  # which weighs nobody
+        foreign = _foreign_load(check, wrench, claimed & ~flight, initial, tolerance)
         undeclared |= foreign is not None
         reasons += [foreign] if foreign else []
         notes.append(UNJUDGED)
@@ -214,7 +220,7 @@ def _undeclared_in_words(
             continue
         place = np.broadcast_to(found.place(slice(first, end)), (end - first, 2))
         for k, names in enumerate(feet.values()):
-            own = [initial.recorded_markers.index(name) for name in names]
+            own = [k for k, name in enumerate(initial.recorded_markers) if name in names]
             if not own:
                 continue
             distance = distance_to_hull(place, markers[first:end][:, own][:, :, [0, 2]])

@@ -13,8 +13,8 @@ from dynakin.errors import LostError, ModelError, RecordingError
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.tracker import Tracker
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.recordings.feet.loads import LOADED_N
 from dynakin.recordings.frame import GroundFrame
+from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.smoothing import CUTOFF_HZ, smooth
 from dynakin.results.measures.tracking import why_lost

@@ -208,6 +208,7 @@ class ModelDefinition:
             parts=rest.parts,
             messages=tuple(messages),
             plan=plan,
+            foot_markers=rest.trial.match.foot_markers,
             feet={s.side: s.name for s in plan.model.segments if s.side is not None and "foot" in s.parts},
         )
 

@@ -5,8 +5,8 @@ Readers are plug-ins by extension (``READERS``, ``register_reader``); everything
 of the file, a missing marker is NaN, and each plate keeps its own wrench, ground-on-person.
 """
 
+from dynakin.recordings.checks import check_plates
 from dynakin.recordings.frame import GroundFrame, find_ground_frame
-from dynakin.recordings.plates.checks import check_plates
 from dynakin.recordings.read import read, register_reader
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.recordings.resampling import ReadOptions

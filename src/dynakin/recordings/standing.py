@@ -17,15 +17,20 @@ MIN_STILL_S = 0.5
 _SPAN_S = 0.1  # speeds are taken over this span, so that 1 mm of marker noise counts as 0.01 m/s only
 
 
-def marker_speeds(recording: Recording) -> Array:
-    """Speed of each marker (T, M) m/s, over 0.1 s around each frame; NaN where either end is missing."""
+def marker_velocities(recording: Recording) -> Array:
+    """Velocity of each marker (T, M, 3) m/s, laboratory frame, over 0.1 s around each frame; NaN where either end is
+    missing."""
     half = max(1, round(0.5 * _SPAN_S * recording.rate)) if recording.n_frames > 1 else 0
     frames = np.arange(recording.n_frames)
     before, after = np.maximum(frames - half, 0), np.minimum(frames + half, recording.n_frames - 1)
     with np.errstate(invalid="ignore", divide="ignore"):
-        travelled = np.linalg.norm(recording.markers[after] - recording.markers[before], axis=2)
-        speeds: Array = travelled / (recording.time[after] - recording.time[before])[:, None]
-    return speeds
+        travelled = recording.markers[after] - recording.markers[before]
+        return np.asarray(travelled / (recording.time[after] - recording.time[before])[:, None, None])
+
+
+def marker_speeds(recording: Recording) -> Array:
+    """Speed of each marker (T, M) m/s; see `marker_velocities`."""
+    return np.asarray(np.linalg.norm(marker_velocities(recording), axis=2))
 
 
 def standing_window(recording: Recording) -> slice | None:

@@ -21,7 +21,7 @@ from dynakin.report.sides import Joint, joints_of, normalising_mass, values_of
 from dynakin.report.styles import SIDE_COLOURS
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.feet import foot_sources
-from dynakin.results.measures.pressure import centre_of_pressure, floor_height
+from dynakin.results.measures.pressure import centre_of_pressure, floor_height, support_height
 from dynakin.results.measures.sources import DERIVED, moment_sources, wrench_sources
 from dynakin.results.naming import number, sentence, words
 from dynakin.units import GRAVITY_M_S2
@@ -158,7 +158,9 @@ def _arrows(estimate: Estimate, arrays: dict[str, Array]) -> list[dict[str, Any]
     arrays["derived"] = (derived == DERIVED).astype(float)
     for kind, name in (("measured", "foot_wrench_measured"), ("estimated", "foot_wrench")):
         wrench = values_of(estimate, name) if feet else values_of(estimate, f"wrench_{kind}")[:, None]
-        points = [centre_of_pressure(wrench[:, k], floor_height(estimate))[0] for k in range(wrench.shape[1])]
+        every = [wrench[:, k] for k in range(wrench.shape[1])]
+        heights = [support_height(estimate, own) if feet else floor_height(estimate) for own in every]
+        points = [centre_of_pressure(own, height)[0] for own, height in zip(every, heights, strict=True)]
         point = np.where(modelled, np.stack(points, axis=1), 0.0)
         known = np.isfinite(point).all(axis=2, keepdims=True)
         force = np.where(known, np.where(modelled, wrench[..., :3], 0.0), np.nan)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Mapping
 
 import numpy as np
@@ -11,33 +12,38 @@ from dynakin.bindings import _core
 from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.total_wrench import foot_wrenches
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.recordings.feet.contact import AFTER_S, ALOFT_M, NEAR_FLOOR_M, SLOW_M_S, distance_to_hull
-from dynakin.recordings.feet.loads import (
-    BETWEEN_M,
-    EMPTY_N,
-    FLAT_FRAMES,
-    FOREIGN_N,
-    LOADED_N,
+from dynakin.recordings.feet.assignment import BETWEEN_M
+from dynakin.recordings.feet.belt import WINDOW_S, one_velocity
+from dynakin.recordings.feet.contact import (
+    AFTER_S,
+    ALOFT_M,
+    LEVEL_M_S,
     NEAR_M,
-    SHARED,
-    PlateLoad,
-    divided,
+    NEAR_SUPPORT_M,
+    RESTS_S,
+    SLOW_M_S,
 )
+from dynakin.recordings.feet.loads import SHARED, FootLoads, divided
 from dynakin.recordings.feet.soles import EARLY_S, PASSING_S, FootShape, Soles, smooth_step
+from dynakin.recordings.hull import distance_to_hull
+from dynakin.recordings.plates.ground_plate import FLAT_FRAMES, GroundPlate
+from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N
 from dynakin.settings.noise import Noise
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
 _RISE_M_S = 0.0025  # how fast a marker's lowest place is forgotten, so that one bad moment does not stay
+_BELT_STEP_S, _BELT_EVERY_S = 0.018, 0.5  # a belt is looked for twice a second, in 50 moments a second
 _DT_S = (0.001, 0.05)  # how far ahead the feet are predicted
 
 
 class LiveFeet:
     """Gives each plate to the feet that stand on it, frame by frame, from the estimate before the step.
 
-    Offline (`recordings.feet.loads`) whole stances are seen; here a stance is what has been seen of it so far, with the
-    same thresholds: a foot stands where a marker is near its lowest place and slow, and for a while after (push-off). A
+    Offline (`recordings.feet.assignment`) whole stances are seen; here a stance is what has been seen of it so far,
+    with the same thresholds: a foot stands where a marker is near its lowest place, or keeps a height that something
+    must hold it at, and is slow against the floor, or the belt of the last seconds; and for a while after (push-off). A
     stance that no plate has carried yet is off the plates.
 
     Args:
@@ -59,6 +65,12 @@ class LiveFeet:
         self._marked = np.array([len(markers) > 0 for markers in own], dtype=bool)
         self._standing, self._floor = np.full(M, np.inf), np.full(M, np.inf)
         self._time = -np.inf
+        self._belts = _Belts(F)
+        self._level = np.zeros(F)  # of what each foot rests on, over its lowest place, m
+        self._kept, self._kept_since = np.full(F, np.inf), np.full(F, np.inf)
+        self._alone_since = np.full(F, np.inf)
+        self._under = np.zeros((F, P), dtype=bool)
+        self._time_before = -np.inf
         self._shapes: list[FootShape] = []
         self._since = np.full(F, np.nan)  # when the stance began
         self._forward = initial.ground.vectors_to_ground(initial.ground.forward)[[0, 2]]
@@ -79,7 +91,21 @@ class LiveFeet:
             state: (n,) before the step. wrenches: (P, 6) N and N m, laboratory frame, or None.
         """
         dt = float(np.clip(time_s - self._time, *_DT_S))
-        outlines, low, moves = self._move(model, state, time_s, dt)
+        offset, size = model.layout.blocks["coordinates"]
+        speeds, _ = model.layout.blocks["speeds"]
+        ahead = state.copy()
+        ahead[offset : offset + size] += dt * state[speeds : speeds + size]
+        before, places = _core.marker_positions(model, state), _core.marker_positions(model, ahead)
+        loads = self.loads(time_s, places, (places - before) / dt, wrenches)
+        return foot_wrenches(loads, self.initial, self.noise), bool(loads.total_known[0])
+
+    def loads(self, time_s: float, places: Array, velocity: Array, wrenches: Array | None) -> FootLoads:
+        """The same as loads (T = 1).
+
+        Args:
+            places: (M, 3) m of the model's markers, ground frame. velocity: (M, 3) m/s. wrenches: as above.
+        """
+        outlines, low, moves = self._move(places, velocity, time_s)
         bears = time_s - self._touched <= AFTER_S
         stands = self._touched == time_s
         aloft = moves & ~bears & (stands.sum() > stands)  # high alone may be a pedal: no later stance is known yet
@@ -92,20 +118,19 @@ class LiveFeet:
         else:
             self._owners[:], off = False, bears
         on = self._owners[:, : len(plates)]
-        seen = [None if (own == len(self._floor)).all() else outlines[[f]] for f, own in enumerate(self._own)]
         soles = self._soles(outlines, bears, time_s)
-        loads = divided(self.feet, plates, seen, on[None], off[None], aloft[None], soles)
-        known = bool(loads.total_known[0])
+        seen_none = np.zeros_like(off)  # the model shows all of them
+        loads = divided(self.feet, plates, soles, self._marked, on[None], off[None], seen_none[None], aloft[None])
         for p in np.flatnonzero(on.sum(axis=0) > 1) if (loads.reason == SHARED).any() else ():
             self._say(
                 f"Both feet stand on {self.plates[p]}: its wrench is divided between them by its centre of pressure."
             )
-        if plates and not known:
+        if plates and not loads.total_known[0]:
             self._say(
                 "The plates do not carry all of the person (a foot off the plates, a load where nobody stands, a plate "
                 "at the end of its range): the total wrench is left out for as long as that is so."
             )
-        return foot_wrenches(loads, self.initial, self.noise), known
+        return loads
 
     def _soles(self, outlines: Array, bears: Flags, time_s: float) -> Soles:
         """Soles of this moment (T = 1). Their sizes and places among the markers are those that were seen first. When
@@ -116,11 +141,13 @@ class LiveFeet:
                 points = outlines[[f]][:, own < len(self._floor)]
                 self._shapes.append(FootShape.of(points, self._forward))
         self._since = np.where(bears, np.fmin(self._since, time_s), np.nan)
+        lowest = float(np.append(self._standing, np.inf)[self._own].min())
         middle, half = np.full((1, F, 3), np.nan), np.stack([shape.half_m for shape in self._shapes])
         for f in np.flatnonzero(self._marked).tolist():
             own = self._own[f] < len(self._floor)
             x, z = self._shapes[f].middle(outlines[[f]][:, own])[0]
-            middle[0, f] = x, self._floor_m, z
+            over = float(self._floor[self._own[f][own]].min()) - lowest  # steps down are below where the feet began
+            middle[0, f] = x, self._floor_m + over + self._level[f], z
         since, left = time_s - self._since, time_s - self._touched
         weight = smooth_step(np.fmin((since + EARLY_S) / PASSING_S, 1.0 - left / AFTER_S))
         weight = np.where(self._marked, np.where(bears, weight, 0.0), 1.0)
@@ -136,33 +163,50 @@ class LiveFeet:
             self._said.add(text)
             self._to_say.append(text)
 
-    def _move(self, model: _core.Model, state: Array, time_s: float, dt: float) -> tuple[Array, Flags, Flags]:
-        """Outlines (F, K, 2) of the feet, predicted, whether each is low, and whether all of it moves; keeps when it
-        last stood."""
-        offset, size = model.layout.blocks["coordinates"]
-        speeds, _ = model.layout.blocks["speeds"]
-        ahead = state.copy()
-        ahead[offset : offset + size] += dt * state[speeds : speeds + size]
-        before, places = _core.marker_positions(model, state), _core.marker_positions(model, ahead)
-        speed = np.linalg.norm(places - before, axis=1) / dt
+    def _move(self, places: Array, velocity: Array, time_s: float) -> tuple[Array, Flags, Flags]:
+        """Outlines (F, K, 2) of the feet, whether each is low, and whether all of it moves; keeps when it stood."""
         if not np.isfinite(self._time):
-            self._standing = before[:, 1].copy()
+            self._standing = places[:, 1].copy()
+        dt = float(np.clip(time_s - self._time, *_DT_S))
         self._floor = np.minimum(np.minimum(self._floor + _RISE_M_S * dt, self._standing), places[:, 1])
         self._time = time_s
         height = places[:, 1] - self._floor
-        touching = np.append((height < NEAR_FLOOR_M) & (speed < SLOW_M_S), False)
-        self._touched[touching[self._own].any(axis=1)] = time_s
-        low = np.append(height < ALOFT_M, False)[self._own].any(axis=1)
-        moves = self._marked & np.append(speed > SLOW_M_S, True)[self._own].all(axis=1)
+        self._belts.look(time_s, velocity, height < NEAR_SUPPORT_M, self._own)
+        own_height = np.append(height, np.inf)[self._own]  # (F, K)
+        against = np.vstack([velocity, np.full(3, np.inf)])[self._own]
+        against[:, :, [0, 2]] -= self._belts.velocity[:, None]
+        with np.errstate(invalid="ignore"):
+            slow = np.linalg.norm(against, axis=2) < SLOW_M_S
+        self._rest(time_s, own_height, slow)
+        touching = slow & (np.abs(own_height - self._level[:, None]) < NEAR_SUPPORT_M)
+        touching |= slow & (own_height < NEAR_SUPPORT_M)
+        self._touched[touching.any(axis=1)] = time_s
+        low = ((own_height < ALOFT_M) | (np.abs(own_height - self._level[:, None]) < ALOFT_M)).any(axis=1)
+        moves = self._marked & ~slow.any(axis=1)
         return np.vstack([places[:, [0, 2]], np.full(2, np.nan)])[self._own], low, moves
 
-    def _plates(self, wrenches: Array) -> list[PlateLoad]:
+    def _rest(self, time_s: float, height: Array, slow: Flags) -> None:
+        """Which feet rest on something higher than their lowest place: they keep a height, and no other foot stands or
+        a plate is loaded under them."""
+        stands = self._touched == self._time_before
+        for f in range(len(self.feet)):
+            lift = float(height[f].min())
+            keeps = bool(slow[f].any()) and abs(lift - self._kept[f]) < LEVEL_M_S * RESTS_S
+            if not keeps:
+                self._kept[f], self._kept_since[f], self._level[f] = lift, time_s, 0.0
+            others = np.delete(stands, f).any()
+            self._alone_since[f] = time_s if others else min(self._alone_since[f], time_s)
+            carried = bool((self._owners[f] | (self._under[f])).any())
+            since = self._kept_since[f] if carried else max(self._kept_since[f], self._alone_since[f])
+            if keeps and lift > NEAR_SUPPORT_M and time_s - since > RESTS_S:
+                self._level[f] = lift
+        self._time_before = time_s
+
+    def _plates(self, wrenches: Array) -> list[GroundPlate]:
         loads = self.initial.ground.wrench_to_ground(wrenches)
         known = np.isfinite(loads).all(axis=1) & ~self._range.at_end(loads[:, 1])
-        push = np.where(np.nan_to_num(loads[:, 1]) > LOADED_N, loads[:, 1], np.nan)
-        cop = np.stack([loads[:, 5] / push, -loads[:, 3] / push], axis=1)
         return [
-            PlateLoad(name, loads[[p]], cop[[p]], np.isfinite(push[[p]]), known[[p]], None)
+            GroundPlate.at_height(name, loads[[p]], known[[p]], None, self._floor_m)
             for p, name in enumerate(self.plates)
         ]
 
@@ -170,13 +214,14 @@ class LiveFeet:
         """(F, P) plates that carry a stance, as far as it has gone: near for most of the load."""
         return np.asarray(self._near > 0.5 * self._loaded)
 
-    def _assign(self, plates: list[PlateLoad], outlines: Array, bears: Flags, low: Flags) -> None:
+    def _assign(self, plates: list[GroundPlate], outlines: Array, bears: Flags, low: Flags) -> None:
         touches = self._touched == self._time
         cops = np.concatenate([plate.cop for plate in plates])
         F, P = len(self.feet), len(plates)
         away = distance_to_hull(np.tile(cops, (F, 1)), np.repeat(outlines, P, axis=0)).reshape(F, P)
         away = np.nan_to_num(away, nan=np.inf)  # of a plate that is not loaded
         near = away < NEAR_M
+        self._under = near.copy()
         apart = np.isfinite(away).any(axis=0) & (away.min(axis=0) > BETWEEN_M)
         if touches.all() and apart.any():
             both = np.broadcast_to(outlines.reshape(1, -1, 2), (P, outlines.size // 2, 2))
@@ -189,7 +234,7 @@ class LiveFeet:
         mine = self._majority() & bears[:, None]
         for p, plate in enumerate(plates):
             push = float(plate.wrench[0, 1])
-            if push <= EMPTY_N:
+            if push <= UNLOADED_N:
                 self._owners[:, p] = False
             elif p in self._assigned:
                 self._owners[:, p] = near[:, p]
@@ -200,11 +245,39 @@ class LiveFeet:
                 self._owners[nearest, p] = bool(near[nearest, p] and low[nearest])
 
 
+class _Belts:
+    """How a belt under each foot moves, by the last seconds, as `recordings.feet.belt` finds it afterwards."""
+
+    def __init__(self, feet: int) -> None:
+        self.velocity = np.zeros((feet, 2))  # m/s, X and Z of the ground
+        self._kept: deque[tuple[float, Array, Flags]] = deque()
+        self._looked = -np.inf
+
+    def look(self, time_s: float, velocity: Array, low: Flags, own: npt.NDArray[np.intp]) -> None:
+        """The next moment: velocities (M, 3) m/s of all markers, which of them are low, and each foot's own (F, K)."""
+        if self._kept and time_s - self._kept[-1][0] < _BELT_STEP_S:
+            return
+        self._kept.append((time_s, velocity, low))
+        while self._kept[0][0] < time_s - WINDOW_S:
+            self._kept.popleft()
+        if time_s - self._looked < _BELT_EVERY_S or len(self._kept) < 10:
+            return
+        self._looked = time_s
+        time = np.array([at for at, _, _ in self._kept])
+        every, lows = np.stack([v for _, v, _ in self._kept]), np.stack([b for _, _, b in self._kept])
+        body = np.median(every, axis=1)
+        for f, markers in enumerate(own):
+            markers = markers[markers < every.shape[1]]
+            found = one_velocity(every[:, markers], lows[:, markers], body, time) if len(markers) else None
+            if found is not None:
+                self.velocity[f] = found
+
+
 class _Range:
     """Whether plates are at the end of their range, as `recordings.feet.loads.saturated` finds it afterwards."""
 
     def __init__(self, plates: int) -> None:
-        self._top = np.full(plates, FOREIGN_N)
+        self._top = np.full(plates, JUDGED_N)
         self._last, self._before = np.full(plates, np.nan), np.full(plates, np.nan)
         self._flat = np.zeros(plates, dtype=int)
 

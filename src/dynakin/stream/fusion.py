@@ -10,7 +10,7 @@ import numpy.typing as npt
 from dynakin.errors import StreamError
 from dynakin.filter.samples import Sample
 from dynakin.recordings.limits import FARTHEST_M
-from dynakin.recordings.plates.pressure import DEFAULT_THRESHOLD_N
+from dynakin.recordings.plates.pressure import UNLOADED_N
 from dynakin.stream.plate_samples import PlateSamples
 from dynakin.stream.sources.clock import Clock, offset_between
 from dynakin.stream.sources.in_order import Counts, InOrder
@@ -207,7 +207,7 @@ class Fusion:
         if self._resampled is not None and self.plates is not None:
             wrenches = self._resampled.at(time_s) if self._offset_s is not None else None
             if wrenches is not None:  # an empty plate, as offline
-                idle = np.linalg.norm(wrenches[:, :3], axis=1) < DEFAULT_THRESHOLD_N
+                idle = np.linalg.norm(wrenches[:, :3], axis=1) < UNLOADED_N
                 wrenches = (
                     np.where(idle[:, None], 0.0, wrenches)
                     if self.plates.rate_hz > 1.01 * self.markers.rate_hz

@@ -16,11 +16,12 @@ from dynakin.filter.tracker import Tracker
 from dynakin.model.calibration.body import steady_load
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition
+from dynakin.model.markers.marker_set import foot_markers_of
+from dynakin.recordings.checks import check_plates
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.landmarks import DEFAULT_PAIRS
 from dynakin.recordings.orientation import axis_vector, find_vertical
-from dynakin.recordings.plates.checks import LOADED_N, check_plates
-from dynakin.recordings.plates.pressure import DEFAULT_THRESHOLD_N, Surface, plate_from_wrench
+from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N, Surface, plate_from_wrench
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.recordings.standing import standing_window
 from dynakin.stream.fusion import Fused
@@ -85,7 +86,7 @@ def _plate(name: str, wrench: np.ndarray, up: np.ndarray) -> Plate:
             wrench[:, 3:],
             floor,
             corners=None,
-            threshold_n=DEFAULT_THRESHOLD_N,
+            threshold_n=UNLOADED_N,
             zero_unloaded=False,
         )
 
@@ -120,7 +121,7 @@ def _weighed(present: Recording, whole: Recording) -> tuple[Recording, str]:
     if not whole.plates or "mass_kg" in present.subject:
         return present, ""
     try:
-        mass, why = steady_load(whole, find_ground_frame(whole))
+        mass, why = steady_load(whole, find_ground_frame(whole), foot_markers_of(whole))
     except RecordingError as error:
         mass, why = None, error.message
     if mass is None:
@@ -156,12 +157,13 @@ def begin(
         said.append(f"Lengths, marker places and masses go on from {len(known)} saved values.")
     usable = True
     if standing.plates:
-        if max(np.nan_to_num(np.abs(plate.force)).max() for plate in standing.plates) < LOADED_N:
+        if max(np.nan_to_num(np.abs(plate.force)).max() for plate in standing.plates) < JUDGED_N:
             return tracker, [*said, "Nobody stands on the plates yet; they are not checked."], usable
         check = check_plates(
             static if static is not None and static.plates else standing,
             initial.ground,
             None if initial.feet else initial.weighed_kg,
+            initial.foot_markers,
         )
         if check.refusal:
             raise RecordingError(f"plates: {check.refusal}")

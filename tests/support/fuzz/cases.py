@@ -14,11 +14,11 @@ from pydantic import BaseModel
 from dynakin.errors import DynakinError
 from dynakin.model.definition import load_model
 from dynakin.model.identified import read_identified
-from dynakin.model.markers.marker_set import load_marker_set
+from dynakin.model.markers.marker_set import foot_markers_of, load_marker_set
 from dynakin.model.opensim.export import read_values
 from dynakin.model.table import load_table
+from dynakin.recordings.checks import check_plates
 from dynakin.recordings.frame import find_ground_frame
-from dynakin.recordings.plates.checks import check_plates
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.settings import presets
@@ -69,7 +69,7 @@ def _recording(path: Path, corpus: Path) -> Recording:
     recording = read(path)
     try:
         ground = find_ground_frame(recording)
-        check_plates(recording, ground)
+        check_plates(recording, ground, None, foot_markers_of(recording))
     except DynakinError as error:  # markers that make no person are no fault of the file
         _check_error(error)
     return recording

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ModelError
 from dynakin.model.calibration.frames import Trial
-from dynakin.recordings.feet.loads import foot_loads
+from dynakin.recordings.checks import check_plates
+from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.frame import GroundFrame
-from dynakin.recordings.plates.checks import check_plates
 from dynakin.recordings.recording import Recording
 from dynakin.settings.subject import Subject
 from dynakin.units import GRAVITY_M_S2
@@ -31,7 +31,11 @@ _STANDS_M_S = 0.1
 """Speed of the lowest marker below which a foot stands: in the air it points down, which adds 0.2 m to a height."""
 
 
-def find_mass(subject: Subject, trials: Sequence[tuple[Recording, GroundFrame]]) -> tuple[float, str]:
+def find_mass(
+    subject: Subject,
+    trials: Sequence[tuple[Recording, GroundFrame]],
+    foot_markers: Mapping[str, Sequence[str]],
+) -> tuple[float, str]:
     """Mass (kg) and where it comes from: given, from the plates while standing still, from the file, or, with a
     warning, from the plates' mean over a movement that is long and steady enough.
 
@@ -45,11 +49,11 @@ def find_mass(subject: Subject, trials: Sequence[tuple[Recording, GroundFrame]])
         if not recording.plates:
             reasons.append(f"{recording.name} has no force plates")
             continue
-        check = check_plates(recording, ground)
+        check = check_plates(recording, ground, None, foot_markers)
         if check.refusal is not None:
             reasons.append(f"{recording.name}: {check.refusal}")
         elif check.mass_kg_from_plates is None:
-            mean, why = steady_load(recording, ground)
+            mean, why = steady_load(recording, ground, foot_markers)
             reasons.append(f"nobody stands still on the plates of {recording.name}, and {why}")
             if mean is not None:
                 means.append((mean, recording.name))
@@ -70,10 +74,12 @@ def find_mass(subject: Subject, trials: Sequence[tuple[Recording, GroundFrame]])
     )
 
 
-def steady_load(recording: Recording, ground: GroundFrame) -> tuple[float | None, str]:
+def steady_load(
+    recording: Recording, ground: GroundFrame, foot_markers: Mapping[str, Sequence[str]]
+) -> tuple[float | None, str]:
     """Mean load (kg) of the frames in which every foot that stands is on a plate, and why it is no weight; None where
     these are few, or it varies too much."""
-    loads = foot_loads(recording, ground)
+    loads = foot_loads(recording, ground, foot_markers)
     push = loads.wrench[..., 1].sum(axis=1)[loads.total_known]
     push = push[np.isfinite(push)]
     seconds = len(push) / recording.rate

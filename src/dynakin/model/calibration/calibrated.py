@@ -12,11 +12,10 @@ from dynakin.errors import ModelError
 from dynakin.model.calibration.lumping import PlacedPart
 from dynakin.model.plan import ModelPlan
 from dynakin.recordings.frame import GroundFrame
+from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.recordings.recording import Recording
 
 Array = npt.NDArray[np.float64]
-
-_LOADED_N = 20.0  # a lesser load has no centre of pressure worth the name
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +49,7 @@ class CalibratedModel:
         messages: sentences on what was found, left out, locked or assumed.
         plan: the same as plain data; None for an OpenSim model.
         feet: "right", "left" -> segment on which the ground acts; empty for a model fixed in the ground.
+        foot_markers: "right", "left" -> the recording's names of the markers on that foot.
         unmodelled_m: (M,) standard deviation of what neither a state nor the cameras explain of each marker; it is
             added to the noise of the cameras.
         dimensionless: geometry parameters that are factors, not lengths.
@@ -76,6 +76,7 @@ class CalibratedModel:
     messages: tuple[str, ...]
     plan: ModelPlan | None
     feet: dict[str, str] = field(default_factory=dict)
+    foot_markers: dict[str, list[str]] = field(default_factory=dict)
     unmodelled_m: Array | float = 0.0
     dimensionless: frozenset[str] = frozenset()
     carried_kg: float = 0.0
@@ -105,7 +106,7 @@ def first_centre_of_pressure(recording: Recording, ground: GroundFrame) -> Array
         return np.zeros(3)
     wrench = ground.wrench_to_ground(recording.total_wrench())
     wrench = wrench[recording.time < recording.time[0] + 1.0]
-    loaded = wrench[np.isfinite(wrench).all(axis=1) & (wrench[:, 1] > _LOADED_N)]
+    loaded = wrench[np.isfinite(wrench).all(axis=1) & (wrench[:, 1] > LOADED_N)]
     if not len(loaded):
         return np.zeros(3)
     force, moment = loaded[:, 1].mean(), loaded[:, 3:].mean(axis=0)

@@ -20,7 +20,7 @@ from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.model.plan import Geometry, ModelPlan
 from dynakin.model.schema import ModelFile
 from dynakin.model.table import BodyTable
-from dynakin.recordings.feet.contact import foot_contact
+from dynakin.recordings.feet.contact import foot_contacts
 from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_laboratory_frame
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.standing import standing_window
@@ -106,7 +106,9 @@ def measure(
     landmarks = finder.find_in_space(standing) if model.sided else finder.find(standing)
 
     mass_kg, how = find_mass(
-        subject, [(t.recording, t.ground) for t in ([source, trial] if static is not None else [trial])]
+        subject,
+        [(t.recording, t.ground) for t in ([source, trial] if static is not None else [trial])],
+        source.match.foot_markers,
     )
     messages.append(how)
     height_m, how = find_height(subject, [r for r in (static, recording) if r is not None], source)
@@ -175,7 +177,8 @@ def flat_slopes(trial: Trial) -> dict[str, float]:
     pair = trial.match.marker_set.heel_toe
     for side in SIDES:
         names = [trial.match.names.get((name, side)) for name in pair or ()]
-        contact = foot_contact(trial.recording, trial.ground, [n for n in names if n]) if all(names) else None
+        own = {side: [name for name in names if name]} if all(names) else {}
+        contact = foot_contacts(trial.recording, trial.ground, own).get(side)
         if contact is None or contact.touching.shape[1] != 2:
             continue
         flat = contact.touching.all(axis=1)

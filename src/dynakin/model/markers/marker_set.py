@@ -7,10 +7,13 @@ from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 
+import numpy as np
+
 from dynakin.errors import ModelError
 from dynakin.files import is_file
 from dynakin.model.markers.schema import Marker, MarkerSetFile
 from dynakin.recordings.landmarks import FacingPairs, plain_name
+from dynakin.recordings.recording import Recording
 from dynakin.settings.strict import nearest, read_toml, validate
 
 MarkerKey = tuple[str, str]
@@ -64,6 +67,16 @@ class MarkerMatch:
         ]
         return FacingPairs(found[0], found[1])
 
+    @property
+    def foot_markers(self) -> dict[str, list[str]]:
+        """Side -> the recorded names of the markers on its foot: those on the segment of heel and toe."""
+        set_ = self.marker_set
+        segments = {set_.marker(name).segment for name in set_.heel_toe or ()} | {"foot", "toes"}
+        own = [marker.name for marker in set_.markers if marker.segment in segments]
+        return {
+            side: [self.names[name, side] for name in own if (name, side) in self.names] for side in ("right", "left")
+        }
+
     def sites(self, side: str, planar: bool = True) -> list[tuple[Marker, MarkerKey, str]]:
         """Markers that become sites of a planar model on "right", "left" or "both" sides, or of one in space; in the
         order of the set."""
@@ -108,6 +121,16 @@ def match_markers(
                 if fits and (marker.name, side) not in found:
                     found[marker.name, side] = fits[0]
     return MarkerMatch(marker_set, found, names, where)
+
+
+def foot_markers_of(recording: Recording) -> dict[str, list[str]]:
+    """Side -> markers on its foot by the built-in set that fits a recording best; none where none fits."""
+    try:
+        chosen = choose_marker_set(recording.marker_names)
+        seen = [bool(np.isfinite(recording.marker(name)).all(axis=1).any()) for name in recording.marker_names]
+        return match_markers(chosen, recording.marker_names, seen, recording.name).foot_markers
+    except ModelError:
+        return {"right": [], "left": []}
 
 
 def choose_marker_set(recorded: Iterable[str]) -> MarkerSetFile:

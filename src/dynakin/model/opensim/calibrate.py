@@ -64,11 +64,16 @@ def refuse_other_gravity(source: OpenSimModel) -> None:
 
 
 def of_subject(
-    source: OpenSimModel, subject: Subject, recordings: list[Recording], ground: GroundFrame, messages: list[str]
+    source: OpenSimModel,
+    subject: Subject,
+    recordings: list[Recording],
+    ground: GroundFrame,
+    feet: dict[str, list[str]],
+    messages: list[str],
 ) -> OpenSimModel:
     """The model with the subject's mass: as given, or as the plates say, or as it stands in the file."""
     try:
-        mass, how = find_mass(subject, [(recording, ground) for recording in recordings])
+        mass, how = find_mass(subject, [(recording, ground) for recording in recordings], feet)
     except ModelError:
         messages.append(f"Mass {source.mass:.2f} kg: the OpenSim file's, as it is neither given nor measured.")
         return source
@@ -144,6 +149,15 @@ def facing_pairs(source: OpenSimModel, chosen: Sequence[tuple[Marker, str]]) -> 
     feet = [pair for body in feet_of(source).values() for pair in ends(body)]
     pelvis = [pair for body in source.bodies if "pelvis" in body.name.casefold() for pair in ends(body.name)]
     return FacingPairs((*feet, *DEFAULT_PAIRS.heel_toe), (*pelvis, *DEFAULT_PAIRS.pelvis))
+
+
+def foot_markers(source: OpenSimModel, chosen: Sequence[tuple[Marker, str]]) -> dict[str, list[str]]:
+    """Side -> the recorded names of the markers on its foot, and on what hangs on that (toes)."""
+    found = {}
+    for side, foot in feet_of(source).items():
+        bodies = {foot} | {joint.child for joint in source.joints if joint.parent == foot}
+        found[side] = [name for marker, name in chosen if marker.body in bodies]
+    return found
 
 
 def feet_of(source: OpenSimModel) -> dict[str, str]:

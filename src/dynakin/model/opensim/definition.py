@@ -19,6 +19,7 @@ from dynakin.model.opensim.calibrate import (
     facing_pairs,
     feet_of,
     first_frame,
+    foot_markers,
     limits_of,
     of_subject,
     reach_of,
@@ -107,11 +108,12 @@ class OpenSimDefinition:
         refuse_other_gravity(source)
         find = find_laboratory_frame if source.floating else find_ground_frame
         chosen, said = sites(source, options.leave_out, recording)
+        on_feet = foot_markers(source, chosen)
         frame = ground or find(recording, vertical=vertical, forward=forward, pairs=facing_pairs(source, chosen))
         messages += frame.how
         if options.scale_masses:
             source = of_subject(
-                source, self.subject, [r for r in (static, recording) if r is not None], frame, messages
+                source, self.subject, [r for r in (static, recording) if r is not None], frame, on_feet, messages
             )
         else:
             messages.append(f"Mass {source.mass:.2f} kg: the OpenSim file's.")
@@ -183,6 +185,7 @@ class OpenSimDefinition:
             messages=tuple(messages),
             plan=None,
             feet=feet_of(source),
+            foot_markers=on_feet,
             unmodelled_m=np.full(len(skin), _MODEL_M),
             dimensionless=frozenset(lengths),
         )

@@ -1,29 +1,39 @@
-"""When each foot stands on the floor, from its markers alone: near the floor, and slow."""
+"""When each foot stands, from its markers and what may support it: near a support, and slow against it.
+
+A support is the floor, a belt that moves (`belt`), or something higher: a step, a box. Higher ones are believed where a
+plate that is loaded under the foot, or that nothing else bears the person, says so: a foot may also be held in the air.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 import numpy.typing as npt
+from scipy import ndimage
 
 from dynakin.arrays import runs
+from dynakin.recordings.feet.belt import belt_velocity
 from dynakin.recordings.frame import GroundFrame
+from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.landmarks import find_marker
-from dynakin.recordings.plates.surfaces import floor_height
+from dynakin.recordings.plates.ground_plate import GroundPlate
+from dynakin.recordings.plates.surfaces import SAME_LEVEL_M, SHOE_M, UNDER_MARKERS_M, floor_height
 from dynakin.recordings.recording import Array, Recording
-from dynakin.recordings.standing import marker_speeds
+from dynakin.recordings.standing import marker_velocities
 
 Flags = npt.NDArray[np.bool_]
 
 NO_CONTACT, ON_PLATE, UNMEASURED, SHARED_PLATE = range(4)
 """Status of a contact, which is a segment that something may push (a foot), in a frame: nothing touches it and its
 wrench is zero; plates bear it; it touches something that measures nothing. Codes of ``foot_contact``."""
-NEAR_FLOOR_M = 0.025
-"""Height of a marker over its own lowest place (5th percentile) up to which the skin under it may touch the floor."""
+NEAR_SUPPORT_M = 0.025
+"""Height of a marker over its place when standing flat (its 5th percentile, raised by the support) up to which the skin
+under it may touch the support."""
 SLOW_M_S = 0.5
-"""Speed up to which a foot stands. A swinging toe passes the floor within 2 cm too, but at 1.5 to 5 m/s."""
+"""Speed against the support up to which a foot stands. A swinging toe passes the floor within 2 cm too, but at 1.5 to
+5 m/s."""
 GAP_S = 0.08
 """Shorter interruptions of a stance, or stances, are none: a foot takes 0.2 s and more for a step."""
 ALOFT_M = 0.05
@@ -31,6 +41,11 @@ ALOFT_M = 0.05
 BEFORE_S, AFTER_S = 0.05, 0.15
 """A foot may bear load that long before its markers are slow (heel strike), and after the last one has left the floor
 (push-off: the toe rolls on while the marker over it rises)."""
+LEVEL_M_S, RESTS_S = 0.15, 0.15
+"""A foot rests on something higher where it keeps its height to that speed, for so long: at the top of its swing, or of
+a jump, it does for 0.05 s."""
+NEAR_M = 0.10
+"""How far a centre of pressure may lie from the outline of a foot's markers: a shoe is some cm wider than these."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,18 +54,23 @@ class FootContact:
 
     Attributes:
         outline: (T, K, 2) m, horizontal places [X, Z of the ground] of its markers, NaN where not seen.
-        support_m: (T,) height of what it stands on, or stood on last.
-        touching: (T, K) markers that are near the floor and slow.
+        seen: (T,) one of its markers is.
+        under: (T, P) plates whose centre of pressure lies within or near its outline.
+        support_m: (T,) height of what it stands on; in between, on the straight line from one to the next.
+        support_velocity: (T, 2) m/s, horizontal: a belt's, else 0.
+        touching: (T, K) markers that are near the support and slow against it.
         stands: (T,) in a stance; short gaps closed.
         stances: frames [first, end) of each stance, not padded.
         low: (T,) one of its markers is not high over its own lowest place.
-        moves: (T,) all of its markers seen move.
-        aloft: (T,) it moves, and all of its markers seen are high. A foot on a belt is low, one on a step or a box
-            stands still; one on a pedal is aloft too.
+        moves: (T,) all of its markers seen move against the support.
+        aloft: (T,) it moves, and all of its markers seen are high. A foot on a pedal is aloft too.
     """
 
     outline: Array
+    seen: Flags
+    under: Flags
     support_m: Array
+    support_velocity: Array
     touching: Flags
     stands: Flags
     stances: tuple[tuple[int, int], ...]
@@ -64,89 +84,244 @@ class FootContact:
         return slice(max(0, stance[0] - before), min(len(self.stands), stance[1] + after))
 
     def bears(self, rate: float) -> Flags:
-        """(T,) frames in which one of its stances may bear load."""
-        found = np.zeros(len(self.stands), dtype=bool)
+        """(T,) frames in which one of its stances may bear load, or nobody sees it, or just before or after that."""
+        around = 2 * round(2.0 * BEFORE_S * rate) + 1 if len(self.seen) > 1 else 1
+        found: Flags = ndimage.binary_dilation(~self.seen, np.ones(around, dtype=bool))
         for stance in self.stances:
             found[self.padded(stance, rate)] = True
         return found
 
 
-def foot_contact(recording: Recording, ground: GroundFrame, names: list[str]) -> FootContact | None:
-    """Contact of the foot that has these markers (heel, toe, ...), None where the recording has none of them."""
-    own = list(dict.fromkeys(marker for name in names if (marker := find_marker(recording, name))))
-    own = [name for name in own if np.isfinite(recording.marker(name)).all(axis=1).any()]
-    if not own:
-        return None
-    places = ground.points_to_ground(np.stack([recording.marker(name) for name in own], axis=1))
-    columns = [recording.marker_names.index(name) for name in own]
-    speed = marker_speeds(recording)[:, columns]
-    height = places[:, :, 1] - np.nanpercentile(places[:, :, 1], 5.0, axis=0)
-    with np.errstate(invalid="ignore"):
-        touching = (height < NEAR_FLOOR_M) & (speed < SLOW_M_S)
-        low = np.asarray((height < ALOFT_M).any(axis=1))
-        high, fast = height > ALOFT_M, speed > SLOW_M_S
-    seen = np.isfinite(height)
-    moves = np.asarray(seen.any(axis=1) & (fast | ~seen).all(axis=1))
-    aloft = np.asarray(moves & (high | ~seen).all(axis=1))
-    gap = max(1, round(GAP_S * recording.rate)) if recording.n_frames > 1 else 1
-    stands = _closed(np.asarray(touching.any(axis=1)), gap)
-    support = np.full(recording.n_frames, floor_height(recording, ground))
-    return FootContact(places[:, :, [0, 2]], support, touching, stands, tuple(runs(stands)), low, moves, aloft)
+def foot_contacts(
+    recording: Recording,
+    ground: GroundFrame,
+    markers: Mapping[str, Sequence[str]],
+    plates: Sequence[GroundPlate] = (),
+) -> dict[str, FootContact]:
+    """Contact of each foot, of those that the recording has markers of.
+
+    Args:
+        markers: foot -> names of its markers (heel, toe, ...).
+        plates: what may say that a foot stands higher than the floor.
+    """
+    velocity = ground.vectors_to_ground(marker_velocities(recording))
+    body = _middle_velocity(velocity)
+    floor = floor_height(recording, ground)
+    feet = {
+        foot: _Foot(places, velocity[:, columns], body, recording, floor, plates)
+        for foot, (columns, places) in foot_places(recording, ground, markers).items()
+    }
+    _settle(list(feet.values()))
+    return {name: foot.contact() for name, foot in feet.items()}
 
 
-def _closed(flags: Flags, gap: int) -> Flags:
-    """Flags with short gaps closed, and then short stretches dropped, but for those at either end."""
+def foot_places(
+    recording: Recording, ground: GroundFrame, markers: Mapping[str, Sequence[str]]
+) -> dict[str, tuple[list[int], Array]]:
+    """The columns of each foot's markers and their places (T, K, 3) m, ground frame; of feet of which one is seen."""
+    found = {}
+    for foot, names in markers.items():
+        own = dict.fromkeys(marker for name in names if (marker := find_marker(recording, name)))
+        columns = [recording.marker_names.index(name) for name in own]
+        columns = [k for k in columns if np.isfinite(recording.markers[:, k]).all(axis=1).any()]
+        if columns:
+            found[foot] = (columns, ground.points_to_ground(recording.markers[:, columns]))
+    return found
+
+
+def _settle(feet: list[_Foot]) -> None:
+    """Believe that feet rest on what is higher than the floor: where a plate carries one; then, the longest first,
+    where no other one stands for a while, or one stands that is on a level with it."""
+    for foot in feet:
+        for rest in [one for one in foot.waiting if foot.carried(one[0])]:
+            foot.believe(rest)
+    while True:
+        waiting = [(rest[0].stop - rest[0].start, k, rest) for k, foot in enumerate(feet) for rest in foot.waiting]
+        for _, k, rest in sorted(waiting, key=lambda one: -one[0]):
+            others = [foot for at, foot in enumerate(feet) if at != k]
+            if feet[k].alone(rest[0], others) or feet[k].level_with(rest, others):
+                feet[k].believe(rest)
+                break
+        else:
+            return
+
+
+def _middle_velocity(velocity: Array) -> Array:
+    """(T, 3) m/s: the median over markers (T, M, 3), NaN where none is seen."""
+    found = np.full((len(velocity), 3), np.nan)
+    seen = np.asarray(np.isfinite(velocity)).any(axis=(1, 2))
+    if seen.any():
+        found[seen] = np.nanmedian(velocity[seen], axis=1)
+    return found
+
+
+class _Foot:
+    """One foot while its contact is worked out."""
+
+    def __init__(
+        self,
+        places: Array,
+        velocity: Array,
+        body: Array,
+        recording: Recording,
+        floor_m: float,
+        plates: Sequence[GroundPlate],
+    ) -> None:
+        self.places, self.plates, self.floor_m = places, plates, floor_m
+        self.rate, n = recording.rate, recording.n_frames
+        self.frames = (lambda seconds: max(1, round(seconds * self.rate))) if n > 1 else (lambda seconds: 1)
+        self.flat = np.nanpercentile(places[:, :, 1], 5.0, axis=0)  # (K,) heights of the markers, standing flat
+        self.rise = places[:, :, 1] - self.flat
+        with np.errstate(invalid="ignore"):
+            self.belt = belt_velocity(velocity, self.rise < NEAR_SUPPORT_M, body, recording.time)
+            against = velocity - np.stack([self.belt[:, 0], np.zeros(n), self.belt[:, 1]], axis=1)[:, None]
+            self.speed = np.linalg.norm(against, axis=2)
+            self.slow = self.speed < SLOW_M_S
+            base = (self.rise < NEAR_SUPPORT_M) & self.slow
+        lowest = np.where(np.isfinite(self.rise), self.rise, np.inf).min(axis=1)
+        self.lift = np.where(np.isfinite(lowest), lowest, np.nan)  # (T,) of the foot's lowest part
+        self.outline = filled_by_others(places[:, :, [0, 2]])
+        self.near = [distance_to_hull(plate.cop, self.outline) < NEAR_M for plate in plates]
+        self.seen = np.asarray(np.isfinite(self.lift))
+        self.touching, self.level = np.zeros_like(base), np.full(n, np.nan)
+        self.waiting: list[tuple[slice, float]] = []  # frames in which it may rest, and its lift there
+        if float(np.min(self.flat)) - floor_m < SHOE_M:
+            self.touching, self.level = base, np.where(base.any(axis=1), 0.0, np.nan)
+        else:
+            self.waiting += [(slice(*run), 0.0) for run in runs(_closed(base.any(axis=1), self.frames(GAP_S)))]
+        self.waiting += self._higher()
+
+    @property
+    def stands(self) -> Flags:
+        return _closed(np.asarray(self.touching.any(axis=1)), self.frames(GAP_S), self.seen)
+
+    def _higher(self) -> list[tuple[slice, float]]:
+        """Stretches in which the foot keeps a height over its lowest place, slow."""
+        if len(self.lift) < 2:
+            return []
+        half = self.frames(0.05)
+        at = np.arange(len(self.lift))
+        after, before = np.minimum(at + half, len(at) - 1), np.maximum(at - half, 0)
+        with np.errstate(invalid="ignore"):
+            climbs = np.abs(self.lift[after] - self.lift[before]) * self.rate / (after - before)
+            level = self.slow.any(axis=1) & (self.lift > NEAR_SUPPORT_M) & (climbs < LEVEL_M_S)
+        found = []
+        for first, end in runs(_closed(np.asarray(level), self.frames(GAP_S))):
+            if end - first >= RESTS_S * self.rate:
+                found.append((slice(first, end), float(np.nanpercentile(self.lift[first:end], 10.0))))
+        return found
+
+    def believe(self, rest: tuple[slice, float]) -> None:
+        """That it stands in these frames, so much higher than its lowest place."""
+        self.waiting = [one for one in self.waiting if one is not rest]
+        frames, lift = rest
+        with np.errstate(invalid="ignore"):
+            on = self.slow & (np.abs(self.rise - lift) < NEAR_SUPPORT_M)
+        grown = _around(np.asarray(on.any(axis=1)), frames)
+        self.touching[grown] |= on[grown]
+        self.level[grown] = np.where(on[grown].any(axis=1), lift, self.level[grown])
+
+    def alone(self, frames: slice, others: Sequence[_Foot]) -> bool:
+        """Whether no other foot stands for a while in these frames."""
+        stand = np.any([foot.stands[frames] for foot in others], axis=0) if others else np.zeros(1, dtype=bool)
+        lasts = [end - first for first, end in runs(np.asarray(~stand))]
+        return not others or max(lasts, default=0) >= RESTS_S * self.rate
+
+    def level_with(self, rest: tuple[slice, float], others: Sequence[_Foot]) -> bool:
+        """Whether a foot that stands in these frames does so at the same height."""
+        own = float(np.min(self.flat)) + rest[1]
+        heights = [float(np.min(foot.flat)) + foot.level[rest[0]] for foot in others]
+        return any(bool((np.abs(height - own) < SAME_LEVEL_M).any()) for height in heights)
+
+    def carried(self, frames: slice) -> bool:
+        """Whether a plate is loaded under the foot for most of these frames."""
+        return any(
+            np.count_nonzero(near[frames] & plate.loaded[frames]) > 0.5 * (frames.stop - frames.start)
+            for near, plate in zip(self.near, self.plates, strict=True)
+        )
+
+    def contact(self) -> FootContact:
+        stands = self.stands
+        with np.errstate(invalid="ignore"):
+            high, fast = self.rise > ALOFT_M, self.speed > SLOW_M_S
+            low = np.asarray((self.rise < ALOFT_M).any(axis=1))
+        unseen = ~np.isfinite(self.rise)
+        moves = np.asarray(self.seen & (fast | unseen).all(axis=1))
+        aloft = np.asarray(moves & (high | unseen).all(axis=1))
+        stances = tuple(runs(stands))
+        under = np.stack(self.near, axis=1) if self.near else np.zeros((len(stands), 0), dtype=bool)
+        support = self._support(stances)
+        return FootContact(
+            self.outline, self.seen, under, support, self.belt, self.touching, stands, stances, low, moves, aloft
+        )
+
+    def _support(self, stances: Sequence[tuple[int, int]]) -> Array:
+        """(T,) m, height of the support: its level by the lift of the foot, anchored where a plate carries it."""
+        least, levels, anchors = float(np.min(self.flat)), [], []
+        for first, end in stances:
+            own = self.level[first:end]
+            lift = float(np.nanmedian(own)) if np.isfinite(own).any() else 0.0
+            levels.append(lift)
+            for near, plate in zip(self.near, self.plates, strict=True):
+                carried = np.count_nonzero(near[first:end] & plate.loaded[first:end]) > 0.5 * (end - first)
+                if (
+                    carried
+                    and plate.height_m is not None
+                    and -0.5 * UNDER_MARKERS_M < least + lift - plate.height_m < SHOE_M
+                ):
+                    anchors.append((plate.height_m - lift, plate.height_m, lift))
+        if anchors:
+            base = float(np.median([anchor for anchor, _, _ in anchors]))
+        else:
+            base = self.floor_m if -UNDER_MARKERS_M < least - self.floor_m < SHOE_M else least - UNDER_MARKERS_M
+        if not stances:
+            return np.full(len(self.lift), base)
+        heights = np.array(levels) + base
+        for k, height in enumerate(heights):
+            exact = [plate for _, plate, lift in anchors if lift == levels[k] and abs(plate - height) < SAME_LEVEL_M]
+            heights[k] = exact[0] if exact else height
+        at = [edge for first, end in stances for edge in (first, end - 1)]
+        return np.asarray(np.interp(np.arange(len(self.lift)), at, np.repeat(heights, 2)))
+
+
+def filled_by_others(points: Array) -> Array:
+    """Points (T, K, D) of one body, a missing one as far from those that are seen as before and after; NaN where none
+    is seen."""
+    seen = np.asarray(np.isfinite(points).all(axis=2))
+    if seen.all() or not seen.any():
+        return points
+    found, frames = points.copy(), np.arange(len(points))
+    for m in range(points.shape[1]):
+        guesses = np.full_like(points, np.nan)
+        for other in range(points.shape[1]):
+            both = seen[:, m] & seen[:, other]
+            if other != m and both.any():
+                offset = points[both, m] - points[both, other]
+                drawn = [np.interp(frames, frames[both], offset[:, c]) for c in range(points.shape[2])]
+                guesses[:, other] = points[:, other] + np.stack(drawn, axis=1)
+        count = np.isfinite(guesses).all(axis=2).sum(axis=1)
+        fill = ~seen[:, m] & (count > 0)
+        found[fill, m] = np.nansum(guesses[fill], axis=1) / count[fill, None]
+    return found
+
+
+def _around(flags: Flags, frames: slice) -> slice:
+    """These frames, grown to both sides for as long as flags (T,) hold."""
+    first, end = frames.start, frames.stop
+    while first > 0 and flags[first - 1]:
+        first -= 1
+    while end < len(flags) and flags[end]:
+        end += 1
+    return slice(first, end)
+
+
+def _closed(flags: Flags, gap: int, seen: Flags | None = None) -> Flags:
+    """Flags with short gaps closed, and then short stretches dropped, but for those at either end, or next to frames
+    that are not seen (T,)."""
     flags = flags.copy()
     for value in (True, False):
         for first, end in runs(flags != value):
-            if end - first < gap and first > 0 and end < len(flags):
+            whole = first > 0 and end < len(flags) and (seen is None or value or bool(seen[first - 1] and seen[end]))
+            if end - first < gap and whole:
                 flags[first:end] = value
     return flags
-
-
-DEFAULT_FOOT_MARKERS: dict[str, list[str]] = {
-    "left": ["LHEE", "LTOE", "LMT5", "LANK", "L_calc", "L_toe", "L_5meta", "L_ankle"],
-    "right": ["RHEE", "RTOE", "RMT5", "RANK", "r_calc", "r_toe", "r_5meta", "r_ankle"],
-}
-"""Plug-in-Gait and OpenCap's laboratory markers on each foot."""
-
-
-def foot_outline(recording: Recording, ground: GroundFrame, names: list[str]) -> Array:
-    """Horizontal places (T, K, 2) m [X, Z of the ground frame] of those of the markers that the recording
-    has."""
-    own = list(dict.fromkeys(marker for name in names if (marker := find_marker(recording, name))))
-    if not own:
-        return np.empty((recording.n_frames, 0, 2))
-    points = np.stack([recording.marker(name) for name in own], axis=1)
-    return ground.points_to_ground(points)[:, :, [0, 2]]
-
-
-def distance_to_hull(points: Array, outline: Array) -> Array:
-    """Distance (T,) m of points (T, 2) from the convex hull of the corners (T, K, 2), 0 inside, NaN corners
-    left out.
-
-    A point outside is as far from the hull as from the nearest of all lines between two corners; it is inside
-    if it lies in some triangle of corners. NaN where the point or all corners are missing.
-    """
-    n_corners = outline.shape[1]
-    distance = np.full(len(points), np.inf)
-    for i in range(n_corners):  # alone: where the only other corners are missing
-        distance = np.fmin(distance, np.linalg.norm(points - outline[:, i], axis=1))
-    for i, j in combinations(range(n_corners), 2):
-        distance = np.fmin(distance, _to_segment(points, outline[:, i], outline[:, j]))
-    for i, j, k in combinations(range(n_corners), 3):
-        sides = np.stack([_side(points, outline[:, a], outline[:, b]) for a, b in ((i, j), (j, k), (k, i))], axis=1)
-        distance[(sides > 0).all(axis=1) | (sides < 0).all(axis=1)] = 0.0
-    return np.where(np.isfinite(distance) & np.isfinite(points).all(axis=1), distance, np.nan)
-
-
-def _to_segment(points: Array, a: Array, b: Array) -> Array:
-    along = b - a
-    with np.errstate(invalid="ignore", divide="ignore"):
-        share = np.clip(((points - a) * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
-        return np.asarray(np.linalg.norm(points - a - share[:, None] * along, axis=1))
-
-
-def _side(points: Array, a: Array, b: Array) -> Array:
-    along, to_point = b - a, points - a
-    return np.asarray(along[:, 0] * to_point[:, 1] - along[:, 1] * to_point[:, 0])

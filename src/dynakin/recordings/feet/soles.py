@@ -145,30 +145,13 @@ def _sole(foot: FootContact, forward: Array, rate: float) -> tuple[Array, Array]
     seen = np.isfinite(foot.outline).all(axis=(1, 2))
     flat = seen & foot.stands if (seen & foot.stands).any() else seen
     shape = FootShape.of(foot.outline[flat], forward)
-    return _drawn_on(_by_the_others(shape.middle(foot.outline), foot.outline), rate), shape.half_m
+    return _drawn_on(shape.middle(foot.outline), rate), shape.half_m
 
 
 def _mean(points: Array) -> Array:
     seen = np.asarray(np.isfinite(points).all(axis=2))
     with np.errstate(invalid="ignore"):
         return np.asarray(np.where(seen[..., None], points, 0.0).sum(axis=1) / seen.sum(axis=1, keepdims=True))
-
-
-def _by_the_others(middle: Array, points: Array) -> Array:
-    """The middle (T, 2) also where one of its two markers is missing: as far from those seen as before and after."""
-    known: Flags = np.asarray(np.isfinite(middle).all(axis=1))
-    seen: Flags = np.asarray(np.isfinite(points).all(axis=2))
-    gaps: Flags = ~known & seen.any(axis=1)
-    if not gaps.any():
-        return middle
-    frames, offset = np.arange(len(middle)), middle[:, None] - points
-    guess = np.full_like(points, np.nan)
-    for m in range(points.shape[1]):
-        have: Flags = known & seen[:, m]
-        if have.any():
-            drawn = [np.interp(frames, frames[have], offset[have, m, c]) for c in (0, 1)]
-            guess[:, m] = points[:, m] + np.stack(drawn, axis=1)
-    return np.where(gaps[:, None], _mean(guess), middle)
 
 
 def _drawn_on(middle: Array, rate: float) -> Array:

@@ -18,7 +18,7 @@ import numpy as np
 from dynakin.errors import RecordingError
 from dynakin.recordings.formats.c3d_parameters import Parameters
 from dynakin.recordings.limits import check_wrench
-from dynakin.recordings.plates.pressure import DEFAULT_THRESHOLD_N, Surface, plate_from_wrench
+from dynakin.recordings.plates.pressure import UNLOADED_N, Surface, plate_from_wrench
 from dynakin.recordings.recording import Array, Plate
 from dynakin.recordings.resampling import CausalLowPass, ReadOptions, filled, low_pass, reach_s, resample, touched
 from dynakin.units import force_factor, moment_factor
@@ -205,7 +205,7 @@ def _at_marker_times(raw: _Raw, time_in: Array, time: Array, options: ReadOption
     wrench = resample(wrench, time_in, time, causal=options.causal).copy()
     rate_out = 1 / (time[1] - time[0]) if len(time) > 1 else np.inf
     wrench[touched(missing, time_in, time, reach_s(rate, rate_out, options.plate_filter_hz))] = np.nan
-    threshold = DEFAULT_THRESHOLD_N if options.force_threshold_n is None else options.force_threshold_n
+    threshold = UNLOADED_N if options.force_threshold_n is None else options.force_threshold_n
     return plate_from_wrench(
         raw.name,
         wrench[:, :3],

@@ -10,7 +10,7 @@ from dynakin.errors import RecordingError
 from dynakin.recordings.formats.grf_columns import PlateColumns, group_columns
 from dynakin.recordings.formats.mot import Table
 from dynakin.recordings.limits import check_wrench
-from dynakin.recordings.plates.pressure import DEFAULT_THRESHOLD_N, Surface, plate_from_wrench
+from dynakin.recordings.plates.pressure import UNLOADED_N, Surface, plate_from_wrench
 from dynakin.recordings.recording import Array, Plate, Recording
 from dynakin.recordings.resampling import ReadOptions, low_pass, resample, same_times
 
@@ -71,7 +71,7 @@ def _plate(group: PlateColumns, table: Table) -> tuple[Plate, list[str]]:
     lost = np.isnan(moment).any(axis=1) & ~np.isnan(np.hstack([point, force, free])).any(axis=1)
     moment[lost] = np.inf
     check_wrench(name, table.time, force, moment, str(table.path))
-    unloaded = np.linalg.norm(force, axis=1) < DEFAULT_THRESHOLD_N
+    unloaded = np.linalg.norm(force, axis=1) < UNLOADED_N
     cop = np.where(unloaded[:, None], np.nan, point)
     return Plate(name, force, moment, cop, free), notes
 
@@ -133,7 +133,7 @@ def _resampled(plate: Plate, table: Table, recording: Recording, options: ReadOp
         rate = float(1 / np.median(np.diff(table.time)))
         wrench = low_pass(wrench, rate, options.plate_filter_hz, causal=options.causal)
     wrench = resample(wrench, table.time, recording.time, causal=options.causal)
-    threshold = DEFAULT_THRESHOLD_N if options.force_threshold_n is None else options.force_threshold_n
+    threshold = UNLOADED_N if options.force_threshold_n is None else options.force_threshold_n
     surface = _surface(plate)
     if surface is None:  # never loaded
         wrench[np.linalg.norm(wrench[:, :3], axis=1) < threshold] = 0.0

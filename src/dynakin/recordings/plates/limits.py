@@ -8,12 +8,11 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.recordings.feet.contact import distance_to_hull
 from dynakin.recordings.frame import GroundFrame
+from dynakin.recordings.hull import distance_to_hull
+from dynakin.recordings.plates.pressure import JUDGED_N
 from dynakin.recordings.recording import Array, Plate, Recording
 
-LOADED_N = 50.0
-"""Vertical force from which a plate is judged."""
 FRICTION = 1.5
 """Horizontal over vertical force. Shoes on force plates hold up to about 1, spikes to 1.2; our recordings, drop jumps
 and running among them, stay below 0.8, walking below 0.5."""
@@ -37,7 +36,7 @@ def beyond_limits(plate: Plate, recording: Recording, ground: GroundFrame) -> st
     pressure, a wrong centre of pressure changes the free moment.
     """
     force = ground.vectors_to_ground(plate.force)
-    load = np.where(np.nan_to_num(force[:, 1]) > LOADED_N, force[:, 1], 0.0)
+    load = np.where(np.nan_to_num(force[:, 1]) > JUDGED_N, force[:, 1], 0.0)
     loaded = load > 0.0
     if not loaded.any():
         return None

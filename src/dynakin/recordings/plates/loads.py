@@ -9,7 +9,7 @@ import numpy as np
 from dynakin.errors import RecordingError
 from dynakin.recordings.landmarks import DEFAULT_PAIRS
 from dynakin.recordings.orientation import axis_vector, find_vertical
-from dynakin.recordings.plates.pressure import DEFAULT_THRESHOLD_N, Surface, centre_of_pressure
+from dynakin.recordings.plates.pressure import UNLOADED_N, Surface, centre_of_pressure
 from dynakin.recordings.recording import Array, Plate, Recording
 from dynakin.settings.subject import PlateLoad
 
@@ -54,5 +54,5 @@ def _relieved(plate: Plate, loads: Sequence[PlateLoad], up: Array) -> Plate:
     points = plate.cop if plate.corners is None else plate.corners
     seen = points[np.isfinite(points).all(axis=1)]
     surface = Surface(np.median(seen, axis=0) if len(seen) else np.zeros(3), up)
-    cop, free = centre_of_pressure(force, moment, surface, DEFAULT_THRESHOLD_N)
+    cop, free = centre_of_pressure(force, moment, surface, UNLOADED_N)
     return Plate(plate.name, force, moment, cop, free, plate.corners)

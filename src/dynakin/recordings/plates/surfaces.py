@@ -11,6 +11,9 @@ UNDER_MARKERS_M = 0.02
 """How far below its lowest marker a shoe's sole is at least: half a marker and its base."""
 SHOE_M = 0.12
 """How far above the floor the lowest marker of a foot that stands may be: on a boot, or on an ankle."""
+SAME_LEVEL_M = 0.05
+"""Supports whose heights differ by less are on one level: a foot's markers show its support to some cm. Steps of stairs
+are 0.15 m and more."""
 
 
 def surface_height(plate: Plate, ground: GroundFrame) -> float | None:
@@ -22,14 +25,15 @@ def surface_height(plate: Plate, ground: GroundFrame) -> float | None:
 
 
 def floor_height(recording: Recording, ground: GroundFrame) -> float:
-    """Height (m, ground frame) of the floor, the one that a run has: that of its lowest plate; without plates the
-    laboratory's zero, which is where laboratories put it. Where markers say that it cannot be (they go lower, or never
-    come near it), it is a little below the lowest of them."""
+    """Height (m, ground frame) of the floor, the one that a run has: that of its lowest plate. Without plates it is the
+    laboratory's zero, which is where laboratories put it, or, where markers go lower or never come near that, a little
+    below the lowest of them."""
     plates = [height for plate in recording.plates if (height := surface_height(plate, ground)) is not None]
-    floor = min(plates) if plates else float(ground.points_to_ground(np.zeros(3))[1])
+    if plates:
+        return min(plates)
+    zero = float(ground.points_to_ground(np.zeros(3))[1])
     heights = ground.points_to_ground(recording.markers)[..., 1]
     if not np.isfinite(heights).any():
-        return floor
-    lowest = float(np.nanpercentile(np.nanmin(np.where(np.isfinite(heights), heights, np.inf), axis=1), 5.0))
-    near = -UNDER_MARKERS_M <= lowest - floor <= (np.inf if plates else SHOE_M)
-    return floor if near else lowest - UNDER_MARKERS_M
+        return zero
+    lowest = float(np.percentile(np.where(np.isfinite(heights), heights, np.inf).min(axis=1), 5.0))
+    return zero if -UNDER_MARKERS_M <= lowest - zero <= SHOE_M or not np.isfinite(lowest) else lowest - UNDER_MARKERS_M

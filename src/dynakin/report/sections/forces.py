@@ -16,7 +16,7 @@ from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import AXES, COMPONENTS, Estimate
 from dynakin.results.measures.feet import foot_sources
 from dynakin.results.measures.metrics import evaluation_window
-from dynakin.results.measures.pressure import centre_of_pressure, floor_height
+from dynakin.results.measures.pressure import centre_of_pressure, support_height
 from dynakin.results.measures.sources import DERIVED, measured_only, wrench_sources
 from dynakin.results.measures.stances import compared_stances
 from dynakin.results.naming import number, sentence
@@ -102,8 +102,8 @@ def _foot_part(estimate: Estimate, foot: str) -> Section:
         title, unit = COMPONENT_LABELS[component]
         note = _peak(estimate, foot, measured_only(adjusted[:, j], source), unit)
         add(title, unit, measured[:, j], adjusted[:, j], note)
-    floor = floor_height(estimate)
-    (seen, seen_free), (made, made_free) = (centre_of_pressure(wrench, floor) for wrench in (measured, adjusted))
+    support = support_height(estimate, measured)
+    (seen, seen_free), (made, made_free) = (centre_of_pressure(wrench, support) for wrench in (measured, adjusted))
     for axis, j in (("forward", 0), ("to the right", 2)):
         add(f"Centre of pressure, {axis}", "mm", 1000.0 * seen[:, j], 1000.0 * made[:, j], least=20.0)
     add("Free moment about the vertical", "N m", seen_free, made_free, least=2.0)

@@ -6,12 +6,13 @@ from pathlib import Path
 
 import numpy as np
 
+from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.results.estimate import AXES, COMPONENTS, Estimate
 from dynakin.results.files.motion import write_sources
 from dynakin.results.files.storage import write_storage
 from dynakin.results.measures.angles import angle_columns
 from dynakin.results.measures.feet import foot_sources
-from dynakin.results.measures.pressure import LOADED_N, foot_pressure
+from dynakin.results.measures.pressure import foot_pressure
 from dynakin.results.measures.sources import joint_sources
 
 _SIDES = {"right": "r", "left": "l"}

@@ -5,21 +5,21 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.recordings.plates.pressure import Surface
+from dynakin.recordings.plates.pressure import LOADED_N, Surface
 from dynakin.recordings.plates.pressure import centre_of_pressure as recorded_pressure
+from dynakin.recordings.plates.surfaces import SAME_LEVEL_M, surface_height
+from dynakin.recordings.plates.surfaces import floor_height as recorded_floor
 from dynakin.results.estimate import Estimate
 
 Array = npt.NDArray[np.float64]
 
-LOADED_N = 20.0
-"""Vertical force from which a centre of pressure is given: below, 1 N m of error moves it by more than 5 cm."""
 
-
-def centre_of_pressure(wrench: Array, height_m: float, threshold_n: float = LOADED_N) -> tuple[Array, Array]:
+def centre_of_pressure(wrench: Array, height_m: float | Array, threshold_n: float = LOADED_N) -> tuple[Array, Array]:
     """Where on the level plane y = ``height_m`` a wrench has no moment but about the vertical.
 
     Args:
         wrench: (T, 6) N and N m about the ground's origin, ground frame; what is not modelled is NaN.
+        height_m: of the plane, one or (T,).
 
     Returns:
         Point (T, 3) m and free moment (T,) N m about the vertical; NaN where the vertical force is below
@@ -28,32 +28,43 @@ def centre_of_pressure(wrench: Array, height_m: float, threshold_n: float = LOAD
     wrench = np.asarray(wrench, dtype=float)
     known = np.isfinite(wrench)
     filled = np.where(known, wrench, 0.0)
-    floor = Surface(np.array([0.0, height_m, 0.0]), np.array([0.0, 1.0, 0.0]))
-    point, free = recorded_pressure(filled[..., :3], filled[..., 3:], floor, threshold_n)
+    up = np.zeros(3) + np.asarray(height_m)[..., None] * [0.0, 1.0, 0.0]
+    force, moment = filled[..., :3], filled[..., 3:] - np.cross(up, filled[..., :3])  # about the plane's own origin
+    point, free = recorded_pressure(force, moment, Surface(np.zeros(3), np.array([0.0, 1.0, 0.0])), threshold_n)
     in_plane, across = known[..., [0, 1, 5]].all(axis=-1), known[..., 1:4].all(axis=-1)
     pushed = known[..., 1] & (filled[..., 1] >= threshold_n)
     given = np.stack([in_plane, known[..., 1], across], axis=-1) & pushed[..., None]
-    return np.where(given, point, np.nan), np.where(known.all(axis=-1) & pushed, free[..., 1], np.nan)
+    return np.where(given, point + up, np.nan), np.where(known.all(axis=-1) & pushed, free[..., 1], np.nan)
 
 
 def foot_pressure(estimate: Estimate, foot: str | None = None) -> tuple[Array, Array]:
-    """Centre of pressure (T, 3) m, ground frame, and free moment (T,) N m, of a foot or of the estimated total wrench;
-    NaN below `LOADED_N` and where the model does not have the components.
+    """Centre of pressure (T, 3) m, ground frame, and free moment (T,) N m, of a foot at the height of what it stands
+    on, or of the estimated total wrench on the floor; NaN below `LOADED_N` and where the model does not have the
+    components.
 
     Raises:
         KeyError: no such foot.
     """
-    wrench = estimate.data["wrench_estimated"] if foot is None else estimate.data["foot_wrench"].sel(foot=foot)
-    return centre_of_pressure(wrench.transpose("time", "component").values, floor_height(estimate))
+    if foot is None:
+        wrench, height = estimate.data["wrench_estimated"], floor_height(estimate)
+        return centre_of_pressure(wrench.transpose("time", "component").values, height)
+    wrench = estimate.data["foot_wrench"].sel(foot=foot).transpose("time", "component")
+    return centre_of_pressure(wrench.values, support_height(estimate, wrench.values))
+
+
+def support_height(estimate: Estimate, wrench: Array) -> float | Array:
+    """Height (m, ground frame; one, or (T,)) of the plate that gives a foot its wrench (T, 6): the floor's where all
+    are on one level, else that of the plate whose vertical force is nearest to the foot's."""
+    floor, ground = floor_height(estimate), estimate.ground
+    heights = [(plate, surface_height(plate, ground)) for plate in estimate.recording.plates]
+    known = [(plate, height) for plate, height in heights if height is not None]
+    if all(abs(height - floor) < SAME_LEVEL_M for _, height in known):
+        return floor
+    pushes = np.stack([ground.vectors_to_ground(plate.force)[:, 1] for plate, _ in known])
+    apart = np.abs(np.nan_to_num(pushes) - np.nan_to_num(wrench[:, 1]))
+    return np.asarray(np.array([height for _, height in known])[apart.argmin(axis=0)])
 
 
 def floor_height(estimate: Estimate) -> float:
-    """Height (m, ground frame) of the plates' surface: the median of their centres of pressure, else of their corners,
-    else 0."""
-    plates, ground = estimate.recording.plates, estimate.ground
-    points = [plate.cop for plate in plates]
-    heights = ground.points_to_ground(np.concatenate(points))[:, 1] if points else np.array([])
-    if not np.isfinite(heights).any():
-        corners = [plate.corners for plate in plates if plate.corners is not None]
-        heights = ground.points_to_ground(np.concatenate(corners))[:, 1] if corners else np.zeros(1)
-    return float(np.nanmedian(heights))
+    """Height (m, ground frame) of the floor; see `recordings.plates.surfaces`."""
+    return recorded_floor(estimate.recording, estimate.ground)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dynakin.recordings.plates.pressure import DEFAULT_THRESHOLD_N, Surface, plate_from_wrench
+from dynakin.recordings.plates.pressure import UNLOADED_N, Surface, plate_from_wrench
 from dynakin.recordings.recording import Plate
 from dynakin.simulation.bodies.body import Contact
 from dynakin.simulation.sensors.sizes import SensorNoise
@@ -84,7 +84,7 @@ def measure(
         moment,
         Surface(centre, np.array([0.0, 1.0, 0.0])),
         corners=corners,
-        threshold_n=DEFAULT_THRESHOLD_N,
+        threshold_n=UNLOADED_N,
         zero_unloaded=False,
     )
 

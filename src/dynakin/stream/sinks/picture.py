@@ -12,11 +12,11 @@ import numpy.typing as npt
 
 from dynakin.bindings import _core
 from dynakin.filter.step import Labelled
+from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.stream.sinks.base import LiveFrame, Started, Status
 
 Array = npt.NDArray[np.float64]
 
-_LOADED_N = 20.0
 _SHOWN = ("length", "inertia")
 _NAMES, _NAME = 4, 40  # of a list of names, so many are shown, and so many characters of each
 
@@ -143,6 +143,6 @@ def split(numbers: Array, sizes: Mapping[str, int]) -> dict[str, Array]:
 
 def arrow(wrench: Array) -> Array:
     """Centre of pressure (3,) m on the ground's plane y = 0 and force (3,) N of a wrench (6,); NaN where unloaded."""
-    if not np.isfinite(wrench).all() or wrench[1] < _LOADED_N:
+    if not np.isfinite(wrench).all() or wrench[1] < LOADED_N:
         return np.full(6, np.nan)
     return np.array([wrench[5] / wrench[1], 0.0, -wrench[3] / wrench[1], *wrench[:3]])

@@ -14,13 +14,13 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ConfigError, StreamError
+from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.units import length_factor
 
 Array = npt.NDArray[np.float64]
 
 FRAMES = ("plate", "lab")
 """Frames that QTM can give forces in: its "Local (force plate)" and "Lab"."""
-_LOADED_N = 20.0  # below, a centre of pressure is noise; the force is taken to act at the plate's centre
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +57,7 @@ class QtmPlate:
         else:
             reach = point
         normal = self.R_LP[:, 2]
-        loaded = (np.abs(force @ normal) > _LOADED_N) & np.isfinite(point).all(axis=1)
+        loaded = (np.abs(force @ normal) > LOADED_N) & np.isfinite(point).all(axis=1)
         free = np.where(loaded, (moment - np.cross(reach, force)) @ normal, 0.0)
         point = np.where(loaded[:, None], point, self.centre)
         return -np.hstack([force, np.cross(point, force) + free[:, None] * normal])

@@ -3,20 +3,21 @@ number."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import combinations, pairwise
 
 import numpy as np
 
-from dynakin.recordings.feet.contact import DEFAULT_FOOT_MARKERS, distance_to_hull, foot_outline
+from dynakin.recordings.feet.contact import NEAR_M, foot_places
 from dynakin.recordings.frame import GroundFrame
+from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.limits import beyond_limits
+from dynakin.recordings.plates.pressure import JUDGED_N
 from dynakin.recordings.recording import Array, Plate, Recording
 from dynakin.recordings.standing import standing_window
 from dynakin.units import GRAVITY_M_S2
 
-LOADED_N = 50.0
-"""A plate whose vertical force is above this in a frame carries a foot."""
 MASS_WARNING = 0.05
 """Relative difference between declared mass and the plates' from which it is said."""
 MASS_MEAN_RATIO = (0.6, 1.1)
@@ -26,9 +27,9 @@ MASS_RATIO_REFUSED = (0.2, 5.0)
 """Plates' mass over declared mass beyond which the units or plates must be wrong."""
 MASS_REFUSED_KG = (5.0, 400.0)
 """The plates' mass itself, where none is declared: not a person's beyond these."""
-COP_WARNING_M, COP_REFUSED_M = 0.10, 0.30
-"""Centre of pressure outside the outline of the markers of the nearest foot: a shoe is some cm wider than
-these."""
+COP_REFUSED_M = 0.30
+"""Centre of pressure outside the outline of the markers of the nearest foot, from which the plate's place or unit must
+be wrong. From `NEAR_M` on it is said."""
 APART_WARNING, APART_FRAMES, APART_S = 0.03, 0.95, 0.5
 """Forces on two plates that push the feet apart: by which part of the load, in which part of the frames, for how long.
 Legs push outwards, so the ground pushes the feet together: by 0.07 to 0.2 of the load in all frames of all of our
@@ -79,7 +80,7 @@ def check_plates(
     recording: Recording,
     ground: GroundFrame,
     mass_kg: float | None = None,
-    foot_markers: dict[str, list[str]] | None = None,
+    foot_markers: Mapping[str, Sequence[str]] | None = None,
 ) -> PlateCheck:
     """Check the plates while the person stands still: the vertical force is positive and near m g, each
     centre of pressure lies under a foot, the force is near vertical, the free moment acts about the vertical
@@ -93,7 +94,7 @@ def check_plates(
     Args:
         ground: gives the vertical; its origin does not matter.
         mass_kg: declared body mass, None if it is to come from the plates.
-        foot_markers: foot -> names of its markers; Plug-in-Gait's and OpenCap's where not given.
+        foot_markers: foot -> names of the markers on it; where not given no pressure is held against a foot.
     """
     if not recording.plates:
         return PlateCheck(False, None, None, (), "no force plates in this recording, expected at least one")
@@ -101,13 +102,13 @@ def check_plates(
     standing = _on_plates(standing_window(recording), recording, ground)
     frames = standing if standing is not None else slice(None)
     mass = _check_vertical(recording, ground, mass_kg, standing, findings)
-    feet = _feet(recording, ground, foot_markers or DEFAULT_FOOT_MARKERS, findings)
+    feet = _feet(recording, ground, foot_markers or {}, findings)
     under: dict[str, str] = {}
     for plate in recording.plates:
         if (beyond := beyond_limits(plate, recording, ground)) is not None:
             findings.refuse(beyond)
         push = ground.vectors_to_ground(plate.force)[frames, 1]
-        loaded = np.flatnonzero(np.abs(np.nan_to_num(push)) > LOADED_N) + (frames.start or 0)
+        loaded = np.flatnonzero(np.abs(np.nan_to_num(push)) > JUDGED_N) + (frames.start or 0)
         if not len(loaded):
             findings.say(f"{plate.name} carries nothing ({'standing' if standing else 'the whole recording'}).")
             continue
@@ -129,7 +130,7 @@ def check_plates(
 def _on_plates(standing: slice | None, recording: Recording, ground: GroundFrame) -> slice | None:
     """The frames of standing, unless the plates are loaded at other times only: who stands is on a box then, say."""
     total = ground.vectors_to_ground(np.sum([plate.force for plate in recording.plates], axis=0))
-    loaded = np.abs(np.nan_to_num(total[:, 1])) > LOADED_N
+    loaded = np.abs(np.nan_to_num(total[:, 1])) > JUDGED_N
     return None if standing is not None and loaded.any() and not loaded[standing].any() else standing
 
 
@@ -142,7 +143,7 @@ def _check_vertical(
 ) -> float | None:
     total = ground.vectors_to_ground(np.sum([plate.force for plate in recording.plates], axis=0))
     if standing is None:
-        loaded = total[np.abs(np.nan_to_num(total[:, 1])) > LOADED_N]
+        loaded = total[np.abs(np.nan_to_num(total[:, 1])) > JUDGED_N]
         when = f"mean of {len(loaded)} loaded frames; the person does not stand still for 0.5 s"
     else:
         loaded = total[standing]
@@ -150,7 +151,7 @@ def _check_vertical(
         when = f"standing still from {start:.4g} s to {stop:.4g} s"
     loaded = loaded[np.isfinite(loaded).all(axis=1)]
     if not len(loaded):
-        findings.refuse(f"the plates carry no load: the vertical force stays below {LOADED_N:g} N")
+        findings.refuse(f"the plates carry no load: the vertical force stays below {JUDGED_N:g} N")
         return None
     mean = loaded.mean(axis=0)
     vertical = float(mean[1])
@@ -189,10 +190,10 @@ def _compare_mass(mass: float, declared: float, standing: bool, findings: _Findi
 
 
 def _feet(
-    recording: Recording, ground: GroundFrame, markers: dict[str, list[str]], findings: _Findings
+    recording: Recording, ground: GroundFrame, markers: Mapping[str, Sequence[str]], findings: _Findings
 ) -> dict[str, Array]:
-    outlines = {foot: foot_outline(recording, ground, names) for foot, names in markers.items()}
-    feet = {foot: outline for foot, outline in outlines.items() if np.isfinite(outline).any()}
+    places = foot_places(recording, ground, markers)
+    feet = {foot: place[:, :, [0, 2]] for foot, (_, place) in places.items()}
     if not feet:
         findings.warn("no foot markers, so it was not checked that the centres of pressure lie under the feet.")
     return feet
@@ -214,19 +215,19 @@ def _check_pressure(
     # While nobody stands still one plate may carry one foot after the other: each frame's nearest foot
     # counts.
     away = float(np.nanmedian(nearest))
-    if away <= COP_WARNING_M:
+    if away <= NEAR_M:
         where = "within its outline" if away == 0 else f"{1000 * away:.0f} mm outside its markers' outline"
         findings.say(f"{plate.name}: centre of pressure under the {foot} foot, {where}.")
         return foot
     both = distance_to_hull(cop, np.concatenate([outline[loaded] for outline in feet.values()], axis=1))
-    if float(np.nanmedian(both)) <= COP_WARNING_M:
+    if float(np.nanmedian(both)) <= NEAR_M:
         findings.say(f"{plate.name}: centre of pressure between the feet, {1000 * away:.0f} mm from the {foot} one.")
         return None
     text = f"{plate.name}: centre of pressure {1000 * away:.0f} mm away from the nearest foot ({foot})"
     if away > COP_REFUSED_M:
         findings.refuse(f"{text}, expected it under the foot (at most {1000 * COP_REFUSED_M:.0f} mm)")
     else:
-        findings.warn(f"{text}, expected at most {1000 * COP_WARNING_M:.0f} mm.")
+        findings.warn(f"{text}, expected at most {1000 * NEAR_M:.0f} mm.")
     return None
 
 
@@ -237,7 +238,7 @@ def _check_together(one: Plate, other: Plate, recording: Recording, ground: Grou
     """
     forces = [np.nan_to_num(ground.vectors_to_ground(plate.force)) for plate in (one, other)]
     apart = ground.points_to_ground(other.cop) - ground.points_to_ground(one.cop)
-    both = (forces[0][:, 1] > LOADED_N) & (forces[1][:, 1] > LOADED_N) & np.isfinite(apart).all(axis=1)
+    both = (forces[0][:, 1] > JUDGED_N) & (forces[1][:, 1] > JUDGED_N) & np.isfinite(apart).all(axis=1)
     if recording.n_frames < 2 or np.count_nonzero(both) < APART_S * recording.rate:
         return
     along = apart[both][:, [0, 2]]

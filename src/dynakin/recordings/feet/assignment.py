@@ -1,0 +1,355 @@
+"""Which foot stands on which plate: the one assignment that a run has.
+
+A plate belongs to a stance (`foot_contacts`) when its centre of pressure lies within or near the foot's outline for
+most of its load, and the foot stands on its level. A stance that no plate belongs to is off the plates: as long as it
+may bear load, the total external wrench is not known. A foot that nobody sees for a while keeps its plate for as long
+as that is pressed; what it does afterwards is not known.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.arrays import runs
+from dynakin.errors import ConfigError
+from dynakin.recordings.feet.contact import GAP_S, FootContact, foot_contacts
+from dynakin.recordings.feet.findings import exchanged, plate_findings
+from dynakin.recordings.feet.loads import FootLoads, divided
+from dynakin.recordings.feet.soles import Soles
+from dynakin.recordings.frame import GroundFrame
+from dynakin.recordings.hull import distance_to_hull
+from dynakin.recordings.plates.ground_plate import GroundPlate
+from dynakin.recordings.plates.pressure import JUDGED_N
+from dynakin.recordings.plates.surfaces import SAME_LEVEL_M
+from dynakin.recordings.recording import Array, Recording
+
+Flags = npt.NDArray[np.bool_]
+
+BETWEEN_M = 0.03
+"""How far from both feet a centre of pressure lies that neither bears alone, where a plate's edges are not known."""
+BEYOND_M = 0.04
+"""How far a touching marker may lie beyond the plates' edges: it sits on the shoe, not on its sole."""
+STEP_S = 0.25
+"""How long a foot may press a plate before its markers show that it stands, and after they show that it left."""
+MOST = 0.8
+"""Part of a press for which a moving foot must be low and near the centre of pressure to be what presses."""
+
+
+def foot_loads(
+    recording: Recording,
+    ground: GroundFrame,
+    foot_markers: Mapping[str, Sequence[str]],
+    *,
+    assigned: Mapping[str, str] | None = None,
+) -> FootLoads:
+    """Give each plate's load to the foot that stands on it.
+
+    Args:
+        ground: the frame and origin of the wrenches.
+        foot_markers: foot -> names of the markers on it, and on its toes.
+        assigned: plate -> foot, where the user knows better (the whole recording).
+
+    Raises:
+        ConfigError: `assigned` names a plate or foot that there is not.
+    """
+    fixed = dict(assigned or {})
+    _check_assigned(fixed, recording, tuple(foot_markers))
+    plates = [GroundPlate.of(plate, ground) for plate in recording.plates]
+    contacts = foot_contacts(recording, ground, foot_markers, plates)
+    forward = ground.vectors_to_ground(ground.forward)[[0, 2]]
+    return _Assignment(recording, tuple(foot_markers), contacts, plates, fixed).loads(forward)
+
+
+def _check_assigned(fixed: dict[str, str], recording: Recording, feet: tuple[str, ...]) -> None:
+    names = [plate.name for plate in recording.plates]
+    for plate, foot in fixed.items():
+        if plate not in names:
+            raise ConfigError(f"plates: {plate!r} is not in {recording.name}; expected one of {', '.join(names)}")
+        if foot not in feet:
+            raise ConfigError(f"plates: {plate!r} is given to {foot!r}, expected one of {', '.join(feet)}")
+
+
+def to_the_end(owners: Flags, pressed: Flags, steps: list[list[tuple[int, int]]]) -> Flags:
+    """Owners (T, F) of a plate, each kept from the first to the last frame of a press (T,) that has owners at all, as
+    long as a step of that foot, frames [first, end), lasts.
+
+    A centre of pressure is far off while a foot sets down or leaves; what the plate carries there is still that foot's.
+    """
+    owners = owners.copy()
+    owned: Flags = np.asarray(owners.any(axis=1))
+    for first, end in runs(pressed):
+        inside = np.flatnonzero(owned[first:end]) + first
+        if not len(inside):
+            continue
+        for k in range(owners.shape[1]):
+            for start, stop in steps[k]:
+                if start <= inside[0] < stop and owners[inside[0], k]:
+                    owners[max(first, start) : inside[0], k] = True
+                if start <= inside[-1] < stop and owners[inside[-1], k]:
+                    owners[inside[-1] + 1 : min(end, stop), k] = True
+    return owners
+
+
+class _Assignment:
+    def __init__(
+        self,
+        recording: Recording,
+        feet: tuple[str, ...],
+        contacts: dict[str, FootContact],
+        plates: list[GroundPlate],
+        fixed: dict[str, str],
+    ) -> None:
+        self.recording, self.feet, self.contacts, self.plates, self.fixed = recording, feet, contacts, plates, fixed
+        n, F, P = recording.n_frames, len(feet), len(plates)
+        self.on = np.zeros((n, F, P), dtype=bool)  # this foot stands on this plate
+        self.off = np.zeros((n, F), dtype=bool)  # it may stand off the plates
+        self.hidden = np.zeros((n, F), dtype=bool)  # nobody sees it, and it may stand anywhere
+        self.under = self.under_feet()
+        for k, foot in enumerate(feet):
+            if foot in contacts:
+                self.stances(k, contacts[foot])
+        aloft, steps = self.aloft(), self.steps()
+        for p, plate in enumerate(plates):
+            self.presses(p, plate)
+            self.on[:, :, p] |= to_the_end(self.on[:, :, p], plate.pressed, steps) & ~aloft
+            self.on[:, :, p] &= ~aloft | (plate.push > JUDGED_N)[:, None]
+        for k, foot in enumerate(feet):
+            if foot in contacts:
+                self.unseen(k, contacts[foot])
+        swapped = exchanged([contacts.get(foot) for foot in feet], plates)
+        for p, plate in enumerate(plates):
+            self.doubtful(p, plate)
+            if any(p in pair for pair in swapped):
+                self.on[:, :, p] = False
+            if plate.name in fixed:
+                self.on[:, :, p] = False
+                self.on[:, feet.index(fixed[plate.name]), p] = plate.pressed
+
+    def under_feet(self) -> Flags:
+        """(T, F, P) plates whose centre of pressure lies under a foot. One on another level than the foot's own support
+        counts only where no other foot stands on its level: a box may stand on a plate."""
+        found = np.zeros_like(self.on)
+        level = np.ones_like(self.on)
+        for k, name in enumerate(self.feet):
+            if (foot := self.contacts.get(name)) is None:
+                continue
+            found[:, k] = foot.under
+            for p, plate in enumerate(self.plates):
+                if plate.height_m is not None:
+                    level[:, k, p] = np.abs(foot.support_m - plate.height_m) < SAME_LEVEL_M
+        return np.asarray(found & (level | ~(found & level).any(axis=1, keepdims=True)))
+
+    def stances(self, k: int, foot: FootContact) -> None:
+        """Which plates carry each stance of one foot."""
+        for stance in foot.stances:
+            inside, reach = slice(*stance), foot.padded(stance, self.recording.rate)
+            mine = []
+            for p, plate in enumerate(self.plates):
+                if self.fixed.get(plate.name, self.feet[k]) != self.feet[k]:
+                    continue
+                loaded = plate.loaded[inside]
+                enough = 0.5 * max(int(np.count_nonzero(loaded)), 1)
+                close = self.under[inside, k, p] | self.between(k, p)[inside] | self.upon(plate, foot, inside)
+                if np.count_nonzero(close & loaded) > enough:
+                    mine.append(p)
+                    self.on[reach, k, p] |= plate.loaded[reach] & (self.under[reach, k, p] | foot.stands[reach])
+                    self.on[inside, k, p] = True
+            if not mine:
+                self.off[reach, k] = True
+            else:
+                self.off[inside, k] |= self.beyond_edges(foot, inside)
+
+    def presses(self, p: int, plate: GroundPlate) -> None:
+        """Presses of a plate on which no foot stands still: they are the foot's that is low and near for most of the
+        press."""
+        for first, end in runs(plate.pressed):
+            press = slice(first, end)
+            loaded = plate.loaded[press]
+            if plate.name in self.fixed or self.on[press, :, p].any() or not loaded.any():
+                continue
+            for k, name in enumerate(self.feet):
+                if (foot := self.contacts.get(name)) is None:
+                    continue
+                near = self.under[press, k, p] & foot.low[press]
+                if np.count_nonzero(near & loaded) > MOST * np.count_nonzero(loaded):
+                    self.on[press, k, p] = True
+
+    def doubtful(self, p: int, plate: GroundPlate) -> None:
+        """A press most of whose load is nobody's is nobody's at all: a foot that steps near its centre of pressure at
+        its end is not what pressed."""
+        for first, end in runs(plate.pressed):
+            judged = plate.push[first:end] > JUDGED_N
+            owned = np.asarray(self.on[first:end, :, p].any(axis=1) | self.hidden[first:end].any(axis=1))
+            if judged.any() and owned[judged].mean() < 0.5:
+                self.on[first:end, :, p] = False
+
+    def unseen(self, k: int, foot: FootContact) -> None:
+        """While nobody sees a foot: the plate that it stood on last, or stands on next, for as long as that is pressed
+        without a break, and one that is pressed while all other feet are elsewhere. What else it does is not known, but
+        in a gap too short for a step."""
+        pressed = [runs(plate.pressed) for plate in self.plates]
+        for first, end in runs(~foot.seen):
+            held = np.zeros(end - first, dtype=bool)
+            for p in range(len(self.plates)):
+                for start, stop in pressed[p]:
+                    before = start < first <= stop and self.on[first - 1, k, p]
+                    after = start <= end < stop and self.on[end, k, p]
+                    if before or after:
+                        self.on[max(start, first) : min(stop, end), k, p] = True
+                    elif stop > first and start < end and self.elsewhere(k, p, start, stop):
+                        self.on[start:stop, k, p] = True
+                held |= self.on[first:end, k, p]
+            if end - first > GAP_S * self.recording.rate:
+                self.hidden[first:end, k] |= ~held
+
+    def elsewhere(self, k: int, p: int, start: int, stop: int) -> bool:
+        """Whether a press that is nobody's is only to be had by a foot that nobody sees: it is judged, and all others
+        are seen, and not at its centre of pressure."""
+        press = slice(start, stop)
+        if self.on[press, :, p].any() or not (self.plates[p].push[press] > JUDGED_N).any():
+            return False
+        here = self.contacts[self.feet[k]].seen[press] & self.plates[p].loaded[press]
+        if (here & ~self.under[press, k, p]).any():
+            return False
+        seen = [foot.seen[press].all() for at, foot in self.contacts.items() if at != self.feet[k]]
+        near = np.delete(self.under[press, :, p], k, axis=1)
+        return len(seen) == len(self.feet) - 1 and all(seen) and not near.any()
+
+    def steps(self) -> list[list[tuple[int, int]]]:
+        """Frames [first, end) of each foot's stances with its setting down and leaving; all of them where nobody sees
+        it, or where it never stands."""
+        n, found = len(self.off), []
+        half = round(STEP_S * self.recording.rate) if n > 1 else 0
+        for name in self.feet:
+            foot = self.contacts.get(name)
+            stances = () if foot is None else foot.stances
+            unseen = [] if foot is None else runs(~foot.seen)
+            found.append(
+                [(max(0, a - half), min(n, b + half)) for a, b in (*stances, *unseen)] if stances else [(0, n)]
+            )
+        return found
+
+    def between(self, k: int, p: int) -> Flags:
+        """Frames in which a plate's centre of pressure lies between two standing feet, and under neither."""
+        others = [c for name, c in self.contacts.items() if name != self.feet[k]]
+        own = self.contacts.get(self.feet[k])
+        if own is None or len(others) != 1:
+            return np.zeros(self.recording.n_frames, dtype=bool)
+        cop, other = self.plates[p].cop, others[0]
+        both = np.concatenate([own.outline, other.outline], axis=1)
+        apart = np.fmin(distance_to_hull(cop, own.outline), distance_to_hull(cop, other.outline)) > BETWEEN_M
+        return np.asarray((distance_to_hull(cop, both) < BETWEEN_M) & apart & own.stands & other.stands)
+
+    def upon(self, plate: GroundPlate, foot: FootContact, frames: slice) -> Flags:
+        """Frames in which all touching markers of a foot lie within a plate's edges, on its level; none where these are
+        not known."""
+        touching = foot.touching[frames]
+        if plate.corners is None or plate.height_m is None:
+            return np.zeros(len(touching), dtype=bool)
+        inside = plate.beyond(foot.outline[frames]) == 0.0
+        level = np.abs(foot.support_m[frames] - plate.height_m) < SAME_LEVEL_M
+        return np.asarray(level & touching.any(axis=1) & (inside | ~touching).all(axis=1))
+
+    def beyond_edges(self, foot: FootContact, frames: slice) -> Flags:
+        """Frames in which a touching marker lies beyond the edges of all plates; none where edges are not known, nor on
+        a step, beyond whose edge nothing is."""
+        touching = foot.touching[frames]
+        heights = [plate.height_m for plate in self.plates if plate.height_m is not None and plate.corners is not None]
+        if len(heights) < len(self.plates):
+            return np.zeros(len(touching), dtype=bool)
+        away = np.min([plate.beyond(foot.outline[frames]) for plate in self.plates], axis=0)
+        raised = foot.support_m[frames] > min(heights) + 2.0 * SAME_LEVEL_M
+        return np.asarray(((away > BEYOND_M) & touching).any(axis=1) & ~raised)
+
+    def aloft(self) -> Flags:
+        """(T, F) feet that are surely in the air: high and moving between two stances of their own, or moving while
+        another one stands still. A pedal moves with the foot that presses it, and lets it stand nowhere."""
+        found = np.zeros(self.off.shape, dtype=bool)
+        for k, name in enumerate(self.feet):
+            if (foot := self.contacts.get(name)) is None:
+                continue
+            others = [other.stands for at, other in self.contacts.items() if at != name]
+            between = np.zeros(len(found), dtype=bool)
+            if len(foot.stances) > 1:
+                between[foot.stances[0][1] : foot.stances[-1][0]] = True
+            bears = foot.bears(self.recording.rate)
+            found[:, k] = (foot.aloft & between) | (np.any(others, axis=0) & foot.moves & ~bears)
+        return found
+
+    def loads(self, forward: Array) -> FootLoads:
+        """The loads, and what there is to say of them."""
+        contacts = [self.contacts.get(foot) for foot in self.feet]
+        marked = np.array([contact is not None for contact in contacts], dtype=bool)
+        soles = Soles.of(contacts, forward, self.recording.rate, self.recording.n_frames)
+        loads = divided(self.feet, self.plates, soles, marked, self.on, self.off, self.hidden, self.aloft())
+        reasons = [*self.off_in_words(), *(text for p in range(len(self.plates)) for text in self.lost_in_words(p))]
+        said = [*self.belt_in_words(), *(text for p in range(len(self.plates)) for text in self.owners_in_words(p))]
+        said += plate_findings(self.recording.time, self.feet, contacts, self.plates, soles, self.on)
+        if missing := [foot for foot in self.feet if foot not in self.contacts]:
+            said.append(f"No markers of the {' and '.join(missing)} foot: it is taken to stand on the plates alone.")
+        return replace(loads, messages=(*said, *reasons), reasons=tuple(reasons))
+
+    def spans(self, flags: Flags) -> str:
+        time = self.recording.time
+        return ", ".join(f"{time[a]:.2f} to {time[b - 1]:.2f} s" for a, b in runs(flags))
+
+    def belt_in_words(self) -> list[str]:
+        found = []
+        for name, foot in self.contacts.items():
+            speed = np.linalg.norm(foot.support_velocity, axis=1)
+            if speed.any():
+                low, high = speed[speed > 0.0].min(), speed.max()
+                size = f"{high:.2f}" if high - low < 0.02 else f"{low:.2f} to {high:.2f}"
+                found.append(f"The {name} foot stands on a belt that moves at {size} m/s, by its markers.")
+        return found
+
+    def off_in_words(self) -> list[str]:
+        if not self.plates:
+            return []
+        time, found, out = self.recording.time, list[str](), "the total wrench is left out there."
+        for k, foot in enumerate(self.feet):
+            found += [
+                f"The {foot} foot stands off the plates from {time[a]:.2f} to {time[b - 1]:.2f} s: {out}"
+                for a, b in runs(self.off[:, k])
+            ]
+            if self.hidden[:, k].any():
+                found.append(
+                    f"Nobody sees where the {foot} foot is from {self.spans(self.hidden[:, k])}: it may stand off the "
+                    f"plates, so {out}"
+                )
+        return found
+
+    def owners_in_words(self, p: int) -> list[str]:
+        plate, owners, found = self.plates[p], self.on[:, :, p], list[str]()
+        for k, foot in enumerate(self.feet):
+            if owners[:, k].any():
+                how = "given" if plate.name in self.fixed else "by its centre of pressure"
+                found.append(f"{plate.name} carries the {foot} foot ({how}): {self.spans(owners[:, k])}.")
+        both = np.flatnonzero(owners.sum(axis=1) > 1)
+        if len(both):
+            time = self.recording.time
+            found.append(
+                f"Both feet stand on {plate.name} in {len(both)} frames from {time[both[0]]:.2f} to "
+                f"{time[both[-1]]:.2f} s: its wrench is divided between them by its centre of pressure."
+            )
+        return found
+
+    def lost_in_words(self, p: int) -> list[str]:
+        plate, time = self.plates[p], self.recording.time
+        found = [
+            f"{plate.name} is not measured or at the end of its range from {time[a]:.2f} to {time[b - 1]:.2f} s: the "
+            "total wrench is left out there."
+            for a, b in runs(~plate.known)
+        ]
+        if len(self.contacts) == len(self.feet):
+            alone = ~self.on[:, :, p].any(axis=1) & (plate.push > JUDGED_N) & ~self.hidden.any(axis=1)
+            found += [
+                f"Warning: {plate.name} carries up to {np.nanmax(plate.wrench[a:b, 1]):.0f} N where no foot stands, "
+                f"from {time[a]:.2f} to {time[b - 1]:.2f} s: the total wrench is left out there."
+                for a, b in runs(alone)
+            ]
+        return found

@@ -1,0 +1,77 @@
+"""How a moving floor moves: the speed of a treadmill's belt, by the feet that it carries along."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.arrays import runs
+from dynakin.recordings.recording import Array
+
+Flags = npt.NDArray[np.bool_]
+
+WINDOW_S = 4.0
+"""Stretch over which a belt's speed is taken for one: some strides. It may change from one to the next."""
+STILL_M_S = 0.3
+"""Slower than this no belt is looked for: a foot on it is slow enough to stand."""
+ALIKE_M_S, ALIKE = 0.15, 0.1
+"""Velocities that differ by no more than the larger of this and that part of their size are one and the same."""
+STRAIGHT, CARRIED_M = 0.15, 0.2
+"""So far a foot must be carried straight on, its velocity the belt's within that part. A pedal (at 60 rpm, crank of
+0.17 m) goes straight for 0.05 m at its lowest place."""
+BODY = 0.5
+"""Part of the belt's speed below which the body's own stays: on a treadmill it stays where it is; a foot that swings
+past the floor moves with the body, and faster."""
+MOST_SAMPLES = 200
+
+
+def belt_velocity(velocity: Array, low: Flags, body: Array, time: Array) -> Array:
+    """Horizontal velocity (T, 2) m/s of what a foot stands on; 0 of a floor.
+
+    Args:
+        velocity: (T, K, 3) m/s of the foot's markers, ground frame. low: (T, K) those near their lowest place.
+        body: (T, 3) m/s of the body as a whole. time: (T,) s.
+    """
+    centres, found = [], []
+    for start in np.arange(time[0], max(time[-1] - 0.25 * WINDOW_S, time[0] + 1e-9), 0.5 * WINDOW_S):
+        inside = (time >= start) & (time < start + WINDOW_S)
+        speed = one_velocity(velocity[inside], low[inside], body[inside], time[inside])
+        if speed is not None:
+            centres.append(float(time[inside].mean()))
+            found.append(speed)
+    if not found:
+        return np.zeros((len(time), 2))
+    return np.stack([np.interp(time, centres, [v[c] for v in found]) for c in (0, 1)], axis=1)
+
+
+def one_velocity(velocity: Array, low: Flags, body: Array, time: Array) -> Array | None:
+    """(2,) of one stretch, 0 where low markers stand still; None where neither that nor a belt is to be seen."""
+    level, known = velocity[..., [0, 2]], np.asarray(np.isfinite(velocity).all(axis=2)) & low
+    if not known.any():
+        return None
+    every = level[known]
+    sample = every[:: max(1, len(every) // MOST_SAMPLES)]
+    apart = np.linalg.norm(sample[:, None] - sample[None], axis=2)
+    reach = np.maximum(ALIKE_M_S, ALIKE * np.linalg.norm(sample, axis=1))
+    alike = np.count_nonzero(apart < reach[:, None], axis=1)
+    best = int(np.argmax(alike))
+    still = np.count_nonzero(np.linalg.norm(sample, axis=1) < STILL_M_S)
+    mode = np.median(sample[apart[best] < reach[best]], axis=0)
+    size = float(np.linalg.norm(mode))
+    if size < STILL_M_S or still > 0.5 * alike[best]:
+        return np.zeros(2)
+    seen = np.isfinite(body).all(axis=1)
+    moves = np.linalg.norm(body[seen].mean(axis=0)[[0, 2]]) if seen.any() else np.inf
+    return np.asarray(mode) if moves < BODY * size and _carries(level, known, mode, time) else None
+
+
+def _carries(level: Array, known: Flags, mode: Array, time: Array) -> bool:
+    """Whether some marker goes along with a velocity for long enough."""
+    size = float(np.linalg.norm(mode))
+    with np.errstate(invalid="ignore"):
+        along = known & (np.linalg.norm(level - mode, axis=2) < STRAIGHT * size)
+    return any(
+        size * (time[end - 1] - time[first]) > CARRIED_M
+        for m in range(along.shape[1])
+        for first, end in runs(along[:, m])
+    )

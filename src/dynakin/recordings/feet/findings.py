@@ -1,0 +1,168 @@
+"""What is wrong with plates that only the feet show: one beside its place, two exchanged, one that drifts.
+
+Each is said in one sentence, with what to do. Nothing is put right here: a load that lies under no foot is left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.arrays import runs
+from dynakin.recordings.feet.contact import NEAR_M, FootContact
+from dynakin.recordings.feet.soles import Soles
+from dynakin.recordings.hull import distance_to_hull
+from dynakin.recordings.plates.ground_plate import GroundPlate
+from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N
+from dynakin.recordings.recording import Array
+
+Flags = npt.NDArray[np.bool_]
+
+BESIDE_M = 0.06
+"""Distance of centres of pressure from a foot's markers that is kept for three quarters of its load: no shoe is so
+wide. Ours stay within 0.05, those with two markers a foot among them."""
+TOGETHER = 0.7
+"""Part of a press in which a foot must stand, and the other way round, for the two to belong together."""
+FITS, MISFITS = 0.8, 0.3
+"""Part of a plate's load that must lie under feet once plates are exchanged, and may at most before."""
+CLEAR_S = 0.5
+"""How long no foot must be near a plate for a drift to be said."""
+CLEAR_M = 0.3
+"""How far a foot must be from a plate to be surely not on it: its own length."""
+
+Contacts = Sequence[FootContact | None]
+
+
+def plate_findings(
+    time: Array, feet: Sequence[str], contacts: Contacts, plates: Sequence[GroundPlate], soles: Soles, on: Flags
+) -> list[str]:
+    """Sentences.
+
+    Args:
+        time: (T,) s. on: (T, F, P) feet on plates, as they were assigned.
+    """
+    if any(contact is None for contact in contacts):
+        return []
+    swapped = exchanged(contacts, plates)
+    said = [
+        f"Warning: {plates[p].name} and {plates[q].name} have been exchanged: each one's load lies under a foot that "
+        "stands once it is put at the other's place, and next to none of it at its own. Exchange the two in the file "
+        "(their channels or their corners); their loads are left out."
+        for p, q in swapped
+    ]
+    for p, plate in enumerate(plates):
+        if not any(p in pair for pair in swapped) and (text := _beside(plate, feet, contacts, soles, on, p)):
+            said.append(text)
+        if text := _drift(time, plate, soles, on[:, :, p]):
+            said.append(text)
+    return said
+
+
+def exchanged(contacts: Contacts, plates: Sequence[GroundPlate]) -> list[tuple[int, int]]:
+    """Pairs of plates each of whose data were measured where the other lies."""
+    if any(contact is None for contact in contacts):
+        return []
+    pairs = combinations(range(len(plates)), 2)
+    return [(p, q) for p, q in pairs if _are_exchanged(plates[p], plates[q], contacts)]
+
+
+def _are_exchanged(one: GroundPlate, other: GroundPlate, contacts: Contacts) -> bool:
+    """Whether two feet that step on them one after the other say so."""
+    if one.corners is None or other.corners is None:
+        return False
+    parts = []
+    for plate, place in ((one, other), (other, one)):
+        if not (plate.push > JUDGED_N).any() or _under_feet(plate, plate.cop, contacts) > MISFITS:
+            return False
+        there = _carried_over(plate.cop, np.asarray(plate.corners), np.asarray(place.corners))
+        parts.append(_under_feet(plate, there, contacts))
+    return min(parts) > FITS
+
+
+def _under_feet(plate: GroundPlate, cop: Array, contacts: Contacts) -> float:
+    """Part of a plate's load that lies under feet that stand, were its centres of pressure at (T, 2) m."""
+    under = [(distance_to_hull(cop, foot.outline) < NEAR_M) & foot.stands for foot in contacts if foot is not None]
+    return float(np.any(under, axis=0)[plate.push > JUDGED_N].mean())
+
+
+def _carried_over(points: Array, source: Array, target: Array) -> Array:
+    """Points (T, 2) as they lie on a plate of corners (4, 2), at the same place of another one."""
+
+    def axes(corners: Array) -> tuple[Array, Array]:
+        x = corners[0] - corners[1]
+        x = x / np.linalg.norm(x)
+        return corners.mean(axis=0), np.stack([x, [-x[1], x[0]]])
+
+    (a, turn_a), (b, turn_b) = axes(source), axes(target)
+    return np.asarray((points - a) @ turn_a.T @ turn_b + b)
+
+
+def _beside(plate: GroundPlate, feet: Sequence[str], contacts: Contacts, soles: Soles, on: Flags, p: int) -> str | None:
+    """Whether a plate's load comes and goes with a foot, but lies beside it."""
+    offsets: dict[int, list[Array]] = {}
+    for first, end in runs(plate.push > JUDGED_N):
+        press = slice(first, end)
+        for k, foot in enumerate(contacts):
+            assert foot is not None
+            others = np.delete(on, p, axis=2)[press, k].any(axis=1).mean() > 1.0 - TOGETHER
+            shared = np.delete(on[press, :, p], k, axis=1).any(axis=1).mean() > 1.0 - TOGETHER
+            with_it = foot.stands[press]
+            if others or shared or with_it.mean() < TOGETHER or not _covers(foot, first, end):
+                continue
+            away = distance_to_hull(plate.cop[press], foot.outline[press])[with_it]
+            if np.isfinite(away).any() and np.nanpercentile(away, 25.0) > BESIDE_M:
+                offsets.setdefault(k, []).append((plate.cop[press] - soles.middle[press, k][:, [0, 2]])[with_it])
+    if len(offsets) != 1:
+        return None
+    k, found = next(iter(offsets.items()))
+    x, z = np.nanmedian(np.concatenate(found), axis=0)
+    return (
+        f"Warning: {plate.name} lies beside its place: its centre of pressure is {np.hypot(x, z):.2f} m (X {x:+.2f}, "
+        f"Z {z:+.2f} m of the ground frame) from the middle of the {feet[k]} foot's sole while its load comes and goes "
+        "with that foot. Correct the plate's place (its corners or origin) in the file."
+    )
+
+
+def _covers(foot: FootContact, first: int, end: int) -> bool:
+    """Whether one stance of a foot goes on for about as long as a press."""
+    inside = [min(b, end) - max(a, first) for a, b in foot.stances if min(b, end) > max(a, first)]
+    lengths = [b - a for a, b in foot.stances if min(b, end) > max(a, first)]
+    return bool(inside) and max(inside) > TOGETHER * max(lengths)
+
+
+def _drift(time: Array, plate: GroundPlate, soles: Soles, owners: Flags) -> str | None:
+    """Whether a plate reads something while no foot is near it."""
+    place = plate.corners if plate.corners is not None else _pressed_at(plate)
+    if place is None:
+        return None
+    away = np.stack(
+        [
+            distance_to_hull(soles.middle[:, k][:, [0, 2]], np.broadcast_to(place, (len(time), *place.shape)))
+            for k in range(owners.shape[1])
+        ],
+        axis=1,
+    )
+    clear = (np.nan_to_num(away, nan=0.0) > CLEAR_M).all(axis=1) & plate.known
+    if len(time) < 2 or np.count_nonzero(clear) * float(np.median(np.diff(time))) < CLEAR_S:
+        return None
+    read = plate.wrench[clear, 1]
+    low, middle, high = np.percentile(read, (5.0, 50.0, 95.0))
+    if not UNLOADED_N < abs(middle) < 2.0 * JUDGED_N:
+        return None
+    return (
+        f"Warning: {plate.name} reads {low:.0f} to {high:.0f} N while no foot is near it, between {time[clear][0]:.2f} "
+        f"and {time[clear][-1]:.2f} s: zero it before the trial, or take it off with plate_loads."
+    )
+
+
+def _pressed_at(plate: GroundPlate) -> Array | None:
+    """(K, 2) the corners of what its centres of pressure span; None of a plate that is never loaded."""
+    judged = plate.cop[plate.push > JUDGED_N]
+    judged = judged[np.isfinite(judged).all(axis=1)]
+    if not len(judged):
+        return None
+    (x0, z0), (x1, z1) = np.percentile(judged, (5.0, 95.0), axis=0)
+    return np.array([[x0, z0], [x1, z0], [x1, z1], [x0, z1]])

@@ -1,0 +1,103 @@
+"""A plate in the ground frame: what it carries, where that presses, and when it can be believed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.arrays import runs
+from dynakin.recordings.frame import GroundFrame
+from dynakin.recordings.hull import distance_to_hull
+from dynakin.recordings.plates.pressure import JUDGED_N, LOADED_N, UNLOADED_N, Surface, centre_of_pressure
+from dynakin.recordings.plates.surfaces import surface_height
+from dynakin.recordings.recording import Array, Plate
+
+Flags = npt.NDArray[np.bool_]
+
+FLAT_FRAMES = 5
+"""A loaded plate that stays at its own extreme to 1e-6 for so many frames is at the end of its range."""
+
+
+@dataclass(frozen=True, eq=False)
+class GroundPlate:
+    """One plate in the ground frame.
+
+    Attributes:
+        wrench: (T, 6) N and N m about the ground's origin.
+        cop: (T, 2) m, X and Z of its centre of pressure at the plate's own height; NaN where it is not loaded.
+        known: (T,) it is measured, and not at the end of its range.
+        corners: (4, 2) m, X and Z; None where not known.
+        height_m: of its surface; None where it is not known.
+    """
+
+    name: str
+    wrench: Array
+    cop: Array
+    known: Flags
+    corners: Array | None
+    height_m: float | None
+
+    @classmethod
+    def of(cls, plate: Plate, ground: GroundFrame) -> GroundPlate:
+        """The plate, turned to the ground frame."""
+        wrench = ground.wrench_to_ground(np.hstack([plate.force, plate.moment]))
+        known = np.asarray(np.isfinite(wrench).all(axis=1)) & ~saturated(wrench[:, 1])
+        corners = None if plate.corners is None else ground.points_to_ground(plate.corners)[:, [0, 2]]
+        return cls.at_height(plate.name, wrench, known, corners, surface_height(plate, ground))
+
+    @classmethod
+    def at_height(
+        cls, name: str, wrench: Array, known: Flags, corners: Array | None, height_m: float | None
+    ) -> GroundPlate:
+        """With its centre of pressure from its wrench; on the ground's own plane where its height is not known."""
+        surface = Surface(np.array([0.0, height_m or 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
+        filled = np.nan_to_num(wrench)
+        cop, _ = centre_of_pressure(filled[:, :3], filled[:, 3:], surface, LOADED_N)
+        cop[filled[:, 1] < LOADED_N] = np.nan
+        return cls(name, wrench, cop[:, [0, 2]], known, corners, height_m)
+
+    @property
+    def push(self) -> Array:
+        """(T,) N, vertical; 0 where it is not measured."""
+        return np.asarray(np.nan_to_num(self.wrench[:, 1]))
+
+    @property
+    def loaded(self) -> Flags:
+        """(T,) its centre of pressure is known."""
+        return np.asarray(self.push > LOADED_N)
+
+    @property
+    def pressed(self) -> Flags:
+        """(T,) it is not empty."""
+        return np.asarray(self.push > UNLOADED_N)
+
+    def beyond(self, points: Array) -> Array:
+        """How far (T, K) m points (T, K, 2) lie beyond its edges; 0 inside.
+
+        Raises:
+            ValueError: its edges are not known.
+        """
+        if self.corners is None:
+            raise ValueError(f"{self.name}: expected corners")
+        flat = points.reshape(-1, 2)
+        return distance_to_hull(flat, np.broadcast_to(self.corners, (len(flat), 4, 2))).reshape(points.shape[:2])
+
+
+def saturated(push: Array) -> Flags:
+    """(T,) where a vertical force (T,) N rests at its largest value, as an amplifier at the end of its range does.
+
+    It gets there on a slope and is cut off; a force that is the same all the time (made up) is not.
+    """
+    found = np.zeros(len(push), dtype=bool)
+    if not np.isfinite(push).any() or np.nanmax(push) < JUDGED_N:
+        return found
+    top = float(np.nanmax(push))
+    with np.errstate(invalid="ignore"):
+        at_top: Flags = push > top * (1.0 - 1e-6)
+    for first, end in runs(at_top):
+        before = push[first - 1] if first > 0 else top
+        after = push[end] if end < len(push) else top
+        found[first:end] = end - first >= FLAT_FRAMES and min(before, after) < 0.99 * top
+    return found

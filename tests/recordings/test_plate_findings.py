@@ -1,0 +1,136 @@
+"""Plates that are exchanged, beside their place, or drift: found by the feet, and said with what to do."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dynakin import read
+from dynakin.model.markers.marker_set import foot_markers_of
+from dynakin.recordings.feet.assignment import foot_loads
+from dynakin.recordings.feet.loads import SWING, UNKNOWN
+from dynakin.recordings.frame import find_ground_frame
+from dynakin.recordings.plates.pressure import Surface, plate_from_wrench
+from dynakin.recordings.recording import Plate, Recording
+from support.made_steps import FOOT_MARKERS, LABORATORY, Made, MadePlate, Stance, lasting, steps, walk
+
+
+def walked(length: float = 0.6, **changes: object) -> Made:
+    """Four steps over four plates; the second one is changed."""
+    feet = walk(4, length)
+    plates = []
+    for side in ("right", "left"):
+        for s in feet[side]:
+            plate = MadePlate(s.plates[0], (s.x - 0.25, s.x + 0.25), (s.z - 0.2, s.z + 0.2))
+            plates.append(replace(plate, **changes) if plate.name == "p1" else plate)
+    return steps(lasting(4), feet, plates)
+
+
+def messages(recording: Recording) -> list[str]:
+    return [t for t in foot_loads(recording, LABORATORY, FOOT_MARKERS).messages if t.startswith("Warning")]
+
+
+def test_plates_that_are_what_they_should_be_are_not_complained_of() -> None:
+    assert messages(walked().recording) == []
+
+
+def exchanged(one: Plate, other: Plate) -> tuple[Plate, Plate]:
+    """Each one's own readings at the other's place."""
+
+    def at(plate: Plate, place: Plate) -> Plate:
+        assert plate.corners is not None and place.corners is not None
+        shift = (place.corners - plate.corners).mean(axis=0)
+        moment = plate.moment + np.cross(shift, plate.force)
+        surface = Surface(place.corners.mean(axis=0), np.array([0.0, 1.0, 0.0]))
+        return plate_from_wrench(
+            plate.name, plate.force, moment, surface, corners=place.corners, threshold_n=10.0, zero_unloaded=False
+        )
+
+    return at(one, other), at(other, one)
+
+
+def test_exchanged_plates_are_named_and_their_loads_left_out() -> None:
+    made = walked()
+    plates = list(made.recording.plates)
+    a, b = (next(k for k, p in enumerate(plates) if p.name == name) for name in ("p1", "p2"))
+    plates[a], plates[b] = exchanged(plates[a], plates[b])
+    recording = made.recording.with_plates(tuple(plates))
+    said = [t for t in messages(recording) if "exchanged" in t]
+    assert len(said) == 1 and said[0].startswith("Warning: p2 and p1 have been exchanged")
+    assert "Exchange the two in the file" in said[0]
+    loads = foot_loads(recording, LABORATORY, FOOT_MARKERS)
+    known = loads.total_known
+    pressed = made.push.sum(axis=1) > 100.0
+    inside = pressed & (made.recording.time > 0.75) & (made.recording.time < 1.6)
+    assert not known[inside].any()
+
+
+@pytest.mark.parametrize(("x", "z"), [(0.0, 0.25), (0.0, -0.16), (0.35, 0.1)])
+def test_a_plate_beside_its_place_is_said_with_its_offset(x: float, z: float) -> None:
+    """More than a shoe is wide, and beyond: what is then under no foot is left out."""
+    made = walked(moved=(x, z))
+    said = [t for t in messages(made.recording) if "beside its place" in t]
+    assert len(said) == 1 and said[0].startswith("Warning: p1") and "left foot" in said[0]
+    told = [float(part.split()[0].rstrip(",")) for part in (said[0].split("(X ")[1], said[0].split("Z ")[1])]
+    np.testing.assert_allclose(told, [x, z], atol=0.03)
+    loads = foot_loads(made.recording, LABORATORY, FOOT_MARKERS)
+    on = (made.push[:, 1] > 100.0) & (made.recording.time < 1.3)
+    assert np.isnan(loads.wrench[on, 1]).all() or abs(z) < 0.2
+
+
+@pytest.mark.parametrize("drift_n", [25.0, -40.0, 45.0])
+def test_a_drift_is_said_and_bears_nobody(drift_n: float) -> None:
+    made = walked(drift_n=drift_n)
+    said = [t for t in messages(made.recording) if "while no foot is near it" in t]
+    assert len(said) == 1 and said[0].startswith("Warning: p1 reads") and "plate_loads" in said[0]
+    loads = foot_loads(made.recording, LABORATORY, FOOT_MARKERS)
+    swings = (made.push[:, 1] == 0.0) & loads.aloft[:, 1] & (loads.reason[:, 1] != UNKNOWN)
+    assert swings.any() and (loads.reason[swings, 1] == SWING).all()
+
+
+def test_a_drift_below_the_noise_is_not_said() -> None:
+    assert messages(walked(drift_n=8.0).recording) == []
+
+
+def test_exchanged_plates_under_feet_that_stand_are_no_ones_business_here() -> None:
+    """Both loads then lie under a foot: only that they push the feet apart shows it (`check_plates`)."""
+    feet = {
+        "right": [Stance(0.0, 2.0, 0.0, 0.15, 0.0, ("p0",))],
+        "left": [Stance(0.0, 2.0, 0.0, -0.15, 0.0, ("p1",))],
+    }
+    made = steps(2.0, feet, [MadePlate("p0", z=(0.0, 0.3)), MadePlate("p1", z=(-0.3, 0.0))])
+    plates = exchanged(*made.recording.plates)
+    assert messages(made.recording.with_plates(plates)) == []
+
+
+@pytest.mark.parametrize("trial", ["squats1", "walking1"])
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_gaps_at_push_off_in_a_real_foot_leave_the_plates_where_they_were(
+    data_dir: Path, trial: str, side: str
+) -> None:
+    """Eight gaps of a second (squats), or one that begins up to 0.8 s before toe-off (a walk of 1.3 s)."""
+    folder = data_dir / "opencap_subject4"
+    recording = read(folder / f"{trial}.trc", folder / f"{trial}_grf.mot")
+    ground, markers = find_ground_frame(recording), foot_markers_of(recording)
+    whole = foot_loads(recording, ground, markers)
+    k = whole.feet.index(side)
+    if trial == "squats1":
+        cases = [np.linspace(10, recording.n_frames - 110, 8).astype(int)]
+    else:
+        leaves = int(np.flatnonzero(np.nan_to_num(whole.wrench[:, k, 1]) > 20.0)[-1])
+        cases = [np.array([max(0, leaves - early)]) for early in range(5, 85, 10)]
+    columns = [recording.marker_names.index(name) for name in markers[side]]
+    for starts in cases:
+        gap = np.zeros(recording.n_frames, dtype=bool)
+        for start in starts:
+            gap[start : start + 100] = True
+        hidden = recording.markers.copy()
+        hidden[np.ix_(gap, columns)] = np.nan
+        loads = foot_loads(replace(recording, markers=hidden), ground, markers)
+        known = np.isfinite(loads.wrench[..., 1]) & np.isfinite(whole.wrench[..., 1])
+        assert np.abs(loads.wrench - whole.wrench)[known].max() < 25.0
+        if trial == "squats1":
+            assert known.all() and loads.all_measured.all()

@@ -1,0 +1,116 @@
+"""Live feet on steps, belts and boxes, frame by frame, beside the same feet afterwards."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dynakin.recordings.feet.assignment import foot_loads
+from dynakin.recordings.feet.loads import MEASURED, OFF_PLATE, SWING, FootLoads
+from dynakin.recordings.standing import marker_velocities
+from dynakin.settings import presets
+from dynakin.stream.feet import LiveFeet
+from support.made_steps import FOOT_MARKERS, LABORATORY, Made, MadePlate, Stance, lasting, steps, walk
+
+
+def live(made: Made) -> list[FootLoads]:
+    """What is said at each frame, of what was seen until then."""
+    recording = made.recording
+    segments = {name: f"foot_{side}" for side, names in FOOT_MARKERS.items() for name in names}
+    spec = SimpleNamespace(markers=[SimpleNamespace(segment=segments.get(n, "body")) for n in recording.marker_names])
+    initial: Any = SimpleNamespace(feet={side: f"foot_{side}" for side in FOOT_MARKERS}, spec=spec, ground=LABORATORY)
+    feet = LiveFeet(initial, presets.default(), tuple(plate.name for plate in recording.plates), {})
+    velocity = np.gradient(recording.markers, recording.time, axis=0)
+    assert marker_velocities(recording).shape == velocity.shape
+    plates = np.stack([np.hstack([p.force, p.moment]) for p in recording.plates], axis=1)
+    return [
+        feet.loads(time, recording.markers[t], velocity[t], plates[t]) for t, time in enumerate(recording.time.tolist())
+    ]
+
+
+def both(made: Made) -> tuple[np.ndarray, np.ndarray, np.ndarray, FootLoads]:
+    """Reasons (T, F) live, vertical forces (T, F) live, heights (T, F) of the soles live, and all of it offline."""
+    now = live(made)
+    return (
+        np.concatenate([one.reason for one in now]),
+        np.concatenate([one.wrench[..., 1] for one in now]),
+        np.concatenate([one.sole[..., 1] for one in now]),
+        foot_loads(made.recording, LABORATORY, FOOT_MARKERS),
+    )
+
+
+@pytest.mark.parametrize("speed", [0.8, 1.3])
+def test_a_belt_is_found_after_some_steps_and_live_then_says_what_offline_says(speed: float) -> None:
+    feet = walk(14, 0.0)
+    feet = {side: [replace(s, x=0.35 * speed, plates=(side,)) for s in own] for side, own in feet.items()}
+    plates = [MadePlate("right", (-1.2, 1.2), (0.0, 0.4)), MadePlate("left", (-1.2, 1.2), (-0.4, 0.0))]
+    made = steps(lasting(14), feet, plates, belt_m_s=speed)
+    reason, push, _, offline = both(made)
+    later = made.recording.time > 3.0
+    known = later[:, None] & np.isfinite(push) & np.isfinite(offline.wrench[..., 1])
+    assert np.abs(push - made.push)[known].max() < 30.0 and known[later].mean() > 0.9
+    assert (reason == offline.reason)[later].mean() > 0.93
+    standing = later[:, None] & (made.push > 100.0)
+    assert (reason == MEASURED)[standing].mean() > 0.97
+
+
+@pytest.mark.parametrize("rise", [-0.19, 0.17])
+def test_stairs_live(rise: float) -> None:
+    """Down each step is the lowest place so far; up it is believed once it has been kept for 0.15 s. The person begins
+    with both feet on the floor."""
+    feet = walk(6, 0.3, rise=rise)
+    feet["left"].insert(0, Stance(0.0, 0.25, 0.0, -0.1, 0.0, ("q",)))
+    plates = [MadePlate(s.plates[0], edges=False, height=s.height) for own in feet.values() for s in own]
+    made = steps(lasting(6), feet, plates)
+    reason, push, height, offline = both(made)
+    known = np.isfinite(push)
+    assert np.abs(push - made.push)[known].max() < 60.0
+    for k, side in enumerate(("right", "left")):
+        for stance in feet[side][1:]:
+            inside = (made.recording.time > stance.start + 0.3) & (made.recording.time < stance.end - 0.05)
+            assert (reason[inside, k] == MEASURED).mean() > 0.9
+            np.testing.assert_allclose(height[inside, k], stance.height, atol=0.03)
+            assert (offline.reason[inside, k] == MEASURED).all()
+
+
+def test_a_box_and_a_foot_held_up_live() -> None:
+    box = {
+        "right": [Stance(0.0, 1.0, 0.0, 0.1, 0.0, ("p0",)), Stance(1.4, 4.0, 0.4, 0.1, 0.3)],
+        "left": [Stance(0.0, 1.8, 0.0, -0.1, 0.0, ("p1",)), Stance(2.2, 4.0, 0.4, -0.1, 0.3)],
+    }
+    plates = [MadePlate("p0", z=(0.0, 0.3)), MadePlate("p1", z=(-0.3, 0.0))]
+    made = steps(4.0, box, plates)
+    now = live(made)
+    time = made.recording.time
+    reason = np.concatenate([one.reason for one in now])
+    known = np.array([bool(one.total_known[0]) for one in now])
+    assert (reason[time > 2.5] == OFF_PLATE).any(axis=1).all() and not known[time > 2.2].any()
+    held = {
+        "right": [Stance(0.0, 1.0, 0.0, 0.1, 0.0, ("p0",)), Stance(1.6, 4.0, 0.0, 0.1, 0.3)],
+        "left": [Stance(0.0, 4.0, 0.0, -0.1, 0.0, ("p1",))],
+    }
+    now = live(steps(4.0, held, plates))
+    reason = np.concatenate([one.reason for one in now])
+    assert (reason[time > 1.4, 0] == SWING).all()
+    assert all(bool(one.total_known[0]) for one, t in zip(now, time, strict=True) if t > 1.4)
+
+
+def test_stance_rises_and_falls_live() -> None:
+    feet = walk(6, 0.6)
+    plates = [
+        MadePlate(s.plates[0], (s.x - 0.2, s.x + 0.2), (s.z - 0.1, s.z + 0.1), edges=False)
+        for own in feet.values()
+        for s in own
+    ]
+    made = steps(lasting(6), feet, plates)
+    weights = np.concatenate([one.stance for one in live(made)])
+    assert weights.min() == 0.0 and weights.max() > 0.99
+    for k, side in enumerate(("right", "left")):
+        for stance in feet[side][1:-1]:
+            middle = (made.recording.time > stance.start + 0.2) & (made.recording.time < stance.end - 0.05)
+            swing = (made.recording.time > stance.end + 0.18) & (made.recording.time < stance.end + 0.3)
+            assert weights[middle, k].min() > 0.9 and weights[swing, k].max() < 0.05
