@@ -55,8 +55,8 @@ def test_level_floor_and_stairs_up_and_down_give_every_stance_its_plate(rise: fl
         for stance in feet[side]:
             inside = (made.recording.time > stance.start + 0.03) & (made.recording.time < stance.end - 0.03)
             assert (loads.reason[inside, k] == MEASURED).all()
-            np.testing.assert_allclose(loads.sole[inside, k, 1], stance.height, atol=0.01)
-            np.testing.assert_allclose(loads.sole[inside, k][:, [0, 2]], made.sole[inside, k][:, [0, 2]], atol=0.045)
+            np.testing.assert_allclose(loads.soles.middle[inside, k, 1], stance.height, atol=0.01)
+            np.testing.assert_allclose(loads.soles.middle[inside, k][:, [0, 2]], made.sole[inside, k][:, [0, 2]], atol=0.045)
     single = (made.push > 0.0).sum(axis=1) == 1
     for k in range(2):
         swings = single & (made.push[:, k] == 0.0) & (made.recording.time > 0.8)
@@ -72,7 +72,7 @@ def test_a_plate_on_a_step_has_its_pressure_on_its_own_surface() -> None:
     assert plate.height_m == pytest.approx(0.5)
     phase = made.recording.time / 2.0
     np.testing.assert_allclose(plate.cop[:, 0], 0.14 * phase - 0.07, atol=0.01)
-    np.testing.assert_allclose(found(made).sole[:, 0, 1], 0.5, atol=1e-6)
+    np.testing.assert_allclose(found(made).soles.middle[:, 0, 1], 0.5, atol=1e-6)
 
 
 @pytest.mark.parametrize("speed", [0.6, 1.3, 3.5])
@@ -91,7 +91,7 @@ def test_a_belts_speed_is_found_and_its_feet_stand(speed: float) -> None:
     for k, side in enumerate(("right", "left")):
         for one in feet[side][1:-1]:
             inside = (made.recording.time > one.start + 0.06) & (made.recording.time < one.end - 0.06)
-            assert loads.bears[inside, k].all() and loads.stance[inside, k].min() > 0.2
+            assert loads.soles.bears[inside, k].all() and loads.soles.stance[inside, k].min() > 0.2
             assert (loads.reason[inside, k] == MEASURED).all()
         ends, next_ = feet[side][1].end, feet[side][2].start
         swing = (made.recording.time > ends + 0.2) & (made.recording.time < next_ - 0.1)
@@ -127,7 +127,7 @@ def test_a_box_that_no_plate_measures_bears_a_foot_that_alone_can_and_a_foot_hel
     assert_true(made, loads)
     assert (loads.reason[time > 1.6, 0] == OFF_PLATE).all() and (loads.reason[time > 2.4, 1] == OFF_PLATE).all()
     assert not loads.total_known[time > 1.5].any() and loads.total_known[time < 0.9].all()
-    np.testing.assert_allclose(loads.sole[time > 2.4, :, 1], 0.3, atol=0.03)
+    np.testing.assert_allclose(loads.soles.middle[time > 2.4, :, 1], 0.3, atol=0.03)
     held = {
         "right": [Stance(0.0, 1.0, 0.0, 0.1, 0.0, ("p0",)), Stance(1.6, 4.0, 0.0, 0.1, 0.3)],
         "left": [Stance(0.0, 4.0, 0.0, -0.1, 0.0, ("p1",))],
@@ -135,7 +135,7 @@ def test_a_box_that_no_plate_measures_bears_a_foot_that_alone_can_and_a_foot_hel
     made = steps(4.0, held, plates)
     loads = found(made)
     assert (loads.reason[time > 1.3, 0] == SWING).all() and loads.total_known.all()
-    assert not loads.bears[time > 1.3, 0].any()
+    assert not loads.soles.bears[time > 1.3, 0].any()
 
 
 def test_a_jump_is_flight_and_not_a_step() -> None:
@@ -221,13 +221,13 @@ def test_a_missing_heel_does_not_move_a_foots_outline() -> None:
     hidden[50:150, made.recording.marker_names.index("RHEE")] = np.nan
     loads, whole = found(replace(made, recording=replace(made.recording, markers=hidden))), found(made)
     np.testing.assert_array_equal(loads.reason, whole.reason)
-    np.testing.assert_allclose(loads.sole, whole.sole, atol=0.01)
+    np.testing.assert_allclose(loads.soles.middle, whole.soles.middle, atol=0.01)
 
 
 def test_stance_rises_from_touch_down_and_falls_to_toe_off() -> None:
     made = steps(lasting(6), walk(6, 0.6), plates_of(walk(6, 0.6)))
     loads = found(made)
-    own = loads.stance[:, 0]
+    own = loads.soles.stance[:, 0]
     assert own.min() == 0.0 and own.max() == 1.0
     assert np.abs(np.diff(own)).max() < 1.6 / (PASSING_S * RATE_HZ)
     for (first, end), stance in zip(runs(own > 0.0)[:2], walk(6, 0.6)["right"][:2], strict=True):

@@ -38,7 +38,7 @@ def both(made: Made) -> tuple[np.ndarray, np.ndarray, np.ndarray, FootLoads]:
     return (
         np.concatenate([one.reason for one in now]),
         np.concatenate([one.wrench[..., 1] for one in now]),
-        np.concatenate([one.sole[..., 1] for one in now]),
+        np.concatenate([one.soles.middle[..., 1] for one in now]),
         foot_loads(made.recording, LABORATORY, FOOT_MARKERS),
     )
 

@@ -271,7 +271,7 @@ class MarkerSpec:
 class ModelSpec:
     """A model as plain data; Model checks and compiles it."""
 
-    def __init__(self, name: str, coordinates: Sequence[CoordinateSpec], parameters: Sequence[ParameterSpec], segments: Sequence[SegmentSpec], markers: Sequence[MarkerSpec], gravity: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C')] = ..., wrench_measured: Sequence[bool] = [True, True, True, True, True, True], wrench_offset: Sequence[bool] = [False, False, False, False, False, False], wrench_delay: bool = False) -> None: ...
+    def __init__(self, name: str, coordinates: Sequence[CoordinateSpec], parameters: Sequence[ParameterSpec], segments: Sequence[SegmentSpec], markers: Sequence[MarkerSpec], gravity: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C')] = ..., wrench_measured: Sequence[bool] = [True, True, True, True, True, True], wrench_offset: Sequence[bool] = [False, False, False, False, False, False], wrench_delay: bool = False, contacts: Sequence[str] = []) -> None: ...
 
     @property
     def name(self) -> str: ...
@@ -326,6 +326,12 @@ class ModelSpec:
 
     @wrench_delay.setter
     def wrench_delay(self, arg: bool, /) -> None: ...
+
+    @property
+    def contacts(self) -> list[str]: ...
+
+    @contacts.setter
+    def contacts(self, arg: Sequence[str], /) -> None: ...
 
     def __getstate__(self) -> tuple: ...
 
@@ -418,19 +424,19 @@ def plates_jacobian(model: Model, x: Annotated[NDArray[numpy.float64], dict(shap
     d plates / dx (6, n) as the filter has it; components that are not measured are 0.
     """
 
-class FootLoads:
+class ContactLoads:
     """
-    Wrenches of the feet over a trial, how sure they are, and what touches.
+    Wrenches of contacts over a trial as they are expected, how sure that is, and what touches.
     """
 
-    def __init__(self, segments: Sequence[str], wrench: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], covariance: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None, None), order='C', device='cpu', writable=False)], contact: Annotated[NDArray[numpy.uint8], dict(shape=(None, None), order='C', device='cpu', writable=False)]) -> None:
+    def __init__(self, segments: Sequence[str], wrench: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], covariance: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], contact: Annotated[NDArray[numpy.uint8], dict(shape=(None, None), order='C', device='cpu', writable=False)], effects: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)] | None = None) -> None:
         """
-        segments: a name a foot. wrench (T, F, 6) N and N m, ground on person, about the ground origin; covariance (T, F, 6, 6) of each, positive definite; contact (T, F) uint8: 0 in the air, 1 measured, 2 not measured. wrench and covariance count where 1. Raises ValueError for other shapes or codes.
+        segments: a name a contact. wrench (T, C, 6) N and N m, on the person, about the ground origin; covariance (T, 6 C, 6 C), that of the sum positive definite; contact (T, C) uint8: 0 nothing touches, 1 on a plate, 2 not measured, 3 on a plate with another contact; effects (T, 6, 6 K): what the six states of each of the first K contacts add to its wrench, where the model has them. Raises ValueError for other shapes or codes.
         """
 
-def contact_moments(model: Model, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)], loads: FootLoads, frame: int = 0, covariance: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='F')] | None = None) -> dict:
+def contact_moments(model: Model, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)], loads: ContactLoads, frame: int = 0, covariance: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='F')] | None = None) -> dict:
     """
-    Joint moments with the feet's wrenches of one frame, changed as little as their covariances allow to give the wrench that x needs. A dict: moments (C,), N m or N; jacobian, d moments / dx (C, n); foot_wrench (F, 6) as used; foot_adjustment (F, 6), its change; remainder (6,) that no foot gives; moment_source (C,): 0 measured, 1 derived from the motion, 2 unknown (NaN); with the covariance (n, n) of x also moments_sd, foot_wrench_sd.
+    Joint moments with the contacts' wrenches of one frame, changed as little as their covariance allows to give the wrench that x needs. A dict: moments (J,), N m or N; jacobian, d moments / dx (J, n); foot_wrench (C, 6) as used; foot_adjustment (C, 6), its change; remainder (6,) that no contact gives; moment_source (J,): 0 measured, 1 derived from the motion, 2 divided by a prior; with the covariance (n, n) of x also moments_sd, foot_wrench_sd.
     """
 
 def whole_body(model: Model, states: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], segments: Sequence[str] = [], foot_wrench: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)] | None = None) -> dict:
@@ -529,20 +535,20 @@ class Filter:
     def predict(self, dt: float) -> None:
         """Moves the state by dt seconds."""
 
-    def update(self, markers: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], wrench: Annotated[NDArray[numpy.float64], dict(shape=(6), order='C')]) -> StepReport:
+    def update(self, markers: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], wrench: Annotated[NDArray[numpy.float64], dict(shape=(6), order='C')], wrench_covariance: Annotated[NDArray[numpy.float64], dict(shape=(6, 6), order='F')] | None = None, wrench_effects: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='F')] | None = None) -> StepReport:
         """
-        Corrects with markers (M, 3), m, and wrench (6,), N and N m about the ground origin; NaN: missing.
-        """
-
-    def step(self, dt: float, markers: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], wrench: Annotated[NDArray[numpy.float64], dict(shape=(6), order='C')]) -> StepReport:
-        """predict(dt), then update(markers, wrench)."""
-
-    def run(self, time: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], markers: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], wrench: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], progress: object | None = None, output_sd: bool = False, feet: FootLoads | None = None) -> dict:
-        """
-        Runs over time (T,), markers (T, M, 3) and wrench (T, 6); the first frame is an update only. Returns arrays by name; with output_sd also markers_sd, wrench_sd (of the body's own wrench) and moments_sd. With feet the moments are those of contact_moments, and foot_wrench, foot_adjustment, remainder, moment_source (and foot_wrench_sd) come with them. Raises DivergenceError naming the frame. progress(done, total) is called now and then.
+        Corrects with markers (M, 3), m, and wrench (6,), N and N m about the ground origin; NaN: missing. wrench_covariance (6, 6), about the ground origin, takes the place of the settings' in this frame.
         """
 
-    def run_smoothed(self, time: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], markers: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], wrench: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], progress: object | None = None, output_sd: bool = False, stretch: int = 0, feet: FootLoads | None = None) -> dict:
+    def step(self, dt: float, markers: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], wrench: Annotated[NDArray[numpy.float64], dict(shape=(6), order='C')], wrench_covariance: Annotated[NDArray[numpy.float64], dict(shape=(6, 6), order='F')] | None = None, wrench_effects: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='F')] | None = None) -> StepReport:
+        """predict(dt), then update(markers, wrench, wrench_covariance)."""
+
+    def run(self, time: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], markers: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], wrench: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], progress: object | None = None, output_sd: bool = False, feet: ContactLoads | None = None, wrench_covariance: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)] | None = None, wrench_effects: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)] | None = None) -> dict:
+        """
+        Runs over time (T,), markers (T, M, 3) and wrench (T, 6); the first frame is an update only. Returns arrays by name; wrench_covariance (T, 6, 6), about the ground origin, takes the place of the settings', and wrench_effects (T, 6, 6 C) is what the states of the contacts take from it; with output_sd also markers_sd, wrench_sd (of the body's own wrench) and moments_sd. With feet the moments are those of contact_moments, and foot_wrench, foot_adjustment, remainder, moment_source (and foot_wrench_sd) come with them. Raises DivergenceError naming the frame. progress(done, total) is called now and then.
+        """
+
+    def run_smoothed(self, time: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], markers: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], wrench: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], progress: object | None = None, output_sd: bool = False, stretch: int = 0, feet: ContactLoads | None = None, wrench_covariance: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)] | None = None, wrench_effects: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)] | None = None) -> dict:
         """
         run, then backwards over the same frames: the arrays of run, and smoothed_state, _markers, _wrench and _moments, each also with _sd, and backward_us. The filter then stands where run would have left it; after an interruption it stands anywhere. progress counts both ways: total is twice the frames. Memory beside the arrays: T / stretch checkpoints and stretch frames; 0: sqrt(T). Raises ValueError where bounds are kept by constraint 'gain' or 'sigmoid'.
         """
@@ -562,9 +568,9 @@ class FixedLag:
         The filter stands before the first frame and is stepped by this object alone. Each step costs in proportion to the lag; with deviations much more.
         """
 
-    def step(self, dt: float, markers: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], wrench: Annotated[NDArray[numpy.float64], dict(shape=(6), order='C')]) -> StepReport:
+    def step(self, dt: float, markers: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], wrench: Annotated[NDArray[numpy.float64], dict(shape=(6), order='C')], wrench_covariance: Annotated[NDArray[numpy.float64], dict(shape=(6, 6), order='F')] | None = None, wrench_effects: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='F')] | None = None) -> StepReport:
         """
-        dt s since the frame before (the first frame is an update only), markers (M, 3), wrench (6,).
+        As of Filter.step: dt s since the frame before (the first frame is an update only), markers (M, 3), wrench (6,).
         """
 
     @property

@@ -11,11 +11,10 @@ import xarray as xr
 
 from dynakin.arrays import finite
 from dynakin.bindings import _core
+from dynakin.filter.contacts import RESIDUAL, ContactLoads
 from dynakin.filter.events import events_of
-from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.parameters import parameters_of
 from dynakin.filter.sources import with_sources
-from dynakin.filter.contacts import RESIDUAL
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.contact import ON_PLATE
 from dynakin.recordings.recording import Recording

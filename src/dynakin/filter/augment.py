@@ -10,13 +10,15 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.bindings import _core
-from dynakin.filter.contacts import RESIDUAL
 from dynakin.filter.noise import jerk_densities, plate_sd, soft_tissue_sd
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.settings.model import QUANTITIES, Quantity
 from dynakin.settings.noise import Noise
 
 Array = npt.NDArray[np.float64]
+
+CONTACT_TIME_S = 0.3
+"""How long what is not known of a contact's wrench lasts: half a step."""
 
 
 def extended(initial: CalibratedModel, noise: Noise, estimate: Collection[Quantity] = QUANTITIES) -> CalibratedModel:
@@ -41,7 +43,7 @@ def extended(initial: CalibratedModel, noise: Noise, estimate: Collection[Quanti
         bool(seen and value > 0.0) for seen, value in zip(spec.wrench_measured, plate_sd(noise), strict=True)
     ]
     spec.wrench_delay = noise.plate_delay_sd_s > 0.0
-    spec.contacts = [*initial.feet, RESIDUAL] if initial.feet else []
+    spec.contacts = list(initial.feet)
     names = list(_core.Model(spec).layout.names)
     first = dict(zip(initial.names, range(len(initial.names)), strict=True))
     added = _added_sd(spec, noise, sd)
@@ -127,23 +129,13 @@ def continuous_noise(initial: CalibratedModel, noise: Noise, layout: _core.State
     for k in range(offset, offset + size):
         coordinate = layout.names[k].removesuffix("/acceleration")
         density[k] = jerk[kinds[coordinate]]
-        import os, json
-        qq = json.loads(os.environ.get('SPIKE', '{}')).get('J', {})
-        for key, f in qq.items():
-            if any(w in coordinate for w in key.split('|')):
-                density[k] *= f
-                break
     offset, size = layout.blocks["lengths"]
     density[offset : offset + size] = noise.length_drift_density_m2_s
     skin_s = noise.soft_tissue_time_s
     if initial.feet and noise.floating_soft_tissue_time_s is not None:
         skin_s = noise.floating_soft_tissue_time_s
-    import os,json
-    q=json.loads(os.environ.get('SPIKE','{}'))
-    offset,size=layout.blocks['contacts']
-    for k in range(offset,offset+size):
-        t=q.get('Tr',0.1) if 'residual' in layout.names[k] else q.get('Tc',0.15)
-        decay[k]=1/t; density[k]=2/t
+    offset, size = layout.blocks["contacts"]
+    decay[offset : offset + size], density[offset : offset + size] = 1.0 / CONTACT_TIME_S, 2.0 / CONTACT_TIME_S
     for block, time in (("soft_tissue", skin_s), ("plates", noise.plate_time_s)):
         offset, size = layout.blocks[block]
         for k in range(offset, offset + size):

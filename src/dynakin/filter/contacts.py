@@ -11,7 +11,7 @@ import numpy.typing as npt
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.filter.samples import in_step
-from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
+from dynakin.recordings.feet.contact import NO_CONTACT
 
 Array = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.uint8]
@@ -31,7 +31,7 @@ class ContactLoads:
         wrench: (T, C, 6) N and N m: what the plates measured, or what is expected where none does; 0 where nothing
             touches.
         covariance: (T, 6 C, 6 C) of their errors; those of contacts that share a plate go together.
-        effects: (T, 6, 6 C): what the six states of each contact, of unit variance, add to its wrench.
+        effects: (T, 6, 6 K): what the six states, of unit variance, of each of the first K contacts add to its wrench.
         contact: (T, C) NO_CONTACT, ON_PLATE, UNMEASURED or SHARED_PLATE.
         known: (T,) frames in which these contacts are all that acts on the person: in others the filter takes nothing
             from their sum.
@@ -55,20 +55,31 @@ class ContactLoads:
         force_sd: npt.ArrayLike,
         moment_sd: npt.ArrayLike,
         reference: npt.ArrayLike,
+        states: int = 0,
     ) -> ContactLoads:
         """With independent errors that are given about a reference point: 20 N there are 20 N m at a metre's distance.
 
         Args:
             force_sd: N, of each component; moment_sd: N m, about the reference point. Both broadcast to (T, C, 3).
             reference: m, ground frame, broadcast to (T, C, 3): the plate's middle, say.
+            states: of how many contacts, the first ones, the model has states.
         """
         codes = np.ascontiguousarray(contact, dtype=np.uint8)
         shape = (*codes.shape, 3)
         force, moment, point = (np.broadcast_to(np.asarray(a, float), shape) for a in (force_sd, moment_sd, reference))
         variance = np.concatenate([force, moment], axis=-1) ** 2
-        each = about_origin(variance[..., None] * np.eye(6), point)
+        X = carry(point)
+        each = (X * variance[..., None, :]) @ np.swapaxes(X, -1, -2)
         known = np.where((codes == NO_CONTACT)[..., None], 0.0, wrench)
-        return cls(tuple(names), tuple(segments), known, _joint(each), np.zeros((len(codes), 6, 6 * len(names))), codes, np.ones(len(codes), dtype=bool))
+        return cls(
+            tuple(names),
+            tuple(segments),
+            known,
+            _joint(each),
+            np.zeros((len(codes), 6, 6 * states)),
+            codes,
+            np.ones(len(codes), dtype=bool),
+        )
 
     def check(self, model: _core.Model) -> None:
         """
@@ -100,14 +111,16 @@ class ContactLoads:
         )
 
     def total(self) -> tuple[Array, Array, Array]:
-        """Sum (T, 6) of the wrenches, NaN where it is not all that acts, and its covariance (T, 6, 6)."""
+        """How the filter measures the total wrench: the sum (T, 6), NaN where it is not all that acts, its covariance
+        (T, 6, 6), and the effects (T, 6, 6 K) of the contacts' states."""
         touches = self.contact != NO_CONTACT
         frames, count = touches.shape
         blocks = self.covariance.reshape(frames, count, 6, count, 6)
         both = touches[:, :, None, None, None] & touches[:, None, None, :, None]
         total = np.where(self.known[:, None], self.wrench.sum(axis=1), np.nan)
         covariance = np.where(both, blocks, 0.0).sum(axis=(1, 3))
-        return total, covariance, np.where(np.repeat(touches, 6, axis=1)[:, None], self.effects, 0.0)
+        states = np.repeat(touches[:, : self.effects.shape[2] // 6], 6, axis=1)
+        return total, covariance, np.where(states[:, None], self.effects, 0.0)
 
     def in_step(self, time: Array, delay_s: float) -> ContactLoads:
         """What belongs to each time (T,) s where the plates lag by ``delay_s``; contacts by the nearest frame."""
@@ -117,7 +130,14 @@ class ContactLoads:
         nearest = np.clip(np.searchsorted(time, time + delay_s - 0.5 * np.median(np.diff(time))), 0, len(time) - 1)
         contact = self.contact[nearest]
         wrench = np.where((contact == NO_CONTACT)[..., None], 0.0, wrench)
-        return replace(self, wrench=wrench, covariance=self.covariance[nearest], effects=self.effects[nearest], contact=contact, known=self.known[nearest])
+        return replace(
+            self,
+            wrench=wrench,
+            covariance=self.covariance[nearest],
+            effects=self.effects[nearest],
+            contact=contact,
+            known=self.known[nearest],
+        )
 
 
 def carry(point: Array) -> Array:
@@ -126,12 +146,6 @@ def carry(point: Array) -> Array:
     found[..., :, :] = np.eye(6)
     found[..., 3:, :3] = np.cross(point[..., None, :], np.eye(3)).swapaxes(-1, -2)
     return found
-
-
-def about_origin(covariance: Array, point: Array) -> Array:
-    """Covariances (..., 6, 6) of wrenches about points (..., 3) m, carried to the ground's origin."""
-    X = carry(point)
-    return np.asarray(X @ covariance @ np.swapaxes(X, -1, -2))
 
 
 def _joint(each: Array) -> Array:

@@ -14,8 +14,8 @@ from dynakin.filter.alignment import PASSES, run_in_step
 from dynakin.filter.assemble import assemble
 from dynakin.filter.augment import initial_covariance
 from dynakin.filter.contacts import ContactLoads
-from dynakin.filter.samples import in_step, recording_arrays
 from dynakin.filter.expected import expected_loads, root_path
+from dynakin.filter.samples import in_step, recording_arrays
 from dynakin.filter.total_wrench import Ground, doubtful_mass, known_ground
 from dynakin.filter.tracker import Progress, Tracker, whether_to_smooth
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -207,7 +207,9 @@ class Estimator:
         if feet is not None:
             on_feet = feet(calibrated)
         elif ground.loads is not None:
-            on_feet = expected_loads(ground.loads, calibrated, self.noise, root_path(calibrated, markers), ground.undeclared)
+            on_feet = expected_loads(
+                ground.loads, calibrated, self.noise, root_path(calibrated, markers), ground.undeclared
+            )
         try:
             doubt = doubtful_mass(wrench, calibrated.weighed_kg, ground.load_ratio)
             passes = 0 if doubt else PASSES

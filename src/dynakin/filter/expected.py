@@ -1,28 +1,45 @@
-"""What is expected of each contact's wrench, and how surely: the plates where they bear it, else what a person can do.
+"""What is expected of each contact's wrench, and how surely: by the plates where they bear it, else by what people do.
 
-A foot that no plate measures pushes, within its sole, roughly towards the pelvis, with a small free moment; how much
-of the weight it bears rises and falls with its stance. That is a Gaussian about the middle of the sole, not a state:
-the motion says the rest, and where it does not, the deviation says so.
+A foot that no plate measures pushes, from within its sole, roughly towards the pelvis, with a small free moment; how
+much of the weight it bears rises and falls with its stance. What is not known of that are six numbers of unit variance
+which last for some tenths of a second: states of the filter, so that the motion decides them where it can, smoothly,
+and their deviations say how far it does (docs/derivations.md, section 15).
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.filter.contacts import RESIDUAL, ContactLoads, about_origin, carry
+from dynakin.filter.contacts import RESIDUAL, ContactLoads, carry
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet import loads as on_plates
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
 from dynakin.recordings.feet.loads import FootLoads
+from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.settings.noise import Noise
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
+Codes = npt.NDArray[np.uint8]
 Flags = npt.NDArray[np.bool_]
-import os, json
-P = dict(pf=2.0, pm=0.5, gain=0.01, turn=0.005, shift=0.002, rf=15.0, rm=5.0, vs=0.4, v0=0.05, h=0.12, sole=0.5, nm=0.01, elsewhere=3.0, arm=0.5, wf=5.0, wm=2.0, rwf=3.0, rwm=1.0)
-P.update(json.loads(os.environ.get("SPIKE", "{}")))
+
+PLATE_NOISE_N, PLATE_NOISE_NM = 2.0, 0.5
+"""White noise of the usual plates, the moment about the centre of pressure."""
+PLATE_GAIN, PLATE_TURN_RAD, PLATE_PLACE_M = 0.01, 0.005, 0.002
+"""Errors that grow with the load: of a plate's gain, how it lies turned, and where it lies."""
+PUSH_SD, PUSH_LEAST_SD = 0.4, 0.05
+"""Part of the weight by which a foot's push may differ from its share of it, in full stance and at its ends."""
+SHEAR_SD = 0.12
+"""The same of its force across the line to the pelvis, which the ground's reaction follows in walking and running."""
+FREE_MOMENT_M = 0.01
+"""Free moment over push: 5 to 10 N m of a grown person's foot."""
+UNDECLARED_SD = 3.0
+"""Part of the weight, and as many metres of it, that something undeclared may bear: as good as anything."""
+_WHITE_N, _WHITE_NM = 5.0, 2.0  # of a wrench that is a state
+_LEAST_HEIGHT_M = 0.3  # of the pelvis over the sole, for the direction
 
 _CONTACT = {
     on_plates.SWING: NO_CONTACT,
@@ -33,96 +50,118 @@ _CONTACT = {
 }
 
 
-def expected_loads(loads: FootLoads, initial: CalibratedModel, noise: Noise, root: Array, undeclared: Flags) -> ContactLoads:
+class Prior(NamedTuple):
+    """Of one contact: its expected wrench (T, 6), about the ground's origin, and what each of six numbers of unit
+    variance adds to it (T, 6, 6)."""
+
+    mean: Array
+    spread: Array
+
+
+def expected_loads(
+    loads: FootLoads, initial: CalibratedModel, noise: Noise, root: Array, undeclared: Flags
+) -> ContactLoads:
+    """The feet's wrenches and, last, the residual: what neither they nor the model explain, on the root.
+
+    Args:
+        root: (T, 3) m, where the root segment is. undeclared: (T,) frames in which something else bears the person.
+    """
     weight = initial.weighed_kg * GRAVITY_M_S2
     contact = np.vectorize(_CONTACT.get, otypes=[np.uint8])(loads.reason)
-    T, F = contact.shape
-    C = F + 1
-    wrench = np.zeros((T, C, 6))
-    wrench[:, :F] = np.nan_to_num(np.where((contact == NO_CONTACT)[..., None], 0.0, loads.wrench))
-    white = np.zeros((T, C, 6, C, 6))
-    effects = np.zeros((T, 6, C, 6))
-    push = np.maximum(np.abs(wrench[:, :F, 1]), on_plates.LOADED_N)
-    pressure = np.stack([wrench[:, :F, 5] / push, np.zeros_like(push), -wrench[:, :F, 3] / push], axis=-1)
-    plate = _plate_errors(push, pressure)
-    mean, spread = _of_feet(loads, weight, root)
+    frames, F = contact.shape
+    wrench = np.nan_to_num(np.where((contact == NO_CONTACT)[..., None], 0.0, loads.wrench))
+    wrench = np.concatenate([wrench, np.zeros((frames, 1, 6))], axis=1)
+    errors, effects = np.zeros((frames, F + 1, 6, F + 1, 6)), np.zeros((frames, 6, F, 6))
+    shared: list[Prior] = []
     for k in range(F):
+        errors[:, k, :, k] = plate_errors(wrench[:, k])
+        prior = foot_prior(loads, k, weight, root)
+        shared.append(prior)
         off = contact[:, k] == UNMEASURED
-        white[:, k, :, k] = plate[:, k]
-        white[off, k, :, k] = about_origin(np.diag([P["wf"] ** 2] * 3 + [P["wm"] ** 2] * 3), loads_sole(loads, root)[off, k])
-        wrench[off, k] = mean[off, k]
-        effects[off, :, k] = spread[off, k]
-    frames = np.flatnonzero((contact == SHARED_PLATE).any(axis=1))
-    if len(frames):
-        each = spread @ np.swapaxes(spread, -1, -2)
-        _divide(wrench, white, frames, contact, mean, each, plate)
-    X = carry(root)
-    size = np.where(undeclared[:, None], P["elsewhere"] * weight, [P["rf"]] * 3 + [P["rm"]] * 3)
-    effects[:, :, F] = X * size[:, None, :]
-    white[:, F, :, F] = X @ np.diag([P["rwf"] ** 2] * 3 + [P["rwm"] ** 2] * 3) @ np.swapaxes(X, -1, -2)
-    names = (*loads.feet, RESIDUAL)
+        wrench[off, k], effects[off, :, k] = prior.mean[off], prior.spread[off]
+        errors[off, k, :, k] = _about(root[off], np.array([_WHITE_N] * 3 + [_WHITE_NM] * 3))
+    for t in np.flatnonzero((contact == SHARED_PLATE).any(axis=1)):
+        _divide(int(t), np.flatnonzero(contact[t] == SHARED_PLATE), shared, wrench, errors)
+    size = [noise.residual_force_sd_n] * 3 + [noise.residual_moment_sd_nm] * 3
+    errors[:, F, :, F] = _about(root, np.where(undeclared[:, None], UNDECLARED_SD * weight, size))
+    residual = np.where(undeclared, UNMEASURED, ON_PLATE if all(size) else NO_CONTACT)
     pelvis = next(s.name for s in initial.spec.segments if s.parent == "ground")
-    segments = (*(initial.feet[foot] for foot in loads.feet), pelvis)
-    codes = np.column_stack([contact, np.full(T, ON_PLATE, dtype=np.uint8)])
-    return ContactLoads(names, segments, wrench, white.reshape(T, 6 * C, 6 * C), effects.reshape(T, 6, 6 * C), codes, ~undeclared)
+    return ContactLoads(
+        names=(*loads.feet, RESIDUAL),
+        segments=(*(initial.feet[foot] for foot in loads.feet), pelvis),
+        wrench=wrench,
+        covariance=errors.reshape(frames, 6 * F + 6, 6 * F + 6),
+        effects=effects.reshape(frames, 6, 6 * F),
+        contact=np.column_stack([contact, residual]).astype(np.uint8),
+        known=~undeclared,
+    )
 
 
-def loads_sole(loads: FootLoads, root: Array) -> Array:
-    return np.where(np.isfinite(loads.sole), loads.sole, root[:, None] * [1.0, 0.0, 1.0])
+def plate_errors(wrench: Array) -> Array:
+    """Covariances (T, 6, 6) about the ground's origin of what a plate says, (T, 6) about it too: at its centre of
+    pressure on the level of that origin."""
+    push = np.maximum(np.abs(wrench[:, 1]), LOADED_N)
+    pressure = np.stack([wrench[:, 5] / push, np.zeros_like(push), -wrench[:, 3] / push], axis=1)
+    shear, lift = np.hypot(PLATE_NOISE_N, PLATE_TURN_RAD * push), np.hypot(PLATE_NOISE_N, PLATE_GAIN * push)
+    moment = np.hypot(PLATE_NOISE_NM, PLATE_PLACE_M * push)
+    return _about(pressure, np.stack([shear, lift, shear, moment, moment, moment], axis=1))
 
 
-def _plate_errors(push: Array, pressure: Array) -> Array:
-    f_h = np.hypot(P["pf"], P["turn"] * push)
-    f_v = np.hypot(P["pf"], P["gain"] * push)
-    n = np.hypot(P["pm"], P["shift"] * push)
-    variance = np.stack([f_h, f_v, f_h, n, n, n], axis=-1) ** 2
-    return about_origin(variance[..., None] * np.eye(6), pressure)
+def foot_prior(loads: FootLoads, k: int, weight: float, root: Array) -> Prior:
+    """Of foot number k, by its sole and its stance.
+
+    The six numbers are, in order: shear along X; push, along the line from the centre of pressure to the root; shear
+    along Z; the two coordinates of the centre of pressure, with the free moment between them.
+    """
+    soles = loads.soles
+    seen: Flags = np.asarray(np.isfinite(soles.pressure[:, k]).all(axis=1))
+    place = np.where(seen[:, None], soles.pressure[:, k], root * [1.0, 0.0, 1.0])
+    spread_m2 = np.where(seen[:, None, None], soles.pressure_covariance[:, k], np.eye(2))
+    stance = soles.stance[:, k]
+    share = stance / np.maximum(soles.stance.sum(axis=1), 1.0)
+    to_root = root - place
+    direction = np.concatenate([to_root / np.maximum(to_root[:, [1]], _LEAST_HEIGHT_M), np.zeros_like(root)], axis=1)
+    direction[:, 1] = 1.0
+    load = weight * (PUSH_LEAST_SD + PUSH_SD * stance) / (PUSH_LEAST_SD + PUSH_SD)  # the weight, in full stance
+    spread = np.zeros((len(root), 6, 6))
+    spread[:, :, 1] = (PUSH_LEAST_SD + PUSH_SD) * load[:, None] * direction
+    spread[:, 0, 0] = spread[:, 2, 2] = SHEAR_SD * load
+    spread[:, 4, 4] = FREE_MOMENT_M * load
+    L = load[:, None, None] * np.linalg.cholesky(spread_m2)
+    for column, axis in ((3, 0), (5, 1)):  # a force upwards at (x, z) has moments (-z, 0, x)
+        spread[:, 3, column], spread[:, 5, column] = -L[:, 1, axis], L[:, 0, axis]
+    X = carry(place)
+    return Prior((X @ (weight * share[:, None] * direction)[..., None])[..., 0], X @ spread)
 
 
-def _of_feet(loads: FootLoads, weight: float, root: Array) -> tuple[Array, Array]:
-    sole = loads_sole(loads, root)
-    to_root = root[:, None] - sole
-    slope = to_root[..., [0, 2]] / np.maximum(to_root[..., [1]], 0.3)
-    share = loads.stance / np.maximum(loads.stance.sum(axis=1, keepdims=True), 1.0)
-    push = weight * share
-    direction = np.zeros((*push.shape, 6))
-    direction[..., 0], direction[..., 1], direction[..., 2] = slope[..., 0], 1.0, slope[..., 1]
-    v = weight * (P["v0"] + P["vs"] * loads.stance)
-    h = P["h"] * v / (P["vs"] + P["v0"])
-    arm = P["sole"] * loads.sole_half_m.max(axis=1)
-    load = v / (P["vs"] + P["v0"])
-    n = arm * load
-    free = P["nm"] * load
-    spread = np.zeros((*push.shape, 6, 6))
-    spread[..., 1] = v[..., None] * direction
-    spread[..., 0, 0] = spread[..., 2, 2] = h
-    L = np.linalg.cholesky(loads.cov)
-    spread[..., 3, 3], spread[..., 5, 3] = -load * L[..., 1, 0], load * L[..., 0, 0]
-    spread[..., 3, 5], spread[..., 5, 5] = -load * L[..., 1, 1], load * L[..., 0, 1]
-    spread[..., 4, 4] = free
-    mean = push[..., None] * direction
-    mean[..., 3:] += np.cross(sole, mean[..., :3])
-    return mean, carry(sole) @ spread
+def _about(point: Array, sd: Array) -> Array:
+    """(T, 6, 6) about the ground's origin of independent errors sd, (6,) or (T, 6), about a point (T, 3)."""
+    spread = carry(point) * np.broadcast_to(sd, (len(point), 6))[:, None]
+    return np.asarray(spread @ np.swapaxes(spread, 1, 2))
 
 
-def _divide(wrench: Array, white: Array, frames: npt.NDArray[np.intp], contact: npt.NDArray[np.uint8], mean: Array, each: Array, plate: Array) -> None:
-    for t in frames:
-        own = np.flatnonzero(contact[t] == SHARED_PLATE)
-        S = each[t, own].sum(axis=0) + plate[t, own].max(axis=0)
-        lack = wrench[t, own].sum(axis=0) - mean[t, own].sum(axis=0)
-        for i in own:
-            wrench[t, i] = mean[t, i] + each[t, i] @ np.linalg.solve(S, lack)
-            for j in own:
-                white[t, i, :, j] = (each[t, i] if i == j else 0.0) - each[t, i] @ np.linalg.solve(S, each[t, j])
+def _divide(t: int, feet: npt.NDArray[np.intp], priors: list[Prior], wrench: Array, errors: Array) -> None:
+    """A frame's plate among the feet on it, in place: their priors, given the sum that it measures."""
+    each = {k: priors[k].spread[t] @ priors[k].spread[t].T for k in feet}
+    plate = np.max([errors[t, k, :, k] for k in feet], axis=0)
+    S = np.sum(list(each.values()), axis=0) + plate
+    lacks = np.sum([wrench[t, k] - priors[k].mean[t] for k in feet], axis=0)
+    gains = {k: np.linalg.solve(S, each[k]).T for k in feet}
+    for k in feet:
+        wrench[t, k] = priors[k].mean[t] + gains[k] @ lacks
+        for j in feet:
+            errors[t, k, :, j] = (each[k] if j == k else 0.0) - gains[k] @ each[j]
 
 
 def root_path(initial: CalibratedModel, markers: Array) -> Array:
-    """(T, 3) m: middle of the root segment's markers, held or led over gaps."""
+    """(T, 3) m: middle of the root segment's markers (T, M, 3) of the model, drawn over gaps by straight lines."""
     root = next(s.name for s in initial.spec.segments if s.parent == "ground")
     own = [k for k, marker in enumerate(initial.spec.markers) if marker.segment == root]
+    places = markers[:, own] if own else markers
+    seen: Flags = np.asarray(np.isfinite(places).all(axis=2))
     with np.errstate(invalid="ignore"):
-        path = np.nanmean(markers[:, own or slice(None)], axis=1)
-    for axis in range(3):
-        seen = np.isfinite(path[:, axis])
-        path[:, axis] = np.interp(np.arange(len(path)), np.flatnonzero(seen), path[seen, axis]) if seen.any() else 0.0
-    return path
+        path = np.where(seen[..., None], places, 0.0).sum(axis=1) / seen.sum(axis=1, keepdims=True)
+    known = np.flatnonzero(seen.any(axis=1))
+    if not len(known):
+        return np.zeros_like(path)
+    return np.stack([np.interp(np.arange(len(path)), known, path[known, axis]) for axis in range(3)], axis=1)

@@ -41,7 +41,9 @@ def with_sources(data: xr.Dataset, feet: ContactLoads | None, undeclared: Flags)
         moments = data["moment_source"].transpose("time", "coordinate").values.copy()
         legs = _below_the_thighs([segments.index(name) for name in dict.fromkeys(feet.segments)], parents)
     joints[np.ix_(undeclared, ~legs)] = ABSENT
-    moments[np.ix_(undeclared, ~legs[moved])] = ABSENT
+    if feet is not None:  # a foot on no plate may be what it bears
+        joints[undeclared[:, None] & (joints != MEASURED)] = ABSENT
+    moments[undeclared[:, None] & (joints[:, moved] == ABSENT)] = ABSENT
     known, held = moments != ABSENT, joints != ABSENT
     found = data.assign(
         moment_source=(("time", "coordinate"), moments.astype(np.uint8)),

@@ -145,7 +145,7 @@ def step_estimate(
     time_s: float,
     x: Array,
     report: _core.StepReport | None,
-    feet: _core.FootLoads | None = None,
+    feet: _core.ContactLoads | None = None,
 ) -> StepEstimate:
     """Everything that a state x (n,) says of its frame; with one frame of feet the moments that these leave."""
     q, qd, qdd = _core.coordinates(model, x)
@@ -161,7 +161,7 @@ def step_estimate(
 
 
 def deviations_of(
-    model: _core.Model, x: Array, covariance: Array, feet: _core.FootLoads | None = None
+    model: _core.Model, x: Array, covariance: Array, feet: _core.ContactLoads | None = None
 ) -> dict[str, Array]:
     """Standard deviations of a state's outputs: J P J' for moments and wrench.
 

@@ -11,34 +11,23 @@ import numpy.typing as npt
 from dynakin.arrays import runs
 from dynakin.errors import RecordingError
 from dynakin.filter.closure import EXCESS, Closure, closure
-from dynakin.filter.contacts import ContactLoads
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.checks import PlateCheck, check_plates
 from dynakin.recordings.feet import loads as on_plates
 from dynakin.recordings.feet.assignment import foot_loads
-from dynakin.recordings.feet.contact import NEAR_M, NO_CONTACT, ON_PLATE, UNMEASURED
+from dynakin.recordings.feet.contact import NEAR_M
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.recordings.recording import Recording
-from dynakin.settings.noise import Noise
 from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
-ELSEWHERE = "elsewhere"
-"""Name of the contact that stands for all that bears the person and is no foot; it acts on the root."""
 MASS_APART = 0.05
 """Part of the weight by which the plates' mean may differ before the mass is doubted: movement explains 2 or 3 %."""
 
-_CONTACT = {
-    on_plates.SWING: NO_CONTACT,
-    on_plates.MEASURED: ON_PLATE,
-    on_plates.SHARED: ON_PLATE,
-    on_plates.OFF_PLATE: UNMEASURED,
-    on_plates.UNKNOWN: UNMEASURED,
-}
 UNJUDGED = (
     "The recording is too short, or shows too few markers, to check by the motion of the centre of mass that the "
     "plates carry the person."
@@ -47,32 +36,6 @@ MANY = 0.2
 """Part of the frames from which it is said that they could not be checked; the ends of a recording never can."""
 _NEARLY_ALL = 0.8
 """Part of the judged frames from which an excess is said of the whole recording: its mass may be wrong."""
-_SHARED_PART = 0.2
-"""Part of a foot's load by which the division of a shared plate may err."""
-_SHARED_REACH_M = 0.1
-"""How far, as an arm of that force, its point may err."""
-
-
-def foot_wrenches(loads: FootLoads, initial: CalibratedModel, noise: Noise) -> ContactLoads:
-    """Each foot's wrench with its uncertainty: the plates' noise at the foot's centre of pressure. Last comes the
-    contact `ELSEWHERE`, not measured in the frames in which something else may bear the person.
-
-    On a shared plate the division is known to a fifth of the load, and to the feet's distance.
-    """
-    contact = np.vectorize(_CONTACT.get, otypes=[np.uint8])(loads.reason)
-    contact = np.column_stack([contact, np.where(loads.elsewhere, UNMEASURED, NO_CONTACT)])
-    wrench = np.concatenate([loads.wrench, np.zeros((len(contact), 1, 6))], axis=1)
-    known = np.nan_to_num(wrench)
-    push = np.maximum(known[..., 1], LOADED_N)
-    pressure = np.stack([known[..., 5] / push, np.zeros_like(push), -known[..., 3] / push], axis=-1)
-    shared = np.pad(loads.reason == on_plates.SHARED, ((0, 0), (0, 1))) * _SHARED_PART * push
-    force = np.hypot(
-        np.sqrt(noise.force_variance_n2 / 2.0), shared[..., None]
-    )  # the noise declared is that of both together
-    moment = np.hypot(np.sqrt(noise.moment_variance_n2_m2 / 2.0), _SHARED_REACH_M * shared[..., None])
-    root = next(s.name for s in initial.spec.segments if s.parent == "ground")
-    names, segments = (*loads.feet, ELSEWHERE), [*(initial.feet[foot] for foot in loads.feet), root]
-    return ContactLoads.of(names, segments, wrench, contact, force, moment, pressure)
 
 
 @dataclass(frozen=True, eq=False)

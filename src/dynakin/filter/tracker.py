@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Collection
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from dynakin.bindings import _core
 from dynakin.errors import ConfigError, DivergenceError, RecordingError
-from dynakin.filter.core_filter import core_filter
 from dynakin.filter.contacts import ContactLoads
+from dynakin.filter.core_filter import core_filter
 from dynakin.filter.samples import Sample, sample_arrays
 from dynakin.filter.step import Labelled, Labels, StepEstimate, deviations_of, step_estimate
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -174,10 +175,8 @@ class Tracker:
             DivergenceError: the filter lost its estimate; the message names the frame.
         """
         time, markers, wrench = (np.ascontiguousarray(values) for values in (time, markers, wrench))
-        wrench, covariance, effects = (wrench, None, None) if feet is None else feet.total()
-        arrays = self._filter.run(
-            time, markers, wrench, progress, output_sd=True, feet=self._loads(feet), wrench_covariance=covariance, wrench_effects=effects
-        )
+        wrench, given = self._given(wrench, feet)
+        arrays = self._filter.run(time, markers, wrench, progress, output_sd=True, **given)
         self._time, self._latest = float(time[-1]), None
         return arrays
 
@@ -196,12 +195,17 @@ class Tracker:
         """
         check_can_smooth(self.noise)
         time, markers, wrench = (np.ascontiguousarray(values) for values in (time, markers, wrench))
-        wrench, covariance, effects = (wrench, None, None) if feet is None else feet.total()
-        arrays = self._filter.run_smoothed(
-            time, markers, wrench, progress, feet=self._loads(feet), wrench_covariance=covariance, wrench_effects=effects
-        )
+        wrench, given = self._given(wrench, feet)
+        arrays = self._filter.run_smoothed(time, markers, wrench, progress, **given)
         self._time, self._latest = float(time[-1]), None
         return smoothed(arrays)
+
+    def _given(self, wrench: Array, feet: ContactLoads | None) -> tuple[Array, dict[str, Any]]:
+        """The total wrench, and how it and the contacts are known: what these sum up to where there are any."""
+        if feet is None:
+            return wrench, {}
+        total, covariance, effects = feet.total()
+        return total, {"feet": self._loads(feet), "wrench_covariance": covariance, "wrench_effects": effects}
 
     def _loads(self, feet: ContactLoads | None) -> _core.ContactLoads | None:
         if feet is None:

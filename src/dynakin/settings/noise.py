@@ -111,7 +111,7 @@ class Noise(Strict, use_attribute_docstrings=True):
     marker_variance_m2: dict[str, Positive] = Field(default_factory=dict)
     """R of single markers, m^2, by their name in the recording, instead of the marker set's."""
     force_variance_n2: Positive = scale(36.0, "N²", "noise of the forces")
-    """R of each force component of the total wrench, N^2."""
+    """R of each force component of the total wrench, N^2, of a model that stands on its root."""
     moment_variance_n2_m2: Positive = scale(4.0, "(N m)²", "noise of the moments")
     """R of each moment component about the reference point, (N m)^2."""
     reference_point_m: tuple[float, float, float] | Literal["auto"] = "auto"
@@ -123,6 +123,12 @@ class Noise(Strict, use_attribute_docstrings=True):
     """The same of each moment about the ground origin, N m."""
     plate_time_s: Seconds = scale(30.0, "s", "how long that error lasts")
     """Time constant of that slow error."""
+    residual_force_sd_n: NotNegative = scale(12.0, "N", "what the model does not explain of the forces")
+    """Of a model that is fixed nowhere: standard deviation, in each frame, of the force on its root that neither
+    contacts nor the model's bodies explain (soft mass, rigid segments, late accelerations). 0: the plates are changed
+    until nothing is left."""
+    residual_moment_sd_nm: NotNegative = scale(4.0, "N m", "what the model does not explain of the moments")
+    """The same of the moment about the root. 0 with the one above."""
     plate_load_tolerance: Positive | None = 0.15
     """Plates whose load is further from the person's weight than this part of it are not used: something that the model
     does not have bears on them. Not given: they always are."""

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from dynakin.bindings import _core
 from dynakin.filter.contacts import ContactLoads
-from dynakin.filter.total_wrench import foot_wrenches
+from dynakin.filter.expected import expected_loads
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.assignment import BETWEEN_M
 from dynakin.recordings.feet.belt import WINDOW_S, one_velocity
@@ -57,6 +57,8 @@ class LiveFeet:
         self.feet = tuple(initial.feet)
         self._assigned = {p: self.feet.index(assigned[name]) for p, name in enumerate(plates) if name in assigned}
         segments = [marker.segment for marker in initial.spec.markers]
+        root = next(s.name for s in initial.spec.segments if s.parent == "ground")
+        self._on_root = np.flatnonzero([s == root for s in segments]) if root in segments else np.arange(len(segments))
         own = [np.flatnonzero([s == initial.feet[foot] for s in segments]) for foot in self.feet]
         F, P, M = len(self.feet), len(plates), len(segments)
         self._own = np.full((F, max(map(len, own), default=0)), M)  # markers of each foot, filled up with M: none
@@ -97,7 +99,9 @@ class LiveFeet:
         ahead[offset : offset + size] += dt * state[speeds : speeds + size]
         before, places = _core.marker_positions(model, state), _core.marker_positions(model, ahead)
         loads = self.loads(time_s, places, (places - before) / dt, wrenches)
-        return foot_wrenches(loads, self.initial, self.noise), bool(loads.total_known[0])
+        root = places[self._on_root].mean(axis=0)[None]
+        undeclared = loads.elsewhere & (wrenches is not None)
+        return expected_loads(loads, self.initial, self.noise, root, undeclared), bool(loads.total_known[0])
 
     def loads(self, time_s: float, places: Array, velocity: Array, wrenches: Array | None) -> FootLoads:
         """The same as loads (T = 1).
@@ -118,7 +122,7 @@ class LiveFeet:
         else:
             self._owners[:], off = False, bears
         on = self._owners[:, : len(plates)]
-        soles = self._soles(outlines, bears, time_s)
+        soles = self._soles(outlines, bears, time_s, places)
         seen_none = np.zeros_like(off)  # the model shows all of them
         loads = divided(self.feet, plates, soles, self._marked, on[None], off[None], seen_none[None], aloft[None])
         for p in np.flatnonzero(on.sum(axis=0) > 1) if (loads.reason == SHARED).any() else ():
@@ -132,7 +136,7 @@ class LiveFeet:
             )
         return loads
 
-    def _soles(self, outlines: Array, bears: Flags, time_s: float) -> Soles:
+    def _soles(self, outlines: Array, bears: Flags, time_s: float, places: Array) -> Soles:
         """Soles of this moment (T = 1). Their sizes and places among the markers are those that were seen first. When
         a stance that goes on will end is not known yet."""
         F = len(self.feet)
@@ -143,15 +147,20 @@ class LiveFeet:
         self._since = np.where(bears, np.fmin(self._since, time_s), np.nan)
         lowest = float(np.append(self._standing, np.inf)[self._own].min())
         middle, half = np.full((1, F, 3), np.nan), np.stack([shape.half_m for shape in self._shapes])
+        pressure, covariance = middle.copy(), np.tile(np.eye(2), (1, F, 1, 1))
         for f in np.flatnonzero(self._marked).tolist():
             own = self._own[f] < len(self._floor)
-            x, z = self._shapes[f].middle(outlines[[f]][:, own])[0]
+            points = outlines[[f]][:, own]
+            x, z = self._shapes[f].middle(points)[0]
+            rise = places[self._own[f][own], 1] - self._floor[self._own[f][own]]
+            ahead, covariance[:, f] = self._shapes[f].rolled(points, rise[None])
             over = float(self._floor[self._own[f][own]].min()) - lowest  # steps down are below where the feet began
             middle[0, f] = x, self._floor_m + over + self._level[f], z
+            pressure[0, f] = middle[0, f] + np.array([ahead[0, 0], 0.0, ahead[0, 1]])
         since, left = time_s - self._since, time_s - self._touched
         weight = smooth_step(np.fmin((since + EARLY_S) / PASSING_S, 1.0 - left / AFTER_S))
         weight = np.where(self._marked, np.where(bears, weight, 0.0), 1.0)
-        return Soles(middle, half, (bears | ~self._marked)[None], weight[None])
+        return Soles(middle, half, (bears | ~self._marked)[None], weight[None], pressure, covariance)
 
     def news(self) -> list[str]:
         """Sentences, each said once."""

@@ -54,6 +54,7 @@ class FootContact:
 
     Attributes:
         outline: (T, K, 2) m, horizontal places [X, Z of the ground] of its markers, NaN where not seen.
+        rise_m: (T, K) height of each marker over its place when the foot stands flat on the floor, NaN where not seen.
         seen: (T,) one of its markers is.
         under: (T, P) plates whose centre of pressure lies within or near its outline.
         support_m: (T,) height of what it stands on; in between, on the straight line from one to the next.
@@ -67,6 +68,7 @@ class FootContact:
     """
 
     outline: Array
+    rise_m: Array
     seen: Flags
     under: Flags
     support_m: Array
@@ -252,8 +254,9 @@ class _Foot:
         under = np.stack(self.near, axis=1) if self.near else np.zeros((len(stands), 0), dtype=bool)
         support = self._support(stances)
         return FootContact(
-            self.outline, self.seen, under, support, self.belt, self.touching, stands, stances, low, moves, aloft
-        )
+            self.outline, self.rise, self.seen, under, support, self.belt, self.touching, stands, stances, low, moves,
+            aloft,
+        )  # fmt: skip
 
     def _support(self, stances: Sequence[tuple[int, int]]) -> Array:
         """(T,) m, height of the support: its level by the lift of the foot, anchored where a plate carries it."""

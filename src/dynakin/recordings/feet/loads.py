@@ -37,11 +37,7 @@ class FootLoads:
         elsewhere: (T,) frames in which something else may bear the person: no plate measures at all, a plate carries
             what no foot puts on it, or (`with_undeclared`) the motion needs what the plates do not have.
         aloft: (T, F) feet that are surely in the air, by their markers alone.
-        sole: (T, F, 3) m, middle of each foot's sole at the height of what it stands on, ground frame; NaN where the
-            foot is not seen.
-        sole_half_m: (F, 2) half the sole's length and half its width.
-        bears: (T, F) the foot may bear load, by its markers and what supports it alone.
-        stance: (T, F) from 0 at touch-down to 1 and back to 0 at toe-off, smooth.
+        soles: where the feet's soles are, when they may bear load, and where it is expected.
         messages: sentences with times. reasons: those of them that say why something is not measured.
     """
 
@@ -52,10 +48,7 @@ class FootLoads:
     all_measured: Flags
     elsewhere: Flags
     aloft: Flags
-    sole: Array
-    sole_half_m: Array
-    bears: Flags
-    stance: Array
+    soles: Soles
     messages: tuple[str, ...] = ()
     reasons: tuple[str, ...] = ()
 
@@ -160,10 +153,7 @@ def divided(
         all_measured,
         np.zeros(n, dtype=bool),
         aloft,
-        soles.middle,
-        soles.half_m,
-        soles.bears,
-        soles.stance,
+        soles,
     )
     return loads.with_undeclared(elsewhere)
 
