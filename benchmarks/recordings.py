@@ -3,7 +3,7 @@
     OMP_NUM_THREADS=1 .venv/bin/python benchmarks/recordings.py [NAME...] [--jobs 2] [--write]
 
 Each runs with its own .osim, else ``fullbody``, and no option but the mass, the forces and the standing trial that
-belong to it. What is measured, derived and absent is what ``estimate.nc`` says (``moment_source``). Runs are kept in
+belong to it. What is measured, derived, prior and absent is what ``estimate.nc`` says (``moment_source``). Runs are kept in
 ``build/recordings`` by their inputs and the source, so that the table can be made again. ``--write`` puts the tables
 into ``docs/validation.md``.
 """
@@ -34,7 +34,7 @@ PAGE = ROOT / "docs" / "validation.md"
 MARKS = ("<!-- recordings: begin -->", "<!-- recordings: end -->")
 LIMIT_S = 1800.0
 SHOWN = 240  # characters of a refusal
-MEASURED, DERIVED, ABSENT = range(3)
+MEASURED, DERIVED, PRIOR, ABSENT = range(4)
 Make = Callable[[], Reference]
 Codes = NDArray[np.integer]
 
@@ -263,7 +263,7 @@ def compared(run: Run, data: xr.Dataset, reference: Reference) -> dict[tuple[str
 
 
 def _share(codes: Codes) -> str:
-    return " / ".join(str(int(np.count_nonzero(codes == code))) for code in (MEASURED, DERIVED, ABSENT))
+    return " / ".join(str(int(np.count_nonzero(codes == code))) for code in (MEASURED, DERIVED, PRIOR, ABSENT))
 
 
 def _mm(value: float | None) -> str:
@@ -273,7 +273,7 @@ def _mm(value: float | None) -> str:
 def tables(runs: list[Run]) -> Iterator[str]:
     """Markdown, line by line."""
     yield (
-        "| recording | model | exit | refused, or why not 0 | frames | right: measured / derived / absent | left "
+        "| recording | model | exit | refused, or why not 0 | frames | right: measured / derived / prior / absent | left "
         "| markers, mean RMS, mm |"
     )
     yield "|---|---|---|---|---|---|---|---|"
