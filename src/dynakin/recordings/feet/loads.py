@@ -42,6 +42,7 @@ class FootLoads:
         sole_half_m: (F, 2) half the sole's length and half its width.
         bears: (T, F) the foot may bear load, by its markers and what supports it alone.
         stance: (T, F) from 0 at touch-down to 1 and back to 0 at toe-off, smooth.
+        on: (T, F, P) which foot stands on which plate: the run's one assignment.
         messages: sentences with times. reasons: those of them that say why something is not measured.
     """
 
@@ -56,6 +57,7 @@ class FootLoads:
     sole_half_m: Array
     bears: Flags
     stance: Array
+    on: Flags
     messages: tuple[str, ...] = ()
     reasons: tuple[str, ...] = ()
 
@@ -164,6 +166,7 @@ def divided(
         soles.half_m,
         soles.bears,
         soles.stance,
+        on,
     )
     return loads.with_undeclared(elsewhere)
 
