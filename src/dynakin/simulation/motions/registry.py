@@ -13,6 +13,7 @@ from dynakin.errors import ConfigError
 from dynakin.files import is_file
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.mechanics import Motion
+from dynakin.simulation.motions.belt import belt_movement
 from dynakin.simulation.motions.gait import gait_movement
 from dynakin.simulation.motions.motion_file import file_movement
 from dynakin.simulation.motions.movement import Movement
@@ -32,6 +33,7 @@ MOTIONS: dict[str, Callable[[np.random.Generator, SimulatedBody, float], Movemen
 MOTIONS_IN_SPACE: dict[str, Callable[[np.random.Generator, SimulatedBody, float], Movement]] = {
     "squat": squat_in_space,
     "gait": gait_movement,
+    "belt": belt_movement,
 }
 """Those of the whole body in space."""
 
