@@ -17,6 +17,7 @@ from dynakin.simulation.motions.belt import belt_movement
 from dynakin.simulation.motions.gait import gait_movement
 from dynakin.simulation.motions.motion_file import file_movement
 from dynakin.simulation.motions.movement import Movement
+from dynakin.simulation.motions.sit_in_space import sit_in_space
 from dynakin.simulation.motions.sit_to_stand import sit_to_stand_movement
 from dynakin.simulation.motions.squat import squat_movement
 from dynakin.simulation.motions.squat_in_space import squat_in_space
@@ -34,6 +35,7 @@ MOTIONS_IN_SPACE: dict[str, Callable[[np.random.Generator, SimulatedBody, float]
     "squat": squat_in_space,
     "gait": gait_movement,
     "belt": belt_movement,
+    "sit": sit_in_space,
 }
 """Those of the whole body in space."""
 
