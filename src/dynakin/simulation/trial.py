@@ -34,7 +34,7 @@ Array = NDArray[np.float64]
 GROUND_IN_LABORATORY = (-0.12, -0.60)  # x and z (m) of the ground origin; the floor is y = 0
 SYNTHETIC_S = 20.0  # duration of a motion that has no end of its own
 # Of walking across a laboratory, on a belt, over steps, of one jump.
-USUAL_S = {"gait": 4.0, "belt": 10.0, "steps": 4.0, "drop-jump": 5.0}
+USUAL_S = {"gait": 4.0, "belt": 10.0, "steps": 5.0, "steps-down": 5.0, "drop-jump": 5.0}
 LONGEST_FRAMES = 2_000_000
 
 

@@ -113,6 +113,8 @@ def _grips(movement: Movement, body: SimulatedBody, duration_s: float) -> tuple[
     shift = moving.segments["pelvis"].origin
     slope = np.array([np.polyfit(np.linspace(0.0, duration_s, 41), shift[:, k], 1)[0] for k in range(3)])
     velocity = np.where(np.abs(slope) > _SLOW_M_S, slope, 0.0)
+    if np.abs(slope[0]) > _SLOW_M_S and movement.refitted is None:
+        raise ConfigError(f"simulation: rail along {movement.name!r}, expected one beside a motion on the level")
     walks = movement.belt_m_s > 0.0 or bool(np.any(velocity != 0.0))
     grips = []
     for side, sign in SIDES:

@@ -21,6 +21,7 @@ from dynakin.simulation.motions.sit_in_space import sit_in_space
 from dynakin.simulation.motions.sit_to_stand import sit_to_stand_movement
 from dynakin.simulation.motions.squat import squat_movement
 from dynakin.simulation.motions.squat_in_space import squat_in_space
+from dynakin.simulation.motions.steps import steps_down, steps_up
 from dynakin.simulation.motions.sway import sway_movement
 
 Array = NDArray[np.float64]
@@ -36,6 +37,8 @@ MOTIONS_IN_SPACE: dict[str, Callable[[np.random.Generator, SimulatedBody, float]
     "gait": gait_movement,
     "belt": belt_movement,
     "sit": sit_in_space,
+    "steps": steps_up,
+    "steps-down": steps_down,
 }
 """Those of the whole body in space."""
 
