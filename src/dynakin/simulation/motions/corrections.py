@@ -7,7 +7,7 @@ every sixth one can be tried at once: the Jacobian costs six evaluations for eac
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +24,9 @@ Array = NDArray[np.float64]
 _DEGREE = 5
 _SPAN = _DEGREE + 1
 _TRIED = 1e-6  # m or rad
+# How far to go along a round's step. Rows are nearly of second degree in it, so a full one that makes things worse is
+# mended by the next round; a shorter one would only crawl.
+_PARTS, _WORSE = (1.0, 0.5, 0.2, 0.1, 0.03), 30.0
 
 
 @dataclass(frozen=True)
@@ -52,6 +55,8 @@ def fit_corrections(
     time: Array,
     residuals: Callable[[Mapping[str, Jet]], Array],
     rounds: int,
+    changed: Sequence[str] | None = None,
+    start: Corrections | None = None,
 ) -> Corrections:
     """The corrections that make rows (T, R) at times (T,) small, by Gauss and Newton.
 
@@ -61,10 +66,12 @@ def fit_corrections(
         residuals: corrections at ``time`` -> rows (T, R), each over what it may well be; a row depends on what is at its
             time only.
         rounds: of Gauss and Newton.
+        changed: names whose corrections are sought, all where None; the others stay as they are at the start.
+        start: from where, on the same knots.
     """
     names, count = tuple(sizes), len(knots) - _SPAN
     weights = np.repeat([1.0 / size**2 for size in sizes.values()], count)
-    found = np.zeros((len(names), count))
+    found = np.zeros((len(names), count)) if start is None else start.coefficients
 
     def rows_of(coefficients: Array) -> Array:
         return residuals(Corrections(names, knots, coefficients).at(time))
@@ -75,7 +82,9 @@ def fit_corrections(
     rows = rows_of(found)
     for _ in range(rounds):
         blocks = []
-        for n in range(len(names)):
+        for n, name in enumerate(names):
+            if changed is not None and name not in changed:
+                continue
             for first in range(_SPAN):
                 tried = found.copy()
                 tried[n, first::_SPAN] += _TRIED
@@ -86,15 +95,16 @@ def fit_corrections(
                     blocks.append((at, np.full(at.size, n * count + k), change[own].ravel()))
         place, column, value = (np.concatenate(parts) for parts in zip(*blocks, strict=True))
         jacobian = csr_matrix((value, (place, column)), shape=(rows.size, found.size))
-        normal = (jacobian.T @ jacobian + diags(weights)).tocsc()
-        step = -spsolve(normal, jacobian.T @ rows.ravel() + weights * found.ravel()).reshape(found.shape)
+        slope = jacobian.T @ rows.ravel() + weights * found.ravel()
+        step = -spsolve((jacobian.T @ jacobian + diags(weights)).tocsc(), slope).reshape(found.shape)
         cost = float(np.sum(rows**2) + weights @ found.ravel() ** 2)
-        for part in (1.0, 0.5, 0.2, 0.05):
+        for part in _PARTS:
             try:
                 after = rows_of(found + part * step)
             except ConfigError:  # a leg does not reach
                 continue
-            if float(np.sum(after**2) + weights @ (found + part * step).ravel() ** 2) < cost:
+            reached = float(np.sum(after**2) + weights @ (found + part * step).ravel() ** 2)
+            if reached < _WORSE * cost:
                 found, rows = found + part * step, after
                 break
         else:

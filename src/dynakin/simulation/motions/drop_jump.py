@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from dynakin.errors import ConfigError
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.bodies.whole_body import SIDES, Sole, ankle_height, hip_in_pelvis
-from dynakin.simulation.jets import Jet, constant, step, swift_step
+from dynakin.simulation.jets import Jet, constant, step
 from dynakin.simulation.mechanics import GRAVITY, Motion, dynamics, kinematics
 from dynakin.simulation.motions.corrections import Corrections, fit_corrections
 from dynakin.simulation.motions.flight import Flight, Jump, plan_flight
@@ -27,26 +27,34 @@ from dynakin.simulation.support import Footing, Support
 
 Array = NDArray[np.float64]
 
+_G = -float(GRAVITY[1])
+
 STARTS_S = 1.2  # quiet standing on the box
 SHORTEST_S = 4.6
 LANDS_AT = np.array([0.55, 0.0, 0.40])  # middle between the ankles, on the laboratory's floor, m
 # Drop jumps from 0.3 m: 3 to 5 times body weight at landing, 0.3 to 0.5 s on the floor with bent knees (Bobbert et al.
 # 1987, Med Sci Sports Exerc 19:332-338, 339-346).
 _BOX_M, _OFF_M_S, _IMPACT, _UP_M_S = (0.28, 0.32), (0.25, 0.35), (3.5, 4.0), (1.50, 1.65)
-_EXTENDED_M = 0.012
+_EXTENDED_M = -0.015
 _AHEAD_M = 0.40  # of the box's feet, where they land
-_PITCH_DEG = (40.0, 42.0)  # toes down, in the first and the second flight
+_PITCH_DEG = (48.0, 46.0)  # toes down, in the first and the second flight
 _GOES_S = 0.35  # how long before leaving the box the body goes forward, and after landing
-_FOLLOWS_S = 0.05  # in which a foot that leaves the ground takes up the speed of the body, and gives it up
-_KNEE_DEG, _LEAN_DEG = 20.0, 6.0  # of who stands ready
+_ROLL_S, _BEYOND_S = 0.10, 0.06  # over the ball on the ground, and what of that turn is in the air
+_FOLLOWS_S = 0.055  # in which a foot that leaves the ground takes up the speed of the body, and gives it up
+_KNEE_DEG, _LEAN_DEG = 24.0, 6.0  # of who stands ready
 _BENT = {"pelvis_tilt": -75.0, "lumbar_extension": -35.0, "neck_extension": 45.0}  # deg a metre that the body is lower
 _PRESSES = (0.35, 0.95)  # from the ankle to the ball: flat, and with the heel up
 # How far a coefficient may well be from that posture (m, rad), and what a residual is measured in (N, N m, m).
 _SIZES = {"x": 0.05, "y": 0.05, "z": 0.01, "pelvis_tilt": 0.15, "pelvis_list": 0.02, "pelvis_rotation": 0.03}
 _FORCE_N, _FLYING_N, _FLYING_NM, _COP_M, _FREE_NM = 4.0, 0.2, 0.05, 0.010, 4.0
+_RUBS = 0.12, 0.04  # friction forward and sideways, over the load
 _STRAIGHTEST, _TOO_STRAIGHT = np.deg2rad(8.0), np.deg2rad(1.0)
-_KNOT_S = 0.015
-_ROUNDS = 4
+_KNOT_S, _FINE_KNOT_S = 0.020, 0.0050
+# How much softer forces are asked for at first, rounds, and what is changed.
+_LEAD = ("x", "y", "pelvis_tilt")
+_STAGES = (
+    (300.0, 2, _LEAD), (60.0, 2, _LEAD), (20.0, 2, _LEAD), (6.0, 3, _LEAD), (4.0, 2, tuple(_SIZES)),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -128,27 +136,19 @@ class _Posed:
     def base(self, time: Array) -> tuple[Jet, Jet, Jet]:
         """Forward place and height (m) of what the feet stand on or, in flight, follow; and how far (0 to 1) the
         heels are up."""
-        flight, height = self.flight, self.flight.height(time)
-        forward, up = constant(time, 0.0), constant(time, flight.jump.box_m)
-        heels = constant(time, 0.0)
-        for n, (leaves, lands) in enumerate(zip(flight.leaves, flight.lands, strict=True)):
-            onto = 0.0 if n == 0 else None
-            taken = swift_step(time, leaves, _FOLLOWS_S)
-            given = 1.0 + -1.0 * swift_step(time, lands - _FOLLOWS_S, _FOLLOWS_S)
-            before = flight.jump.box_m if n == 0 else 0.0
-            follows = height - flight.jump.extended_m
-            up = up + taken * given * follows - before * taken
-            if onto is not None:
-                forward = forward + swift_step(time, leaves, lands - leaves)
-            heels = heels + step(time, leaves - 0.16, 0.24) - step(time, lands - 0.04, 0.12)
+        flight = self.flight
+        up, heels = constant(time, flight.jump.box_m), constant(time, 0.0)
+        for leaves, lands in zip(flight.leaves, flight.lands, strict=True):
+            up = up + _carried_along(flight, time, leaves, lands)
+            heels = heels + _heels_up(time, leaves, lands)
+        forward = step(time, flight.leaves[0], flight.lands[0] - flight.leaves[0])
         return _AHEAD_M * (forward - 1.0), up, heels
 
     def feet_turn(self, time: Array) -> Jet:
         """Pitch of the feet, rad."""
         total = constant(time, 0.0)
         for deg, leaves, lands in zip(_PITCH_DEG, self.flight.leaves, self.flight.lands, strict=True):
-            down = step(time, leaves - 0.16, 0.24) - step(time, lands - 0.04, 0.12)
-            total = total - float(np.deg2rad(deg)) * down
+            total = total - float(np.deg2rad(deg)) * _heels_up(time, leaves, lands)
         return total
 
     def motion(self, time: Array, more: Mapping[str, Jet]) -> Motion:
@@ -215,21 +215,60 @@ class _Posed:
         return Support(pressed[0], pressed[1], share, in_flight=self.flight.in_flight(time))
 
 
+def _heels_up(time: Array, leaves: float, lands: float) -> Jet:
+    """How far (0 to 1) the heels are up around a flight."""
+    whole = _ROLL_S + _BEYOND_S
+    return step(time, leaves - _ROLL_S, whole) - step(time, lands - _BEYOND_S, whole)
+
+
+def _carried_along(flight: Flight, time: Array, leaves: float, lands: float) -> Jet:
+    """How high (m) feet are over where they left: they take up the body's vertical speed after leaving the ground and
+    give it up before they touch it, so that they meet it at rest; what then lacks of the way they make in between."""
+    ends = (leaves, lands - _FOLLOWS_S, lands)
+    taken, given = (step(time, start, _FOLLOWS_S) for start in ends[:2])
+    body, at = flight.height(time), flight.height(np.array([*ends, leaves + _FOLLOWS_S]))
+
+    def way(taken_s: Array, given_s: Array, height: Array) -> Array:
+        """The integral of what the feet take of the speed: all of it, but for the two steps."""
+        late = at.rate[0] * taken_s - 0.5 * _G * taken_s**2 - _way_taken(taken_s, float(at.rate[0]))
+        return np.asarray(height - at.value[0] - late - _way_taken(given_s, float(at.rate[1])))
+
+    height = flight.height(np.clip(time, leaves, lands)).value
+    taken_s, given_s = (np.clip(time - start, 0.0, _FOLLOWS_S) for start in ends[:2])
+    full = np.full(1, _FOLLOWS_S)
+    lacking = float(at.value[2] - at.value[0] - way(full, full, at.value[2])[0])
+    share = taken * (1.0 + -1.0 * given)
+    speed = Jet(share.value * body.rate, share.rate * body.rate + share.value * body.second, np.zeros_like(time))
+    made = lacking * step(time, leaves + _FOLLOWS_S, lands - leaves - 2.0 * _FOLLOWS_S)
+    return Jet(way(taken_s, given_s, height), speed.value, speed.rate) + made
+
+
+def _way_taken(lasting_s: Array, speed: float) -> Array:
+    """Integral (m) of `step` over `_FOLLOWS_S` times the speed (m/s) of who falls, ``speed`` at its start."""
+    s = lasting_s / _FOLLOWS_S
+    uniform = s**5 * (7.0 - 14.0 * s + 10.0 * s**2 - 2.5 * s**3)
+    falling = s**6 * (35.0 / 6.0 - 12.0 * s + 70.0 / 8.0 * s**2 - 20.0 / 9.0 * s**3)
+    return np.asarray(_FOLLOWS_S * (speed * uniform - _G * _FOLLOWS_S * falling))
+
+
 def _fit(posed: _Posed) -> Corrections:
     body, flight = posed.body, posed.flight
     start, end = STARTS_S - 0.1, flight.rests_s + 0.3
-    knots = np.arange(start, end, _KNOT_S)
-    time = np.arange(start, end, 0.5 * _KNOT_S)
+    knots = _knots(flight, start, end)
+    time = (knots[:-1, None] + np.diff(knots)[:, None] * [0.25, 0.75]).ravel()
     on, flying = posed.support(time), flight.in_flight(time)
-    weight = -float(GRAVITY[1]) * body.subject.mass_kg
+    weight = _G * body.subject.mass_kg
     load = flight.load(time) * weight
     assert on.share is not None
     presses = on.share[:, None] * on.right + (1.0 - on.share[:, None]) * on.left
-    by_force = np.where(flying[:, None], _FLYING_N, [0.3 * weight, _FORCE_N, 0.1 * weight])
+    rubs = load + 0.03 * weight
+    by_force = np.where(
+        flying[:, None], _FLYING_N, np.stack([_RUBS[0] * rubs, np.full_like(load, _FORCE_N), _RUBS[1] * rubs], axis=1)
+    )
     lever = _COP_M * (load + 0.02 * weight)
     by_moment = np.where(flying[:, None], _FLYING_NM, np.stack([lever, np.full_like(load, _FREE_NM), lever], axis=1))
 
-    def residuals(more: Mapping[str, Jet]) -> Array:
+    def residuals(more: Mapping[str, Jet], softer: float) -> Array:
         motion = posed.motion(time, more)
         moving = kinematics(body.tree, motion)
         wrench = dynamics(body.tree, motion, moving).wrench
@@ -239,6 +278,25 @@ def _fit(posed: _Posed) -> Corrections:
         wanted = np.stack([np.zeros_like(load), load, np.zeros_like(load)], axis=1)
         knees = motion.q[:, [motion.names.index(f"knee_angle_{side}") for side, _ in SIDES]]
         straight = np.maximum(_STRAIGHTEST - knees, 0.0) / _TOO_STRAIGHT
-        return np.hstack([(force - wanted) / by_force, moment / by_moment, straight])
+        by_f, by_m = (np.where(flying[:, None], softer * by, by * min(softer, 5.0)) for by in (by_force, by_moment))
+        return np.hstack([(force - wanted) / by_f, moment / by_m, straight])
 
-    return fit_corrections(_SIZES, knots, time, residuals, _ROUNDS)
+    def stage(softer: float, rounds: int, names: tuple[str, ...], found: Corrections | None) -> Corrections:
+        return fit_corrections(_SIZES, knots, time, lambda more: residuals(more, softer), rounds, names, found)
+
+    found = None
+    for softer, rounds, names in _STAGES:
+        found = stage(softer, rounds, names, found)
+    assert found is not None
+    return found
+
+
+def _knots(flight: Flight, start: float, end: float) -> Array:
+    """Close together around the flights, where forces change fastest."""
+    fast = np.array([[leaves - 0.05, lands + 0.10] for leaves, lands in zip(flight.leaves, flight.lands, strict=True)])
+    edges = [start, *fast.ravel(), end]
+    parts = []
+    for n, (a, b) in enumerate(zip(edges[:-1], edges[1:], strict=True)):
+        count = int(np.ceil((b - a) / (_KNOT_S if n % 2 == 0 else _FINE_KNOT_S)))
+        parts.append(np.linspace(a, b, count, endpoint=False))
+    return np.concatenate([*parts, [end]])

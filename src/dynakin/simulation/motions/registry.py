@@ -14,6 +14,7 @@ from dynakin.files import is_file
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.mechanics import Motion
 from dynakin.simulation.motions.belt import belt_movement
+from dynakin.simulation.motions.drop_jump import drop_jump
 from dynakin.simulation.motions.gait import gait_movement
 from dynakin.simulation.motions.motion_file import file_movement
 from dynakin.simulation.motions.movement import Movement
@@ -39,6 +40,7 @@ MOTIONS_IN_SPACE: dict[str, Callable[[np.random.Generator, SimulatedBody, float]
     "sit": sit_in_space,
     "steps": steps_up,
     "steps-down": steps_down,
+    "drop-jump": drop_jump,
 }
 """Those of the whole body in space."""
 
