@@ -1,5 +1,5 @@
-"""A person in space on two feet, on a seat as well or in flight: what each contact carries of the wrench that the motion
-takes, and which plate feels it."""
+"""A person in space on two feet, on a seat as well or in flight: what each contact carries of the wrench that the
+motion takes, and which plate feels it."""
 
 from __future__ import annotations
 
@@ -68,7 +68,8 @@ def carried_by_contacts(wrench: Array, support: Support) -> tuple[dict[str, Arra
     with np.errstate(divide="ignore", invalid="ignore"):  # nothing presses in flight
         feet = split_between(on_feet, support)
     if support.in_flight is not None:
-        feet = tuple(np.where(support.in_flight[:, None], 0.0, foot) for foot in feet)
+        right, left = (np.where(support.in_flight[:, None], 0.0, foot) for foot in feet)
+        feet = right, left
     carried = {"right foot": feet[0], "left foot": feet[1], **parts}
     heights = {"right foot": support.right[:, 1], "left foot": support.left[:, 1]}
     if support.seated is not None:

@@ -29,11 +29,11 @@ class Truth:
     Attributes:
         data: coordinates, speeds, accelerations, moments (time, coordinate), named and signed as in the model;
             wrench (time, component), ground on person, about the ground origin, and contact_wrench (time,
-            contact, component) of each foot, the seat and each hand, in space with its segment and contact_point
-            (time, contact, axis), where it presses or pulls (NaN where a foot or seat is not loaded); markers (time, marker, axis) on the bones, and
-            soft_tissue, the displacement of each marker from there; joint_centres (time, joint, axis);
-            kinetic_energy, potential_energy (time). Moments are net joint moments: what a seat carries no joint
-            below it supplies.
+            contact, component) of each foot, the seat and each hand; in space contact_segment (contact) and
+            contact_point (time, contact, axis), where it presses or pulls (NaN where a foot or seat is not loaded);
+            markers (time, marker, axis) on the bones, and soft_tissue, the displacement of each marker from there;
+            joint_centres (time, joint, axis); kinetic_energy, potential_energy (time). Moments are net joint
+            moments: what a seat carries no joint below it supplies.
         parameters: lengths and inertial parameters by the names of the filter's state (length/shank,
             inertia/shank/izz), and where markers truly are (marker/r_knee/x, m, in their segment's frame, by
             their names in the recording).

@@ -61,7 +61,12 @@ def on_belt(on_floor: Movement, speed: float, middle_s: float) -> Movement:
         return replace(on, right=on.right - back, left=on.left - back)
 
     footings = tuple(
-        Footing(f"plate {n}", PLATES_AT + [0.0, 0.0, side * HALF_BELT_M[1]], ((foot, -np.inf, np.inf),), HALF_BELT_M)
+        Footing(
+            f"plate {n}",
+            PLATES_AT + np.array([0.0, 0.0, side * HALF_BELT_M[1]]),
+            ((foot, -np.inf, np.inf),),
+            HALF_BELT_M,
+        )
         for n, foot, side in ((1, "right foot", 1.0), (2, "left foot", -1.0))
     )
     description = f"walking at {speed:.2f} m/s on a belt"

@@ -1,8 +1,8 @@
 """Small smooth changes of a posed motion, fitted so that its forces are what they are to be.
 
-A change is a spline of degree 5 (forces, from its second derivative, have a continuous second derivative themselves); it
-and its derivatives vanish at both ends of its window. Each coefficient acts on six intervals between knots only, so that
-every sixth one can be tried at once: the Jacobian costs six evaluations for each thing that changes.
+A change is a spline of degree 5 (forces, from its second derivative, are smooth themselves); it and its derivatives
+vanish at both ends of its window. Each coefficient acts on six intervals between knots only, so that every sixth one
+can be tried at once: the Jacobian costs six evaluations for each thing that changes.
 """
 
 from __future__ import annotations
@@ -42,7 +42,9 @@ class Corrections:
         inside = np.clip(time, self.knots[0], self.knots[-1])
         within = ((time > self.knots[0]) & (time < self.knots[-1]))[:, None]
         # Five more knots and zeros at either end, between which a spline of these is defined.
-        before, after = (np.arange(1.0, _SPAN) * step for step in (self.knots[1] - self.knots[0], self.knots[-1] - self.knots[-2]))
+        before, after = (
+            np.arange(1.0, _SPAN) * step for step in (self.knots[1] - self.knots[0], self.knots[-1] - self.knots[-2])
+        )
         knots = np.concatenate([self.knots[0] - before[::-1], self.knots, self.knots[-1] + after])
         spline = BSpline(knots, np.pad(self.coefficients.T, ((_DEGREE, _DEGREE), (0, 0))), _DEGREE)
         values = [np.where(within, spline(inside, order), 0.0) for order in range(3)]
@@ -63,8 +65,8 @@ def fit_corrections(
     Args:
         sizes: by name, how large a coefficient may well be (m or rad).
         knots: (K + 6,) s, rising.
-        residuals: corrections at ``time`` -> rows (T, R), each over what it may well be; a row depends on what is at its
-            time only.
+        residuals: corrections at ``time`` -> rows (T, R), each over what it may well be; a row depends on what is at
+            its time only.
         rounds: of Gauss and Newton.
         changed: names whose corrections are sought, all where None; the others stay as they are at the start.
         start: from where, on the same knots.

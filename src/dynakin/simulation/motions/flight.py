@@ -76,16 +76,16 @@ def plan_flight(jump: Jump, duration_s: float) -> Flight:
     """
     grid = np.arange(0.0, duration_s + 2.0, _GRID_S)
 
-    def with_pulses(before: PPoly, fixed: Pulse, free: Sequence[Pulse], at_s: float, height: float, speed: float):
+    def with_pulses(
+        before: PPoly, fixed: Pulse, free: Sequence[Pulse], at_s: float, height: float, speed: float
+    ) -> tuple[PPoly, Array]:
         """Sizes of two pulses so that the phase ends at ``at_s`` with this height (m) over the box and speed (m/s)."""
         known = _added(before, [(1.0, _poly(grid, fixed))])
         basis = [_poly(grid, pulse) for pulse in free]
         end = np.array([at_s])
         jet = _integrated(known, end)
         moved = [_G * np.array([p.antiderivative(2)(at_s), p.antiderivative(1)(at_s)]) for p in basis]
-        sizes = np.linalg.solve(
-            np.stack(moved, axis=1), [height - jet.value[0], speed - jet.rate[0]]
-        )
+        sizes = np.linalg.solve(np.stack(moved, axis=1), [height - jet.value[0], speed - jet.rate[0]])
         return _added(known, list(zip(sizes, basis, strict=True))), sizes
 
     leaves = jump.start_s + _PUSH_S
@@ -100,7 +100,7 @@ def plan_flight(jump: Jump, duration_s: float) -> Flight:
     )
     lands = leaves + _falling(jump.off_m_s, jump.box_m)
 
-    def first_contact(contact_s: float):
+    def first_contact(contact_s: float) -> tuple[PPoly, Array]:
         until = lands + contact_s
         pulses = (_impact(lands), _pulse(lands + 0.035, 0.13, until - 0.14, 0.14))
         return with_pulses(force, np.zeros_like, pulses, until, jump.extended_m - jump.box_m, jump.up_m_s)
@@ -110,7 +110,7 @@ def plan_flight(jump: Jump, duration_s: float) -> Flight:
     crossing = np.flatnonzero(np.diff(np.sign(beyond)))
     if len(crossing) == 0:
         raise ConfigError(
-            f"simulation: no contact lands with {jump.impact:.1f} and leaves at {jump.up_m_s:.1f} m/s (it would land with "
+            f"simulation: no contact lands with {jump.impact:.1f} and leaves at {jump.up_m_s:.1f} m/s (it would with "
             f"{beyond.min() + jump.impact:.1f} to {beyond.max() + jump.impact:.1f})"
         )
     k = crossing[-1]  # the softer way
@@ -156,6 +156,4 @@ def _integrated(force: PPoly, time: Array) -> Jet:
     """Height (m) over the start of who begins at rest."""
     inside = np.clip(time, force.x[0], force.x[-1])
     speed, height = force.antiderivative(1), force.antiderivative(2)
-    return Jet(
-        _G * (height(inside) - 0.5 * inside**2), _G * (speed(inside) - inside), _G * (force(inside) - 1.0)
-    )
+    return Jet(_G * (height(inside) - 0.5 * inside**2), _G * (speed(inside) - inside), _G * (force(inside) - 1.0))

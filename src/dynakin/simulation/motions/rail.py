@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dynakin.errors import ConfigError
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.bodies.whole_body import SIDES
-from dynakin.simulation.jets import Jet, constant, sinusoids, step
+from dynakin.simulation.jets import constant, sinusoids, step
 from dynakin.simulation.mechanics import GRAVITY, Motion, Segment, TreeMotion, kinematics
 from dynakin.simulation.motions.movement import Hand, Movement
 
@@ -19,7 +19,10 @@ Array = NDArray[np.float64]
 
 HARDEST = 0.3  # of body weight, all hands together
 # From the shoulder to the rail, over the arm's length: forward, up and outward; of who stays, in his first posture.
-_REACH, _REACH_WALKING = np.array([0.58, -0.44, 0.08]), np.array([0.40, -0.60, 0.10])
+# The first that can be reached all the time is taken (who sits down moves back from it).
+_REACHES = tuple(np.array([ahead, -down, 0.08]) for down in (0.44, 0.55, 0.70) for ahead in (0.58, 0.45, 0.30, 0.15))
+_REACH_WALKING = np.array([0.40, -0.60, 0.10])
+_NEAREST, _FARTHEST = 0.40, 0.95  # over the arm's length
 _FOLLOWS = ("arm_flex", "arm_add", "elbow_flex")
 _SLOW_M_S = 0.2  # slower on average is on the spot: the rail is held at one place, else the hand slides along
 _CLOSED_M = 1e-12
@@ -122,10 +125,21 @@ def _grips(movement: Movement, body: SimulatedBody, duration_s: float) -> tuple[
             continue
         hand = next(s for s in body.tree if s.name == f"hand_{side}")
         shoulder = moving.segments[f"upper_arm_{side}"].origin
-        start = shoulder.mean(axis=0) - 0.5 * duration_s * velocity if walks else shoulder[0]
-        start = start + (_REACH_WALKING if walks else _REACH) * [1.0, 1.0, sign] * sum(_lengths(body.tree, side))
+        arm, mirror = sum(_lengths(body.tree, side)), np.array([1.0, 1.0, sign])
+        if walks:
+            start = shoulder.mean(axis=0) - 0.5 * duration_s * velocity + _REACH_WALKING * mirror * arm
+        else:
+            start = shoulder[0] + min(
+                _REACHES, key=lambda r: _too_far(shoulder, shoulder[0] + r * mirror * arm, arm)
+            ) * (mirror * arm)
         grips.append(Grip(side, hand.com, start, velocity))
     return tuple(grips)
+
+
+def _too_far(shoulder: Array, rail: Array, arm_m: float) -> float:
+    """How far (over the arm's length) the rail is from where an arm reaches well, at the worst of times."""
+    apart = np.linalg.norm(rail - shoulder, axis=1) / arm_m
+    return float(np.maximum(_NEAREST - apart, apart - _FARTHEST).max(initial=0.0))
 
 
 def _lengths(tree: Sequence[Segment], side: str) -> tuple[float, float]:

@@ -1,5 +1,5 @@
-"""Sitting down and standing up in space: down to a seat in balance over the feet, which then shares the load as the trunk
-leans back."""
+"""Sitting down and standing up in space: down to a seat in balance over the feet, which then shares the load as the
+trunk leans back."""
 
 from __future__ import annotations
 
@@ -35,7 +35,10 @@ Array = NDArray[np.float64]
 _ANKLE, _KNEE, _LUMBAR = (8.0, 22.0), (11.0, 98.0), (8.0, -22.0)
 _ARMS = {"arm_flex": (5.0, 55.0), "arm_add": (-9.0, -4.0), "arm_rot": (0.0, 8.0), "elbow_flex": (14.0, 10.0),
          "pro_sup": (90.0, -15.0)}  # fmt: skip
-_LEAST_SHARE, _MOST_SHARE = 0.55, 0.70  # of the weight on the seat; the feet of who sits upright carry a quarter to a half
+_LEAST_SHARE, _MOST_SHARE = (
+    0.55,
+    0.70,
+)  # of the weight on the seat; the feet of who sits upright carry a quarter to a half
 _BACKWARD = 0.30  # of the tip of the sole: how far the centre of mass goes back over the feet, to the ankles
 _HALF_SEAT_M = (0.20, 0.20)
 _DEGREE = 6
@@ -44,9 +47,9 @@ _DEGREE = 6
 def sit_in_space(rng: np.random.Generator, body: SimulatedBody, duration_s: float) -> Movement:
     """From standing down to a seat and up again, an analytic function of time, on a seat under the pelvis.
 
-    Lowering and rising are in balance over the feet. Between them, hips at rest, the trunk leans back and the seat takes
-    over by a smooth step of time; the pelvis' tilt is the polynomial of the seat's share that puts the centre of mass
-    where seat and feet share it so.
+    Lowering and rising are in balance over the feet. Between them, hips at rest, the trunk leans back and the seat
+    takes over by a smooth step of time; the pelvis' tilt is the polynomial of the seat's share that puts the centre of
+    mass where seat and feet share it so.
 
     Raises:
         ConfigError: too short, or the subject cannot sit so.

@@ -207,7 +207,9 @@ def upper_body(stance: Stance, level: Jet, arms: Jet, sway: Sway | None, time: A
     jets["neck_extension"] = float(np.deg2rad(_GAZE * -35.0)) * level
     jets |= {name: constant(time, 0.0) for name in ("neck_bending", "neck_rotation")}
     for (side, _), more in zip(SIDES, stance.arms, strict=True):
-        jets |= {f"{name}_{side}": _between((low, more * added), arms) for name, (low, added) in stance.arms_deg.items()}
+        jets |= {
+            f"{name}_{side}": _between((low, more * added), arms) for name, (low, added) in stance.arms_deg.items()
+        }
     for name in _SWAY_DEG:
         if sway is not None and name in jets:
             jets[name] = jets[name] + sway.of(name, time)

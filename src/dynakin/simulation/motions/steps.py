@@ -1,4 +1,4 @@
-"""Walking up or down two steps: a walk whose feet stand at different heights, with a plate in the floor and on each step."""
+"""Walking up or down two steps: a walk whose feet stand at different heights, a plate in the floor and on each step."""
 
 from __future__ import annotations
 
@@ -23,7 +23,10 @@ Array = NDArray[np.float64]
 
 # Heights of a step, m: up as public stairs (0.15 to 0.17); down low ones, as one walks down landing on the heel.
 _UP_M, _DOWN_M = (0.13, 0.17), (0.09, 0.12)
-_SLOWER, _SHORTER = 1.25, 0.92  # than over the floor: 0.5 steps a second less (Riener et al. 2002, Gait Posture 15:32-44)
+_SLOWER, _SHORTER = (
+    1.25,
+    0.92,
+)  # than over the floor: 0.5 steps a second less (Riener et al. 2002, Gait Posture 15:32-44)
 _KNOT_S = 0.06
 _BEFORE, _AFTER = 1.0, 1.5  # strides for which the walk differs from that over the floor
 # What a residual is measured in (m, N m), and how far (m, rad) the pelvis may well leave the walk over the floor.
@@ -107,7 +110,7 @@ def _movement(level: Walk, body: SimulatedBody, climbs: Mapping[int, float]) -> 
     footings = []
     for n, k in enumerate((middle - 1, middle, middle + 1), start=1):
         foot = "right foot" if k % 2 == 0 else "left foot"
-        centre = PLATES_AT + [(k - middle) * walk.step_m, walk.at[1] + walk.level(k), 0.0]
+        centre = PLATES_AT + np.array([(k - middle) * walk.step_m, walk.at[1] + walk.level(k), 0.0])
         half = (0.5 * walk.step_m, 0.20)
         stance = (foot, walk.lands(k), walk.lands(k) + TOE_OFF * walk.stride_s)
         footings.append(Footing(f"plate {n}", centre, (stance,), half))
