@@ -37,8 +37,8 @@ _G = -float(GRAVITY[1])
 STARTS_S = 1.2  # quiet standing on the box
 SHORTEST_S = 4.6
 LANDS_AT = np.array([0.55, 0.0, 0.40])  # middle between the ankles, on the laboratory's floor, m
-# Drop jumps from 0.3 m: 3 to 5 times body weight at landing, 0.3 to 0.5 s on the floor with bent knees (Bobbert et al.
-# 1987, Med Sci Sports Exerc 19:332-338, 339-346).
+# Sizes of countermovement drop jumps from 0.3 m: a landing of 3 to 5 times body weight, 0.5 s on the floor (cf. Bobbert
+# et al. 1987, Med Sci Sports Exerc 19:332-338, 339-346).
 _BOX_M, _OFF_M_S, _IMPACT, _UP_M_S = (0.28, 0.32), (0.25, 0.35), (3.5, 4.0), (1.50, 1.65)
 _EXTENDED_M = -0.015
 _AHEAD_M = 0.40  # of the box's feet, where they land

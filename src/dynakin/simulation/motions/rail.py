@@ -51,8 +51,7 @@ def hold_rail(
 
     Shoulder and elbow bring the hand to the rail, where it stays, exactly (walking over the floor: slides at the
     person's speed). The rail pushes up and a little forward, in holds that begin and end smoothly; ``size``: the
-    hardest over body weight, all hands together. Leaning on a handrail takes 5 to 20 % of it (treadmills: Chang et al.
-    1996, J Hum Mov Stud; chairs: Janssen et al. 2002, Phys Ther 82:866-879).
+    hardest over body weight, all hands together (a tenth is a light hold; the sizes are chosen).
 
     Raises:
         ConfigError: a size that is no share, a motion of a plane, or an arm that does not reach.

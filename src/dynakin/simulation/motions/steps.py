@@ -23,10 +23,7 @@ Array = NDArray[np.float64]
 
 # Heights of a step, m: up as public stairs (0.15 to 0.17); down low ones, as one walks down landing on the heel.
 _UP_M, _DOWN_M = (0.13, 0.17), (0.09, 0.12)
-_SLOWER, _SHORTER = (
-    1.25,
-    0.92,
-)  # than over the floor: 0.5 steps a second less (Riener et al. 2002, Gait Posture 15:32-44)
+_SLOWER, _SHORTER = 1.25, 0.92  # strides than over the floor; chosen
 _KNOT_S = 0.06
 _BEFORE, _AFTER = 1.0, 1.5  # strides for which the walk differs from that over the floor
 # What a residual is measured in (m, N m), and how far (m, rad) the pelvis may well leave the walk over the floor.
