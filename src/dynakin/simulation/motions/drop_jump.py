@@ -3,8 +3,8 @@
 The vertical force is given (`flight.py`), and with it the height of the centre of mass. Feet are led: on the ball of
 the foot while the heel is up, with the centre of mass while in the air. The pelvis follows a posture that bends with
 the height, and smooth corrections of its place and turn are fitted so that the ground gives just that force, under the
-feet, and in flight neither force nor moment. A fit ends: what is left in flight is 1 to 20 N and 0.3 to 8 N m at the
-worst frame (mean: some tenths), which the truth's wrench shows and no contact carries.
+feet, and in flight neither force nor moment. A fit ends: what is left in flight is 2 to 4 N and 0.4 to 0.6 N m at the
+worst of 100 frames a second (seeds 1, 3, 5), which the truth's wrench shows and no contact carries.
 
 Not as people do: knees are bent by 50 deg when the feet leave the ground (near a straight knee small changes of the
 hip's height turn it fast, and no fit is found), and knee moments have a spike of 30 ms at landing.
