@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 import xarray as xr
+from dynakin.filter.foot_wrenches import FootWrenches
 
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.filter.assemble import assemble
-from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.filter.tracker import smoothed
 from dynakin.pipeline.result import Result
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED

@@ -56,7 +56,9 @@ def test_level_floor_and_stairs_up_and_down_give_every_stance_its_plate(rise: fl
             inside = (made.recording.time > stance.start + 0.03) & (made.recording.time < stance.end - 0.03)
             assert (loads.reason[inside, k] == MEASURED).all()
             np.testing.assert_allclose(loads.soles.middle[inside, k, 1], stance.height, atol=0.01)
-            np.testing.assert_allclose(loads.soles.middle[inside, k][:, [0, 2]], made.sole[inside, k][:, [0, 2]], atol=0.045)
+            np.testing.assert_allclose(
+                loads.soles.middle[inside, k][:, [0, 2]], made.sole[inside, k][:, [0, 2]], atol=0.045
+            )
     single = (made.push > 0.0).sum(axis=1) == 1
     for k in range(2):
         swings = single & (made.push[:, k] == 0.0) & (made.recording.time > 0.8)
@@ -70,8 +72,8 @@ def test_without_plates_a_foot_that_is_loaded_may_bear_and_is_never_in_the_air(r
     made = steps(lasting(6), feet, plates_of(feet))
     loads = found(replace(made, recording=made.recording.with_plates(())))
     loaded = made.push > 50.0
-    assert loads.bears[loaded].mean() > 0.98 and not loads.aloft[loaded].any()
-    assert loads.bears[~loaded].mean() < 0.6 and (loads.reason == SWING).mean(axis=0).min() > 0.1
+    assert loads.soles.bears[loaded].mean() > 0.98 and not loads.aloft[loaded].any()
+    assert loads.soles.bears[~loaded].mean() < 0.6 and (loads.reason == SWING).mean(axis=0).min() > 0.1
     assert not loads.total_known.any()
 
 

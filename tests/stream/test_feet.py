@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from dynakin.filter.foot_wrenches import FootWrenches
 
 import dynakin
 from dynakin.bindings import _core
-from dynakin.filter.foot_wrenches import FootWrenches
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
 from dynakin.recordings.feet.soles import FootShape
