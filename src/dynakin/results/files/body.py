@@ -38,7 +38,7 @@ def write_powers(estimate: Estimate, path: Path) -> None:
     """``powers.sto``: W, a column a coordinate, ``knee_angle_r_power``."""
     notes = [
         "Moment times speed in W, positive where energy is added to the body.",
-        "moments_source.sto says of each moment whether it is measured, derived or absent (nan).",
+        "moments_source.sto says of each moment whether it is measured, derived, a prior or absent (nan).",
     ]
     _write(
         path,
@@ -84,7 +84,9 @@ def write_centre_of_pressure(estimate: Estimate, path: Path) -> None:
         f"nan below {LOADED_N:g} N of vertical force. Frame: {estimate.ground.in_words}."
     ]
     if estimate.foot_names:
-        notes.append("feet_source.sto says of each foot whether its force is measured, derived or absent (nan).")
+        notes.append(
+            "feet_source.sto says of each foot whether its force is measured, derived, a prior or absent (nan)."
+        )
     _write(path, "Centres of pressure", estimate, names, table, notes)
 
 
@@ -111,7 +113,7 @@ def write_joint_reactions(estimate: Estimate, path: Path) -> None:
         "Intersegmental loads: force in N and moment in N m about the joint's centre (px py pz, m), ground axes, of "
         "the parent on the named segment; muscles, ligaments and bones together.",
         f"Frame: {estimate.ground.in_words}.",
-        "joint_reactions_source.sto says of each joint whether its load is measured, derived or absent (nan).",
+        "joint_reactions_source.sto says of each joint whether its load is measured, derived, a prior or absent (nan).",
     ]
     _write(path, "Joint reactions", estimate, names, np.column_stack(columns), notes)
 
@@ -153,7 +155,7 @@ def write_feet(estimate: Estimate, path: Path) -> None:
     notes = [
         "Forces in N at points in m, torques in N m, of the ground on the feet; adjusted.",
         f"Frame: {estimate.ground.in_words}.",
-        "feet_source.sto says of each foot whether its force is measured, derived or absent (nan).",
+        "feet_source.sto says of each foot whether its force is measured, derived, a prior or absent (nan).",
     ]
     _write(path, "Ground reaction of the feet", estimate, names, np.hstack(columns), notes)
 

@@ -72,7 +72,7 @@ def write_moments(estimate: Estimate, path: Path) -> None:
         in_degrees=False,
         notes=[
             "Moments in N m, forces in N. In a model that lumps both sides, leg moments are the sum of both legs.",
-            "moments_source.sto says of each whether it is measured, derived or absent (nan).",
+            "moments_source.sto says of each whether it is measured, derived, a prior or absent (nan).",
         ],
     )
 
@@ -83,7 +83,7 @@ def write_moment_sources(estimate: Estimate, path: Path) -> None:
 
 
 def write_sources(path: Path, title: str, estimate: Estimate, names: list[str], codes: np.ndarray) -> None:
-    """A table of codes (T, N), 0 measured, 1 derived, 2 absent, which the header explains."""
+    """A table of codes (T, N) of `results.measures.sources`, which the header explains."""
     write_storage(path, title, estimate.time, names, codes.astype(float), in_degrees=False, notes=NOTES)
 
 
@@ -117,7 +117,7 @@ def write_deviations(estimate: Estimate, path: Path) -> None:
         in_degrees=True,
         notes=[
             "One standard deviation, as the filter believes. Degrees, metres, seconds, N, N m.",
-            "Of moments that are derived or absent (moments_source.sto) too, nan where absent.",
+            "Of moments that are derived or a prior (moments_source.sto) too, nan where absent.",
         ],
     )
 
