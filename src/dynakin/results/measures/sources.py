@@ -154,6 +154,8 @@ def moment_figures(estimate: Estimate, lost: str = "") -> dict[str, Any]:
         found = [str(text).removeprefix("Warning: ") for text in estimate.config.get("ground", {}).get("reasons", [])]
         reasons = [sentence(text) for text in [*found, *([lost] if lost else [])]]
     names = estimate.coordinate_names
+    moving = {str(name) for name in data["element"].values}
+    spoken = {leg: [k for k in own if names[k] in moving] or own for leg, own in groups.items()}  # not of locked joints
     return {
         "what": "frames of the whole recording; derived: from the motion, because one contact behind the joint is not "
         "measured; prior: how several contacts divide the load is assumed; absent: not known",
@@ -161,7 +163,7 @@ def moment_figures(estimate: Estimate, lost: str = "") -> dict[str, Any]:
         "legs": legs,
         "coordinates": {name: _count(sources[:, k]) for k, name in enumerate(names)},
         "reasons": list(dict.fromkeys(reasons)),
-        "verdict": _words({leg: _by_joint(sources, names, own) for leg, own in groups.items()}, len(sources)),
+        "verdict": _words({leg: _by_joint(sources, names, own) for leg, own in spoken.items()}, len(sources)),
     }
 
 
@@ -200,9 +202,9 @@ def _words(legs: dict[str, dict[str, dict[str, int]]], frames: int) -> str:
         parts = []
         for counts, names in sorted(alike.items(), reverse=True):
             said = []
-            for meaning, count in zip(MEANINGS, counts, strict=True):
-                if count or (meaning == "measured" and not any(counts)):
-                    said.append(f"{_how(meaning)} in {count}{of}")
+            for meaning, number in zip(MEANINGS, counts, strict=True):
+                if number or (meaning == "measured" and not any(counts)):
+                    said.append(f"{_how(meaning)} in {number}{of}")
                     of = ""
             parts.append((f"{listed(names)} " if len(alike) > 1 else "") + listed(said))
         each.append(f"{leg}{':' if leg and len(alike) > 1 else ''} {', '.join(parts)}".strip())
