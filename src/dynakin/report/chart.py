@@ -23,6 +23,9 @@ _WIDTH, _HEIGHT = 2592, 1440
 _LEFT, _RIGHT, _TOP, _BOTTOM = 400, 2560, 70, 1140
 _MARGIN = 0.08
 _MOST_POINTS = 240
+_RARE = 2.0
+"""Per cent of derived values and priors that may leave the panel at either end: a centre of pressure is far off where a
+foot sets down."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +42,7 @@ class Line:
     """values (T,), NaN where there is nothing to draw; ``sd`` (T,) adds a band of two standard deviations.
 
     source: (T,) where the values come from (`results.measures.sources`): derived ones are dashed, a prior's dotted, and
-    both may leave the panel. width in points. dashes: of what is measured, or all, in tenths of a point.
+    rare ones far out leave the panel. width in points. dashes: of what is measured, or all, in tenths of a point.
     """
 
     values: Array
@@ -107,19 +110,21 @@ def chart(
     return Panel(title, note, svg)
 
 
+def _filling(line: Line) -> Array:
+    """The values that a panel has to hold: all that are measured, and of the others all but the rare ones far out."""
+    known = np.isfinite(line.values)
+    if line.source is None:
+        return line.values[known]
+    others = line.values[known & (line.source != MEASURED)]
+    rare = np.percentile(others, [_RARE, 100.0 - _RARE]) if len(others) else others
+    return np.concatenate([line.values[known & (line.source == MEASURED)], rare])
+
+
 def _range(lines: Sequence[Line], levels: Sequence[float], least: float) -> tuple[float, float]:
-    solid = [line.values if line.source is None else line.values[line.source == MEASURED] for line in lines]
-    values = np.concatenate([*solid, np.asarray(levels, dtype=float)])
-    values = values[np.isfinite(values)]
-    every = np.concatenate([line.values[np.isfinite(line.values)] for line in lines]) if lines else values
-    if not len(values):
-        values = every
+    values = np.concatenate([*(_filling(line) for line in lines), np.asarray(levels, dtype=float)])
     if not len(values):
         return -1.0, 1.0
     low, high = float(values.min()), float(values.max())
-    if len(every) and high > low:  # what is derived or a prior is less sure: it does not press the rest flat
-        reach = 0.25 * (high - low)
-        low, high = min(low, max(float(every.min()), low - reach)), max(high, min(float(every.max()), high + reach))
     least = max(least, 1e-9 * max(1.0, abs(low), abs(high)))
     if high - low < least:
         low, high = 0.5 * (low + high - least), 0.5 * (low + high + least)

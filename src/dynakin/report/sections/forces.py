@@ -79,8 +79,7 @@ def _adjustments(figures: dict[str, Any]) -> TextTable:
     if figures["remainder_rms"] is not None:
         each[f"In flight, residual ({figures['flight_frames']} frames)"] = figures["remainder_rms"]
     rows = [
-        (what, *("–" if rms is None else number(rms[name], digits=2) for name in COMPONENTS))
-        for what, rms in each.items()
+        (what, *(number(rms[name], digits=2) for name in COMPONENTS)) for what, rms in each.items() if rms is not None
     ]
     headings = ("RMS", *(f"{name}, {COMPONENT_LABELS[name][1]}" for name in COMPONENTS))
     return TextTable("What was changed, in place of a residual", headings, rows, tuple(range(1, 7)))
