@@ -12,7 +12,7 @@ from dynakin.report.labels import COMPONENT_LABELS
 from dynakin.report.plot import ESTIMATED, MEASURED
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.sides import side_key, values_of
-from dynakin.report.styles import ESTIMATED_LINE, MEASURED_LINE, SIDE_COLOURS, source_key
+from dynakin.report.styles import BAND, ESTIMATED_LINE, MEASURED_LINE, SIDE_COLOURS, source_key
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import AXES, COMPONENTS, Estimate
 from dynakin.results.measures.feet import foot_sources
@@ -69,6 +69,7 @@ def foot_section(page: Page) -> Section | None:
         "Feet",
         figures["verdict"],
         lines=(MEASURED_LINE, *side_key(estimate), *source_key(foot_sources(estimate.data))),
+        band=BAND if "foot_wrench_sd" in estimate.data else "",
         tables=[table for table in (_adjustments(figures),) if table.rows],
         parts=[part for foot in estimate.foot_names if (part := _foot_part(estimate, foot)).panels],
     )
@@ -96,19 +97,28 @@ _CONTACTS = {
 def _foot_part(estimate: Estimate, foot: str) -> Section:
     k = estimate.foot_names.index(foot)
     measured, adjusted = (values_of(estimate, name)[:, k] for name in ("foot_wrench_measured", "foot_wrench"))
+    sd = values_of(estimate, "foot_wrench_sd")[:, k] if "foot_wrench_sd" in estimate.data else None
     contact, source = estimate.data["foot_contact"].sel(foot=foot).values, foot_sources(estimate.data)[:, k]
     panels = []
 
-    def add(title: str, unit: str, seen: np.ndarray, made: np.ndarray, note: str = "", least: float = 0.0) -> None:
+    def add(
+        title: str,
+        unit: str,
+        seen: np.ndarray,
+        made: np.ndarray,
+        note: str = "",
+        least: float = 0.0,
+        made_sd: np.ndarray | None = None,
+    ) -> None:
         if np.isfinite(made).any():
-            own = Line(made, SIDE_COLOURS.get(foot, ESTIMATED), 1.1, source=source)
+            own = Line(made, SIDE_COLOURS.get(foot, ESTIMATED), 1.1, made_sd, source)
             lines = [Line(seen, MEASURED, 2.6), own]
             panels.append(chart(title, unit, estimate.time, lines, note=note, least_range=least))
 
     for j, component in enumerate(COMPONENTS[:3]):
         title, unit = COMPONENT_LABELS[component]
         note = _peak(estimate, foot, measured_only(adjusted[:, j], source), unit)
-        add(title, unit, measured[:, j], adjusted[:, j], note)
+        add(title, unit, measured[:, j], adjusted[:, j], note, made_sd=None if sd is None else sd[:, j])
     floor = floor_height(estimate)
     (seen, seen_free), (made, made_free) = (centre_of_pressure(wrench, floor) for wrench in (measured, adjusted))
     for axis, j in (("forward", 0), ("to the right", 2)):

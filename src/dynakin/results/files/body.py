@@ -7,15 +7,12 @@ from pathlib import Path
 import numpy as np
 
 from dynakin.results.estimate import AXES, COMPONENTS, Estimate
-from dynakin.results.files.motion import write_sources
+from dynakin.results.files.motion import force_stem, write_sources
 from dynakin.results.files.storage import write_storage
 from dynakin.results.measures.angles import angle_columns
 from dynakin.results.measures.feet import foot_sources
 from dynakin.results.measures.pressure import LOADED_N, foot_pressure
 from dynakin.results.measures.sources import joint_sources
-
-_SIDES = {"right": "r", "left": "l"}
-"""OpenSim's names of the sides in the columns of ground forces; another foot keeps its own name."""
 
 
 def write_body_files(estimate: Estimate, folder: Path) -> None:
@@ -128,7 +125,7 @@ def write_joint_sources(estimate: Estimate, path: Path) -> None:
 
 def write_foot_sources(estimate: Estimate, path: Path) -> None:
     """``feet_source.sto``: a column a foot, ``ground_force_r``, with the code of where its wrench comes from."""
-    names = [f"ground_force_{_SIDES.get(foot, foot)}" for foot in estimate.foot_names]
+    names = [force_stem(foot) for foot in estimate.foot_names]
     write_sources(path, "Sources of the feet's ground reaction", estimate, names, foot_sources(estimate.data))
 
 
@@ -147,9 +144,9 @@ def write_feet(estimate: Estimate, path: Path) -> None:
         loaded = np.asarray(np.isfinite(point).all(axis=1))
         torque = wrench[:, 3:].copy()
         torque[loaded] = np.column_stack([0.0 * free[loaded], free[loaded], 0.0 * free[loaded]])
-        side = _SIDES.get(foot, foot)
-        names += [f"ground_force_{side}_v{a}" for a in AXES] + [f"ground_force_{side}_p{a}" for a in AXES]
-        names += [f"ground_torque_{side}_{a}" for a in AXES]
+        stem = force_stem(foot)
+        names += [f"{stem}_v{a}" for a in AXES] + [f"{stem}_p{a}" for a in AXES]
+        names += [f"{stem.replace('force', 'torque', 1)}_{a}" for a in AXES]
         unknown = np.isnan(wrench).any(axis=1)
         columns += [wrench[:, :3], np.where(loaded[:, None], point, np.where(unknown, np.nan, 0.0)[:, None]), torque]
     notes = [
