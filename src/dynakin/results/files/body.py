@@ -81,6 +81,7 @@ def write_centre_of_pressure(estimate: Estimate, path: Path) -> None:
         f"nan below {LOADED_N:g} N of vertical force. Frame: {estimate.ground.in_words}."
     ]
     if estimate.foot_names:
+        notes.append("The total is derived from the motion where wrench.sto has no measured one.")
         notes.append(
             "feet_source.sto says of each foot whether its force is measured, derived, a prior or absent (nan)."
         )
