@@ -4,8 +4,8 @@
 
 Each runs with its own .osim, else ``fullbody``, and no option but the mass, the forces and the standing trial that
 belong to it. What is measured, derived, prior and absent is what ``estimate.nc`` says (``moment_source``). Runs are
-kept in ``build/recordings`` by their inputs and the source, so that the table can be made again. ``--write`` puts the tables
-into ``docs/validation.md``.
+kept in ``build/recordings`` by their inputs and the source, so that the table can be made again. ``--write`` puts the
+tables into ``docs/validation.md``.
 """
 
 from __future__ import annotations
@@ -27,6 +27,8 @@ import xarray as xr
 from numpy.typing import NDArray
 from recordings_references import JOINTS, SIDES, Array, Inverse, Reference, bodies_under, of_c3d, of_storage
 
+from dynakin.results.measures.sources import MEANINGS, MEASURED
+
 ROOT = Path(__file__).resolve().parents[1]
 DATA = Path(os.environ.get("DYNAKIN_TEST_DATA", ROOT.parent / "shared" / "data"))
 KEPT = ROOT / "build" / "recordings"
@@ -34,7 +36,6 @@ PAGE = ROOT / "docs" / "validation.md"
 MARKS = ("<!-- recordings: begin -->", "<!-- recordings: end -->")
 LIMIT_S = 1800.0
 SHOWN = 240  # characters of a refusal
-MEASURED, DERIVED, PRIOR, ABSENT = range(4)
 Make = Callable[[], Reference]
 Codes = NDArray[np.integer]
 
@@ -298,7 +299,7 @@ def compared(run: Run, data: xr.Dataset, reference: Reference) -> dict[tuple[str
 
 
 def _share(codes: Codes) -> str:
-    return " / ".join(str(int(np.count_nonzero(codes == code))) for code in (MEASURED, DERIVED, PRIOR, ABSENT))
+    return " / ".join(str(int(np.count_nonzero(codes == code))) for code in range(len(MEANINGS)))
 
 
 def _mm(value: float | None) -> str:
