@@ -16,8 +16,8 @@ ContactRecord::ContactRecord(const Model& model, const ContactTrial& of)
       source(of.frames * model.coordinates().size()),
       loads_(of.segments.size(), of.states) {
   if (static_cast<int>(of.states) != model.contacts())
-    throw std::invalid_argument("contacts: effects of the states of " + std::to_string(of.states) + " contacts, expected " +
-                                std::to_string(model.contacts()) + " as the model has");
+    throw std::invalid_argument("contacts: effects of the states of " + std::to_string(of.states) +
+                                " contacts, expected " + std::to_string(model.contacts()) + " as the model has");
 }
 
 void ContactRecord::report(std::size_t k, const StateRef& x, const KinematicState& state, const DynamicState& dynamics,
@@ -29,7 +29,7 @@ void ContactRecord::report(std::size_t k, const StateRef& x, const KinematicStat
   loads_.covariance = Eigen::Map<const Eigen::MatrixXd>(trial.covariance.data() + 36 * first * n, size, size);
   using Effects = Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::RowMajor>;
   loads_.effects = Eigen::Map<const Effects>(trial.effects.data() + 36 * trial.states * k, 6,
-                                              static_cast<Eigen::Index>(6 * trial.states));
+                                             static_cast<Eigen::Index>(6 * trial.states));
   if (!moments.distribute(x, dynamics, loads_))
     throw std::invalid_argument("frame " + std::to_string(k) +
                                 ": the covariance of the sum of the contacts' wrenches is not positive definite");

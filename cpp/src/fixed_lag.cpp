@@ -38,8 +38,7 @@ StepReport FixedLag::record(Frame& now, double dt, const MarkerRef& markers, con
   }
 }
 
-StepReport FixedLag::step(double dt, const MarkerRef& markers, const Vector6& wrench,
-                          const WrenchModel* how) {
+StepReport FixedLag::step(double dt, const MarkerRef& markers, const Vector6& wrench, const WrenchModel* how) {
   const bool first = frames_ == 0;
   if (!first) filter_.predict(dt);
   ++frames_;

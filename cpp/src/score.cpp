@@ -53,7 +53,8 @@ Score::Score(const Model& model, std::size_t frames, const ScoreOptions& options
 
 Score score_trial(Filter& filter, const Trial& trial, const ScoreOptions& options) {
   const Model& model = filter.model();
-  const std::size_t n_markers = model.markers().size(), m = 3 * n_markers, n = model.state_size(), nc = model.coordinates().size();
+  const std::size_t n_markers = model.markers().size(), m = 3 * n_markers, n = model.state_size(),
+                    nc = model.coordinates().size();
   const std::size_t end = std::min(trial.frames, options.end);
   Score score(model, trial.frames, options);
   int lost = 0;
@@ -94,8 +95,7 @@ Score score_trial(Filter& filter, const Trial& trial, const ScoreOptions& option
     const std::size_t then = k + options.ahead;
     if (options.ahead == 0 || then < options.first || then >= end) continue;
     const Measurement& foreseen = filter.foresee(trial.time[then] - trial.time[k]);
-    add_markers(model, trial.markers_at(then, n_markers), foreseen.predicted().data(),
-                score.ahead);
+    add_markers(model, trial.markers_at(then, n_markers), foreseen.predicted().data(), score.ahead);
     add_wrench(model, trial.wrench + 6 * then, foreseen.dynamics().wrench.vector(), score.ahead);
   }
   return score;

@@ -37,8 +37,9 @@ void FilterSettings::check(const Model& model) const {
     const auto in = [&](const char* block) { return holds(model.layout().block(block), i); };
     const bool may_decay = in("soft_tissue") || in("plates") || in("contacts");
     if (!(decay_rate(i) >= 0.0) || std::isinf(decay_rate(i)) || (decay_rate(i) > 0.0 && !may_decay))
-      fail("decay_rate", "of '" + names[i] + "' is " + std::to_string(decay_rate(i)) +
-                             (may_decay ? ", expected 0 or more" : ", expected 0: only soft tissue, plates and contacts decay"));
+      fail("decay_rate",
+           "of '" + names[i] + "' is " + std::to_string(decay_rate(i)) +
+               (may_decay ? ", expected 0 or more" : ", expected 0: only soft tissue, plates and contacts decay"));
     if (!(lower(i) <= upper(i)))
       fail("bounds", "of '" + names[i] + "' are " + std::to_string(lower(i)) + " and " + std::to_string(upper(i)) +
                          ", expected lower <= upper");

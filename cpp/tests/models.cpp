@@ -98,6 +98,18 @@ ModelSpec spatial_tree() {
   return spec;
 }
 
+ModelSpec with_contact(ModelSpec spec) {
+  spec.contacts = {"foot"};
+  return spec;
+}
+
+WrenchModel wrench_model_for(const Model& model) {
+  WrenchModel how{Matrix6::Constant(0.5), Eigen::MatrixXd::Constant(6, 6 * model.contacts(), 10.0)};
+  how.covariance.diagonal().array() += 4.0;
+  for (Eigen::Index k = 0; k < how.effects.cols(); ++k) how.effects(k % 6, k) += 90.0;
+  return how;
+}
+
 FilterSettings settings_for(const Model& model) {
   const int n = model.state_size();
   FilterSettings settings;

@@ -40,6 +40,7 @@ void operator delete(void* p, std::size_t, std::align_val_t) noexcept { std::fre
 
 namespace {
 
+// With contacts in the spec also with a WrenchModel that changes, frame by frame, and is away in some.
 void check_no_allocation(const dynakin::ModelSpec& spec) {
   using namespace dynakin;
   const Model model(spec);
@@ -49,10 +50,13 @@ void check_no_allocation(const dynakin::ModelSpec& spec) {
   auto markers = markers_at(model, x);
   const Vector6 wrench = Vector6::Constant(10.0);
   Filter filter(model, settings, x, prior_for(model));
+  WrenchModel how = wrench_model_for(model);
   for (int k = 0; k < 20; ++k) {
     if (k == 10) markers.col(1).setConstant(std::nan(""));
+    how.effects *= 0.9;
+    const bool given = model.contacts() > 0 && k % 5 != 4;
     const long before = allocations;
-    const StepReport report = filter.step(0.01, markers, wrench);
+    const StepReport report = filter.step(0.01, markers, wrench, given ? &how : nullptr);
     CHECK(allocations == before);
     CHECK(!report.diverged());
     CHECK(report.constrained > 0 || k > 0);
@@ -189,8 +193,12 @@ void check_contacts_allocate_nothing(const dynakin::ModelSpec& spec) {
   DynamicState dynamics(model);
   forward_kinematics(model, x, kinematics);
   subtree_dynamics(model, x, kinematics, dynamics);
-  ContactMoments contacts(model, {0, static_cast<int>(model.segments().size()) - 1});
-  ContactLoads loads(2);
+  ContactMoments contacts(model, {static_cast<int>(model.segments().size()) - 1, 0});
+  ContactLoads loads(2, static_cast<std::size_t>(model.contacts()));
+  loads.effects.setConstant(3.0);
+  loads.covariance.topRightCorner(6, 6).setIdentity();  // errors that go together
+  loads.covariance.topRightCorner(6, 6) *= -0.5;
+  loads.covariance.bottomLeftCorner(6, 6) = loads.covariance.topRightCorner(6, 6);
   Eigen::VectorXd moments(model.coordinates().size());
   std::vector<double> moments_sd(model.coordinates().size()), wrench_sd(12);
   std::vector<Force> joints(model.segments().size());
@@ -221,13 +229,14 @@ void check_fixed_lag_allocates_nothing(const dynakin::ModelSpec& spec, bool devi
   const Vector6 wrench = Vector6::Constant(10.0);
   Filter filter(model, settings, x, prior_for(model));
   FixedLag lag(filter, 5, deviations);
+  const WrenchModel how = wrench_model_for(model);
   OutputDeviation deviation(model);
   std::vector<double> markers_sd(3 * model.markers().size()), moments_sd(model.coordinates().size()), wrench_sd(6);
   bool bound = false;
   for (int k = 0; k < 20; ++k) {
     if (k == 10) markers.col(1).setConstant(std::nan(""));
     const long before = allocations;
-    const StepReport report = lag.step(0.01, markers, wrench);
+    const StepReport report = lag.step(0.01, markers, wrench, model.contacts() > 0 ? &how : nullptr);
     const Measurement& now = filter.evaluate();
     deviation.markers(now.kinematics(), filter.covariance(), markers_sd.data());
     deviation.wrench(now.kinematics(), now.dynamics(), filter.covariance(), wrench_sd.data());
@@ -253,6 +262,10 @@ TEST(the_counter_sees_allocations) {
 
 TEST(a_planar_step_allocates_nothing) { check_no_allocation(planar_chain()); }
 TEST(a_spatial_step_allocates_nothing) { check_no_allocation(spatial_tree()); }
+TEST(a_step_with_contacts_allocates_nothing) {
+  check_no_allocation(with_contact(planar_chain()));
+  check_no_allocation(with_contact(spatial_tree()));
+}
 TEST(a_planar_step_with_everything_on_allocates_nothing) { check_no_allocation_with_everything_on(planar_chain()); }
 TEST(a_spatial_step_with_everything_on_allocates_nothing) { check_no_allocation_with_everything_on(spatial_tree()); }
 TEST(recovery_allocates_nothing) {
@@ -270,11 +283,14 @@ TEST(the_moments_derivatives_allocate_nothing) {
 TEST(contacts_allocate_nothing) {
   check_contacts_allocate_nothing(planar_chain());
   check_contacts_allocate_nothing(spatial_tree());
+  check_contacts_allocate_nothing(with_contact(planar_chain()));
+  check_contacts_allocate_nothing(with_contact(spatial_tree()));
 }
 TEST(a_fixed_lag_allocates_nothing) {
   for (bool deviations : {false, true}) {
     check_fixed_lag_allocates_nothing(planar_chain(), deviations);
     check_fixed_lag_allocates_nothing(spatial_tree(), deviations);
+    check_fixed_lag_allocates_nothing(with_contact(spatial_tree()), deviations);
   }
 }
 #endif

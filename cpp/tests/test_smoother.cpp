@@ -21,12 +21,27 @@ struct Made {
       if (k > 5 && k < 10) shown.col(1).setConstant(std::nan(""));
       time.push_back(0.01 * k + 0.001 * (k % 3));
       markers.insert(markers.end(), shown.data(), shown.data() + shown.size());
-      for (int c = 0; c < 6; ++c) wrench.push_back(c == 1 ? 400.0 : 5.0);
+      for (int c = 0; c < 6; ++c) wrench.push_back(k == 15 ? std::nan("") : c == 1 ? 400.0 : 5.0);
+      if (spec.contacts.empty()) continue;
+      const WrenchModel how = wrench_model_for(model);
+      const Eigen::Matrix<double, 6, 6> R = (1.0 + 0.1 * (k % 4)) * how.covariance;
+      covariance.insert(covariance.end(), R.data(), R.data() + R.size());
+      const double part = k < 14 ? 1.0 - 0.05 * k : 0.0;  // a contact that leaves
+      for (Eigen::Index i = 0; i < 6; ++i)
+        for (Eigen::Index j = 0; j < how.effects.cols(); ++j) effects.push_back(part * how.effects(i, j));
     }
+  }
+  Trial trial() const {
+    return {time.data(),
+            markers.data(),
+            wrench.data(),
+            time.size(),
+            covariance.empty() ? nullptr : covariance.data(),
+            effects.empty() ? nullptr : effects.data()};
   }
   SmoothRecord smoothed(std::size_t stretch) const {
     Filter f(model, settings, model.initial_state(), prior_for(model));
-    Smoother smoother(f, {time.data(), markers.data(), wrench.data(), time.size()}, stretch);
+    Smoother smoother(f, trial(), stretch);
     RunRecord record(model, time.size());
     smoother.forward(0, 7, record);
     smoother.forward(7, time.size(), record);
@@ -45,13 +60,14 @@ struct Made {
 
   Model model;
   FilterSettings settings;
-  std::vector<double> time, markers, wrench;
+  std::vector<double> time, markers, wrench, covariance, effects;
 };
 
 }  // namespace
 
 TEST(smoothing_gives_the_same_bits_with_any_checkpoints) {
-  for (const ModelSpec& spec : {planar_chain(), spatial_tree()}) {
+  for (const ModelSpec& spec :
+       {planar_chain(), spatial_tree(), with_contact(planar_chain()), with_contact(spatial_tree())}) {
     const Made trial(spec);
     const SmoothRecord whole = trial.smoothed(1000);
     for (std::size_t stretch : {0, 1, 4, 22}) {
@@ -62,17 +78,36 @@ TEST(smoothing_gives_the_same_bits_with_any_checkpoints) {
   }
 }
 
-TEST(a_fixed_lag_ends_where_the_smoother_does) {
-  const Made trial(spatial_tree());
+TEST(what_is_given_of_the_wrench_tells_the_smoother) {
+  Made trial(with_contact(spatial_tree()));
+  const SmoothRecord with = trial.smoothed(4);
+  const int contact = trial.model.contact_column(0);
+  CHECK(with.state_sd[static_cast<std::size_t>(contact) + 1] <
+        0.9 * std::sqrt(prior_for(trial.model)(contact, contact)));
+  trial.covariance.clear();
+  trial.effects.clear();
+  const SmoothRecord without = trial.smoothed(4);
+  CHECK(with.state != without.state && with.wrench_sd != without.wrench_sd);
+}
+
+void check_a_fixed_lag_ends_where_the_smoother_does(const ModelSpec& spec) {
+  const Made trial(spec);
   const SmoothRecord out = trial.smoothed(0);
   Filter f(trial.model, trial.settings, trial.model.initial_state(), prior_for(trial.model));
   FixedLag lag(f, 6, true);
   const std::size_t m = trial.model.markers().size(), n = trial.model.state_size(), frames = trial.time.size();
+  const Trial given = trial.trial();
+  WrenchModel how;
   for (std::size_t k = 0; k < frames; ++k) {
     CHECK(lag.ready() == (k > 6));
-    lag.step(k > 0 ? trial.time[k] - trial.time[k - 1] : 0.0,
-             Eigen::Map<const MarkerMatrix>(trial.markers.data() + 3 * m * k, 3, m),
-             Eigen::Map<const Vector6>(trial.wrench.data() + 6 * k));
+    if (given.wrench_covariance) {
+      const Eigen::Index columns = 6 * trial.model.contacts();
+      how.covariance = Eigen::Map<const Matrix6>(given.wrench_covariance + 36 * k);
+      how.effects = Eigen::Map<const Eigen::Matrix<double, 6, Eigen::Dynamic, Eigen::RowMajor>>(
+          given.wrench_effects + 6 * columns * k, 6, columns);
+    }
+    lag.step(given.dt(k), given.markers_at(k, m), Eigen::Map<const Vector6>(trial.wrench.data() + 6 * k),
+             given.wrench_covariance ? &how : nullptr);
   }
   CHECK_NEAR(lag.delay(), trial.time[frames - 1] - trial.time[frames - 7], 1e-12);
   for (std::size_t i = 0; i < n; ++i) {
@@ -80,6 +115,11 @@ TEST(a_fixed_lag_ends_where_the_smoother_does) {
     CHECK_NEAR(lag.state()(static_cast<Eigen::Index>(i)), out.state[(frames - 7) * n + i], 1e-7 * sd);
     CHECK_NEAR(std::sqrt(lag.covariance()(i, i)), sd, 1e-10 * sd);
   }
+}
+
+TEST(a_fixed_lag_ends_where_the_smoother_does) {
+  check_a_fixed_lag_ends_where_the_smoother_does(spatial_tree());
+  check_a_fixed_lag_ends_where_the_smoother_does(with_contact(spatial_tree()));
 }
 
 TEST(smoothing_refuses_bounds_that_have_no_smoother) {

@@ -8,13 +8,21 @@ import pytest
 from dynakin.bindings import _core
 from support.core.bridge import model_of
 from support.core.differences import BLOCKS, central_differences, compare
-from support.core.random_models import planar_model, random_state, spatial_model, with_functions, with_slow_errors
+from support.core.random_models import (
+    planar_model,
+    random_state,
+    spatial_model,
+    with_contacts,
+    with_functions,
+    with_slow_errors,
+)
 from support.oracle import measurement
 from support.oracle.state import Layout
 
 MODELS = [planar_model(s) for s in range(5)] + [spatial_model(s) for s in range(16)]
 MODELS += [with_functions(spatial_model(s), s) for s in range(16, 26)]
 SLOW = [with_slow_errors(spec, k) for k, spec in enumerate(MODELS)]
+SLOW += [with_contacts(SLOW[2]), with_contacts(SLOW[8], ("right",))]
 OFFSETS_ONLY = with_slow_errors(planar_model(3), 7, delay=False)
 
 

@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 
 from support.core.bridge import filter_of
-from support.core.random_models import continuous, planar_model, settings, spatial_model, trial, with_slow_errors
+from support.core.random_models import (
+    continuous,
+    planar_model,
+    settings,
+    spatial_model,
+    trial,
+    with_contacts,
+    with_slow_errors,
+)
 from support.oracle import gate
 from support.oracle.filter import Filter, Settings
 from support.oracle.inertia import all_possible
@@ -45,6 +53,15 @@ CONTINUOUS = {
     ),
     "sigmoid, planar chain": (lambda: planar_model(50, n_segments=4), {"constraint": "sigmoid"}),
     "gain, spatial": (lambda: spatial_model(6), {"constraint": "gain"}),
+    "contacts, planar chain": (
+        lambda: with_contacts(planar_model(50, n_segments=5)),
+        {"constraint": "projection", "total_mass": None},
+    ),
+    "contacts, spatial": (lambda: with_contacts(spatial_model(4)), {}),
+    "contacts and gates, spatial, axis functions": (
+        lambda: with_contacts(spatial_model(9), ("left", "right", "seat")),
+        {"marker_gate": gate.limits(0.3), "wrench_gate": gate.limits(0.1), "wrench_needs_markers": True},
+    ),
 }
 NAMES = [*CASES, *CONTINUOUS]
 
@@ -63,7 +80,9 @@ def case(name):
             options["lower"], options["upper"] = options["lower"].copy(), options["upper"].copy()
             options["lower"][0] -= 0.3
             options["upper"][0] += 0.3
-    expected = Filter(spec, Settings(**options), data.x0, data.P0).run(data.time, data.markers, data.wrench)
+    expected = Filter(spec, Settings(**options), data.x0, data.P0).run(
+        data.time, data.markers, data.wrench, **data.given
+    )
     return spec, data, options, expected
 
 
@@ -83,6 +102,11 @@ def test_trial_is_a_real_test(name):
         refused = (expected["verdicts"] == "refused").mean(axis=0)
         assert refused[:-1].max() > 0.02
         assert 0 < refused[-1] < 0.9
+    if spec.contacts:  # which are there, change, are gone, and decide something while they are there
+        acts = np.abs(data.wrench_effects).max(axis=1).reshape(len(data.time), -1, 6).max(axis=2) > 0.0
+        assert len(np.unique(acts, axis=0)) > 3 and not acts[-1].any()
+        assert np.isnan(data.wrench[acts.any(axis=1)]).any()
+        assert expected["state_sd"][:, Layout(spec).block("contacts")].min() < 0.6  # 1 before anything is measured
     if options["constraint"] == "projection":
         assert all(all_possible(Layout(spec), x) for x in expected["state"])
     if options["constraint"] == "sigmoid":
@@ -98,7 +122,7 @@ def test_trial_is_a_real_test(name):
 def test_run_equals_the_oracle(name, chunk_rows):
     spec, data, options, expected = case(name)
     f = filter_of(spec, options, data.x0, data.P0, chunk_rows)
-    out = f.run(data.time, data.markers, data.wrench)
+    out = data.run(f.run)
     near(out["state"], expected["state"], name="state")
     near(out["state_sd"], expected["state_sd"], scale=expected["state_sd"], name="state_sd")
     np.testing.assert_array_equal(out["n_rows"], expected["n_rows"])
@@ -130,7 +154,14 @@ def test_run_equals_the_oracle(name, chunk_rows):
 
 
 @pytest.mark.parametrize(
-    "name", ["paper: planar chain of 7", "spatial, axis functions", "projection, spatial", "sigmoid, planar chain"]
+    "name",
+    [
+        "paper: planar chain of 7",
+        "spatial, axis functions",
+        "projection, spatial",
+        "sigmoid, planar chain",
+        "contacts, spatial",
+    ],
 )
 def test_single_steps_equal_the_oracle(name):
     """Covariance after each of predict and update, not only at the end."""
@@ -144,8 +175,7 @@ def test_single_steps_equal_the_oracle(name):
                 oracle.predict(0.004 + 0.0003 * k)
             else:
                 core.report_sensors(k % 2 == 0)
-                report = core.update(data.markers[k], data.wrench[k])
-                expected = oracle.update(data.markers[k], data.wrench[k])
+                report, expected = core.update(*data.at(k)), oracle.update(*data.at(k))
                 assert (report.n_rows, report.constrained) == (expected.n_rows, expected.constrained)
                 assert report.nis == pytest.approx(expected.nis, rel=1e-9, abs=1e-9)
                 assert report.log_likelihood == pytest.approx(expected.log_likelihood, rel=1e-9, abs=1e-9)

@@ -12,6 +12,7 @@ from support.core.smoother_cases import BOUNDED, case, lost_and_found
 CASES = {
     "planar": lambda: case(planar_model(50, n_segments=5), 31, 40),
     "spatial, all blocks": lambda: case(spatial_model(9), 31, 40, states="all"),
+    "contacts": lambda: case(spatial_model(4, nonlinear=False), 31, 40, states="contacts"),
     "bounds": BOUNDED["all blocks"],
     "lost and found": lost_and_found,
 }
@@ -22,7 +23,7 @@ def stepped(c, lag, frames, **options):
     d = c.data
     for k in range(frames):
         dt = d.time[k] - d.time[k - 1] if k else 0.0
-        smoother.step(dt, d.markers[k], d.wrench[k])
+        smoother.step(dt, *d.at(k))
         yield k, smoother
 
 
@@ -44,7 +45,7 @@ def test_equals_the_full_smoother_on_the_data_until_now(name, lag):
         np.testing.assert_array_less(np.abs(smoother.state - full["smoothed_state"][there]) / sd, 1e-7)
 
 
-@pytest.mark.parametrize("name", ["planar", "spatial, all blocks"])
+@pytest.mark.parametrize("name", ["planar", "spatial, all blocks", "contacts"])
 def test_without_deviations_the_mean_is_the_same(name):
     c = CASES[name]()
     with_sd = [(s.state, s.delay_s) for _, s in stepped(c, 6, 40, deviations=True) if s.ready]

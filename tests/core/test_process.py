@@ -7,11 +7,20 @@ import pytest
 
 from dynakin.bindings import _core
 from support.core.bridge import filter_of
-from support.core.random_models import continuous, planar_model, prior_sd, settings, spatial_model, with_slow_errors
+from support.core.random_models import (
+    continuous,
+    planar_model,
+    prior_sd,
+    settings,
+    spatial_model,
+    with_contacts,
+    with_slow_errors,
+)
 from support.oracle import process
 from support.oracle.state import Layout
 
 SPECS = [with_slow_errors(planar_model(50, n_segments=7), 1), with_slow_errors(spatial_model(6), 2)]
+SPECS += [with_contacts(SPECS[0])]
 each_spec = pytest.mark.parametrize("spec", SPECS, ids=lambda s: s.name)
 
 
@@ -126,7 +135,7 @@ def test_wrong_densities_and_rates_are_refused_by_name(key, value, text):
 
 
 @pytest.mark.parametrize("block", ["coordinates", "speeds", "accelerations", "lengths", "markers", "inertia"])
-def test_only_soft_tissue_and_plates_may_decay(block):
+def test_only_soft_tissue_plates_and_contacts_may_decay(block):
     """A length or a mass that decays to 0 is a mistake."""
     spec = SPECS[0]
     options, layout = continuous(spec, 3), Layout(spec)

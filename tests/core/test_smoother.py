@@ -21,6 +21,10 @@ CASES = {
     "planar, all blocks, plates late": lambda: case(
         planar_model(50, n_segments=4), 31, FRAMES, states="all", delay=True
     ),
+    "planar, contacts": lambda: case(
+        planar_model(50, n_segments=3), 31, FRAMES, states="contacts", delay=True, total_mass=None
+    ),
+    "spatial, contacts": lambda: case(spatial_model(4, nonlinear=False), 31, FRAMES, states="contacts"),
     "spatial, all blocks": lambda: case(spatial_model(9), 31, FRAMES, states="all", total_mass=None),
 }
 each_case = pytest.mark.parametrize("name", CASES)

@@ -12,6 +12,7 @@ FRAMES = 60
 CASES = {
     "plain": lambda: case(spatial_model(6), 31, FRAMES),
     "all blocks": lambda: case(planar_model(50, n_segments=3), 31, FRAMES, states="all"),
+    "contacts": lambda: case(spatial_model(6), 31, FRAMES, states="contacts", delay=True),
     "bounds": BOUNDED["all blocks"],
     "lost and found": lost_and_found,
 }
@@ -33,13 +34,12 @@ def test_checkpoints_change_no_bit(name, stretch):
 def test_the_forward_run_is_that_of_run(name):
     c = CASES[name]()
     f, g = c.filter(), c.filter()
-    trial = (c.data.time, c.data.markers, c.data.wrench)
-    both, alone = f.run_smoothed(*trial), g.run(*trial)
+    both, alone = c.data.run(f.run_smoothed), c.data.run(g.run)
     assert_same({key: both[key] for key in alone}, alone)
     np.testing.assert_array_equal(f.covariance, g.covariance)
     for _ in range(5):  # also in what they remember
-        f.step(0.01, c.data.markers[-1], c.data.wrench[-1])
-        g.step(0.01, c.data.markers[-1], c.data.wrench[-1])
+        f.step(0.01, *c.data.at(-1))
+        g.step(0.01, *c.data.at(-1))
     np.testing.assert_array_equal(f.state, g.state)
 
 

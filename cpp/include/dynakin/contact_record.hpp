@@ -31,8 +31,8 @@ struct ContactRecord {
   const ContactTrial& trial;
   ContactMoments moments;
   std::vector<double> wrench, wrench_sd, adjustment;  // (frames, contacts, 6)
-  std::vector<double> remainder;                                     // (frames, 6)
-  std::vector<std::uint8_t> source;                                  // (frames, coordinates) MomentSource
+  std::vector<double> remainder;                      // (frames, 6)
+  std::vector<std::uint8_t> source;                   // (frames, coordinates) MomentSource
  private:
   ContactLoads loads_;
 };

@@ -48,8 +48,7 @@ class Filter {
   // state is not to be used; further updates report the same until reset().
   // how: the wrench of this frame is measured, see Measurement::expect.
   StepReport update(const MarkerRef& markers, const Vector6& wrench, const WrenchModel* how = nullptr);
-  StepReport step(double dt, const MarkerRef& markers, const Vector6& wrench,
-                  const WrenchModel* how = nullptr) {
+  StepReport step(double dt, const MarkerRef& markers, const Vector6& wrench, const WrenchModel* how = nullptr) {
     predict(dt);
     return update(markers, wrench, how);
   }

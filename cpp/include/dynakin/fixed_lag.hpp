@@ -22,8 +22,7 @@ class FixedLag {
   FixedLag& operator=(const FixedLag&) = delete;
 
   // dt since the frame before; the first frame is an update only.
-  StepReport step(double dt, const MarkerRef& markers, const Vector6& wrench,
-                  const WrenchModel* how = nullptr);
+  StepReport step(double dt, const MarkerRef& markers, const Vector6& wrench, const WrenchModel* how = nullptr);
 
   const Filter& filter() const { return filter_; }
   int lag() const { return lag_; }
@@ -41,8 +40,7 @@ class FixedLag {
     Belief filtered;
     FrameTape tape;
   };
-  StepReport record(Frame& now, double dt, const MarkerRef& markers, const Vector6& wrench,
-                    const WrenchModel* how);
+  StepReport record(Frame& now, double dt, const MarkerRef& markers, const Vector6& wrench, const WrenchModel* how);
   Frame& back(int by) { return ring_[static_cast<std::size_t>((frames_ - 1 - by) % (lag_ + 1))]; }
 
   Filter& filter_;

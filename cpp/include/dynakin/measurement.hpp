@@ -24,10 +24,10 @@ struct RowBlock {
   int rows = 0;  // of these, how many are measured in this frame
 };
 
-// How the total wrench of a frame is measured, where what bears the person changes from frame to frame: about the ground
-// origin, measured = body's wrench - effects * (states of the contacts) + white errors.
+// How the total wrench of a frame is measured, where what bears the person changes from frame to frame: about the
+// ground origin, measured = body's wrench - effects * (states of the contacts) + white errors.
 struct WrenchModel {
-  Matrix6 covariance;                              // of the white errors, positive definite
+  Matrix6 covariance;                                // of the white errors, positive definite
   Eigen::Matrix<double, 6, Eigen::Dynamic> effects;  // (6, 6 contacts) of the model
 };
 

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "dynakin/contact_record.hpp"
-#include "dynakin/trial.hpp"
 #include "dynakin/output_sd.hpp"
+#include "dynakin/trial.hpp"
 
 namespace dynakin {
 

@@ -9,9 +9,9 @@ namespace dynakin {
 
 // Row-major arrays, a row a frame, which must outlive it.
 struct Trial {
-  const double* time;                         // s
-  const double* markers;                      // (frames, M, 3) m
-  const double* wrench;                       // (frames, 6) N, N m about the ground origin
+  const double* time;     // s
+  const double* markers;  // (frames, M, 3) m
+  const double* wrench;   // (frames, 6) N, N m about the ground origin
   std::size_t frames;
   // WrenchModel of each frame: (frames, 6, 6), symmetric, and (frames, 6, 6 C); nullptr: the settings' covariance.
   const double* wrench_covariance = nullptr;

@@ -33,7 +33,8 @@ PyContactLoads contact_loads(std::vector<std::string> segments, const Array3& wr
   if (contact.shape(0) != frames || contact.shape(1) != n)
     throw std::invalid_argument("contact: expected " + shape({frames, n}));
   const std::size_t states = effects ? effects->shape(2) / 6 : 0;
-  if (effects && (effects->shape(0) != frames || effects->shape(1) != 6 || effects->shape(2) != 6 * states || states > n))
+  if (effects &&
+      (effects->shape(0) != frames || effects->shape(1) != 6 || effects->shape(2) != 6 * states || states > n))
     throw std::invalid_argument("effects: expected " + shape({frames, 6, 6 * n}) + " or fewer columns, six a contact");
   PyContactLoads out;
   out.names = std::move(segments);
@@ -171,7 +172,8 @@ std::vector<int> segment_indices(const Model& model, const std::vector<std::stri
 }
 
 void bind_contacts(nb::module_& m) {
-  nb::class_<PyContactLoads>(m, "ContactLoads", "Wrenches of contacts over a trial as they are expected, how sure that is, and what touches.")
+  nb::class_<PyContactLoads>(
+      m, "ContactLoads", "Wrenches of contacts over a trial as they are expected, how sure that is, and what touches.")
       .def(
           "__init__",
           [](PyContactLoads* self, std::vector<std::string> segments, const Array3& wrench, const Array3& covariance,
@@ -182,7 +184,8 @@ void bind_contacts(nb::module_& m) {
           nb::arg("effects") = nb::none(),
           "segments: a name a contact. wrench (T, C, 6) N and N m, on the person, about the ground origin; covariance "
           "(T, 6 C, 6 C), that of the sum positive definite; contact (T, C) uint8: 0 nothing touches, 1 on a plate, 2 "
-          "not measured, 3 on a plate with another contact; effects (T, 6, 6 K): what the six states of each of the first K "
+          "not measured, 3 on a plate with another contact; effects (T, 6, 6 K): what the six states of each of the "
+          "first K "
           "contacts add to its wrench, where the model has them. Raises ValueError for other shapes or codes.");
   m.def("contact_moments", &contact_moments, nb::arg("model"), nb::arg("x"), nb::arg("loads"), nb::arg("frame") = 0,
         nb::arg("covariance") = nb::none(),

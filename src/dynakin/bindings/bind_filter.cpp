@@ -138,7 +138,8 @@ void bind_filter(nb::module_& m) {
           "update",
           [](Filter& f, const Array2& markers, const Vector6& wrench, const std::optional<Matrix6>& wrench_covariance,
              const std::optional<Eigen::MatrixXd>& wrench_effects) {
-            return f.update(marker_map(markers, f.model()), wrench, GivenWrenchModel(f.model(), wrench_covariance, wrench_effects));
+            return f.update(marker_map(markers, f.model()), wrench,
+                            GivenWrenchModel(f.model(), wrench_covariance, wrench_effects));
           },
           nb::arg("markers"), nb::arg("wrench"), nb::arg("wrench_covariance") = nb::none(),
           nb::arg("wrench_effects") = nb::none(),
@@ -147,13 +148,12 @@ void bind_filter(nb::module_& m) {
       .def(
           "step",
           [](Filter& f, double dt, const Array2& markers, const Vector6& wrench,
-             const std::optional<Matrix6>& wrench_covariance,
-             const std::optional<Eigen::MatrixXd>& wrench_effects) {
-            return f.step(dt, marker_map(markers, f.model()), wrench, GivenWrenchModel(f.model(), wrench_covariance, wrench_effects));
+             const std::optional<Matrix6>& wrench_covariance, const std::optional<Eigen::MatrixXd>& wrench_effects) {
+            return f.step(dt, marker_map(markers, f.model()), wrench,
+                          GivenWrenchModel(f.model(), wrench_covariance, wrench_effects));
           },
           nb::arg("dt"), nb::arg("markers"), nb::arg("wrench"), nb::arg("wrench_covariance") = nb::none(),
-          nb::arg("wrench_effects") = nb::none(),
-          "predict(dt), then update(markers, wrench, wrench_covariance).");
+          nb::arg("wrench_effects") = nb::none(), "predict(dt), then update(markers, wrench, wrench_covariance).");
   bind_run(filter);
   bind_score(filter);
 }

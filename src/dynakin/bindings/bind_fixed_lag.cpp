@@ -36,14 +36,14 @@ void bind_fixed_lag(nb::module_& m) {
       .def(
           "step",
           [](FixedLag& lag, double dt, const Array2& markers, const Vector6& wrench,
-             const std::optional<Matrix6>& wrench_covariance,
-             const std::optional<Eigen::MatrixXd>& wrench_effects) {
+             const std::optional<Matrix6>& wrench_covariance, const std::optional<Eigen::MatrixXd>& wrench_effects) {
             return lag.step(dt, marker_map(markers, lag.filter().model()), wrench,
                             GivenWrenchModel(lag.filter().model(), wrench_covariance, wrench_effects));
           },
           nb::arg("dt"), nb::arg("markers"), nb::arg("wrench"), nb::arg("wrench_covariance") = nb::none(),
           nb::arg("wrench_effects") = nb::none(),
-          "As of Filter.step: dt s since the frame before (the first frame is an update only), markers (M, 3), wrench (6,).")
+          "As of Filter.step: dt s since the frame before (the first frame is an update only), markers (M, 3), wrench "
+          "(6,).")
       .def_prop_ro("lag", &FixedLag::lag, "frames")
       .def_prop_ro("ready", &FixedLag::ready, "whether there is a smoothed frame yet")
       .def_prop_ro("delay_s", &FixedLag::delay, "how far the smoothed frame lies back")

@@ -5,8 +5,8 @@
 #include <utility>
 
 #include "arrays.hpp"
-#include "dynakin/smoother.hpp"
 #include "contacts.hpp"
+#include "dynakin/smoother.hpp"
 #include "module.hpp"
 #include "trial.hpp"
 
@@ -107,8 +107,7 @@ nb::dict run(Filter& filter, const Array1& time, const Array3& markers, const Ar
 
 nb::dict run_smoothed(Filter& filter, const Array1& time, const Array3& markers, const Array2& wrench,
                       nb::object progress, bool output_sd, std::size_t stretch, const PyContactLoads* loads,
-                      const std::optional<Array3>& wrench_covariance,
-             const std::optional<Array3>& wrench_effects) {
+                      const std::optional<Array3>& wrench_covariance, const std::optional<Array3>& wrench_effects) {
   const Trial trial = trial_of(filter, time, markers, wrench, wrench_covariance, wrench_effects);
   Feet feet(filter.model(), loads, trial.frames), smoothed_feet(filter.model(), loads, trial.frames);
   const std::size_t frames = trial.frames;
@@ -143,16 +142,20 @@ nb::dict run_smoothed(Filter& filter, const Array1& time, const Array3& markers,
 void bind_run(nb::class_<Filter>& filter) {
   filter
       .def("run", &run, nb::arg("time"), nb::arg("markers"), nb::arg("wrench"), nb::arg("progress") = nb::none(),
-           nb::arg("output_sd") = false, nb::arg("feet") = nb::none(), nb::arg("wrench_covariance") = nb::none(), nb::arg("wrench_effects") = nb::none(),
+           nb::arg("output_sd") = false, nb::arg("feet") = nb::none(), nb::arg("wrench_covariance") = nb::none(),
+           nb::arg("wrench_effects") = nb::none(),
            "Runs over time (T,), markers (T, M, 3) and wrench (T, 6); the first frame is an update only. Returns "
-           "arrays by name; wrench_covariance (T, 6, 6), about the ground origin, takes the place of the settings', and wrench_effects (T, 6, 6 C) is what the states of the contacts take from it; with output_sd also markers_sd, wrench_sd (of the body's own wrench) and moments_sd. "
+           "arrays by name; wrench_covariance (T, 6, 6), about the ground origin, takes the place of the settings', "
+           "and wrench_effects (T, 6, 6 C) is what the states of the contacts take from it; with output_sd also "
+           "markers_sd, wrench_sd (of the body's own wrench) and moments_sd. "
            "With feet the moments are those of contact_moments, and foot_wrench, foot_adjustment, remainder, "
            "moment_source "
            "(and foot_wrench_sd) come with them. "
            "Raises DivergenceError naming the frame. progress(done, total) is called now and then.")
       .def("run_smoothed", &run_smoothed, nb::arg("time"), nb::arg("markers"), nb::arg("wrench"),
            nb::arg("progress") = nb::none(), nb::arg("output_sd") = false, nb::arg("stretch") = 0,
-           nb::arg("feet") = nb::none(), nb::arg("wrench_covariance") = nb::none(), nb::arg("wrench_effects") = nb::none(),
+           nb::arg("feet") = nb::none(), nb::arg("wrench_covariance") = nb::none(),
+           nb::arg("wrench_effects") = nb::none(),
            "run, then backwards over the same frames: the arrays of run, and smoothed_state, _markers, _wrench and "
            "_moments, each also with _sd, and backward_us. The filter then stands where run would have left it; after "
            "an interruption it stands anywhere. progress counts both ways: total is twice the frames. Memory beside "

@@ -15,8 +15,8 @@ inline dynakin::Trial trial_of(const dynakin::Filter& filter, const Array1& time
                                 ", 3)");
   if (wrench.shape(0) != frames || wrench.shape(1) != 6)
     throw std::invalid_argument("wrench: expected (" + std::to_string(frames) + ", 6)");
-  if (wrench_covariance && (wrench_covariance->shape(0) != frames || wrench_covariance->shape(1) != 6 ||
-                            wrench_covariance->shape(2) != 6))
+  if (wrench_covariance &&
+      (wrench_covariance->shape(0) != frames || wrench_covariance->shape(1) != 6 || wrench_covariance->shape(2) != 6))
     throw std::invalid_argument("wrench_covariance: expected (" + std::to_string(frames) + ", 6, 6)");
   const auto columns = static_cast<std::size_t>(6 * filter.model().contacts());
   if (wrench_covariance && !wrench_effects && columns > 0)
@@ -25,8 +25,12 @@ inline dynakin::Trial trial_of(const dynakin::Filter& filter, const Array1& time
       (wrench_effects->shape(0) != frames || wrench_effects->shape(1) != 6 || wrench_effects->shape(2) != columns))
     throw std::invalid_argument("wrench_effects: expected (" + std::to_string(frames) + ", 6, " +
                                 std::to_string(columns) + ")");
-  return {time.data(), markers.data(), wrench.data(), frames,
-          wrench_covariance ? wrench_covariance->data() : nullptr, wrench_effects ? wrench_effects->data() : nullptr};
+  return {time.data(),
+          markers.data(),
+          wrench.data(),
+          frames,
+          wrench_covariance ? wrench_covariance->data() : nullptr,
+          wrench_effects ? wrench_effects->data() : nullptr};
 }
 
 // How one frame's wrench is measured, where that is given.

@@ -44,6 +44,7 @@ def to_core(spec: Spec) -> _core.ModelSpec:
         wrench_measured=spec.wrench_measured,
         wrench_offset=spec.wrench_offset,
         wrench_delay=spec.wrench_delay,
+        contacts=spec.contacts,
     )
 
 

@@ -4,7 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-BLOCKS = ("coordinates", "speeds", "accelerations", "lengths", "markers", "soft_tissue", "inertia", "plates")
+BLOCKS = (
+    "coordinates",
+    "speeds",
+    "accelerations",
+    "lengths",
+    "markers",
+    "soft_tissue",
+    "inertia",
+    "plates",
+    "contacts",
+)
 
 
 def central_differences(function, x):

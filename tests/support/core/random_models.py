@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from copy import deepcopy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.random import Generator
@@ -197,6 +199,14 @@ def with_slow_errors(spec: Spec, seed: int, delay: bool = True) -> Spec:
     return spec
 
 
+def with_contacts(spec: Spec, names: tuple[str, ...] = ("left", "right")) -> Spec:
+    """The same model with the states of so many contacts."""
+    spec = deepcopy(spec)
+    spec.contacts = list(names)
+    spec.name += " with contacts"
+    return spec
+
+
 def random_function(rng: Generator) -> Function:
     """A polynomial, or a gentle function through some points."""
     kind = str(rng.choice(["polynomial", "spline", "spline", "piecewise_linear"]))
@@ -227,6 +237,7 @@ def random_state(layout: Layout, rng: Generator) -> NDArray:
     x[layout.block("soft_tissue")] = rng.normal(size=layout.blocks["soft_tissue"][1]) * 0.02
     plates = layout.block("plates")
     x[plates] = [0.03 if name == "plates/delay" else 20.0 * rng.normal() for name in layout.names[plates]]
+    x[layout.block("contacts")] = rng.normal(size=layout.blocks["contacts"][1])
     for block, size in (("lengths", 0.1), ("inertia", 0.02)):  # a body of 2 % other numbers can still exist
         here = layout.block(block)
         x[here] *= rng.uniform(1 - size, 1 + size, x[here].size)
@@ -243,6 +254,43 @@ class Trial:
     x0: NDArray
     P0: NDArray
     truth: NDArray  # (T, n)
+    wrench_covariance: NDArray | None = None  # (T, 6, 6) where the model has contacts
+    wrench_effects: NDArray | None = None  # (T, 6, 6 C)
+
+    @property
+    def given(self) -> dict[str, NDArray]:
+        """How the total wrench is measured, as ``run`` takes it."""
+        if self.wrench_covariance is None or self.wrench_effects is None:
+            return {}
+        return {"wrench_covariance": self.wrench_covariance, "wrench_effects": self.wrench_effects}
+
+    def run(self, run: Callable[..., dict[str, Any]], **options: Any) -> dict[str, Any]:
+        """What a filter's ``run`` or ``run_smoothed`` makes of it."""
+        return run(self.time, self.markers, self.wrench, **self.given, **options)
+
+    def at(self, k: int) -> tuple[NDArray, ...]:
+        """What a filter's update takes of frame k."""
+        return (self.markers[k], self.wrench[k], *(values[k] for values in self.given.values()))
+
+    def first(self, frames: int | None) -> Trial:
+        """The first so many frames."""
+        names = ("time", "markers", "wrench", *self.given)
+        return replace(self, **{name: getattr(self, name)[:frames] for name in names})
+
+
+def wrench_models(spec: Spec, frames: int, seed: int) -> tuple[NDArray, NDArray]:
+    """(T, 6, 6) and (T, 6, 6 C): errors that grow and shrink, and contacts that come, change and go, at last all."""
+    rng = np.random.default_rng(seed)
+    root = rng.normal(size=(2, 6, 6)) * 0.8
+    swing = 1.0 + np.sin(np.linspace(0.0, 9.0, frames))[:, None, None]
+    covariance = root[0] @ root[0].T + swing * (root[1] @ root[1].T) + np.diag([4.0, 4.0, 4.0, 1.0, 1.0, 1.0])
+    effects, C = np.zeros((frames, 6, len(spec.contacts), 6)), len(spec.contacts)
+    for k in range(C):
+        stance = slice(k * frames // (C + 2), (k + 2) * frames // (C + 2))
+        ends = rng.normal(size=(2, 6, 6)) * np.array([20.0, 20.0, 20.0, 8.0, 8.0, 8.0])[:, None]
+        part = np.linspace(0.0, 1.0, frames)[stance, None, None]
+        effects[stance, :, k] = (1.0 - part) * ends[0] + part * ends[1]
+    return covariance, effects.reshape(frames, 6, 6 * C)
 
 
 def trial(spec: Spec, seed: int, frames: int = 300, uneven: bool = True, gaps: bool = True) -> Trial:
@@ -271,7 +319,15 @@ def trial(spec: Spec, seed: int, frames: int = 300, uneven: bool = True, gaps: b
     truth[:, layout.block("soft_tissue")], truth[:, layout.block("plates")] = wave[:, :n_tissue], wave[:, n_tissue:]
     markers = measurement.marker_positions(layout, truth)
     markers = markers + rng.normal(size=markers.shape) * 0.002
+    given: tuple[NDArray, ...] = ()
     wrench = measurement.plates(layout, truth) + rng.normal(size=(frames, 6)) * 2.0
+    if spec.contacts:
+        given = wrench_models(spec, frames, seed)
+        there, own = layout.block("contacts"), np.random.default_rng(seed + 1)
+        rate, phase = own.uniform(2, 5, layout.blocks["contacts"][1]), own.uniform(0, 6, layout.blocks["contacts"][1])
+        truth[:, there] = np.sqrt(2.0) * np.sin(np.outer(time, rate) + phase)
+        errors = np.linalg.cholesky(given[0]) @ own.normal(size=(frames, 6, 1))
+        wrench = measurement.plates(layout, truth) - (given[1] @ truth[:, there, None] - errors)[..., 0]
     if gaps:
         for k in range(len(spec.markers)):
             start = int(rng.integers(frames))
@@ -285,7 +341,7 @@ def trial(spec: Spec, seed: int, frames: int = 300, uneven: bool = True, gaps: b
     x0 += rng.normal(size=layout.size) * spread * 0.3
     for block in ("lengths", "markers", "inertia"):
         x0[layout.block(block)] = layout.initial_state()[layout.block(block)]
-    return Trial(time, markers, wrench, x0, np.diag(spread**2), truth)
+    return Trial(time, markers, wrench, x0, np.diag(spread**2), truth, *given)
 
 
 def prior_sd(layout: Layout) -> NDArray:
@@ -297,6 +353,7 @@ def prior_sd(layout: Layout) -> NDArray:
     sd[layout.block("soft_tissue")] = 0.005
     plates = layout.block("plates")
     sd[plates] = [0.01 if name == "plates/delay" else 3.0 for name in layout.names[plates]]
+    sd[layout.block("contacts")] = 1.0
     for block in ("lengths", "inertia"):
         here = layout.block(block)
         sd[here] = 0.05 * np.abs(start[here]) + 0.01
@@ -348,6 +405,9 @@ def continuous(spec: Spec, seed: int, constraint: str = "none", **changes) -> di
             if layout.names[k] != "plates/delay":
                 decay[k] = rng.uniform(0.5, 3.0)
                 density[k] = 2.0 * sd[k] ** 2 * decay[k]
+    here = layout.block("contacts")
+    decay[here] = rng.uniform(2.0, 5.0, layout.blocks["contacts"][1])
+    density[here] = 2.0 * decay[here]  # of unit variance
     return (
         settings(spec, seed)
         | {

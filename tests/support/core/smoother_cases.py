@@ -11,7 +11,16 @@ from numpy.typing import NDArray
 
 from dynakin.bindings import _core
 from support.core.bridge import filter_of, model_of
-from support.core.random_models import Trial, continuous, planar_model, settings, spatial_model, trial, with_slow_errors
+from support.core.random_models import (
+    Trial,
+    continuous,
+    planar_model,
+    settings,
+    spatial_model,
+    trial,
+    with_contacts,
+    with_slow_errors,
+)
 from support.oracle import measurement, process, sensors
 from support.oracle.smoother import Frame
 from support.oracle.state import Layout
@@ -31,10 +40,7 @@ class Case:
         return filter_of(self.spec, self.options | changes, self.data.x0, self.data.P0, chunk_rows)
 
     def smoothed(self, frames: int | None = None, stretch: int = 0, **changes: Any) -> dict[str, NDArray]:
-        d = self.data
-        return self.filter(**changes).run_smoothed(
-            d.time[:frames], d.markers[:frames], d.wrench[:frames], output_sd=True, stretch=stretch
-        )
+        return self.data.first(frames).run(self.filter(**changes).run_smoothed, output_sd=True, stretch=stretch)
 
 
 def case(
@@ -42,10 +48,11 @@ def case(
 ) -> Case:
     """A trial with gaps and uneven steps.
 
-    ``states``: "all" adds soft tissue and the plates' errors, and takes white jerk.
+    ``states``: "all" adds soft tissue and the plates' errors, and takes white jerk; "contacts" those of contacts too.
     """
-    if states == "all":
+    if states:
         spec = with_slow_errors(spec, seed, delay)
+        spec = with_contacts(spec) if states == "contacts" else spec
         options = continuous(spec, seed)
     else:
         options = settings(spec, seed)
@@ -79,7 +86,7 @@ def walk(case: Case, **changes: Any) -> Walk:
             f.predict(dt)
         before.append((f.state, f.covariance))
         frames.append(linearised(case, f.state, k, dt))
-        reports.append(f.update(d.markers[k], d.wrench[k]))
+        reports.append(f.update(*d.at(k)))
         after.append((f.state, f.covariance))
     (x_predicted, P_predicted), (x, P) = (map(np.array, zip(*pairs, strict=True)) for pairs in (before, after))
     return Walk(x_predicted, P_predicted, x, P, frames, reports)
@@ -89,8 +96,10 @@ def linearised(case: Case, x: NDArray, k: int, dt: float) -> Frame:
     """F, Q of the step to frame k and H, R, z of what it measures, linear about x."""
     layout, o = Layout(case.spec), case.options
     F, Q = process.transition(layout, o["process_density"], o["decay_rate"], dt)
-    h, H = measurement.value_and_jacobian(layout, x)
-    z, R, present = sensors.rows(case.spec, SimpleNamespace(**o), case.data.markers[k], case.data.wrench[k])
+    given = {name: values[k] for name, values in case.data.given.items()}
+    h, H = measurement.value_and_jacobian(layout, x, given.get("wrench_effects"))
+    markers, wrench = case.data.markers[k], case.data.wrench[k]
+    z, R, present = sensors.rows(case.spec, SimpleNamespace(**o), markers, wrench, given.get("wrench_covariance"))
     z = (z - h + H @ x)[present]
     return Frame(F, Q + np.diag(o["process_variance"]), H[present], R[np.ix_(present, present)], z)
 

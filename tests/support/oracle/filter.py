@@ -67,13 +67,22 @@ class Filter:
         self.state = F @ self.state
         self.covariance = F @ self.covariance @ F.T + Q + np.diag(self.settings.process_variance)
 
-    def measurement_rows(self, markers: NDArray, wrench: NDArray) -> tuple[NDArray, NDArray, NDArray]:
+    def measurement_rows(
+        self, markers: NDArray, wrench: NDArray, wrench_covariance: NDArray | None = None
+    ) -> tuple[NDArray, NDArray, NDArray]:
         """z, R of all 3 M + 7 rows (R of absent ones is arbitrary) and which are present."""
-        return sensors.rows(self.spec, self.settings, markers, wrench)
+        return sensors.rows(self.spec, self.settings, markers, wrench, wrench_covariance)
 
-    def update(self, markers: NDArray, wrench: NDArray) -> Report:
-        z, R, present = self.measurement_rows(markers, wrench)
-        h, H = measurement.value_and_jacobian(self.layout, self.state)
+    def update(
+        self,
+        markers: NDArray,
+        wrench: NDArray,
+        wrench_covariance: NDArray | None = None,
+        wrench_effects: NDArray | None = None,
+    ) -> Report:
+        """``wrench_covariance`` (6, 6), ``wrench_effects`` (6, 6 C): how this frame's total wrench is measured."""
+        z, R, present = self.measurement_rows(markers, wrench, wrench_covariance)
+        h, H = measurement.value_and_jacobian(self.layout, self.state, wrench_effects)
         x, P, v = self.state, self.covariance, z - h
         judged = sensors.reports(self.settings, v, H, P, R, present)
         use = sensors.believed(self.settings, judged["verdicts"], present)
@@ -128,24 +137,37 @@ class Filter:
         beyond = np.flatnonzero(clipped != x)
         return beyond, clipped[beyond]
 
-    def step(self, dt: float, markers: NDArray, wrench: NDArray) -> Report:
+    def step(self, dt: float, *measured: NDArray) -> Report:
         self.predict(dt)
-        return self.update(markers, wrench)
+        return self.update(*measured)
 
-    def run(self, time: NDArray, markers: NDArray, wrench: NDArray) -> dict[str, NDArray]:
+    def run(
+        self,
+        time: NDArray,
+        markers: NDArray,
+        wrench: NDArray,
+        wrench_covariance: NDArray | None = None,
+        wrench_effects: NDArray | None = None,
+    ) -> dict[str, NDArray]:
         """Over a trial; the first frame only updates. Keys as the core's ``run``, plus the covariances."""
         frames = []
+        given = [a for a in (wrench_covariance, wrench_effects) if a is not None]
         for k in range(len(time)):
             if k > 0:
                 self.predict(time[k] - time[k - 1])
             before = {"state_predicted": self.state}
-            report = vars(self.update(markers[k], wrench[k]))
+            report = vars(self.update(markers[k], wrench[k], *(a[k] for a in given)))
             frames.append(before | report | {"state": self.state, "covariance": self.covariance})
         out = {key: np.array([frame[key] for frame in frames]) for key in frames[0]}
         out["state_sd"] = np.sqrt(np.diagonal(out["covariance"], axis1=1, axis2=2))
         for when, x in (("predicted", out["state_predicted"]), ("estimated", out["state"])):
             out[f"markers_{when}"] = measurement.marker_positions(self.layout, x)
-        out["wrench_predicted"] = measurement.plates(self.layout, out["state_predicted"])
+        out["wrench_predicted"] = np.array(
+            [
+                measurement.plates(self.layout, x, None if wrench_effects is None else wrench_effects[k])
+                for k, x in enumerate(out["state_predicted"])
+            ]
+        )
         out["wrench_estimated"] = measurement.wrench(self.layout, out["state"])
         out["moments"] = measurement.joint_moments(self.layout, out["state"])
         return out

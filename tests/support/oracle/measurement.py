@@ -35,10 +35,14 @@ def wrench(layout: Layout, x: NDArray) -> NDArray:
     return mechanics.total_wrench(layout.spec, kin, values.inertia)
 
 
-def plates(layout: Layout, x: NDArray) -> NDArray:
-    """(..., 6) N, N m: what the plates should say, the body's wrench of a delay ago and their slow error."""
+def plates(layout: Layout, x: NDArray, effects: NDArray | None = None) -> NDArray:
+    """(..., 6) N, N m: what the plates should say, the body's wrench of a delay ago and their slow error, less what the
+    contacts' states add to what was expected of them: effects (6, 6 C), without them nothing."""
     values, kin = _kinematics(layout, x, late=True)
-    return mechanics.total_wrench(layout.spec, kin, values.inertia) + values.offset
+    said = mechanics.total_wrench(layout.spec, kin, values.inertia) + values.offset
+    if effects is None:
+        return said
+    return said - values.contacts.reshape(*x.shape[:-1], -1) @ np.swapaxes(effects, -1, -2)
 
 
 def joint_moments(layout: Layout, x: NDArray) -> NDArray:
@@ -52,17 +56,17 @@ def total_mass(layout: Layout, x: NDArray) -> NDArray:
     return unpack(layout, x).inertia[..., :, 0].sum(axis=-1)
 
 
-def everything(layout: Layout, x: NDArray) -> NDArray:
+def everything(layout: Layout, x: NDArray, effects: NDArray | None = None) -> NDArray:
     """[3 M marker numbers, 6 of the plates, total mass], (..., 3 M + 7), measured or not."""
     markers = marker_positions(layout, x)
     flat = markers.reshape(*markers.shape[:-2], 3 * markers.shape[-2])
-    return np.concatenate([flat, plates(layout, x), total_mass(layout, x)[..., None]], axis=-1)
+    return np.concatenate([flat, plates(layout, x, effects), total_mass(layout, x)[..., None]], axis=-1)
 
 
-def value_and_jacobian(layout: Layout, x: NDArray) -> tuple[NDArray, NDArray]:
+def value_and_jacobian(layout: Layout, x: NDArray, effects: NDArray | None = None) -> tuple[NDArray, NDArray]:
     """``everything`` at x (n,) and its (rows, n) Jacobian: one batch of n complex steps."""
-    f = jacobian(lambda z: everything(layout, z), x)
-    return everything(layout, x), f
+    f = jacobian(lambda z: everything(layout, z, effects), x)
+    return everything(layout, x, effects), f
 
 
 def jacobian(function: Callable[[NDArray], NDArray], x: NDArray) -> NDArray:

@@ -18,8 +18,13 @@ def carried_to_origin(covariance: NDArray, r: NDArray) -> NDArray:
     return carry @ covariance @ carry.T
 
 
-def rows(spec: Any, s: Any, markers: NDArray, wrench: NDArray) -> tuple[NDArray, NDArray, NDArray]:
-    """z, R of all 3 M + 7 rows (R of absent ones is arbitrary) and which are present."""
+def rows(
+    spec: Any, s: Any, markers: NDArray, wrench: NDArray, wrench_covariance: NDArray | None = None
+) -> tuple[NDArray, NDArray, NDArray]:
+    """z, R of all 3 M + 7 rows (R of absent ones is arbitrary) and which are present.
+
+    ``wrench_covariance`` (6, 6) about the ground's origin: of this frame, in place of the settings'.
+    """
     n_markers = len(spec.markers)
     n = 3 * n_markers + 7
     z, R, present = np.zeros(n), np.eye(n), np.zeros(n, bool)
@@ -33,6 +38,8 @@ def rows(spec: Any, s: Any, markers: NDArray, wrench: NDArray) -> tuple[NDArray,
             R[here, here] = np.eye(3) * s.marker_variance[k]
     here = slice(3 * n_markers, 3 * n_markers + 6)
     R[here, here], known = wrench_noise(s)
+    if wrench_covariance is not None:
+        R[here, here] = wrench_covariance
     present[here] = np.array(spec.wrench_measured, bool) & np.isfinite(wrench) & known
     z[here] = wrench
     if s.total_mass is not None and np.isfinite(s.total_mass_variance):

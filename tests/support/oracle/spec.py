@@ -85,3 +85,4 @@ class Spec:
     wrench_measured: list[bool] = field(default_factory=lambda: [True] * 6)
     wrench_offset: list[bool] = field(default_factory=lambda: [False] * 6)
     wrench_delay: bool = False
+    contacts: list[str] = field(default_factory=list)

@@ -1,4 +1,4 @@
-"""The state (3) with soft tissue and plate errors: its names in order, and what they mean for a specification."""
+"""The state (3) with soft tissue, plate errors and contacts: its names in order, and what a specification means."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ class Values:
     inertia: NDArray  # (..., S, 10)
     offset: NDArray  # (..., 6) N and N m, the plates' slow error about the ground's origin
     delay: NDArray  # (...) s, of the plates behind the markers
+    contacts: NDArray  # (..., C, 6), what is not known of the contacts' wrenches
 
 
 class Layout:
@@ -59,6 +60,11 @@ class Layout:
             ],
             "plates": [(f"plates/{WRENCH_NAMES[a]}", ("offset", a)) for a in range(6) if spec.wrench_offset[a]]
             + [("plates/delay", ("delay",))] * bool(spec.wrench_delay),
+            "contacts": [
+                (f"contact/{name}/{WRENCH_NAMES[a]}", ("contacts", k, a))
+                for k, name in enumerate(spec.contacts)
+                for a in range(6)
+            ],
         }
         self.names = [name for block in entries.values() for name, _ in block]
         self.targets = [target for block in entries.values() for _, target in block]
@@ -105,6 +111,7 @@ def unpack(layout: Layout, x: NDArray, values_of_spec: bool = False) -> Values:
         inertia=filled([s.inertia for s in spec.segments], (len(spec.segments), 10)),
         offset=filled(np.zeros(6), (6,)),
         delay=np.zeros(batch, dtype),
+        contacts=filled(np.zeros((len(spec.contacts), 6)), (len(spec.contacts), 6)),
     )
     if values_of_spec:
         return values
