@@ -14,7 +14,7 @@ from dynakin.bindings import _core
 from dynakin.filter.contacts import RESIDUAL, ContactLoads
 from dynakin.filter.events import events_of
 from dynakin.filter.parameters import parameters_of
-from dynakin.filter.sources import with_sources
+from dynakin.filter.sources import moved_segments, with_sources
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.contact import ON_PLATE
 from dynakin.recordings.recording import Recording
@@ -140,7 +140,7 @@ def _dataset(
         "time": recording.time,
         "coordinate": model.coordinate_names,
         "coordinate_type": ("coordinate", _types(spec)),
-        "coordinate_segment": ("coordinate", _moved(spec)),
+        "coordinate_segment": ("coordinate", moved_segments(spec)),
         "marker": list(initial.recorded_markers),
         "axis": list(AXES),
         "axis_": list(AXES),
@@ -229,15 +229,6 @@ def _joints(spec: _core.ModelSpec) -> tuple[list[str], list[int], list[str]]:
         names = segments
     parents = [segments.index(s.parent) if s.parent in segments else -1 for s in spec.segments]
     return names, parents, segments
-
-
-def _moved(spec: _core.ModelSpec) -> list[str]:
-    """Segment of the first joint that each coordinate moves."""
-    first: dict[str, str] = {}
-    for segment in spec.segments:
-        for axis in segment.axes:
-            first.setdefault(axis.coordinate, segment.name)
-    return [first[c.name] for c in spec.coordinates]
 
 
 def _types(spec: _core.ModelSpec) -> list[str]:

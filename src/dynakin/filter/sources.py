@@ -6,6 +6,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from dynakin.bindings import _core
 from dynakin.filter.contacts import ContactLoads
 from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, PRIOR, contact_sources
 
@@ -35,15 +36,11 @@ def with_sources(data: xr.Dataset, feet: ContactLoads | None, undeclared: Flags)
         moments = np.tile(np.where(blind, DERIVED, MEASURED)[:, None], (1, len(moved)))
         legs = np.zeros(len(segments), dtype=bool)
     else:
-        contacts = contact_sources(feet.contact, undeclared)
-        data = data.assign(foot_source=(("time", "foot"), contacts))
-        joints = _behind(contacts, [segments.index(name) for name in feet.segments], parents)
+        data = data.assign(foot_source=(("time", "foot"), contact_sources(feet.contact, undeclared)))
+        joints, legs = _joint_codes(feet, undeclared, segments, parents)
         moments = data["moment_source"].transpose("time", "coordinate").values.copy()
         moments[undeclared[:, None] & (moments == DERIVED)] = PRIOR
-        legs = _below_the_thighs([segments.index(name) for name in dict.fromkeys(feet.segments)], parents)
     joints[np.ix_(undeclared, ~legs)] = ABSENT
-    if feet is not None:  # a foot on no plate may be what it bears
-        joints[undeclared[:, None] & (joints != MEASURED)] = ABSENT
     moments[undeclared[:, None] & (joints[:, moved] == ABSENT)] = ABSENT
     known, held = moments != ABSENT, joints != ABSENT
     found = data.assign(
@@ -54,6 +51,47 @@ def with_sources(data: xr.Dataset, feet: ContactLoads | None, undeclared: Flags)
         found[name] = found[name].where(xr.DataArray(known, dims=("time", "coordinate")))
     found["joint_loads"] = found["joint_loads"].where(xr.DataArray(held, dims=("time", "joint")))
     return found
+
+
+class LiveSources:
+    """The same of a model's moments, frame by frame."""
+
+    def __init__(self, spec: _core.ModelSpec) -> None:
+        self._segments = [segment.name for segment in spec.segments]
+        self._parents = np.array([_place(self._segments, segment.parent) for segment in spec.segments])
+        self._moved = [self._segments.index(name) for name in moved_segments(spec)]
+
+    def moments(self, feet: ContactLoads | None) -> Codes:
+        """(C,) codes of a frame's moments by its contacts (T = 1); measured, as far as anybody knows, without any."""
+        if feet is None:
+            return np.full(len(self._moved), MEASURED, dtype=np.uint8)
+        undeclared = ~feet.known
+        joints, legs = _joint_codes(feet, undeclared, self._segments, self._parents)
+        joints[np.ix_(undeclared, ~legs)] = ABSENT
+        return np.asarray(joints[0, self._moved])
+
+
+def moved_segments(spec: _core.ModelSpec) -> list[str]:
+    """Segment of the first joint that each coordinate moves."""
+    first: dict[str, str] = {}
+    for segment in spec.segments:
+        for axis in segment.axes:
+            first.setdefault(axis.coordinate, segment.name)
+    return [first[c.name] for c in spec.coordinates]
+
+
+def _place(names: list[str], name: str) -> int:
+    return names.index(name) if name in names else -1
+
+
+def _joint_codes(
+    feet: ContactLoads, undeclared: Flags, segments: list[str], parents: npt.NDArray[np.int_]
+) -> tuple[Codes, Flags]:
+    """(T, J) codes of the joints' loads by the contacts behind them, and (J,) which joints are of a leg."""
+    contacts = contact_sources(feet.contact, undeclared)
+    joints = _behind(contacts, [segments.index(name) for name in feet.segments], parents)
+    joints[undeclared[:, None] & (joints != MEASURED)] = ABSENT  # a foot on no plate may be what bears the person
+    return joints, _below_the_thighs([segments.index(name) for name in dict.fromkeys(feet.segments)], parents)
 
 
 def _behind(contacts: Codes, at: list[int], parents: npt.NDArray[np.int_]) -> Codes:

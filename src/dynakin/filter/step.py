@@ -12,9 +12,11 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
+from dynakin.results.measures.sources import ABSENT
 from dynakin.settings.strict import nearest
 
 Array = npt.NDArray[np.float64]
+Codes = npt.NDArray[np.uint8]
 Places = Mapping[str, int]
 
 _WRENCH: Places = {name: k for k, name in enumerate(("fx", "fy", "fz", "mx", "my", "mz"))}
@@ -104,7 +106,7 @@ class StepEstimate:
     """
 
     time_s: float
-    values: Mapping[str, Array]
+    values: Mapping[str, Any]
     labels: Labels
     report: _core.StepReport | None
 
@@ -129,6 +131,12 @@ class StepEstimate:
         return Labelled(self.values["moments"], self.labels.coordinates)
 
     @property
+    def moment_sources(self) -> Labelled:
+        """(C,) codes of where each moment comes from: 0 measured, 1 derived, 2 prior, 3 absent (the moment is NaN), as
+        `results.measures.sources` has them."""
+        return Labelled(self.values["moment_sources"], self.labels.coordinates)
+
+    @property
     def wrench(self) -> Labelled:
         """(6,) N, N m: fx to mz about the model's ground origin."""
         return Labelled(self.values["wrench"], _WRENCH)
@@ -145,15 +153,22 @@ def step_estimate(
     time_s: float,
     x: Array,
     report: _core.StepReport | None,
+    sources: Codes,
     feet: _core.ContactLoads | None = None,
 ) -> StepEstimate:
-    """Everything that a state x (n,) says of its frame; with one frame of feet the moments that these leave."""
+    """Everything that a state x (n,) says of its frame; with one frame of feet the moments that these leave.
+
+    Args:
+        sources: (C,) codes of the moments; what is absent becomes NaN.
+    """
     q, qd, qdd = _core.coordinates(model, x)
+    moments = _core.joint_moments(model, x) if feet is None else _core.contact_moments(model, x, feet)["moments"]
     values = {
         "coordinates": q,
         "speeds": qd,
         "accelerations": qdd,
-        "moments": _core.joint_moments(model, x) if feet is None else _core.contact_moments(model, x, feet)["moments"],
+        "moments": np.where(sources == ABSENT, np.nan, moments),
+        "moment_sources": sources,
         "wrench": _core.wrench(model, x),
         "markers": _core.marker_positions(model, x),
     }

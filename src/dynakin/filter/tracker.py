@@ -14,8 +14,10 @@ from dynakin.errors import ConfigError, DivergenceError, RecordingError
 from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.core_filter import core_filter
 from dynakin.filter.samples import Sample, sample_arrays
-from dynakin.filter.step import Labelled, Labels, StepEstimate, deviations_of, step_estimate
+from dynakin.filter.sources import LiveSources
+from dynakin.filter.step import Codes, Labelled, Labels, StepEstimate, deviations_of, step_estimate
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.results.measures.sources import ABSENT
 from dynakin.results.records import NOT_SMOOTHED
 from dynakin.settings.model import QUANTITIES, Quantity
 from dynakin.settings.noise import Noise
@@ -49,9 +51,10 @@ class Tracker:
         self._lag = _core.FixedLag(self._filter, lag) if lag else None
         self._filter.report_sensors(True)
         self._labels = Labels.of(self.core_model)
+        self._sources = LiveSources(self.calibrated.spec)
         self._time: float | None = None
         self._latest: StepEstimate | None = None
-        self._stepped: deque[tuple[float, _core.ContactLoads | None]] = deque(maxlen=lag + 1)
+        self._stepped: deque[tuple[float, _core.ContactLoads | None, Codes]] = deque(maxlen=lag + 1)
 
     def fresh(self) -> Tracker:
         """Another one, at the start of the same model."""
@@ -83,7 +86,8 @@ class Tracker:
         """What the last step gave; before the first one the start, whose time is NaN."""
         if self._latest is None:
             time = np.nan if self._time is None else self._time
-            self._latest = step_estimate(self.core_model, self._labels, time, self.state, None)
+            sources = self._sources.moments(None)
+            self._latest = step_estimate(self.core_model, self._labels, time, self.state, None, sources)
         return self._latest
 
     def step(self, sample: Sample, feet: ContactLoads | None = None) -> StepEstimate:
@@ -121,8 +125,9 @@ class Tracker:
         if report.diverged:
             raise DivergenceError(f"the filter diverged at {sample.time_s} s: {report.status}")
         self._time = sample.time_s
-        self._stepped.append((sample.time_s, loads))
-        self._latest = step_estimate(self.core_model, self._labels, sample.time_s, self.state, report, loads)
+        sources = self._sources.moments(feet)
+        self._stepped.append((sample.time_s, loads, sources))
+        self._latest = step_estimate(self.core_model, self._labels, sample.time_s, self.state, report, sources, loads)
         return self._latest
 
     def delayed(self) -> StepEstimate | None:
@@ -139,8 +144,8 @@ class Tracker:
         if self._time is None or not self._lag.ready:
             return None
         time = self._time - self._lag.delay_s
-        _, loads = min(self._stepped, key=lambda stepped: abs(stepped[0] - time))
-        return step_estimate(self.core_model, self._labels, time, self._lag.state, None, loads)
+        _, loads, sources = min(self._stepped, key=lambda stepped: abs(stepped[0] - time))
+        return step_estimate(self.core_model, self._labels, time, self._lag.state, None, sources, loads)
 
     def deviations(self) -> dict[str, Labelled]:
         """Standard deviations of the present estimate, as it was last stepped: propagated now, not in every step.
@@ -149,8 +154,9 @@ class Tracker:
             coordinates, speeds, accelerations, moments (C,), of all coordinates of the model; wrench (6,). Moments as
             `step` gave them: with the feet's wrenches where it had these.
         """
-        loads = self._stepped[-1][1] if self._stepped else None
+        loads, absent = (self._stepped[-1][1], self._stepped[-1][2] == ABSENT) if self._stepped else (None, False)
         found = deviations_of(self.core_model, self.state, self.covariance, loads)
+        found["moments"] = np.where(absent, np.nan, found["moments"])
         return {name: Labelled(values, self._labels.on(name)) for name, values in found.items()}
 
     def run_arrays(

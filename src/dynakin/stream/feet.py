@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from dynakin.bindings import _core
 from dynakin.filter.contacts import ContactLoads
-from dynakin.filter.expected import expected_loads
+from dynakin.filter.expected import expected_loads, root_path
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.assignment import BETWEEN_M
 from dynakin.recordings.feet.belt import WINDOW_S, one_velocity
@@ -57,8 +57,6 @@ class LiveFeet:
         self.feet = tuple(initial.feet)
         self._assigned = {p: self.feet.index(assigned[name]) for p, name in enumerate(plates) if name in assigned}
         segments = [marker.segment for marker in initial.spec.markers]
-        root = next(s.name for s in initial.spec.segments if s.parent == "ground")
-        self._on_root = np.flatnonzero([s == root for s in segments]) if root in segments else np.arange(len(segments))
         own = [np.flatnonzero([s == initial.feet[foot] for s in segments]) for foot in self.feet]
         F, P, M = len(self.feet), len(plates), len(segments)
         self._own = np.full((F, max(map(len, own), default=0)), M)  # markers of each foot, filled up with M: none
@@ -99,7 +97,7 @@ class LiveFeet:
         ahead[offset : offset + size] += dt * state[speeds : speeds + size]
         before, places = _core.marker_positions(model, state), _core.marker_positions(model, ahead)
         loads = self.loads(time_s, places, (places - before) / dt, wrenches)
-        root = places[self._on_root].mean(axis=0)[None]
+        root = root_path(self.initial, places[None])
         undeclared = loads.elsewhere & (wrenches is not None)
         return expected_loads(loads, self.initial, self.noise, root, undeclared), bool(loads.total_known[0])
 

@@ -305,7 +305,7 @@ class Live:
         rate, holds = self.fusion.markers.rate_hz, self.estimator.noise.recover
         self._monitor = Monitor(initial, rate, plates, plates and self._use_plates, holds)
         self._feet = None
-        if initial.feet:  # without plates too: what depends on the ground is then absent
+        if initial.feet:  # without plates too: what depends on the ground is then a prior
             names = () if self.fusion.plates is None else self.fusion.plates.names
             self._feet = LiveFeet(initial, self.estimator.noise, names, self.estimator.plates)
         self._running = True

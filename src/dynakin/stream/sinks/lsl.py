@@ -16,7 +16,7 @@ _KINDS = ("length", "marker", "inertia")
 
 
 class LslSink(Sink):
-    """Outlets NAME-coordinates, NAME-speeds, NAME-moments and NAME-parameters; a stamp is
+    """Outlets NAME-coordinates, NAME-speeds, NAME-moments, NAME-moment-sources and NAME-parameters; a stamp is
     when its sample arrived, by this machine's clock.
 
     Args:
@@ -40,6 +40,7 @@ class LslSink(Sink):
             "coordinates": (names, ["rad" if turn else "m" for turn in turns]),
             "speeds": (names, ["rad/s" if turn else "m/s" for turn in turns]),
             "moments": (names, ["N m" if turn else "N" for turn in turns]),
+            "moment-sources": (names, ["code"] * len(names)),
             "parameters": ([initial.names[k] for k in self._constants], None),
         }
         for kind, (labels, units) in kinds.items():
@@ -62,10 +63,11 @@ class LslSink(Sink):
             "coordinates": estimate.coordinates,
             "speeds": estimate.speeds,
             "moments": estimate.moments,
+            "moment-sources": estimate.moment_sources,
             "parameters": frame.state[self._constants],
         }
         for kind, outlet in self._outlets.items():
-            outlet.push_sample(np.ascontiguousarray(values[kind]), stamp)
+            outlet.push_sample(np.ascontiguousarray(values[kind], dtype=float), stamp)
 
     def close(self) -> None:
         """The outlets end."""
