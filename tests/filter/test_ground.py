@@ -6,6 +6,8 @@ import csv
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ import pytest
 import dynakin
 from dynakin import Estimate, Estimator, Subject, load_model
 from dynakin.filter.closure import closure
+from dynakin.filter.sources import with_sources
 from dynakin.filter.total_wrench import Ground
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
@@ -25,6 +28,7 @@ from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, PRIOR, wrench_sources
 from dynakin.simulation.trial import simulate as simulate_anew
 from dynakin.units import GRAVITY_M_S2
+from support.estimates.walking import make_walker
 
 WEIGHT = 70.0 * GRAVITY_M_S2
 
@@ -164,9 +168,9 @@ def test_a_box_that_nothing_measures_is_no_flight() -> None:
     contact = found.data["foot_contact"].transpose("time", "foot").values
     early, late = recording.time < 1.9, recording.time > 2.4
     assert (contact[early] == UNMEASURED).all() and (contact[late] == ON_PLATE).all()
-    assert (sources(found, "knee_angle_r")[early] == PRIOR).all() and (foot_sources(found.data)[early] == PRIOR).all()
-    assert (sources(found, "hip_flexion_r")[early] == ABSENT).all()
-    assert np.isnan(found.data["moments"].sel(coordinate="hip_flexion_r").values[early]).all()
+    assert (foot_sources(found.data)[early] == ABSENT).all() and np.isnan(found.data["foot_wrench"].values[early]).all()
+    assert (sources(found, "knee_angle_r")[early] == ABSENT).all()
+    assert np.isnan(found.data["moments"].sel(coordinate="knee_angle_r").values[early]).all()
     assert (sources(found, "elbow_flex_r")[early] == ABSENT).all()  # it may be a rail as well
     assert (sources(found, "knee_angle_r")[late] == 0).all()
 
@@ -321,3 +325,23 @@ def test_a_recording_too_short_to_judge_is_weighed(frames: int) -> None:
     assert short.n_frames == frames
     ground = ground_of(short, person("fullbody"))
     assert ground.undeclared.all() and any("not used for the total" in text for text in ground.reasons)
+
+
+def test_beside_something_undeclared_a_foot_off_its_plate_is_absent() -> None:
+    """Alone it would follow from the motion; with a seat next to it nobody knows what each of them takes."""
+    data = make_walker((2,)).data
+    data = data.assign_coords(coordinate_segment=("coordinate", ["pelvis", "foot_r", "foot_l", *["upper_arm_r"] * 2]))
+    feet: Any = SimpleNamespace(contact=data["foot_contact"].values, segments=("foot_r", "foot_l"))
+    off = feet.contact[:, 1] == UNMEASURED
+    undeclared = off & (data["time"].values > 2.0)
+    found = with_sources(data, feet, undeclared)
+    expected = np.where(undeclared, ABSENT, np.where(off, DERIVED, MEASURED))
+    assert 0 < undeclared.sum() < off.sum()
+    np.testing.assert_array_equal(foot_sources(found)[:, 1], expected)
+    np.testing.assert_array_equal(found["moment_source"].sel(coordinate="knee_angle_l"), expected)
+    np.testing.assert_array_equal(found["joint_source"].sel(joint="foot_l"), expected)
+    assert (found["joint_source"].sel(joint="shank_l").values[undeclared] == ABSENT).all()
+    assert (found["joint_source"].sel(joint="torso").values[undeclared] == ABSENT).all()
+    assert (foot_sources(found)[:, 0] == MEASURED).all()
+    lacking = np.isnan(found["moments"].sel(coordinate="arm_flex_l").values)
+    np.testing.assert_array_equal(lacking, undeclared)

@@ -116,8 +116,8 @@ def test_what_a_contact_is_called_follows_from_plates_and_contacts_alone() -> No
         ],
         dtype=np.uint8,
     )
-    seat = np.array([0, 0, 0, 0, 0, 0, 1], dtype=bool)  # it and the foot divide what the plates lack
-    expected = [[0, 0], [0, DERIVED], [0, DERIVED], [PRIOR, PRIOR], [PRIOR, PRIOR], [PRIOR, 0], [0, PRIOR]]
+    seat = np.array([0, 0, 0, 0, 0, 0, 1], dtype=bool)  # it may be what the foot stands on
+    expected = [[0, 0], [0, DERIVED], [0, DERIVED], [PRIOR, PRIOR], [PRIOR, PRIOR], [PRIOR, 0], [0, ABSENT]]
     np.testing.assert_array_equal(contact_sources(contact, seat), expected)
 
 

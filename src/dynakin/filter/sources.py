@@ -8,7 +8,7 @@ import xarray as xr
 
 from dynakin.bindings import _core
 from dynakin.filter.contacts import ContactLoads
-from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, PRIOR, contact_sources
+from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, contact_sources
 
 Flags = npt.NDArray[np.bool_]
 Codes = npt.NDArray[np.uint8]
@@ -18,9 +18,9 @@ def with_sources(data: xr.Dataset, feet: ContactLoads | None, undeclared: Flags)
     """The dataset of an estimate with ``foot_source``, ``moment_source`` and ``joint_source``, and NaN where absent.
 
     A load is as good as the worst of the contacts behind its joint (`contact_sources`). Where something undeclared
-    bears the person, it may touch any segment but those between the feet and the thighs: what lies there is absent, and
-    what follows from the motion elsewhere is no more than a prior. A model that stands on its root has the plates' sum
-    behind every joint: without it all is derived, or absent where undeclared.
+    bears the person, it may touch any segment but those between the feet and the thighs, and a foot on no plate: what
+    lies there, or has such a foot behind it, is absent. A model that stands on its root has the plates' sum behind
+    every joint: without it all is derived, or absent where undeclared.
 
     Args:
         data: with the joints' tree and, of floating models, the core's ``moment_source``.
@@ -37,9 +37,11 @@ def with_sources(data: xr.Dataset, feet: ContactLoads | None, undeclared: Flags)
         legs = np.zeros(len(segments), dtype=bool)
     else:
         data = data.assign(foot_source=(("time", "foot"), contact_sources(feet.contact, undeclared)))
+        for name in ("foot_wrench", "foot_wrench_sd"):
+            if name in data:
+                data[name] = data[name].where(data["foot_source"] != ABSENT)
         joints, legs = _joint_codes(feet, undeclared, segments, parents)
         moments = data["moment_source"].transpose("time", "coordinate").values.copy()
-        moments[undeclared[:, None] & (moments == DERIVED)] = PRIOR
     joints[np.ix_(undeclared, ~legs)] = ABSENT
     moments[undeclared[:, None] & (joints[:, moved] == ABSENT)] = ABSENT
     known, held = moments != ABSENT, joints != ABSENT

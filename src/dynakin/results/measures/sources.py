@@ -56,12 +56,14 @@ def contact_sources(contact: Codes, undeclared: npt.NDArray[np.bool_] | None = N
     """Codes (T, C) of contacts' forces, by their status (T, C) (`recordings.feet.contact`).
 
     Args:
-        undeclared: (T,) frames in which something bears the person that no plate measures: one more contact whose share
-            nobody measures.
+        undeclared: (T,) frames in which something bears the person that no plate measures: a contact that no plate
+            measures either may be what it bears, and is absent.
     """
     unmeasured = contact == UNMEASURED
-    unknown = unmeasured.sum(axis=1) + (0 if undeclared is None else undeclared)
-    codes = np.where(unmeasured, np.where(unknown > 1, PRIOR, DERIVED)[:, None], MEASURED)
+    unknown = np.where(unmeasured.sum(axis=1) > 1, PRIOR, DERIVED)
+    if undeclared is not None:
+        unknown[undeclared] = ABSENT
+    codes = np.where(unmeasured, unknown[:, None], MEASURED)
     return np.where(contact == SHARED_PLATE, PRIOR, codes).astype(np.uint8)
 
 
