@@ -13,7 +13,7 @@ import xarray as xr
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.filter.assemble import assemble
-from dynakin.filter.foot_wrenches import FootWrenches
+from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.tracker import smoothed
 from dynakin.pipeline.result import Result
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
@@ -49,15 +49,15 @@ def data() -> Trial:
     return trial(SPEC, 31, FRAMES, uneven=False, gaps=False)
 
 
-def feet_of(data: Trial, codes: np.ndarray) -> FootWrenches:
+def feet_of(data: Trial, codes: np.ndarray) -> ContactLoads:
     total = measurement.wrench(Layout(SPEC), data.truth)
     share = np.linspace(0.3, 0.7, FRAMES)[:, None]
     wrench = np.stack([share * total, (1 - share) * total], axis=1)
     wrench += np.random.default_rng(32).normal(size=wrench.shape) * [3.0, 3.0, 3.0, 1.0, 1.0, 1.0]
-    return FootWrenches.of(NAMES, FEET, wrench, codes, 5.0, 2.0, REFERENCE)
+    return ContactLoads.of(NAMES, FEET, wrench, codes, 5.0, 2.0, REFERENCE)
 
 
-def estimate_of(data: Trial, feet: FootWrenches | None, smooth: bool = False) -> Estimate:
+def estimate_of(data: Trial, feet: ContactLoads | None, smooth: bool = False) -> Estimate:
     chosen = settings(SPEC, 33, bounds=False) | {"constraint": "none"}
     core = filter_of(SPEC, chosen, data.x0, data.P0)
     loads = None if feet is None else feet.core()
@@ -96,12 +96,12 @@ def estimate_of(data: Trial, feet: FootWrenches | None, smooth: bool = False) ->
 
 
 @pytest.fixture(scope="module")
-def feet(data: Trial) -> FootWrenches:
+def feet(data: Trial) -> ContactLoads:
     return feet_of(data, contacts())
 
 
 @pytest.fixture(scope="module", params=[False, True], ids=["filtered", "smoothed"])
-def estimate(data: Trial, feet: FootWrenches, request: pytest.FixtureRequest) -> Estimate:
+def estimate(data: Trial, feet: ContactLoads, request: pytest.FixtureRequest) -> Estimate:
     return estimate_of(data, feet, request.param)
 
 
@@ -230,7 +230,7 @@ def test_files(estimate: Estimate, tmp_path: Path) -> None:
         assert stored["foot_contact"].attrs["flag_meanings"] == "none plate unmeasured"
 
 
-def test_the_feet_change_nothing_but_the_moments(data: Trial, feet: FootWrenches) -> None:
+def test_the_feet_change_nothing_but_the_moments(data: Trial, feet: ContactLoads) -> None:
     with_feet, without = estimate_of(data, feet), estimate_of(data, None)
     for name in ("coordinates", "wrench_estimated", "state_sd", "mass_centre", "joint_centres"):
         np.testing.assert_array_equal(values(with_feet, name), values(without, name))
@@ -239,7 +239,7 @@ def test_the_feet_change_nothing_but_the_moments(data: Trial, feet: FootWrenches
 
 def test_errors_about_a_reference_point_are_carried_to_the_origin() -> None:
     codes = np.full((1, 2), ON_PLATE)
-    feet = FootWrenches.of(NAMES, FEET, np.zeros((1, 2, 6)), codes, 20.0, 3.0, [[1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
+    feet = ContactLoads.of(NAMES, FEET, np.zeros((1, 2, 6)), codes, 20.0, 3.0, [[1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])
     rng = np.random.default_rng(34)
     force, moment = rng.normal(size=(200_000, 3)) * 20.0, rng.normal(size=(200_000, 3)) * 3.0
     drawn = np.cov(np.hstack([force, moment + np.cross([1.0, 0.0, 0.0], force)]).T)
@@ -248,7 +248,7 @@ def test_errors_about_a_reference_point_are_carried_to_the_origin() -> None:
     assert feet.covariance[0, 0][5, 5] == pytest.approx(409.0)  # 20 N at 1 m is 20 N m
 
 
-def test_late_plates_are_taken_earlier(data: Trial, feet: FootWrenches) -> None:
+def test_late_plates_are_taken_earlier(data: Trial, feet: ContactLoads) -> None:
     late = feet.in_step(data.time, 0.01)  # a frame
     np.testing.assert_allclose(late.wrench[10], feet.wrench[11], rtol=1e-6, atol=1e-6)
     assert (late.contact[18] == ON_PLATE).all() and late.contact[19, 1] == NO_CONTACT
@@ -261,12 +261,12 @@ def test_feet_that_do_not_fit_are_told(data: Trial) -> None:
     model = _core.Model(to_core(SPEC))
     good = feet_of(data, contacts())
     good.check(model)
-    wrong = FootWrenches(NAMES, ("left_2", "paw"), good.wrench, good.covariance, good.contact)
+    wrong = ContactLoads(NAMES, ("left_2", "paw"), good.wrench, good.covariance, good.contact)
     with pytest.raises(ModelError, match="foot 'right': segment 'paw' is not in the model, expected one of root"):
         wrong.check(model)
-    twice = FootWrenches(NAMES, ("left_2", "left_2"), good.wrench, good.covariance, good.contact)
+    twice = ContactLoads(NAMES, ("left_2", "left_2"), good.wrench, good.covariance, good.contact)
     with pytest.raises(ModelError, match="'left_2' is given twice"):
         twice.check(model)
-    blank = FootWrenches(NAMES, FEET, good.wrench * np.nan, good.covariance, good.contact)
+    blank = ContactLoads(NAMES, FEET, good.wrench * np.nan, good.covariance, good.contact)
     with pytest.raises(ModelError, match="foot 'left': frame 1 is measured but its wrench is"):
         blank.check(model)

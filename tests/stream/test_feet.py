@@ -9,7 +9,7 @@ import pytest
 
 import dynakin
 from dynakin.bindings import _core
-from dynakin.filter.foot_wrenches import FootWrenches
+from dynakin.filter.contacts import ContactLoads
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
 from dynakin.recordings.feet.soles import FootShape
@@ -143,7 +143,7 @@ class Standing:
             x, z = FootShape.of(own, forward).middle(own)[0]
             self.middles.append(np.array([x, 0.0, z]))
 
-    def look(self, push: float, point: np.ndarray) -> tuple[FootWrenches, bool]:
+    def look(self, push: float, point: np.ndarray) -> tuple[ContactLoads, bool]:
         """A vertical force in N at a point of the ground frame."""
         force, ground = np.array([0.0, push, 0.0]), self.initial.ground
         wrench = np.concatenate([force, np.cross(point * [1.0, 0.0, 1.0], force)])
