@@ -3,9 +3,9 @@
     OMP_NUM_THREADS=1 .venv/bin/python benchmarks/recordings.py [NAME...] [--jobs 2] [--write]
 
 Each runs with its own .osim, else ``fullbody``, and no option but the mass, the forces and the standing trial that
-belong to it. What is measured, derived and absent is what ``estimate.nc`` says (``moment_source``). Runs are kept in
-``build/recordings`` by their inputs and the source, so that the table can be made again. ``--write`` puts the tables
-into ``docs/validation.md``.
+belong to it. What is measured, derived, prior and absent is what ``estimate.nc`` says (``moment_source``). Runs are
+kept in ``build/recordings`` by their inputs and the source, so that the table can be made again. ``--write`` puts the
+tables into ``docs/validation.md``.
 """
 
 from __future__ import annotations
@@ -19,13 +19,15 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
-from recordings_references import JOINTS, SIDES, Array, Reference, of_c3d, of_kinematics, of_storage
+from recordings_references import JOINTS, SIDES, Array, Inverse, Reference, bodies_under, of_c3d, of_storage
+
+from dynakin.results.measures.sources import MEANINGS, MEASURED
 
 ROOT = Path(__file__).resolve().parents[1]
 DATA = Path(os.environ.get("DYNAKIN_TEST_DATA", ROOT.parent / "shared" / "data"))
@@ -34,7 +36,6 @@ PAGE = ROOT / "docs" / "validation.md"
 MARKS = ("<!-- recordings: begin -->", "<!-- recordings: end -->")
 LIMIT_S = 1800.0
 SHOWN = 240  # characters of a refusal
-MEASURED, DERIVED, ABSENT = range(3)
 Make = Callable[[], Reference]
 Codes = NDArray[np.integer]
 
@@ -49,6 +50,7 @@ class Trial:
     static: str | None = None
     osim: str | None = None
     reference: Make | None = None
+    filtered: Make | None = None  # the same with forces low-passed as its motion
 
     @property
     def name(self) -> str:
@@ -64,13 +66,22 @@ class Trial:
 def _opencap(name: str, hz: float | None) -> Trial:
     folder, model = "opencap_subject4", "optimized_scale_and_markers.osim"
 
-    def make() -> Reference:
+    def make(filtered: bool) -> Reference:
         assert hz is not None
-        return of_kinematics(DATA / folder, name, model, hz, KEPT / f"id_{name}")
+        root = DATA / folder
+        files = [root / f"{name}{end}" for end in ("_ik.mot", "_external_forces.xml", "_grf.mot")]
+        inverse = Inverse(files[0], root / model, files[1], files[2], hz, bodies_under(root, name))
+        return inverse.run(KEPT / f"id_{name}{'_filtered' * filtered}", filtered=filtered)
 
     forces = f"{folder}/{name}_grf.mot"
     static = None if name == "static1" else f"{folder}/static1.trc"
-    return Trial(f"{folder}/{name}.trc", 60.05, forces, static, f"{folder}/{model}", make if hz else None)
+    makes = (lambda: make(False), lambda: make(True)) if hz else (None, None)
+    return Trial(f"{folder}/{name}.trc", 60.05, forces, static, f"{folder}/{model}", *makes)
+
+
+def _filtered(motion: str, model: str, loads: str, forces: str, hz: float) -> Make:
+    paths = [DATA / part for part in (motion, model, loads, forces)]
+    return lambda: Inverse(*paths, hz).run(KEPT / f"id_{Path(motion).stem}_filtered", filtered=True)
 
 
 def _c3d(path: str, mass_kg: float, static: str | None = None, moments: bool = False) -> Trial:
@@ -95,6 +106,13 @@ TRIALS = (
         f"{_R}/static_run.trc",
         f"{_R}/subject_scaled_run.osim",
         _storage(f"{_R}/run_id.sto", 0.4, 5.1, "OpenSim's inverse dynamics, 15 Hz"),
+        _filtered(
+            f"{_R}/run_ik.mot",
+            f"{_R}/subject_scaled_run.osim",
+            f"{_R}/grf_run_external_forces.xml",
+            f"{_R}/grf_run.mot",
+            15.0,
+        ),
     ),
     Trial(
         f"{_R}/motion_capture_walk.trc",
@@ -103,6 +121,13 @@ TRIALS = (
         f"{_R}/static_walk_1.trc",
         f"{_R}/subject_scaled_walk.osim",
         _storage(f"{_R}/walk_id.sto", 0.45, 1.8, "OpenSim's inverse dynamics, 6 Hz, 0.45 to 1.8 s"),
+        _filtered(
+            f"{_R}/walk_ik.mot",
+            f"{_R}/subject_scaled_walk.osim",
+            f"{_R}/grf_walk_external_forces.xml",
+            f"{_R}/grf_walk.mot",
+            6.0,
+        ),
     ),
     Trial(f"{_R}/static_run.trc", 72.84, None, None, f"{_R}/subject_scaled_run.osim"),
     Trial(f"{_R}/static_walk_1.trc", 85.07, None, None, f"{_R}/subject_scaled_walk.osim"),
@@ -114,6 +139,13 @@ TRIALS = (
         f"{_G}/subject01_static.trc",
         f"{_G}/subject01_simbody.osim",
         _storage(f"{_G}/inverse_dynamics.sto", 0.4, 1.6, "OpenSim's inverse dynamics as shipped, 6 Hz"),
+        _filtered(
+            f"{_G}/subject01_walk1_ik.mot",
+            f"{_G}/subject01_simbody.osim",
+            f"{_G}/subject01_walk1_grf.xml",
+            f"{_G}/subject01_walk1_grf.mot",
+            6.0,
+        ),
     ),
     Trial(f"{_G}/subject01_static.trc", 72.6, None, None, f"{_G}/subject01_simbody.osim"),
     _c3d(f"{_P}/GaitNormal_1.c3d", 66.0),
@@ -233,6 +265,10 @@ class Agreement:
     def cells(self) -> str:
         return f"{self.frames} | {self.rms:.1f} | {self.slope:.2f} | {self.r:.2f}"
 
+    @property
+    def short(self) -> str:
+        return f"{self.rms:.1f}, {self.slope:.2f}, {self.r:.2f}"
+
 
 def agreement(ours: Array, theirs: Array) -> Agreement | None:
     """Over the frames in which both are known; None of fewer than ten."""
@@ -263,7 +299,7 @@ def compared(run: Run, data: xr.Dataset, reference: Reference) -> dict[tuple[str
 
 
 def _share(codes: Codes) -> str:
-    return " / ".join(str(int(np.count_nonzero(codes == code))) for code in (MEASURED, DERIVED, ABSENT))
+    return " / ".join(str(int(np.count_nonzero(codes == code))) for code in range(len(MEANINGS)))
 
 
 def _mm(value: float | None) -> str:
@@ -273,8 +309,8 @@ def _mm(value: float | None) -> str:
 def tables(runs: list[Run]) -> Iterator[str]:
     """Markdown, line by line."""
     yield (
-        "| recording | model | exit | refused, or why not 0 | frames | right: measured / derived / absent | left "
-        "| markers, mean RMS, mm |"
+        "| recording | model | exit | refused, or why not 0 | frames | right: measured / derived / prior / absent "
+        "| left | markers, mean RMS, mm |"
     )
     yield "|---|---|---|---|---|---|---|---|"
     judged = []
@@ -293,14 +329,27 @@ def tables(runs: list[Run]) -> Iterator[str]:
         if codes is not None and each.trial.reference is not None:
             judged.append((each, data))
     yield ""
-    yield "| recording | against | joint | right: frames | RMS, N m | slope | r | left: frames | RMS, N m | slope | r |"
-    yield "|---|---|---|---|---|---|---|---|---|---|---|"
+    yield (
+        "| recording | against | joint | right: frames | RMS, N m | slope | r | its forces filtered: RMS, slope, r "
+        "| left: frames | RMS, N m | slope | r | filtered |"
+    )
+    yield f"|{'---|' * 13}"
     for each, data in judged:
         assert each.trial.reference is not None
         reference = each.trial.reference()
         found = compared(each, data, reference)
+        filtered = {}
+        if each.trial.filtered is not None:
+            alike = each.trial.filtered()
+            seen = {key: np.interp(alike.time, reference.time, values) for key, values in reference.moments.items()}
+            only = {key: np.where(np.isfinite(seen[key]), values, np.nan) for key, values in alike.moments.items()}
+            filtered = compared(each, data, replace(alike, moments=only))
         for joint in JOINTS:
             cells = [a.cells if (a := found[side, joint]) else "– | – | – | –" for side in SIDES]
+            cells = [
+                f"{cell} | {a.short if (a := filtered.get((side, joint))) else '–'}"
+                for cell, side in zip(cells, SIDES, strict=True)
+            ]
             yield f"| `{each.trial.name}` | {reference.what} | {joint} | {cells[0]} | {cells[1]} |"
 
 

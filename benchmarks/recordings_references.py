@@ -6,16 +6,17 @@ They judge what a run says is measured; nothing of a run follows from them.
 from __future__ import annotations
 
 import os
-import re
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
+from xml.etree import ElementTree
 
 import ezc3d
 import numpy as np
 from numpy.typing import NDArray
+from scipy import signal
 
 from dynakin.recordings.formats.mot import read_table
 from dynakin.recordings.read import read
@@ -51,41 +52,97 @@ def of_storage(path: Path, span: tuple[float, float], what: str, knee_sign: floa
     return Reference(what, np.asarray(table.time), moments, {})
 
 
-def of_kinematics(folder: Path, name: str, model: str, cutoff_hz: float, made: Path) -> Reference:
-    """OpenSim's inverse dynamics on the file's own inverse kinematics, each plate on the foot that it lies under.
+@dataclass(frozen=True)
+class Inverse:
+    """What OpenSim's inverse dynamics takes: paths of a motion, a model and external loads, and the low-pass."""
 
-    Away from the ends, where a low-pass has nothing on one side.
-    """
-    import opensim
+    motion: Path
+    model: Path
+    loads: Path
+    forces: Path
+    cutoff_hz: float
+    bodies: tuple[str, ...] | None = None
+    """Of each load; None: as the file has them."""
 
-    opensim.Logger.setLevelString("error")
-    made.mkdir(parents=True, exist_ok=True)
-    loads = made / "loads.xml"
-    text = (folder / f"{name}_external_forces.xml").read_text(encoding="utf-8")
-    feet = iter(_bodies(folder, name))
-    text = re.sub(r"<applied_to_body>.*?<", lambda _: f"<applied_to_body>{next(feet)}<", text)
-    loads.write_text(re.sub(r"<datafile>.*?<", f"<datafile>{folder / f'{name}_grf.mot'}<", text), encoding="utf-8")
-    motion = folder / f"{name}_ik.mot"
-    time = read_table(motion).time
-    tool = opensim.InverseDynamicsTool()
-    tool.setModelFileName(str(folder / model))
-    tool.setCoordinatesFileName(str(motion))
-    tool.setLowpassCutoffFrequency(cutoff_hz)
-    tool.setExternalLoadsFileName(str(loads))
-    tool.setStartTime(float(time[0]))
-    tool.setEndTime(float(time[-1]))
-    excluded = opensim.ArrayStr()
-    excluded.append("Muscles")
-    tool.setExcludedForces(excluded)
-    tool.setResultsDir(str(made))
-    tool.setOutputGenForceFileName("id.sto")
-    with _quiet():
-        done = tool.run()
-    if not done:
-        raise RuntimeError(f"{name}: OpenSim's inverse dynamics failed")
-    edge = 1.0 / cutoff_hz
-    what = f"OpenSim's inverse dynamics on {name}_ik.mot, {cutoff_hz:g} Hz"
-    return of_storage(made / "id.sto", (float(time[0]) + edge, float(time[-1]) - edge), what)
+    def run(self, made: Path, *, filtered: bool) -> Reference:
+        """With forces as measured, or low-passed like the motion; away from the ends, where a low-pass has nothing on
+        one side."""
+        import opensim
+
+        opensim.Logger.setLevelString("error")
+        made.mkdir(parents=True, exist_ok=True)
+        time = read_table(self.motion).time
+        tool = opensim.InverseDynamicsTool()
+        tool.setModelFileName(str(self.model))
+        tool.setCoordinatesFileName(str(self.motion))
+        tool.setLowpassCutoffFrequency(self.cutoff_hz)
+        tool.setExternalLoadsFileName(str(self._loads(made, filtered)))
+        tool.setStartTime(float(time[0]))
+        tool.setEndTime(float(time[-1]))
+        excluded = opensim.ArrayStr()
+        excluded.append("Muscles")
+        tool.setExcludedForces(excluded)
+        tool.setResultsDir(str(made))
+        tool.setOutputGenForceFileName("id.sto")
+        with _quiet():
+            done = tool.run()
+        if not done:
+            raise RuntimeError(f"{self.motion.name}: OpenSim's inverse dynamics failed")
+        edge = 1.0 / self.cutoff_hz
+        what = f"OpenSim's inverse dynamics on {self.motion.name}, {self.cutoff_hz:g} Hz"
+        return of_storage(made / "id.sto", (float(time[0]) + edge, float(time[-1]) - edge), what)
+
+    def _loads(self, made: Path, filtered: bool) -> Path:
+        tree = ElementTree.parse(self.loads)
+        loads = list(tree.iter("ExternalForce"))
+        names = [tuple(_text(load, f"{kind}_identifier") for kind in ("force", "point", "torque")) for load in loads]
+        for k, load in enumerate(loads):
+            if self.bodies is not None:
+                _set(load, "applied_to_body", self.bodies[k])
+            if filtered:
+                for kind in ("force", "point", "torque"):
+                    _set(load, f"{kind}_identifier", f"{kind}_{k}_")
+        forces = self.forces
+        if filtered:
+            forces = made / "filtered.mot"
+            _low_passed(self.forces, names, self.cutoff_hz, forces)
+        for at in tree.iter("datafile"):
+            at.text = str(forces)
+        tree.write(made / "loads.xml")
+        return made / "loads.xml"
+
+
+def _text(load: ElementTree.Element, tag: str) -> str:
+    found = load.find(tag)
+    return (found.text or "").strip() if found is not None else ""
+
+
+def _set(load: ElementTree.Element, tag: str, text: str) -> None:
+    found = load.find(tag)
+    assert found is not None, tag
+    found.text = text
+
+
+def _low_passed(source: Path, names: list[tuple[str, ...]], cutoff_hz: float, target: Path) -> None:
+    """Forces and their moments about the origin, second order there and back; each is then applied at the origin."""
+    table = read_table(source)
+    rate = 1.0 / float(np.median(np.diff(table.time)))
+    time = np.arange(table.time[0], table.time[-1], 1.0 / rate)
+    sos = signal.butter(2, cutoff_hz / 0.802, fs=rate, output="sos")
+    columns, head = [time], ["time"]
+    for k, (force, point, torque) in enumerate(names):
+        F, p, t = (
+            np.stack([table.values[:, table.names.index(name + axis)] for axis in "xyz"], axis=1)
+            for name in (force, point, torque)
+        )
+        moment = np.cross(np.where(np.abs(F) > 0.0, p, 0.0), F) + t
+        both = np.stack([np.interp(time, table.time, column) for column in np.hstack([F, moment]).T], axis=1)
+        smooth = signal.sosfiltfilt(sos, both, axis=0)
+        columns += [*smooth[:, :3].T, *np.zeros((3, len(time))), *smooth[:, 3:].T]
+        head += [f"{kind}_{k}_{axis}" for kind in ("force", "point", "torque") for axis in "xyz"]
+    lines = [f"{target.stem}", "version=1", f"nRows={len(time)}", f"nColumns={len(head)}", "inDegrees=no", "endheader"]
+    rows = ["\t".join(f"{value:.9g}" for value in row) for row in np.stack(columns, axis=1)]
+    target.write_text("\n".join([*lines, "\t".join(head), *rows]) + "\n", encoding="utf-8")
 
 
 @contextmanager
@@ -102,7 +159,7 @@ def _quiet() -> Iterator[None]:
             os.close(kept)
 
 
-def _bodies(folder: Path, name: str) -> list[str]:
+def bodies_under(folder: Path, name: str) -> tuple[str, ...]:
     """Which heel bone lies under each plate; the right one for a plate that carries nothing."""
     recording = read(folder / f"{name}.trc", folder / f"{name}_grf.mot")
     found = []
@@ -115,7 +172,7 @@ def _bodies(folder: Path, name: str) -> list[str]:
             for side, heel in (("r", "r_calc"), ("l", "L_calc"))
         }
         found.append(f"calcn_{min(away, key=lambda side: away[side])}")
-    return found
+    return tuple(found)
 
 
 def of_c3d(path: Path, mass_kg: float) -> Reference:

@@ -38,7 +38,7 @@ from withheld_judge import (
 )
 
 from dynakin.recordings.orientation import axis_vector
-from dynakin.recordings.plates.pressure import DEFAULT_THRESHOLD_N, Surface, plate_from_wrench
+from dynakin.recordings.plates.pressure import LOADED_N, Surface, plate_from_wrench
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.simulation.output import SimulatedTrial
@@ -137,7 +137,7 @@ def owners_by_load(made: SimulatedTrial) -> dict[str, list[Plate]]:
     data = made.truth.data
     owners: dict[str, list[Plate]] = {}
     for plate in made.recording.plates:
-        on = plate.force[:, 1] > DEFAULT_THRESHOLD_N
+        on = plate.force[:, 1] > LOADED_N
         away = {
             str(name): float(
                 np.abs(data["contact_wrench"].sel(contact=name, component="fy").values - plate.force[:, 1])[on].mean()
@@ -184,7 +184,7 @@ def summed(plates: Sequence[Plate], vertical: str) -> Plate:
         ]
     force, moment = (np.sum([getattr(plate, key) for plate in used], axis=0) for key in ("force", "moment"))
     return plate_from_wrench(
-        "plate 1", force, moment, Surface(level * up, up), corners=corners, threshold_n=DEFAULT_THRESHOLD_N,
+        "plate 1", force, moment, Surface(level * up, up), corners=corners, threshold_n=LOADED_N,
         zero_unloaded=False,
     )  # fmt: skip
 

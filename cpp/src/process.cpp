@@ -8,10 +8,10 @@ namespace dynakin {
 namespace {
 
 // Noise of density w[0] on the rate of q, w[1] on that of qd, w[2] (the jerk) on that of qdd, integrated over dt.
-void add_chain_noise(const Eigen::VectorXd& density, int n, double dt, Eigen::MatrixXd& P) {
+void add_chain_noise(const Eigen::VectorXd& density, int n, double dt, Eigen::MatrixXd& P, double times = 1.0) {
   const double d2 = dt * dt, d3 = d2 * dt;
   for (int i = 0; i < n; ++i) {
-    const double w0 = density(i), w1 = density(n + i), w2 = density(2 * n + i);
+    const double w0 = times * density(i), w1 = times * density(n + i), w2 = times * density(2 * n + i);
     const double q_qd = w1 * d2 / 2.0 + w2 * d2 * d2 / 8.0, q_qdd = w2 * d3 / 6.0, qd_qdd = w2 * d2 / 2.0;
     P(i, i) += w0 * dt + w1 * d3 / 3.0 + w2 * d3 * d2 / 20.0;
     P(n + i, n + i) += w1 * dt + w2 * d3 / 3.0;
@@ -81,6 +81,10 @@ void predict(const Model& model, const FilterSettings& settings, double dt, Eige
   for (int i = 3 * n; i < size; ++i)
     if (settings.process_density(i) > 0.0)
       P(i, i) += decayed_noise(settings.process_density(i), settings.decay_rate(i), dt);
+}
+
+void stir(const Model& model, const FilterSettings& settings, double times, double dt, Eigen::MatrixXd& P) {
+  add_chain_noise(settings.process_density, model.n_free(), dt, P, times);
 }
 
 void decay(const Model& model, const FilterSettings& settings, double dt, Eigen::VectorXd& scratch, Eigen::VectorXd& x,

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "dynakin/process.hpp"
+
 namespace dynakin {
 
 const char* describe(Tracking tracking) {
@@ -70,6 +72,7 @@ void Recovery::hold() {
 // uncertain that no gate would refuse a marker: it has to be found, not merely agreed with.
 Tracking Recovery::correct(const MarkerRef& markers, const Vector6& wrench) {
   Tracking tracking = Tracking::following;
+  if (settings_.enabled && !memory_.held) expect_impact();
   if (memory_.held)
     tracking = seek(markers);
   else if (settings_.enabled && !(gate_.markers_measured() > 0 && believes_most()))
@@ -77,6 +80,22 @@ Tracking Recovery::correct(const MarkerRef& markers, const Vector6& wrench) {
   if (settings_.enabled && tracking == Tracking::following) return fit(markers, wrench);
   if (tracking != Tracking::found) c_.correct(markers, wrench);
   return tracking;
+}
+
+// A landing changes speeds within a few frames by more than the jerk that is declared for moving allows: several markers
+// at once are then refused, rightly placed. Where a denser jerk over the last moments would have at most half as many
+// refused, it was an impact; markers that are astray stay so.
+void Recovery::expect_impact() {
+  constexpr int least = 3;
+  constexpr double times = 30.0, lasts_s = 0.04;  // speeds by 0.8 m/s and 4 rad/s, of the jerk declared for walking
+  const int refused = gate_.markers_refused();
+  if (refused < least) return;
+  kept_.P = now_.P;
+  stir(model_, c_.settings, times, lasts_s, now_.P);
+  gate_.judge(c_.settings, measurement_.blocks(), now_.P);
+  if (2 * gate_.markers_refused() <= refused) return;
+  now_.P = kept_.P;
+  gate_.judge(c_.settings, measurement_.blocks(), now_.P);
 }
 
 // Nothing of this frame is used, or where no marker is measured perhaps the plates.

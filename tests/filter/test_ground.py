@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -14,11 +15,14 @@ from dynakin import Estimate, Estimator, Subject, load_model
 from dynakin.filter.closure import closure
 from dynakin.filter.total_wrench import Ground
 from dynakin.recordings.feet.assignment import foot_loads
-from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
+from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
 from dynakin.recordings.feet.loads import UNKNOWN as FOOT_UNKNOWN
+from dynakin.recordings.formats.mot import read_table
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Plate, Recording
-from dynakin.results.measures.sources import ABSENT, DERIVED
+from dynakin.results.measures.feet import foot_sources
+from dynakin.results.measures.metrics import compute_metrics
+from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, PRIOR, wrench_sources
 from dynakin.simulation.trial import simulate as simulate_anew
 from dynakin.units import GRAVITY_M_S2
 
@@ -79,20 +83,77 @@ def test_a_seat_that_nothing_measures_is_noticed_and_leaves_no_moments(seed: int
     assert len(said) == 1 and "less upwards" in said[0]
 
 
-def test_without_plates_a_leg_that_may_stand_has_no_moments_and_one_that_swings_has() -> None:
+@pytest.fixture(scope="module")
+def blind() -> Estimate:
+    """A walk without plates."""
     walk = simulate("fullbody", "gait", 3, 4.0, 50.0).recording
-    blind = person("fullbody").run(walk.with_plates(()), smooth=False)
+    return person("fullbody").run(walk.with_plates(()), smooth=False)
+
+
+def test_without_plates_one_foot_that_may_stand_is_derived_and_two_are_a_prior(blind: Estimate) -> None:
     contact = blind.data["foot_contact"].transpose("time", "foot").values
     assert set(np.unique(contact)) == {NO_CONTACT, UNMEASURED}
+    standing = contact == UNMEASURED
+    expected = np.where(standing, np.where(standing.all(axis=1), PRIOR, DERIVED)[:, None], MEASURED)
+    assert set(np.unique(expected)) == {MEASURED, DERIVED, PRIOR}
+    np.testing.assert_array_equal(foot_sources(blind.data), expected)
     for k, side in enumerate("rl"):
         for joint in ("hip_flexion", "knee_angle", "ankle_angle"):
-            moments = blind.data["moments"].sel(coordinate=f"{joint}_{side}").values
-            assert np.array_equal(np.isnan(moments), contact[:, k] == UNMEASURED)
-        assert 0.1 < np.mean(contact[:, k] == NO_CONTACT) < 0.45
-        assert np.isfinite(blind.data["moments"].sel(coordinate=f"elbow_flex_{side}").values).all()
-    assert np.isnan(blind.data["moments"].sel(coordinate="pelvis_ty").values).all()
-    assert np.isnan(blind.data["joint_loads"].sel(joint="pelvis").values).all()
-    assert np.isfinite(blind.data["joint_loads"].sel(joint="torso").values).all()
+            np.testing.assert_array_equal(sources(blind, f"{joint}_{side}"), expected[:, k])
+            deviation = blind.data["moments_sd"].sel(coordinate=f"{joint}_{side}").values
+            assert (deviation > 0.0).all() and np.isfinite(deviation).all()
+        ankle = blind.data["moments_sd"].sel(coordinate=f"ankle_angle_{side}").values
+        assert np.median(ankle[standing[:, k]]) > 5.0 * np.median(ankle[~standing[:, k]])
+        assert (sources(blind, f"elbow_flex_{side}") == MEASURED).all()
+    assert np.isfinite(blind.data["moments"].values).all() and np.isfinite(blind.data["joint_loads"].values).all()
+
+
+def test_a_prior_is_in_every_file_with_its_flag_and_in_no_figure_as_measured(blind: Estimate, tmp_path: Path) -> None:
+    result = dynakin.Result(blind)
+    folder = result.save(tmp_path / "out")
+    tables = {path.name: read_table(path) for path in folder.glob("*.sto")}
+    codes = tables["moments_source.sto"]
+    leg = [str(name).startswith(("hip_", "knee_", "ankle_")) for name in codes.names]
+    assert (codes.values[:, leg] == PRIOR).any(axis=0).all() and not (codes.values == ABSENT).any()
+    for name in ("moments.sto", "powers.sto", "joint_reactions.sto", "feet.sto", "uncertainty.sto"):
+        assert np.isfinite(tables[name].values).all(), name
+    assert (tables["feet_source.sto"].values == PRIOR).any(axis=0).all()
+    assert (tables["joint_reactions_source.sto"].values == PRIOR).any()
+    force = tables["uncertainty.sto"].values[:, list(tables["uncertainty.sto"].names).index("ground_force_r_vy")]
+    aloft = foot_sources(blind.data)[:, 0] == MEASURED
+    assert not force[aloft].any() and (force[~aloft] > 10.0).all()
+    metrics = result.metrics()
+    assert metrics["moments"]["legs"]["right"]["prior"] > 0 and metrics["feet"]["prior_frames"] > 0
+    assert "estimated with a prior in" in metrics["moments"]["verdict"]
+    for block in ("peak_moments_per_kg", "work"):
+        assert not any(name.startswith(("hip_", "knee_", "ankle_")) for name in metrics[block])
+    assert set(metrics["asymmetry"]["feet"].values()) == {None}
+    with (folder / "repetitions.csv").open() as file:
+        rows = [row["quantity"] for row in csv.DictReader(file) if int(row["n"])]
+    assert "knee_angle_r" in rows and not any(name.endswith("/moment") and name.startswith("knee") for name in rows)
+    page = (folder / "report.html").read_text()
+    assert "prior: load sharing assumed" in page and "A dotted arrow, and a moment with ≈?" in page
+
+
+def test_two_feet_on_one_plate_are_a_prior_and_their_sum_is_measured() -> None:
+    squat = simulate("fullbody", "squat", 4, 6.0, 50.0).recording
+    right, left = squat.plates
+    force, moment = right.force + left.force, right.moment + left.moment
+    cop = (right.cop * right.force[:, [1]] + left.cop * left.force[:, [1]]) / force[:, [1]]
+    free = moment - np.cross(cop, force)
+    found = person("fullbody").run(squat.with_plates((Plate("one", force, moment, cop, free, None),)), smooth=False)
+    assert (found.data["foot_contact"].values == SHARED_PLATE).all()
+    assert (foot_sources(found.data) == PRIOR).all() and not wrench_sources(found.data).any()
+    for joint in ("hip_flexion", "knee_angle", "ankle_angle"):
+        assert (sources(found, f"{joint}_r") == PRIOR).all() and (sources(found, f"{joint}_l") == PRIOR).all()
+    assert (sources(found, "elbow_flex_r") == MEASURED).all()
+    total = found.data["foot_wrench"].sel(component="fy").sum("foot").values
+    assert np.sqrt(np.mean((total - force[:, 1]) ** 2)) < 0.03 * WEIGHT
+    sd = found.data["foot_wrench_sd"].sel(component="fy").values
+    assert (sd > 0.02 * WEIGHT).all()  # of the parts
+    figures = compute_metrics(found)
+    assert figures["feet"]["prior_frames"] > 0 and "a prior" in figures["feet"]["verdict"]
+    assert not any(name.startswith(("hip_", "knee_", "ankle_")) for name in figures["peak_moments_per_kg"])
 
 
 def test_a_box_that_nothing_measures_is_no_flight() -> None:
@@ -103,7 +164,9 @@ def test_a_box_that_nothing_measures_is_no_flight() -> None:
     contact = found.data["foot_contact"].transpose("time", "foot").values
     early, late = recording.time < 1.9, recording.time > 2.4
     assert (contact[early] == UNMEASURED).all() and (contact[late] == ON_PLATE).all()
-    assert np.isnan(found.data["moments"].sel(coordinate="knee_angle_r").values[early]).all()
+    assert (sources(found, "knee_angle_r")[early] == PRIOR).all() and (foot_sources(found.data)[early] == PRIOR).all()
+    assert (sources(found, "hip_flexion_r")[early] == ABSENT).all()
+    assert np.isnan(found.data["moments"].sel(coordinate="hip_flexion_r").values[early]).all()
     assert (sources(found, "elbow_flex_r")[early] == ABSENT).all()  # it may be a rail as well
     assert (sources(found, "knee_angle_r")[late] == 0).all()
 

@@ -56,12 +56,25 @@ def test_level_floor_and_stairs_up_and_down_give_every_stance_its_plate(rise: fl
             inside = (made.recording.time > stance.start + 0.03) & (made.recording.time < stance.end - 0.03)
             assert (loads.reason[inside, k] == MEASURED).all()
             np.testing.assert_allclose(loads.soles.middle[inside, k, 1], stance.height, atol=0.01)
-            np.testing.assert_allclose(loads.soles.middle[inside, k][:, [0, 2]], made.sole[inside, k][:, [0, 2]], atol=0.045)
+            np.testing.assert_allclose(
+                loads.soles.middle[inside, k][:, [0, 2]], made.sole[inside, k][:, [0, 2]], atol=0.045
+            )
     single = (made.push > 0.0).sum(axis=1) == 1
     for k in range(2):
         swings = single & (made.push[:, k] == 0.0) & (made.recording.time > 0.8)
         assert loads.aloft[swings, k].mean() > 0.4 and not (loads.reason[swings, k] == OFF_PLATE).any()
     assert loads.total_known[made.recording.time > 0.5].all()
+
+
+@pytest.mark.parametrize("rise", [0.0, 0.17, -0.19])
+def test_without_plates_a_foot_that_is_loaded_may_bear_and_is_never_in_the_air(rise: float) -> None:
+    feet = walk(6, 0.30, rise=rise)
+    made = steps(lasting(6), feet, plates_of(feet))
+    loads = found(replace(made, recording=made.recording.with_plates(())))
+    loaded = made.push > 50.0
+    assert loads.soles.bears[loaded].mean() > 0.98 and not loads.aloft[loaded].any()
+    assert loads.soles.bears[~loaded].mean() < 0.6 and (loads.reason == SWING).mean(axis=0).min() > 0.1
+    assert not loads.total_known.any()
 
 
 def test_a_plate_on_a_step_has_its_pressure_on_its_own_surface() -> None:
@@ -188,6 +201,9 @@ def test_a_foot_that_crosses_to_the_other_belts_plate_takes_it_along() -> None:
     crossed = feet["right"][2]
     alone = (made.push[:, 0] > 300.0) & (made.push[:, 1] == 0.0)
     alone &= (made.recording.time > crossed.start) & (made.recording.time < crossed.end)
+    shared = alone & (loads.reason == SHARED).any(axis=1)  # just after the left foot has left, which may still bear
+    np.testing.assert_allclose(loads.wrench[shared, :, 1].sum(axis=1), made.push[shared, 0], atol=12.0)
+    alone &= ~shared
     assert alone.sum() > 10
     np.testing.assert_allclose(loads.wrench[alone, 0, 1], made.push[alone, 0], atol=12.0)
     assert not np.nan_to_num(loads.wrench[alone, 1, 1]).any()

@@ -1,4 +1,5 @@
-"""Derived moments and forces are dashed wherever they are drawn, absent ones are not, and the page says so first."""
+"""Derived moments and forces are dashed wherever they are drawn, a prior's dotted, absent ones are not, and the page
+says so first."""
 
 from __future__ import annotations
 
@@ -27,12 +28,13 @@ from dynakin.results.estimate import Estimate
 from dynakin.results.measures.mean_curves import mean_curves, signals
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.repetitions import Found, Repetition
-from dynakin.results.measures.sources import ABSENT, DERIVED, measured_moments
+from dynakin.results.measures.sources import ABSENT, DERIVED, PRIOR, measured_moments
 from dynakin.validation.methods import Trial
 from support.estimates.walking import make_walker
 from support.page import shown
 
-DERIVED_WORDS = "derived from the motion"
+DERIVED_WORDS, PRIOR_WORDS = "derived from the motion", "prior: load sharing assumed"
+DASHED, DOTTED = 'stroke-dasharray="36 26"', 'stroke-dasharray="10 22"'
 
 
 @pytest.fixture(scope="module")
@@ -91,11 +93,35 @@ def test_derived_stretches_are_dashed_in_every_panel(walker: Estimate, metrics: 
     )
 
 
-def test_a_derived_stretch_has_no_band_and_no_peak(walker: Estimate, metrics: dict[str, Any]) -> None:
+@pytest.mark.parametrize(("code", "pattern", "label"), [(DERIVED, DASHED, DERIVED_WORDS), (PRIOR, DOTTED, PRIOR_WORDS)])
+def test_each_source_has_its_own_line_and_name(code: int, pattern: str, label: str) -> None:
+    walker = make_walker((2,), code=code)
+    page = Page(walker, compute_metrics(walker))
+    moments, powers, feet = moment_section(page), shown(power_section(page)), shown(foot_section(page))
+    panels = [titled(part.panels, "Knee") for part in (moments.parts[0], powers)]
+    for panel in [*panels, titled(feet.parts[1].panels, "Vertical")]:
+        assert panel.svg.count(pattern) == dashes(panel) == 1
+    for section in (moments, powers, feet):
+        marked = [line.label for line in section.lines if line.label in (DERIVED_WORDS, PRIOR_WORDS)]
+        assert marked == [label]
+    assert f"{['dashed', 'dotted'][code == PRIOR]}; no peak, work or mean curve holds them" in moments.text
+    total = titled(shown(wrench_section(page)).panels, "Vertical")
+    assert total.svg.count(DASHED) == 1  # the sum follows from the motion, however it is divided
+    left_out = np.isnan(measured_moments(walker.data)[:, walker.coordinate_names.index("knee_angle_l")])
+    np.testing.assert_array_equal(left_out, walker.data["foot_source"][:, 1] == code)
+
+
+def test_a_stretch_that_is_not_measured_keeps_its_band_and_has_no_peak(
+    walker: Estimate, metrics: dict[str, Any]
+) -> None:
     knee = titled(moment_section(Page(walker, metrics)).parts[0].panels, "Knee")
     assert knee.note == "right 0.00 to 1.17; left 0.00 to 1.17"  # derived it would be 1.75
     band = re.findall(r'<path d="([^"]+)" class="spread" fill="#D55E00"', knee.svg)
-    assert len(band) == 1 and band[0].count("M") == 2
+    assert len(band) == 1 and band[0].count("M") == 1
+    data = walker.data.copy(deep=True)
+    data["moments_sd"][:] = np.where(data["moment_source"] == DERIVED, 500.0, 0.5)  # says how little is known there
+    wide = replace(walker, data=data)
+    assert titled(moment_section(Page(wide, metrics)).parts[0].panels, "Knee").svg.count('class="spread"') == 2
     assert titled(shown(foot_section(Page(walker, metrics))).parts[1].panels, "Vertical").note.startswith("peak 700 N")
     beside = make_walker((1, 2))
     found = compute_metrics(beside)
@@ -106,7 +132,7 @@ def test_a_derived_stretch_has_no_band_and_no_peak(walker: Estimate, metrics: di
 
 
 def test_absent_legs_are_not_drawn_and_the_page_says_so_first() -> None:
-    walker = make_walker((0, 1, 2, 3), absent=True)
+    walker = make_walker((0, 1, 2, 3), code=ABSENT)
     data = walker.data.copy(deep=True)
     data["moment_source"][:, :3] = ABSENT
     data["moments"][:, :3] = np.nan
@@ -132,16 +158,32 @@ def test_the_film_dashes_what_is_derived(walker: Estimate) -> None:
     found = playback(walker)
     content = json.loads(str(found.data))
     frames = np.searchsorted(walker.time, np.array(content["time"]) - 1e-6)
-    packed = content["arrays"]["derived"]
+    packed = content["arrays"]["sources"]
     numbers = np.frombuffer(base64.b64decode(packed["values"]), dtype="<i2").astype(float)
     derived = packed["scale"] * numbers.reshape(-1, packed["columns"])
     np.testing.assert_allclose(derived[:, 1], (frames >= 170) & (frames < 230), atol=1e-3)
     assert not derived[:, 0].any() and found.has_derived
-    assert [entry["derived"] for entry in content["arrows"]] == [False, False, True, True]
+    assert [entry["sourced"] for entry in content["arrows"]] == [False, False, True, True]
     html = render_report(walker)
     assert "A dashed arrow, and a moment with ≈, is derived from the motion" in html
-    assert "setLineDash(entry.derived" in html
-    assert "A dashed arrow" not in render_report(make_walker())
+    assert "setLineDash(entry.sourced" in html
+    assert "A dashed arrow" not in render_report(make_walker()) and "A dotted arrow" not in html
+
+
+def test_the_film_dots_a_prior() -> None:
+    walker = make_walker((2,), code=PRIOR)
+    found = playback(walker)
+    assert found.has_prior and not found.has_derived
+    content = json.loads(str(found.data))
+    frames = np.searchsorted(walker.time, np.array(content["time"]) - 1e-6)
+    for name, column in (("sources", 1), ("moment_sources", 1)):
+        packed = content["arrays"][name]
+        numbers = np.frombuffer(base64.b64decode(packed["values"]), dtype="<i2").astype(float)
+        codes = packed["scale"] * numbers.reshape(-1, packed["columns"])
+        np.testing.assert_allclose(codes[:, column], PRIOR * ((frames >= 170) & (frames < 230)), atol=1e-3)
+    html = render_report(walker)
+    assert "A dotted arrow, and a moment with ≈?, takes a prior" in html and "A dashed arrow" not in html
+    assert "Those that take a prior (dotted) are in the files with their flag" in html
 
 
 def test_mean_curves_say_how_many_cycles_are_left(walker: Estimate) -> None:
@@ -199,6 +241,8 @@ def test_figures_for_papers_dash_what_is_derived(walker: Estimate, tmp_path: Pat
     for name in ("figure6_wrench", "figure7_knee_moment"):
         assert DERIVED_WORDS in written[name] and "stroke-dasharray" in written[name]
         assert DERIVED_WORDS not in whole[name]
+    prior = {p.stem: p.read_text() for p in save_figures(make_walker((2,), code=PRIOR), tmp_path / "d", ("svg",))}
+    assert PRIOR_WORDS in prior["figure7_knee_moment"] and DERIVED_WORDS not in prior["figure7_knee_moment"]
     data = walker.data.copy(deep=True)
     data["moments"][:] = np.nan
     gone = save_figures(replace(walker, data=data), tmp_path / "c", ("svg",))

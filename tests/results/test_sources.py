@@ -14,14 +14,23 @@ from rich.console import Console
 
 from dynakin.cli import summary
 from dynakin.pipeline.result import Result
-from dynakin.recordings.feet.contact import UNMEASURED
+from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
 from dynakin.recordings.formats.mot import read_table
 from dynakin.report.insights import in_short, insights
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.mean_curves import curve_points, mean_curves, signals, write_curves
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.repetitions import Repetition
-from dynakin.results.measures.sources import ABSENT, DERIVED, legs_of, measured_moments, moment_figures, moment_sources
+from dynakin.results.measures.sources import (
+    ABSENT,
+    DERIVED,
+    PRIOR,
+    contact_sources,
+    legs_of,
+    measured_moments,
+    moment_figures,
+    moment_sources,
+)
 from dynakin.results.measures.stances import counted, phases
 from dynakin.results.measures.tracking import without_lost
 from support.estimates.walking import MASS_KG, STANCE_S, make_walker
@@ -54,10 +63,10 @@ def test_a_symmetric_walker_is_symmetric_where_both_feet_have_a_whole_measured_s
     )
 
 
-@pytest.mark.parametrize("absent", [False, True])
-def test_without_a_whole_measured_stance_of_one_foot_nothing_is_compared(absent: bool) -> None:
+@pytest.mark.parametrize("code", [DERIVED, PRIOR, ABSENT])
+def test_without_a_whole_measured_stance_of_one_foot_nothing_is_compared(code: int) -> None:
     """A plate is missing under the left foot: today's +100 % and more are of the plates, not of the person."""
-    found = compute_metrics(make_walker((1, 2), absent=absent))["asymmetry"]
+    found = compute_metrics(make_walker((1, 2), code=code))["asymmetry"]
     assert found["feet"] == {"peak_vertical_force": None, "impulse": None}
     knee, arm = found["coordinates"]["knee_angle"], found["coordinates"]["arm_flex"]
     assert knee["peak_moment"] is knee["positive_work"] is knee["negative_work"] is None
@@ -66,14 +75,17 @@ def test_without_a_whole_measured_stance_of_one_foot_nothing_is_compared(absent:
     assert "The left foot has no stance that is measured from touch-down to toe-off" in found["reason"]
 
 
-def test_peaks_and_work_are_of_whole_measured_stances_and_swings() -> None:
-    metrics = compute_metrics(make_walker((2,)))
+@pytest.mark.parametrize("code", [DERIVED, PRIOR])
+def test_peaks_and_work_are_of_whole_measured_stances_and_swings(code: int) -> None:
+    metrics = compute_metrics(make_walker((2,), code=code))
     peaks, work = metrics["peak_moments_per_kg"], metrics["work"]
-    assert peaks["knee_angle_l"]["largest"] == pytest.approx(0.1 * PEAK_N / MASS_KG, rel=0.01)  # derived: 1.5 times
+    assert peaks["knee_angle_l"]["largest"] == pytest.approx(
+        0.1 * PEAK_N / MASS_KG, rel=0.01
+    )  # in the other: 1.5 times
     assert peaks["knee_angle_r"]["frames"] == 301 and peaks["knee_angle_l"]["frames"] == 60 + 3 * 40
     assert work["knee_angle_l"]["frames"] == 180 and work["arm_flex_l"]["frames"] == 301
     assert work["knee_angle_l"]["positive_j"] == pytest.approx(work["knee_angle_r"]["positive_j"] / 3.0, rel=0.02)
-    nothing = compute_metrics(make_walker(ALL, absent=True))
+    nothing = compute_metrics(make_walker(ALL, code=ABSENT))
     for found in (nothing["peak_moments_per_kg"], nothing["work"]):  # swings alone have no peak of a leg
         assert "knee_angle_l" not in found and {"knee_angle_r", "arm_flex_l"} <= set(found)
 
@@ -83,12 +95,46 @@ def test_standing_on_a_plate_that_fails_for_a_frame_has_no_peak() -> None:
     data = walker.data.copy(deep=True)
     data["foot_contact"][:] = 1
     data["foot_contact"][100, 1] = UNMEASURED
-    data["moment_source"][100, 2] = DERIVED
+    data["moment_source"][100, 2] = data["foot_source"][100, 1] = DERIVED
     standing = replace(walker, data=data)
     assert counted(standing, np.ones(301, dtype=bool)).sum(axis=0).tolist() == [301, 301, 0, 301, 301]
     found = compute_metrics(standing)["asymmetry"]
     assert found["feet"]["impulse"] is None and found["stances"] is None
     assert "not measured in every frame" in found["reason"]
+
+
+def test_what_a_contact_is_called_follows_from_plates_and_contacts_alone() -> None:
+    contact = np.array(
+        [
+            [ON_PLATE, ON_PLATE],
+            [ON_PLATE, UNMEASURED],
+            [NO_CONTACT, UNMEASURED],
+            [UNMEASURED, UNMEASURED],
+            [SHARED_PLATE, SHARED_PLATE],
+            [SHARED_PLATE, ON_PLATE],
+            [ON_PLATE, UNMEASURED],
+        ],
+        dtype=np.uint8,
+    )
+    seat = np.array([0, 0, 0, 0, 0, 0, 1], dtype=bool)  # it and the foot divide what the plates lack
+    expected = [[0, 0], [0, DERIVED], [0, DERIVED], [PRIOR, PRIOR], [PRIOR, PRIOR], [PRIOR, 0], [0, PRIOR]]
+    np.testing.assert_array_equal(contact_sources(contact, seat), expected)
+
+
+def test_a_prior_of_the_feet_is_counted_and_said() -> None:
+    feet = compute_metrics(make_walker((2,), code=PRIOR))["feet"]
+    assert (feet["derived_frames"], feet["prior_frames"], feet["unknown_frames"]) == (0, 60, 0)
+    assert "In 60 of 301 frames several contacts were not measured each on its own" in feet["verdict"]
+    assert "absent" not in feet["verdict"]
+    walker = make_walker()
+    data = walker.data.copy(deep=True)
+    data["foot_contact"][:], data["foot_source"][:] = SHARED_PLATE, PRIOR
+    data["moment_source"][:, :3] = PRIOR
+    shared = compute_metrics(replace(walker, data=data))
+    assert "in the 301 of 301 frames in which every contact" in shared["feet"]["verdict"]  # their sum is measured
+    assert shared["feet"]["adjustment_rms"] == {"right": None, "left": None}
+    assert shared["asymmetry"]["feet"] == {"peak_vertical_force": None, "impulse": None}
+    assert not {"knee_angle_r", "knee_angle_l"} & {*shared["peak_moments_per_kg"], *shared["work"]}
 
 
 @pytest.mark.parametrize("window", [(0, 31), (0, 10), (25, 60), (60, 75), (100, 101)])
@@ -104,20 +150,32 @@ def test_a_foot_that_changes_once_in_the_window_or_never_has_no_stance_to_count(
 def test_frames_are_counted_by_leg_and_said_with_the_reason() -> None:
     found = compute_metrics(make_walker((2,)))["moments"]
     assert found["legs"] == {
-        "right": {"measured": 301, "derived": 0, "absent": 0},
-        "left": {"measured": 241, "derived": 60, "absent": 0},
+        "right": {"measured": 301, "derived": 0, "prior": 0, "absent": 0},
+        "left": {"measured": 241, "derived": 60, "prior": 0, "absent": 0},
     }
     assert found["coordinates"]["arm_flex_l"]["measured"] == 301
     assert found["verdict"] == (
         "Leg moments: right measured in 301 of 301 frames; left measured in 241 and derived from the motion in 60."
     )
     assert found["reasons"] == make_walker((2,)).messages[-1:]
+    prior = compute_metrics(make_walker((2,), code=PRIOR))["moments"]
+    assert prior["legs"]["left"] == {"measured": 241, "derived": 0, "prior": 60, "absent": 0}
+    assert prior["verdict"].endswith("left measured in 241 and estimated with a prior in 60.")
+    every = moment_figures(with_legs(make_walker(), PRIOR))
+    assert every["verdict"] == "Leg moments: estimated with a prior in all 301 frames."
     whole = compute_metrics(make_walker())["moments"]
     assert whole["verdict"] == "Leg moments: measured in all 301 frames." and whole["reasons"] == []
 
 
+def with_legs(walker: Estimate, code: int) -> Estimate:
+    """All moments of both legs come from there."""
+    data = walker.data.copy(deep=True)
+    data["moment_source"][:, 1:3] = code
+    return replace(walker, data=data)
+
+
 def test_legs_are_said_by_joint_where_these_differ() -> None:
-    """Both feet touch one plate: only the hips are absent, and 0.1 said that of all the legs."""
+    """Of a seated person with both feet on plates only the hips are absent, and 0.1 said that of all the legs."""
     walker = make_walker()
     renamed = {"knee_angle_r": "subtalar_angle_r", "knee_angle_l": "hip_flexion_l"}
     data = walker.data.copy(deep=True)
@@ -167,9 +225,9 @@ def test_what_has_no_codes_is_measured_and_what_is_nan_is_absent(estimate: Estim
     assert moment_sources(data)[5, 2] == ABSENT and moment_sources(data).sum() == ABSENT
 
 
-@pytest.fixture(scope="module", params=[False, True], ids=["derived", "absent"])
+@pytest.fixture(scope="module", params=[DERIVED, PRIOR, ABSENT], ids=["derived", "prior", "absent"])
 def saved(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> tuple[Estimate, Path]:
-    walker = make_walker((2,), absent=request.param)
+    walker = make_walker((2,), code=request.param)
     return walker, Result(walker).save(tmp_path_factory.mktemp("walker") / "out")
 
 
@@ -181,7 +239,7 @@ def test_every_table_has_its_flags(saved: tuple[Estimate, Path]) -> None:
     np.testing.assert_array_equal(sources.values, walker.data["moment_source"].values)
     np.testing.assert_array_equal(np.isnan(moments.values), sources.values == ABSENT)
     text = (folder / "moments_source.sto").read_text().split("endheader")[0]
-    assert "1 derived" in text and "2 absent" in text
+    assert all(word in text for word in ("1 derived", "2 prior", "3 absent"))
     powers = read_table(folder / "powers.sto")
     np.testing.assert_array_equal(np.isnan(powers.values), sources.values == ABSENT)
     deviations = read_table(folder / "uncertainty.sto")
@@ -201,13 +259,14 @@ def test_every_table_has_its_flags(saved: tuple[Estimate, Path]) -> None:
 def test_netcdf_flags_follow_cf(saved: tuple[Estimate, Path]) -> None:
     walker, folder = saved
     with xr.open_dataset(folder / "estimate.nc") as stored:
-        for name in ("moment_source", "joint_source"):
-            assert list(stored[name].attrs["flag_values"]) == [0, 1, 2]
-            assert stored[name].attrs["flag_meanings"] == "measured derived absent"
+        for name in ("moment_source", "joint_source", "foot_source"):
+            assert list(stored[name].attrs["flag_values"]) == [0, 1, 2, 3]
+            assert stored[name].attrs["flag_meanings"] == "measured derived prior absent"
             np.testing.assert_array_equal(stored[name].values, walker.data[name].values)
-        assert stored["foot_contact"].attrs["flag_meanings"] == "none plate unmeasured"
+        assert stored["foot_contact"].attrs["flag_meanings"] == "none plate unmeasured shared_plate"
         assert stored["moments"].attrs["ancillary_variables"] == "moment_source"
         assert stored["joint_loads"].attrs["ancillary_variables"] == "joint_source"
+        assert stored["foot_wrench"].attrs["ancillary_variables"] == "foot_source"
 
 
 def test_a_cycle_that_is_not_measured_throughout_is_left_out_of_the_mean(tmp_path: Path) -> None:

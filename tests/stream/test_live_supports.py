@@ -107,7 +107,7 @@ def test_stance_rises_and_falls_live() -> None:
         for s in own
     ]
     made = steps(lasting(6), feet, plates)
-    weights = np.concatenate([one.stance for one in live(made)])
+    weights = np.concatenate([one.soles.stance for one in live(made)])
     assert weights.min() == 0.0 and weights.max() > 0.99
     for k, side in enumerate(("right", "left")):
         for stance in feet[side][1:-1]:

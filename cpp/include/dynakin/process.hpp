@@ -19,6 +19,9 @@ void predict(const Model& model, const FilterSettings& settings, double dt, Eige
 void decay(const Model& model, const FilterSettings& settings, double dt, Eigen::VectorXd& scratch, Eigen::VectorXd& x,
            Eigen::MatrixXd& P);
 
+// P <- P + what white jerk, so many times as dense as declared, adds to the motion over dt.
+void stir(const Model& model, const FilterSettings& settings, double times, double dt, Eigen::MatrixXd& P);
+
 // x <- f(x) over dt alone: where the state is expected to be then, whatever is measured meanwhile.
 void predict_mean(const Model& model, const FilterSettings& settings, double dt, Eigen::VectorXd& x);
 

@@ -42,6 +42,7 @@ class Recovery {
 
  private:
   bool believes_most() const { return 2 * gate_.markers_refused() <= gate_.markers_measured(); }
+  void expect_impact();
   Tracking doubt();
   Tracking seek(const MarkerRef& markers);
   bool seek_motion(const MarkerRef& markers, int refused);

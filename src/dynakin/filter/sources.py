@@ -1,4 +1,4 @@
-"""Where each moment comes from: the plates, the motion, or nowhere; and nowhere means no number."""
+"""Where each moment comes from: the plates, the motion, a prior, or nowhere; and nowhere means no number."""
 
 from __future__ import annotations
 
@@ -7,20 +7,19 @@ import numpy.typing as npt
 import xarray as xr
 
 from dynakin.filter.contacts import ContactLoads
-from dynakin.recordings.feet.contact import SHARED_PLATE, UNMEASURED
-from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, PRIOR
+from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, PRIOR, contact_sources
 
 Flags = npt.NDArray[np.bool_]
 Codes = npt.NDArray[np.uint8]
 
 
 def with_sources(data: xr.Dataset, feet: ContactLoads | None, undeclared: Flags) -> xr.Dataset:
-    """The dataset of an estimate with ``moment_source`` and ``joint_source``, and NaN where a source is unknown.
+    """The dataset of an estimate with ``foot_source``, ``moment_source`` and ``joint_source``, and NaN where absent.
 
-    A load that depends on one unmeasured contact is derived from the motion, on several it is not known. Where
-    something undeclared bears the person, it may touch any segment but those between the plates and the thighs. A model
-    that stands on its root has the plates' sum behind every joint: without it all is derived, or unknown where
-    undeclared.
+    A load is as good as the worst of the contacts behind its joint (`contact_sources`). Where something undeclared
+    bears the person, it may touch any segment but those between the feet and the thighs: what lies there is absent, and
+    what follows from the motion elsewhere is no more than a prior. A model that stands on its root has the plates' sum
+    behind every joint: without it all is derived, or absent where undeclared.
 
     Args:
         data: with the joints' tree and, of floating models, the core's ``moment_source``.
@@ -36,9 +35,11 @@ def with_sources(data: xr.Dataset, feet: ContactLoads | None, undeclared: Flags)
         moments = np.tile(np.where(blind, DERIVED, MEASURED)[:, None], (1, len(moved)))
         legs = np.zeros(len(segments), dtype=bool)
     else:
-        at = [segments.index(name) for name in feet.segments]
-        joints = _behind(feet.contact, at, parents)
+        contacts = contact_sources(feet.contact, undeclared)
+        data = data.assign(foot_source=(("time", "foot"), contacts))
+        joints = _behind(contacts, [segments.index(name) for name in feet.segments], parents)
         moments = data["moment_source"].transpose("time", "coordinate").values.copy()
+        moments[undeclared[:, None] & (moments == DERIVED)] = PRIOR
         legs = _below_the_thighs([segments.index(name) for name in dict.fromkeys(feet.segments)], parents)
     joints[np.ix_(undeclared, ~legs)] = ABSENT
     if feet is not None:  # a foot on no plate may be what it bears
@@ -55,15 +56,12 @@ def with_sources(data: xr.Dataset, feet: ContactLoads | None, undeclared: Flags)
     return found
 
 
-def _behind(contact: Codes, at: list[int], parents: npt.NDArray[np.int_]) -> Codes:
-    """(T, J) codes of the joints' loads by the unmeasured contacts (T, F) that lie behind each."""
-    lacks = contact == UNMEASURED
-    code = np.where(lacks, np.where(lacks.sum(axis=1) > 1, PRIOR, DERIVED)[:, None], MEASURED)
-    code = np.where(contact == SHARED_PLATE, PRIOR, code)
-    joints = np.zeros((len(contact), len(parents)), dtype=np.uint8)
+def _behind(contacts: Codes, at: list[int], parents: npt.NDArray[np.int_]) -> Codes:
+    """(T, J) codes of the joints' loads: the worst of the contacts' (T, C) that lie behind each."""
+    joints = np.zeros((len(contacts), len(parents)), dtype=np.uint8)
     for k, segment in enumerate(at):
         while segment >= 0:
-            joints[:, segment] = np.maximum(joints[:, segment], code[:, k])
+            joints[:, segment] = np.maximum(joints[:, segment], contacts[:, k])
             segment = int(parents[segment])
     return joints
 

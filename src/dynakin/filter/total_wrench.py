@@ -97,13 +97,13 @@ def known_ground(
         loads = foot_loads(recording, initial.ground, foot_markers(initial), assigned=assigned)
     if not recording.plates:
         text = (
-            "No force plates: the ground reaction is not known, so the moments of a leg that may stand are absent; "
-            "inertial parameters stay as the table has them."
+            "No force plates: the ground reaction follows from the motion where one foot may stand, and where both may "
+            "how they divide it is assumed; inertial parameters stay as the table has them."
         )
         return Ground(loads, np.zeros(n, dtype=bool), False, None, (text,), (text,))
     # steps off the plates: their mean load is no mass
-    mass, feet = (None if initial.feet else initial.weighed_kg), foot_markers(initial)
-    check = check_plates(recording, initial.ground, mass, feet)
+    mass = None if initial.feet else initial.weighed_kg
+    check = check_plates(recording, initial.ground, mass, foot_markers(initial), loads)
     if check.refusal:
         raise RecordingError(f"{recording.path or recording.name}: {check.refusal}")
     notes, reasons = list(check.messages), list[str]()

@@ -12,7 +12,8 @@ import numpy.typing as npt
 from matplotlib.ticker import MaxNLocator
 
 from dynakin.arrays import runs
-from dynakin.report.plot import GRID, LIMIT, thin, with_next
+from dynakin.report.plot import GRID, LIMIT, by_source, thin
+from dynakin.results.measures.sources import MEASURED
 
 Array = npt.NDArray[np.float64]
 Place = Callable[[Array], Array]
@@ -22,6 +23,9 @@ _WIDTH, _HEIGHT = 2592, 1440
 _LEFT, _RIGHT, _TOP, _BOTTOM = 400, 2560, 70, 1140
 _MARGIN = 0.08
 _MOST_POINTS = 240
+_RARE = 2.0
+"""Per cent of derived values and priors that may leave the panel at either end: a centre of pressure is far off where a
+foot sets down."""
 
 
 @dataclass(frozen=True)
@@ -37,15 +41,15 @@ class Panel:
 class Line:
     """values (T,), NaN where there is nothing to draw; ``sd`` (T,) adds a band of two standard deviations.
 
-    dashed: (T,) bool, where the line is drawn dashed; there it may leave the panel. width in points. dashes: of the
-    whole line, in tenths of a point.
+    source: (T,) where the values come from (`results.measures.sources`): derived ones are dashed, a prior's dotted, and
+    rare ones far out leave the panel. width in points. dashes: of what is measured, or all, in tenths of a point.
     """
 
     values: Array
     colour: str
     width: float = 1.2
     sd: Array | None = None
-    dashed: npt.NDArray[np.bool_] | None = None
+    source: npt.NDArray[np.uint8] | None = None
     dashes: str = ""
 
 
@@ -96,10 +100,9 @@ def chart(
             f'<text x="{_RIGHT}" y="{level - 18}" text-anchor="end" style="fill:{LIMIT}">{escape(text)}</text>'
         )
     for line in lines:
-        dashed = np.zeros(len(time), dtype=bool) if line.dashed is None else line.dashed
-        for part, more in ((~dashed, line.dashes), (dashed, "36 26")):
-            own = np.where(with_next(part), np.clip(line.values, low, high), np.nan)
-            if path := _path(*thin(time, own, _MOST_POINTS), x, y):
+        for part, dashes in by_source(np.clip(line.values, low, high), line.source):
+            if path := _path(*thin(time, part, _MOST_POINTS), x, y):
+                more = " ".join(f"{10.0 * length:.0f}" for length in dashes) or line.dashes
                 pattern = f' stroke-dasharray="{more}"' if more else ""
                 parts.append(f'<path d="{path}" stroke="{line.colour}" stroke-width="{10 * line.width:.0f}"{pattern}/>')
     label = escape(f"{title} in {unit} over {x_label.partition(',')[0]}", quote=True)
@@ -107,19 +110,21 @@ def chart(
     return Panel(title, note, svg)
 
 
+def _filling(line: Line) -> Array:
+    """The values that a panel has to hold: all that are measured, and of the others all but the rare ones far out."""
+    known = np.isfinite(line.values)
+    if line.source is None:
+        return line.values[known]
+    others = line.values[known & (line.source != MEASURED)]
+    rare = np.percentile(others, [_RARE, 100.0 - _RARE]) if len(others) else others
+    return np.concatenate([line.values[known & (line.source == MEASURED)], rare])
+
+
 def _range(lines: Sequence[Line], levels: Sequence[float], least: float) -> tuple[float, float]:
-    solid = [line.values if line.dashed is None else line.values[~line.dashed] for line in lines]
-    values = np.concatenate([*solid, np.asarray(levels, dtype=float)])
-    values = values[np.isfinite(values)]
-    every = np.concatenate([line.values[np.isfinite(line.values)] for line in lines]) if lines else values
-    if not len(values):
-        values = every
+    values = np.concatenate([*(_filling(line) for line in lines), np.asarray(levels, dtype=float)])
     if not len(values):
         return -1.0, 1.0
     low, high = float(values.min()), float(values.max())
-    if len(every) and high > low:  # what is dashed is less sure: it does not press the rest flat
-        reach = 0.25 * (high - low)
-        low, high = min(low, max(float(every.min()), low - reach)), max(high, min(float(every.max()), high + reach))
     least = max(least, 1e-9 * max(1.0, abs(low), abs(high)))
     if high - low < least:
         low, high = 0.5 * (low + high - least), 0.5 * (low + high + least)

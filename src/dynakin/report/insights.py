@@ -89,8 +89,9 @@ def _moments(estimate: Estimate, metrics: Metrics) -> Insight | None:
     text = ["Peaks, work, symmetry and mean curves are of measured moments only."]
     if any(count["absent"] for count in found["legs"].values()):
         text.append("Absent moments, powers and joint reactions are nan in the files.")
-    if any(count["derived"] for count in found["legs"].values()):
-        text.append("Derived ones are in the files with their flag (moments_source.sto) and dashed in the figures.")
+    flagged = {"derived": "derived ones (dashed in the figures)", "prior": "those that take a prior (dotted)"}
+    if shown := [how for meaning, how in flagged.items() if any(count[meaning] for count in found["legs"].values())]:
+        text.append(f"{sentence(listed(shown))} are in the files with their flag (moments_source.sto).")
     text += found["reasons"][:3]
     if len(found["reasons"]) > 3:
         text.append(f"{plural(len(found['reasons']) - 3, 'more reason')} under Joint moments.")

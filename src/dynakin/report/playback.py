@@ -22,7 +22,7 @@ from dynakin.report.styles import SIDE_COLOURS
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.feet import foot_sources
 from dynakin.results.measures.pressure import centre_of_pressure, floor_height, support_height
-from dynakin.results.measures.sources import DERIVED, moment_sources, wrench_sources
+from dynakin.results.measures.sources import ABSENT, DERIVED, PRIOR, moment_sources, wrench_sources
 from dynakin.results.naming import number, sentence, words
 from dynakin.units import GRAVITY_M_S2
 
@@ -36,6 +36,10 @@ _FOLLOWED_FROM_MM = 1200.0
 _MOST_SQUARES = 200  # along the floor
 _VIEWS = {"Right": (0, 0), "Front": (90, 0), "Left": (180, 0), "Back": (-90, 0), "Above": (0, 90), "Aslant": (40, 12)}
 """Azimuth and elevation in degrees: 0 looks from the right, 90 from the front."""
+
+
+_SOURCES = ("sources", "moment_sources")
+"""The arrays that say where the arrows and the moments come from."""
 
 
 @dataclass(frozen=True)
@@ -53,6 +57,7 @@ class Playback:
     has_measured: bool
     has_mass_centre: bool
     has_derived: bool
+    has_prior: bool
     moment_unit: str
     colours: dict[str, str]
     note: str
@@ -103,7 +108,8 @@ def playback(estimate: Estimate) -> Playback:
         has_reaction=bool(len(forces)),
         has_measured=bool(np.isfinite(arrays["measured_sizes"]).any()),
         has_mass_centre="mass_centre" in arrays,
-        has_derived=bool(arrays["derived"].any() or arrays["moments_derived"].any()),
+        has_derived=any(bool((arrays[name] == DERIVED).any()) for name in _SOURCES),
+        has_prior=any(bool((arrays[name] == PRIOR).any()) for name in _SOURCES),
         moment_unit="N m/kg" if mass else "N m",
         colours=key,
         note="Moments of legs and arms are those of both sides together." if planar else "",
@@ -154,8 +160,9 @@ def _arrows(estimate: Estimate, arrays: dict[str, Array]) -> list[dict[str, Any]
     behind."""
     entries: list[dict[str, Any]] = []
     feet, modelled = estimate.foot_names, estimate.modelled_axes()
-    derived = foot_sources(estimate.data) if feet else wrench_sources(estimate.data).max(axis=1, keepdims=True)
-    arrays["derived"] = (derived == DERIVED).astype(float)
+    total = wrench_sources(estimate.data)
+    total = total[:, (total != ABSENT).any(axis=0)].max(axis=1, initial=0, keepdims=True)  # what is modelled
+    arrays["sources"] = (foot_sources(estimate.data) if feet else total).astype(float)
     for kind, name in (("measured", "foot_wrench_measured"), ("estimated", "foot_wrench")):
         wrench = values_of(estimate, name) if feet else values_of(estimate, f"wrench_{kind}")[:, None]
         every = [wrench[:, k] for k in range(wrench.shape[1])]
@@ -175,7 +182,7 @@ def _arrows(estimate: Estimate, arrays: dict[str, Array]) -> list[dict[str, Any]
                 "colour": MEASURED if kind == "measured" else SIDE_COLOURS.get(feet[k], INK) if feet else INK,
                 "width": 6 if kind == "measured" else 2.5,
                 "behind": kind == "measured",
-                "derived": kind == "estimated",
+                "sourced": kind == "estimated",
             }
             for k in range(wrench.shape[1])
         ]
@@ -186,11 +193,11 @@ def _joint_values(estimate: Estimate, joints: list[Joint]) -> dict[str, Array]:
     """Angles in degrees (mm) and moments, in space per kg, of the joints' columns, in the order of `_rows`."""
     columns = [k for joint in joints for k in joint.columns.values()]
     moments = values_of(estimate, "moments") / (normalising_mass(estimate) or 1.0)
-    derived = (moment_sources(estimate.data) == DERIVED).astype(float)
+    sources = moment_sources(estimate.data).astype(float)
     return {
         "angles": _degrees(estimate)[:, columns],
         "moments": moments[:, columns],
-        "moments_derived": derived[:, columns],
+        "moment_sources": sources[:, columns],
     }
 
 

@@ -12,6 +12,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
+from dynakin.results.measures import sources
+
 # Okabe and Ito's colours, distinguished by people with any kind of colour vision; measured and estimated differ in
 # lightness and width too.
 MEASURED = "#9a9a9a"
@@ -57,6 +59,8 @@ FILE_STYLE: dict[Any, Any] = {
     "savefig.facecolor": "white",
 }
 """Of the figures that are written as files of their own."""
+DASHES: dict[int, tuple[float, ...]] = {sources.MEASURED: (), sources.DERIVED: (3.6, 2.6), sources.PRIOR: (1.0, 2.2)}
+"""By where a value comes from: solid, dashed, dotted; what is absent is a gap."""
 _MOST_POINTS = 700
 _GROUP_ID = re.compile(r' id="(?:figure|axes|patch|matplotlib\.axis|xtick|ytick|line2d|text|[A-Za-z]+Collection)_\d+"')
 _TAG = re.compile(r"<[^>]*>")
@@ -99,15 +103,21 @@ def with_next(part: np.ndarray) -> np.ndarray:
     return grown
 
 
+def by_source(values: np.ndarray, source: np.ndarray | None) -> list[tuple[np.ndarray, tuple[float, ...]]]:
+    """Values (T,) in parts (T,), NaN elsewhere, each with its `DASHES`: by where they come from (T,), codes of
+    `results.measures.sources`; None: all are of one kind."""
+    if source is None:
+        return [(values, ())]
+    drawn = [(np.where(with_next(source == code), values, np.nan), pattern) for code, pattern in DASHES.items()]
+    return [(part, pattern) for part, pattern in drawn if np.isfinite(part).any()]
+
+
 def draw_sourced(
-    axes: Axes, time: np.ndarray, values: np.ndarray, derived: np.ndarray | None, *, color: str, linewidth: float
+    axes: Axes, time: np.ndarray, values: np.ndarray, source: np.ndarray, *, color: str, linewidth: float
 ) -> None:
-    """A line over time (T,) that is dashed where the values are ``derived`` (T,) bool from the motion."""
-    dashed = np.zeros(len(time), dtype=bool) if derived is None else derived
-    for part, pattern in ((~dashed, "-"), (dashed, (0.0, (3.6, 2.4)))):
-        own = np.where(with_next(part), values, np.nan)
-        if np.isfinite(own).any():
-            axes.plot(*thin(time, own), color=color, linewidth=linewidth, linestyle=pattern)
+    """A line over time (T,) that shows where its values come from (T,)."""
+    for part, pattern in by_source(values, source):
+        axes.plot(*thin(time, part), color=color, linewidth=linewidth, linestyle=(0.0, pattern or None))
 
 
 def to_svg(figure: Figure, key: str, description: str) -> str:

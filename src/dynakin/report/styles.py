@@ -6,7 +6,10 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+import numpy as np
+
 from dynakin.report.plot import ESTIMATED, LIMIT, MEASURED, QUIET, REFERENCE
+from dynakin.results.measures.sources import DERIVED, PRIOR
 
 # Paul Tol's "muted" scheme (SRON/EPS/TN/09-002), made for people with any kind of colour vision; the light ones are
 # darkened to be seen as thin lines on white. Neighbours in the body are far apart in hue or lightness.
@@ -66,7 +69,14 @@ MEASURED_LINE, ESTIMATED_LINE = LineStyle("measured", MEASURED, 2.6), LineStyle(
 BOUND_LINE = LineStyle("bound", LIMIT, 1.0, "dashed")
 BAND = "± 2 standard deviations"
 DERIVED_LINE = LineStyle("derived from the motion", QUIET, 1.2, "dashed")
-"""In the key of figures in which some of a line is derived, because a contact is not measured."""
+PRIOR_LINE = LineStyle("prior: load sharing assumed", QUIET, 1.2, "dotted")
+
+
+def source_key(source: np.ndarray) -> tuple[LineStyle, ...]:
+    """What a figure's key says of the values that it shows, by their codes of where they come from: nothing where all
+    are measured."""
+    lines = {DERIVED: DERIVED_LINE, PRIOR: PRIOR_LINE}
+    return tuple(line for code, line in lines.items() if (source == code).any())
 
 
 def side_of(name: str) -> str:

@@ -44,7 +44,7 @@ class Estimate:
     foot_wrench, foot_wrench_sd, foot_wrench_measured             (time, foot, component)     N or N m
     foot_adjustment                                               (time, foot, component)     N or N m
     wrench_remainder                                              (time, component)           N or N m
-    foot_contact                                                  (time, foot)                codes
+    foot_contact, foot_source                                     (time, foot)                codes
     moment_source, joint_source                                   (time, coordinate | joint)  codes
     nis, n_rows, log_likelihood                                   (time,)                     1
     ============================================================  ==========================  =====================
@@ -57,10 +57,12 @@ class Estimate:
     axis whether the model explains it. The wrench is what the ground does to the person, about the model's ground
     origin. ``joint_loads`` is what a segment's parent does to it through the joint by which it hangs, muscles and all,
     ground axes, about the joint's centre; ``joint_orientations`` turns a segment's axes into the ground's. The feet's
-    variables are there if the moments were made with the feet's wrenches: ``foot_contact`` is 0 in the air, 1 measured,
-    2 not measured. ``moment_source`` and ``joint_source`` are 0 where a moment or a joint's load is measured (with all
-    the ground's reactions behind it), 1 where it is derived from the motion, because one of them is not, and 2 where it
-    is absent (NaN); where they are missing all is measured (`dynakin.results.measures.sources`).
+    variables are there if the moments were made with the feet's wrenches: ``foot_contact`` is 0 in the air, 1 on a
+    plate, 2 not measured, 3 on a plate that bears another contact too. ``moment_source``, ``joint_source`` and
+    ``foot_source`` are 0 where a moment, a joint's load or a foot's wrench is measured (with all the ground's reactions
+    behind it), 1 where it is derived from the motion, because one of them is not, 2 where it is a prior, because how
+    several of them divide the load is assumed, and 3 where it is absent (NaN); where they are missing all is measured
+    (`dynakin.results.measures.sources`).
 
     ``lost`` (time,) is true in frames in which the filter lost the person: everything that was estimated there is NaN,
     but for ``state`` and ``state_sd``, which keep what the filter held.
@@ -131,8 +133,8 @@ class Estimate:
         return None if mass is None else float(mass)
 
     def powers(self) -> np.ndarray:
-        """Power (T, C) W of each coordinate, moment times speed; positive adds energy to the body. Derived and absent
-        where the moment is (``moment_source``)."""
+        """Power (T, C) W of each coordinate, moment times speed; positive adds energy to the body. It comes from where
+        the moment does (``moment_source``)."""
         moments, speeds = (self.data[name].transpose("time", "coordinate").values for name in ("moments", "speeds"))
         return np.asarray(moments * speeds)
 

@@ -6,7 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from dynakin.recordings.feet.contact import UNMEASURED
 from dynakin.results.estimate import COMPONENTS, Estimate
+from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED
 from support.estimates.synthetic import make_estimate
 
 COORDINATES = {
@@ -51,9 +53,9 @@ def make_spatial(duration_s: float = 6.0, *, walk_m: float = 0.0) -> Estimate:
     moments = -depth[:, None] * np.array([0, 0, 60, 60, 90, 45, 50, 3, 3, 0.0])
     source = np.zeros((frames, count), dtype=np.uint8)
     derived, unknown = (time >= 1.0) & (time < 2.0), (time >= 2.0) & (time < 2.5)
-    source[np.ix_(derived, [3, 5])] = 1
-    source[np.ix_(unknown, [2, 3])] = 2
-    moments[source == 2] = np.nan
+    source[np.ix_(derived, [3, 5])] = DERIVED
+    source[np.ix_(unknown, [2, 3])] = ABSENT
+    moments[source == ABSENT] = np.nan
     sd = np.broadcast_to(np.where(size > 0.0, 0.01, 0.0), (frames, count))
 
     forward = np.zeros((frames, 1, 3))
@@ -72,7 +74,8 @@ def make_spatial(duration_s: float = 6.0, *, walk_m: float = 0.0) -> Estimate:
     adjustment[:, 0, 1] = 2.0
     measured = feet - adjustment
     contact = np.ones((frames, 2), dtype=np.uint8)
-    contact[derived, 1] = 2
+    contact[derived, 1] = UNMEASURED
+    foot_source = np.where(contact == UNMEASURED, DERIVED, MEASURED).astype(np.uint8)
     measured[derived, 1] = np.nan
     total = feet.sum(axis=1)
     names = [str(name) for name in made.data["element"].values][21:]  # the constants
@@ -83,7 +86,7 @@ def make_spatial(duration_s: float = 6.0, *, walk_m: float = 0.0) -> Estimate:
             "coordinates": (per, coordinates),
             "coordinates_sd": (per, sd),
             "moments": (per, moments),
-            "moments_sd": (per, np.where(source == 2, np.nan, 1.0)),
+            "moments_sd": (per, np.where(source == ABSENT, np.nan, 1.0)),
             "moment_source": (per, source),
             "state": (("time", "element"), made.data["state"].values[:, 21:]),
             "state_sd": (("time", "element"), made.data["state_sd"].values[:, 21:]),
@@ -96,6 +99,7 @@ def make_spatial(duration_s: float = 6.0, *, walk_m: float = 0.0) -> Estimate:
             "foot_wrench_measured": (("time", "foot", "component"), measured),
             "foot_adjustment": (("time", "foot", "component"), adjustment),
             "foot_contact": (("time", "foot"), contact),
+            "foot_source": (("time", "foot"), foot_source),
             "wrench_remainder": (("time", "component"), np.zeros((frames, len(COMPONENTS)))),
         }
     )

@@ -8,7 +8,7 @@ import numpy as np
 
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
 from dynakin.results.estimate import Estimate
-from dynakin.results.measures.sources import ABSENT, DERIVED
+from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED
 from support.estimates.synthetic import make_estimate
 
 COORDINATES = {
@@ -33,13 +33,14 @@ STANCE_S, CYCLE_S = 0.6, 1.0
 TOUCH_DOWN_S = {"right": (0.2, 1.2, 2.2), "left": (-0.3, 0.7, 1.7, 2.7)}
 """In 3 s at 100 Hz: three whole stances of the right foot, two of the left and two that the ends cut."""
 WRONG = 1.5
-"""What is derived from the motion is so many times too large."""
+"""What is not measured is so many times too large."""
 
 
-def make_walker(withheld: tuple[int, ...] = (), *, absent: bool = False) -> Estimate:
+def make_walker(withheld: tuple[int, ...] = (), *, code: int = DERIVED) -> Estimate:
     """Both legs do the same half a second apart; knees bear a tenth of their foot's force as a moment.
 
-    withheld: numbers of the left foot's stances off the plates, derived then, or ``arrays``.
+    withheld: numbers of the left foot's stances off the plates. code: what depends on them is derived, a prior, or
+    absent.
     """
     made = make_estimate(3.0, gaps=False)
     time = made.time
@@ -52,9 +53,8 @@ def make_walker(withheld: tuple[int, ...] = (), *, absent: bool = False) -> Esti
             beside = foot == 1 and k in withheld
             contact[stands, foot] = UNMEASURED if beside else ON_PLATE
             load = 700.0 * np.sin(np.pi * (time[stands] - start) / STANCE_S)
-            push[stands, foot] = (np.nan if absent else WRONG * load) if beside else load
+            push[stands, foot] = (np.nan if code == ABSENT else WRONG * load) if beside else load
     lacking = contact == UNMEASURED
-    code = ABSENT if absent else DERIVED
     source = np.zeros((frames, len(COORDINATES)), dtype=np.uint8)
     source[lacking[:, 1], 2] = source[lacking[:, 1], 0] = code
     phase = 2.0 * np.pi * (time[:, None] - [0.2, 0.7]) / CYCLE_S
@@ -100,6 +100,7 @@ def make_walker(withheld: tuple[int, ...] = (), *, absent: bool = False) -> Esti
             "foot_wrench_measured": (by_foot, measured),
             "foot_adjustment": (by_foot, np.zeros_like(feet)),
             "foot_contact": (("time", "foot"), contact),
+            "foot_source": (("time", "foot"), np.where(lacking, code, MEASURED).astype(np.uint8)),
             "wrench_remainder": (("time", "component"), np.where(flight[:, None], [0.0, 8.0, 0, 0, 0, 0], 0.0)),
         }
     )

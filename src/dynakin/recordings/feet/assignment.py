@@ -19,7 +19,7 @@ from dynakin.errors import ConfigError
 from dynakin.recordings.feet.contact import GAP_S, FootContact, foot_contacts
 from dynakin.recordings.feet.findings import exchanged, plate_findings
 from dynakin.recordings.feet.loads import FootLoads, divided
-from dynakin.recordings.feet.soles import Soles
+from dynakin.recordings.feet.soles import EARLY_S, LATE_S, Soles
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import GroundPlate
@@ -117,6 +117,7 @@ class _Assignment:
             self.presses(p, plate)
             self.on[:, :, p] |= to_the_end(self.on[:, :, p], plate.pressed, steps) & ~aloft
             self.on[:, :, p] &= ~aloft | (plate.push > JUDGED_N)[:, None]
+            self.passed_on(p, plate)
         for k, foot in enumerate(feet):
             if foot in contacts:
                 self.unseen(k, contacts[foot])
@@ -177,6 +178,20 @@ class _Assignment:
                 near = self.under[press, k, p] & foot.low[press]
                 if np.count_nonzero(near & loaded) > MOST * np.count_nonzero(loaded):
                     self.on[press, k, p] = True
+
+    def passed_on(self, p: int, plate: GroundPlate) -> None:
+        """A press that two feet bear one after the other bears both as long as either of them may: the centre of
+        pressure leaves a foot before its load does."""
+        for first, end in runs(plate.pressed):
+            owners = np.flatnonzero(self.on[first:end, :, p].any(axis=0)).tolist()
+            for k in owners if len(owners) > 1 else []:
+                if (foot := self.contacts.get(self.feet[k])) is None:
+                    continue
+                for stance in foot.stances:
+                    start, stop = max(first, stance[0]), min(end, stance[1])
+                    if start < stop and self.on[start:stop, k, p].any():
+                        before, after = round(EARLY_S * self.recording.rate), round(LATE_S * self.recording.rate)
+                        self.on[max(first, stance[0] - before) : min(end, stance[1] + after), k, p] = True
 
     def doubtful(self, p: int, plate: GroundPlate) -> None:
         """A press most of whose load is nobody's is nobody's at all: a foot that steps near its centre of pressure at
@@ -245,13 +260,19 @@ class _Assignment:
         return np.asarray((distance_to_hull(cop, both) < BETWEEN_M) & apart & own.stands & other.stands)
 
     def upon(self, plate: GroundPlate, foot: FootContact, frames: slice) -> Flags:
-        """Frames in which all touching markers of a foot lie within a plate's edges, on its level; none where these are
-        not known."""
+        """Frames in which all touching markers of a foot lie within a plate's edges, on its level, or higher where no
+        other foot stands on that: on a box; none where edges are not known."""
         touching = foot.touching[frames]
         if plate.corners is None or plate.height_m is None:
             return np.zeros(len(touching), dtype=bool)
         inside = plate.beyond(foot.outline[frames]) == 0.0
         level = np.abs(foot.support_m[frames] - plate.height_m) < SAME_LEVEL_M
+        others = [
+            other.stands[frames] & (np.abs(other.support_m[frames] - plate.height_m) < SAME_LEVEL_M)
+            for other in self.contacts.values()
+            if other is not foot
+        ]
+        level |= (foot.support_m[frames] > plate.height_m) & ~np.any([np.zeros_like(level), *others], axis=0)
         return np.asarray(level & touching.any(axis=1) & (inside | ~touching).all(axis=1))
 
     def beyond_edges(self, foot: FootContact, frames: slice) -> Flags:

@@ -29,14 +29,14 @@ from dynakin.report.sections.repetitions import (
     plots_by_method,
 )
 from dynakin.report.sides import joints_of, side_lines, values_of
-from dynakin.report.styles import BAND, DERIVED_LINE, LineStyle, method_styles
+from dynakin.report.styles import BAND, LineStyle, method_styles, source_key
 from dynakin.results.estimate import COMPONENTS, Estimate
 from dynakin.results.measures.fit import signal_fit
 from dynakin.results.measures.mean_curves import PERCENT, estimate_curves
 from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.measures.pressure import floor_height
 from dynakin.results.measures.repetitions import repetitions_of
-from dynakin.results.measures.sources import DERIVED, moment_sources, wrench_sources
+from dynakin.results.measures.sources import moment_sources, wrench_sources
 from dynakin.results.naming import number, sentence, words
 from dynakin.validation.differences import angle_differences, moment_differences
 from dynakin.validation.methods import AT, CLASSICAL, Method, Trial
@@ -135,7 +135,7 @@ def wrench_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure
     if not shown:
         return None
     at = _reference(comparison, AT)
-    derived = wrench_sources(estimate.data) == DERIVED
+    source = wrench_sources(estimate.data)
     figure = Figure(figsize=(7.2, 0.5 + 1.35 * len(shown)), layout="constrained")
     every = figure.subplots(len(shown), 1, sharex=True, squeeze=False).ravel()
     window = evaluation_window(estimate.time)
@@ -144,7 +144,7 @@ def wrench_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure
         axes.plot(estimate.time, measured[:, k], color=MEASURED, linewidth=2.8, solid_capstyle="round")
         if at is not None:
             _draw(axes, estimate.time, at.wrench[:, k], at)
-        draw_sourced(axes, estimate.time, estimated[:, k], derived[:, k], color=ESTIMATED, linewidth=1.0)
+        draw_sourced(axes, estimate.time, estimated[:, k], source[:, k], color=ESTIMATED, linewidth=1.0)
         rms = [f"EKF {number(signal_fit(measured[window, k], estimated[window, k]).rms, unit)}"]
         if at is not None:
             rms.append(f"AT {number(signal_fit(measured[window, k], at.wrench[window, k]).rms, unit)}")
@@ -153,8 +153,8 @@ def wrench_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure
             axes.set_title(f"RMS difference: {', '.join(rms)}", loc="right", color=QUIET, weight="normal", fontsize=8)
         axes.set_xlim(float(estimate.time[0]), float(estimate.time[-1]))
     every[-1].set_xlabel("time, s")
-    dashed = [_DERIVED] if derived[:, shown].any() else []
-    _key(figure, every[0], [LineStyle("measured", MEASURED, 2.8), _EKF, *dashed, *_styles(at)])
+    marked = _source_key(source[:, shown])
+    _key(figure, every[0], [LineStyle("measured", MEASURED, 2.8), _EKF, *marked, *_styles(at)])
     return figure
 
 
@@ -165,16 +165,16 @@ def knee_moment_figure(estimate: Estimate, comparison: Trial | None = None) -> F
     knees = [k for k in free if "knee" in names[k] and np.isfinite(moments[:, k]).any()]
     if not knees:
         return None
-    sources = moment_sources(estimate.data) == DERIVED
+    source = moment_sources(estimate.data)
     figure = Figure(figsize=(4.6, 0.5 + 2.3 * len(knees)), layout="constrained")
     every = figure.subplots(len(knees), 1, sharex=True, squeeze=False).ravel()
     at = _reference(comparison, AT)
     differences = {row.coordinate: row for row in moment_differences([] if comparison is None else [comparison])}
     for axes, k in zip(every, knees, strict=True):
-        name, moment, derived = names[k], moments[:, k], sources[:, k]
-        draw_sourced(axes, estimate.time, moment, derived, color=ESTIMATED, linewidth=1.2)
+        name, moment = names[k], moments[:, k]
+        draw_sourced(axes, estimate.time, moment, source[:, k], color=ESTIMATED, linewidth=1.2)
         if "moments_sd" in estimate.data:
-            sd = np.where(derived, np.nan, values_of(estimate, "moments_sd")[:, k])
+            sd = values_of(estimate, "moments_sd")[:, k]
             axes.fill_between(estimate.time, moment - 2.0 * sd, moment + 2.0 * sd, color=ESTIMATED, alpha=0.2, lw=0)
         note = moment_note(estimate, name)
         axes.set_title(f"{sentence(words(name))} moment, N m{f' ({note})' if note else ''}")
@@ -188,7 +188,7 @@ def knee_moment_figure(estimate: Estimate, comparison: Trial | None = None) -> F
         else:
             axes.set_xlabel("time, s")
         axes.set_xlim(float(estimate.time[0]), float(estimate.time[-1]))
-    _key(figure, every[0], [_EKF, *([_DERIVED] if sources[:, knees].any() else []), *_styles(at)])
+    _key(figure, every[0], [_EKF, *_source_key(source[:, knees]), *_styles(at)])
     return figure
 
 
@@ -220,7 +220,10 @@ def _styles(method: Method | None) -> list[LineStyle]:
 
 
 _EKF = LineStyle("EKF", ESTIMATED, 1.4)
-_DERIVED = replace(DERIVED_LINE, colour=ESTIMATED, width=1.4)
+
+
+def _source_key(source: np.ndarray) -> list[LineStyle]:
+    return [replace(line, colour=ESTIMATED, width=1.4) for line in source_key(source)]
 
 
 def _key(

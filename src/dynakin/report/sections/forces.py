@@ -6,18 +6,19 @@ from typing import Any
 
 import numpy as np
 
+from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
 from dynakin.report.chart import Line, chart
 from dynakin.report.labels import COMPONENT_LABELS
 from dynakin.report.plot import ESTIMATED, MEASURED
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.sides import side_key, values_of
-from dynakin.report.styles import DERIVED_LINE, ESTIMATED_LINE, MEASURED_LINE, SIDE_COLOURS
+from dynakin.report.styles import BAND, ESTIMATED_LINE, MEASURED_LINE, SIDE_COLOURS, source_key
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import AXES, COMPONENTS, Estimate
 from dynakin.results.measures.feet import foot_sources
 from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.measures.pressure import centre_of_pressure, support_height
-from dynakin.results.measures.sources import DERIVED, measured_only, wrench_sources
+from dynakin.results.measures.sources import measured_only, wrench_sources
 from dynakin.results.measures.stances import compared_stances
 from dynakin.results.naming import number, sentence
 
@@ -29,7 +30,7 @@ def wrench_section(page: Page) -> Section | None:
     if page.metrics["wrench"] is None:
         return None
     measured, estimated = (values_of(page.estimate, f"wrench_{kind}") for kind in ("measured", "estimated"))
-    derived = wrench_sources(page.estimate.data) == DERIVED
+    source = wrench_sources(page.estimate.data)
     # a planar model's wrench is its own, plates or not; of a body in space only what is measured is compared
     shown = np.isfinite(estimated if page.planar else measured).any(axis=0)
     panels = []
@@ -38,14 +39,14 @@ def wrench_section(page: Page) -> Section | None:
         title, unit = COMPONENT_LABELS[component]
         rms = page.metrics["wrench"]["rms"].get(component)
         note = f"{component}, RMS difference {number(rms, unit)}" if rms is not None else component
-        lines = [Line(measured[:, k], MEASURED, 2.6), Line(estimated[:, k], ESTIMATED, 1.0, dashed=derived[:, k])]
+        lines = [Line(measured[:, k], MEASURED, 2.6), Line(estimated[:, k], ESTIMATED, 1.0, source=source[:, k])]
         panels.append(chart(title, unit, page.estimate.time, lines, note=note))
     return Section(
         "wrench",
         "Ground reaction",
         _IN_A_PLANE if page.planar else _IN_SPACE,
         panels,
-        lines=(MEASURED_LINE, ESTIMATED_LINE, *((DERIVED_LINE,) if derived[:, shown].any() else ())),
+        lines=(MEASURED_LINE, ESTIMATED_LINE, *source_key(source[:, shown])),
     )
 
 
@@ -63,12 +64,12 @@ def foot_section(page: Page) -> Section | None:
     estimate, figures = page.estimate, page.metrics["feet"]
     if not estimate.foot_names or figures is None:
         return None
-    derived = bool((foot_sources(estimate.data) == DERIVED).any())
     return Section(
         "feet",
         "Feet",
         figures["verdict"],
-        lines=(MEASURED_LINE, *side_key(estimate), *((DERIVED_LINE,) if derived else ())),
+        lines=(MEASURED_LINE, *side_key(estimate), *source_key(foot_sources(estimate.data))),
+        band=BAND if "foot_wrench_sd" in estimate.data else "",
         tables=[table for table in (_adjustments(figures),) if table.rows],
         parts=[part for foot in estimate.foot_names if (part := _foot_part(estimate, foot)).panels],
     )
@@ -79,29 +80,45 @@ def _adjustments(figures: dict[str, Any]) -> TextTable:
     if figures["remainder_rms"] is not None:
         each[f"In flight, residual ({figures['flight_frames']} frames)"] = figures["remainder_rms"]
     rows = [
-        (what, *("–" if rms is None else number(rms[name], digits=2) for name in COMPONENTS))
-        for what, rms in each.items()
+        (what, *(number(rms[name], digits=2) for name in COMPONENTS)) for what, rms in each.items() if rms is not None
     ]
     headings = ("RMS", *(f"{name}, {COMPONENT_LABELS[name][1]}" for name in COMPONENTS))
     return TextTable("What was changed, in place of a residual", headings, rows, tuple(range(1, 7)))
 
 
+_CONTACTS = {
+    NO_CONTACT: "in the air",
+    ON_PLATE: "measured",
+    SHARED_PLATE: "on one plate with another contact, so that only the sum is measured",
+    UNMEASURED: "on the ground but not measured",
+}
+
+
 def _foot_part(estimate: Estimate, foot: str) -> Section:
     k = estimate.foot_names.index(foot)
     measured, adjusted = (values_of(estimate, name)[:, k] for name in ("foot_wrench_measured", "foot_wrench"))
+    sd = values_of(estimate, "foot_wrench_sd")[:, k] if "foot_wrench_sd" in estimate.data else None
     contact, source = estimate.data["foot_contact"].sel(foot=foot).values, foot_sources(estimate.data)[:, k]
     panels = []
 
-    def add(title: str, unit: str, seen: np.ndarray, made: np.ndarray, note: str = "", least: float = 0.0) -> None:
+    def add(
+        title: str,
+        unit: str,
+        seen: np.ndarray,
+        made: np.ndarray,
+        note: str = "",
+        least: float = 0.0,
+        made_sd: np.ndarray | None = None,
+    ) -> None:
         if np.isfinite(made).any():
-            own = Line(made, SIDE_COLOURS.get(foot, ESTIMATED), 1.1, dashed=source == DERIVED)
+            own = Line(made, SIDE_COLOURS.get(foot, ESTIMATED), 1.1, made_sd, source)
             lines = [Line(seen, MEASURED, 2.6), own]
             panels.append(chart(title, unit, estimate.time, lines, note=note, least_range=least))
 
     for j, component in enumerate(COMPONENTS[:3]):
         title, unit = COMPONENT_LABELS[component]
         note = _peak(estimate, foot, measured_only(adjusted[:, j], source), unit)
-        add(title, unit, measured[:, j], adjusted[:, j], note)
+        add(title, unit, measured[:, j], adjusted[:, j], note, made_sd=None if sd is None else sd[:, j])
     support = support_height(estimate, measured)
     (seen, seen_free), (made, made_free) = (centre_of_pressure(wrench, support) for wrench in (measured, adjusted))
     for axis, j in (("forward", 0), ("to the right", 2)):
@@ -109,7 +126,7 @@ def _foot_part(estimate: Estimate, foot: str) -> Section:
     add("Free moment about the vertical", "N m", seen_free, made_free, least=2.0)
     shares = [
         f"{share} in {number(100.0 * float(np.mean(contact == code)), '%', digits=2)} of the frames"
-        for code, share in ((0, "In the air"), (1, "measured"), (2, "on the ground but not measured"))
+        for code, share in _CONTACTS.items()
         if (contact == code).any()
     ]
     return Section(f"foot-{foot}", f"{sentence(foot)} foot", sentence(", ".join(shares)) + ".", panels)

@@ -10,12 +10,10 @@ from dynakin.report.chart import Line, Panel, band_is_too_wide, chart
 from dynakin.report.labels import moment_note
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.sides import REGIONS, Joint, joints_of, normalising_mass, side_key, side_lines, values_of
-from dynakin.report.styles import BAND, DERIVED_LINE
+from dynakin.report.styles import BAND, source_key
 from dynakin.results.measures.angles import convention_of
-from dynakin.results.measures.feet import ROUNDING
-from dynakin.results.measures.power import root_coordinates
-from dynakin.results.measures.sources import DERIVED, MEASURED, UNKNOWN, moment_sources
-from dynakin.results.naming import listed, number
+from dynakin.results.measures.sources import DERIVED, MEASURED, PRIOR, UNKNOWN, moment_sources
+from dynakin.results.naming import listed, number, sentence
 
 
 def angle_section(page: Page) -> Section:
@@ -64,7 +62,7 @@ def angle_section(page: Page) -> Section:
 
 
 def moment_section(page: Page) -> Section:
-    """Moments, in space over the body mass; what is derived is dashed, what is absent left out."""
+    """Moments, in space over the body mass; what is derived is dashed, a prior dotted, what is absent left out."""
     estimate, lines_of = page.estimate, side_lines(page.estimate)
     mass = normalising_mass(estimate)
     moments = values_of(estimate, "moments") / (mass or 1.0)
@@ -80,9 +78,8 @@ def moment_section(page: Page) -> Section:
             if not np.isfinite(moments[:, k]).any():
                 notes.append(f"{who}absent")
                 continue
-            derived = source[:, k] == DERIVED
-            band, wide = _band(moments[:, k], None if sd is None else np.where(derived, np.nan, sd[:, k]))
-            lines.append(Line(moments[:, k], lines_of[side].colour, 1.2, band, derived))
+            band, wide = _band(moments[:, k], None if sd is None else sd[:, k], source[:, k])
+            lines.append(Line(moments[:, k], lines_of[side].colour, 1.2, band, source[:, k]))
             if peaks and name in peaks:
                 notes.append(f"{who}{_two_digits(peaks[name]['smallest'])} to {_two_digits(peaks[name]['largest'])}")
             elif peaks is not None:
@@ -104,9 +101,10 @@ def moment_section(page: Page) -> Section:
     if shown := bool(panels or parts):
         about = "What muscles and ligaments do about each joint, in the direction in which its coordinate grows"
         text.append(f"{about}, over the body mass." if mass else f"{about}.")
-        text += [_IN_A_PLANE] if page.planar else _left_at_root(page, source)
-    if (source == DERIVED).any():
-        text.append("Derived moments are dashed, and no peak, work or mean curve holds them.")
+        text += [_IN_A_PLANE] if page.planar else []
+    words = {DERIVED: "derived moments are dashed", PRIOR: "those that take a prior are dotted"}
+    if marked := [how for code, how in words.items() if (source == code).any()]:
+        text.append(f"{sentence(listed(marked))}; no peak, work or mean curve holds them.")
     if absent:
         text.append(f"Absent in every frame: {listed(absent, 12)}.")
     return Section(
@@ -114,7 +112,7 @@ def moment_section(page: Page) -> Section:
         "Joint moments",
         " ".join(text),
         panels,
-        lines=(*side_key(estimate), *((DERIVED_LINE,) if (source == DERIVED).any() else ())) if shown else (),
+        lines=(*side_key(estimate), *source_key(source)) if shown else (),
         band=BAND if sd is not None and shown else "",
         notes=tuple(found["reasons"]),
         parts=parts,
@@ -127,23 +125,13 @@ _IN_A_PLANE = (
 )
 
 
-def _left_at_root(page: Page, source: np.ndarray) -> list[str]:
-    """What the model needs at its root and nothing gives, in the frames in which that is measured; in words."""
-    names = root_coordinates(page.estimate)
-    root = [k for k, name in enumerate(page.estimate.coordinate_names) if name in names]
-    known = values_of(page.estimate, "moments")[:, root][(source[:, root] == MEASURED).all(axis=1)]
-    if not known.size or not np.isfinite(known).any():
-        return []
-    most = float(np.nanmax(np.abs(known)))
-    left = "no residual" if most <= ROUNDING else f"a residual of at most {number(most, 'N or N m', digits=2)}"
-    return [f"At the root {left} is left in the {len(known)} frames in which every contact is measured."]
-
-
-def _band(values: np.ndarray, sd: np.ndarray | None) -> tuple[np.ndarray | None, str]:
-    """The deviation to draw; where its band would press the line flat none, and its size in words."""
-    if sd is None or not band_is_too_wide(values, sd):
+def _band(values: np.ndarray, sd: np.ndarray | None, source: np.ndarray | None = None) -> tuple[np.ndarray | None, str]:
+    """The deviation to draw; where the band of what is measured would press the line flat none, and its size in words.
+    Of derived values and priors it may: it says how little they say."""
+    measured = sd if sd is None or source is None else np.where(source == MEASURED, sd, np.nan)
+    if sd is None or measured is None or not band_is_too_wide(values, measured):
         return sd, ""
-    return None, f" (2 sd {number(2.0 * float(np.nanmedian(sd)), digits=2)})"
+    return None, f" (2 sd {number(2.0 * float(np.nanmedian(measured)), digits=2)})"
 
 
 def _two_digits(value: float) -> str:

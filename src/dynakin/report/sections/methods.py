@@ -10,11 +10,11 @@ import numpy as np
 from dynakin.report.chart import Line, Panel, chart
 from dynakin.report.labels import COMPONENT_LABELS, moment_note
 from dynakin.report.sections.section import Page, Section
-from dynakin.report.styles import DERIVED_LINE, LineStyle, method_styles
+from dynakin.report.styles import LineStyle, method_styles, source_key
 from dynakin.report.text_tables import table2_text
 from dynakin.results.estimate import COMPONENTS
 from dynakin.results.measures.mean_curves import MEASURED
-from dynakin.results.measures.sources import DERIVED, moment_sources
+from dynakin.results.measures.sources import moment_sources, wrench_sources
 from dynakin.results.naming import number, sentence, words
 from dynakin.validation.differences import AngleDifference, MomentDifference, angle_differences, moment_differences
 from dynakin.validation.methods import AT, CLASSICAL, Trial
@@ -54,7 +54,7 @@ def wrench_part(trial: Trial, key: str) -> Section:
     """Figure 6: each modelled component as measured, by the filters and by AT."""
     methods = [*trial.of_kind(AT), *trial.of_kind("EKF")]
     rms = {(row.quantity, row.method): row.rms for row in table2([trial])}
-    derived = np.isnan(trial.measured_wrench) & np.isfinite(trial.measured_wrench).any(axis=0)
+    source = wrench_sources(next(iter(trial.estimates.values())).data)
     panels = []
     for k, component in enumerate(COMPONENTS):
         if not trial.of_kind(AT) or not np.isfinite(trial.measured_wrench[:, k]).any():
@@ -62,11 +62,11 @@ def wrench_part(trial: Trial, key: str) -> Section:
         title, unit = COMPONENT_LABELS[component]
         lines = {MEASURED: trial.measured_wrench[:, k], **{method.name: method.wrench[:, k] for method in methods}}
         note = _each({method.name: rms[component, method.name] for method in reversed(methods)}, unit)
-        panels.append(_overlaid(trial, title, unit, lines, f"RMS: {note}", derived[:, k]))
+        panels.append(_overlaid(trial, title, unit, lines, f"RMS: {note}", source[:, k]))
     names = [MEASURED, *(method.name for method in methods)]
-    return Section(
-        f"{key}-wrench", "Ground reaction by method", "", panels, lines=_key(trial, names, bool(derived.any()))
-    )
+    measured = np.isfinite(trial.measured_wrench).any(axis=0)
+    key_lines = (*_key(trial, names), *source_key(source[:, measured]))
+    return Section(f"{key}-wrench", "Ground reaction by method", "", panels, lines=key_lines)
 
 
 def angle_part(trial: Trial, key: str) -> Section:
@@ -98,7 +98,7 @@ def moment_part(trial: Trial, key: str) -> Section:
     methods = [*trial.of_kind("EKF"), *trial.of_kind(AT)]
     panels: dict[str, Panel] = {}
     estimate = next(iter(trial.estimates.values()))
-    derived = moment_sources(estimate.data) == DERIVED  # by the plates alone, so alike for all filters
+    source = moment_sources(estimate.data)  # by the plates alone, so alike for all filters
     for name, rows in _by_coordinate(moment_differences([trial])).items():
         k = trial.coordinate_names.index(name)
         unit = rows[0].unit
@@ -108,7 +108,7 @@ def moment_part(trial: Trial, key: str) -> Section:
             note += f", {number(rows[0].nrms_rms_percent.mean, digits=2)} % of AT’s RMS"
         if about := moment_note(estimate, name):
             note = f"{about}; {note}"
-        panels[name] = _overlaid(trial, f"{sentence(words(name))} moment", unit, lines, note, derived[:, k])
+        panels[name] = _overlaid(trial, f"{sentence(words(name))} moment", unit, lines, note, source[:, k])
     knees = [panel for name, panel in panels.items() if "knee" in name]
     others = [panel for name, panel in panels.items() if "knee" not in name]
     return Section(
@@ -118,7 +118,7 @@ def moment_part(trial: Trial, key: str) -> Section:
         knees or others,
         folded=others if knees else [],
         folded_title="The other joints’ moments against AT",
-        lines=_key(trial, [method.name for method in methods], bool(derived.any())),
+        lines=(*_key(trial, [method.name for method in methods]), *source_key(source)),
     )
 
 
@@ -127,14 +127,13 @@ PARTS = (wrench_part, angle_part, moment_part)
 
 
 def _overlaid(
-    trial: Trial, title: str, unit: str, lines: dict[str, np.ndarray], note: str, derived: np.ndarray | None = None
+    trial: Trial, title: str, unit: str, lines: dict[str, np.ndarray], note: str, source: np.ndarray | None = None
 ) -> Panel:
-    """Signals (T,) by method, the first at the bottom; a filter's is dashed where it is ``derived`` (T,) bool, because
-    a contact is not measured."""
+    """Signals (T,) by method, the first at the bottom; a filter's shows where it comes from (T,)."""
     styles, drawn = _styles(trial), []
     for name, values in lines.items():
-        own = derived if styles[name].dash == "solid" and name != MEASURED else None
-        drawn.append(Line(values, styles[name].colour, styles[name].width, dashed=own, dashes=styles[name].dashes))
+        own = source if styles[name].dash == "solid" and name != MEASURED else None
+        drawn.append(Line(values, styles[name].colour, styles[name].width, source=own, dashes=styles[name].dashes))
     return chart(title, unit, trial.time, drawn, note=note)
 
 
@@ -142,9 +141,9 @@ def _styles(trial: Trial) -> dict[str, LineStyle]:
     return method_styles([MEASURED, *(method.name for method in trial.methods)])
 
 
-def _key(trial: Trial, names: Sequence[str], derived: bool = False) -> tuple[LineStyle, ...]:
+def _key(trial: Trial, names: Sequence[str]) -> tuple[LineStyle, ...]:
     styles = _styles(trial)
-    return (*(styles[name] for name in names), *((DERIVED_LINE,) if derived else ()))
+    return tuple(styles[name] for name in names)
 
 
 def _each(figures: dict[str, Spread], unit: str) -> str:

@@ -10,10 +10,10 @@ import numpy as np
 from dynakin.report.chart import Line, Panel, chart
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.sides import Joint, joints_of, normalising_mass, side_key, side_lines, values_of
-from dynakin.report.styles import DERIVED_LINE
+from dynakin.report.styles import source_key
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import Estimate
-from dynakin.results.measures.sources import DERIVED, measured_moments, moment_sources
+from dynakin.results.measures.sources import measured_moments, moment_sources
 from dynakin.results.naming import listed, number
 
 _NOT_MEANT = 0.02
@@ -35,12 +35,12 @@ def power_section(page: Page) -> Section | None:
     if not joints:
         return None
     unit = "W/kg" if mass else "W"
-    derived = moment_sources(estimate.data) == DERIVED
+    source = moment_sources(estimate.data)
     legs: list[Panel] = []
     others: list[Panel] = []
     colours = {side: line.colour for side, line in side_lines(estimate).items()}
     for joint in joints:
-        lines = [Line(powers[:, k], colours[side], dashed=derived[:, k]) for side, k in joint.columns.items()]
+        lines = [Line(powers[:, k], colours[side], source=source[:, k]) for side, k in joint.columns.items()]
         note = "; ".join(
             f"{f'{side} ' if side else ''}peak {number(own['peak_w'] / (mass or 1.0), unit, digits=2)}"
             for side, k in joint.columns.items()
@@ -59,7 +59,7 @@ def power_section(page: Page) -> Section | None:
         legs or others,
         folded=others if legs else [],
         folded_title="Powers of trunk and arms",
-        lines=(*side_key(estimate), *((DERIVED_LINE,) if derived.any() else ())),
+        lines=(*side_key(estimate), *source_key(source)),
         tables=[table for table in (_work_table(estimate, joints, work, f"Work, {seconds}"),) if table.rows],
     )
 

@@ -117,6 +117,9 @@ var dynakinPlayer = (function () {
       stroke(project(cx - half, y, k * step), project(cx + half, y, k * step), FLOOR, 1);
     }
   }
+  // By where a number comes from: measured, derived, prior, absent.
+  var SOURCES = [{ dash: [], mark: "" }, { dash: [7, 5], mark: "≈ " }, { dash: [2, 3], mark: "≈? " }, { dash: [], mark: "" }];
+  function source(array, frame, column) { return SOURCES[Math.round(array(frame, column))]; }
   function arrow(project, frame, entry) {
     var p = arrays[entry.points], f = arrays[entry.forces], k = 3 * entry.k;
     var x = p(frame, k), y = p(frame, k + 1), z = p(frame, k + 2);
@@ -124,7 +127,7 @@ var dynakinPlayer = (function () {
     var g = data.view.mm_per_newton, a = project(x, y, z);
     var b = project(x + g * f(frame, k), y + g * f(frame, k + 1), z + g * f(frame, k + 2));
     var dx = b[0] - a[0], dy = b[1] - a[1], long = Math.hypot(dx, dy), head = Math.min(4 * entry.width + 4, long);
-    pen.setLineDash(entry.derived && arrays.derived(frame, entry.k) > 0.5 ? [7, 5] : []);
+    pen.setLineDash(entry.sourced ? source(arrays.sources, frame, entry.k).dash : []);
     pen.lineCap = "butt";
     stroke(a, b, entry.colour, entry.width);
     pen.setLineDash([]);
@@ -173,8 +176,8 @@ var dynakinPlayer = (function () {
     }
     cells.forEach(function (cell) {
       var name = cell.getAttribute("data-array"), column = Number(cell.getAttribute("data-column"));
-      var derived = name === "moments" && arrays.moments_derived(frame, column) > 0.5;
-      cell.textContent = (derived ? "≈ " : "") + text(arrays[name](frame, column), Number(cell.getAttribute("data-digits")), "");
+      var mark = name === "moments" ? source(arrays.moment_sources, frame, column).mark : "";
+      cell.textContent = mark + text(arrays[name](frame, column), Number(cell.getAttribute("data-digits")), "");
     });
   }
   function fit() {

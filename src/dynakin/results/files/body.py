@@ -8,15 +8,12 @@ import numpy as np
 
 from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.results.estimate import AXES, COMPONENTS, Estimate
-from dynakin.results.files.motion import write_sources
+from dynakin.results.files.motion import force_stem, write_sources
 from dynakin.results.files.storage import write_storage
 from dynakin.results.measures.angles import angle_columns
 from dynakin.results.measures.feet import foot_sources
 from dynakin.results.measures.pressure import foot_pressure
 from dynakin.results.measures.sources import joint_sources
-
-_SIDES = {"right": "r", "left": "l"}
-"""OpenSim's names of the sides in the columns of ground forces; another foot keeps its own name."""
 
 
 def write_body_files(estimate: Estimate, folder: Path) -> None:
@@ -39,7 +36,7 @@ def write_powers(estimate: Estimate, path: Path) -> None:
     """``powers.sto``: W, a column a coordinate, ``knee_angle_r_power``."""
     notes = [
         "Moment times speed in W, positive where energy is added to the body.",
-        "moments_source.sto says of each moment whether it is measured, derived or absent (nan).",
+        "moments_source.sto says of each moment whether it is measured, derived, a prior or absent (nan).",
     ]
     _write(
         path,
@@ -85,7 +82,10 @@ def write_centre_of_pressure(estimate: Estimate, path: Path) -> None:
         f"nan below {LOADED_N:g} N of vertical force. Frame: {estimate.ground.in_words}."
     ]
     if estimate.foot_names:
-        notes.append("feet_source.sto says of each foot whether its force is measured, derived or absent (nan).")
+        notes.append("The total is derived from the motion where wrench.sto has no measured one.")
+        notes.append(
+            "feet_source.sto says of each foot whether its force is measured, derived, a prior or absent (nan)."
+        )
     _write(path, "Centres of pressure", estimate, names, table, notes)
 
 
@@ -112,7 +112,7 @@ def write_joint_reactions(estimate: Estimate, path: Path) -> None:
         "Intersegmental loads: force in N and moment in N m about the joint's centre (px py pz, m), ground axes, of "
         "the parent on the named segment; muscles, ligaments and bones together.",
         f"Frame: {estimate.ground.in_words}.",
-        "joint_reactions_source.sto says of each joint whether its load is measured, derived or absent (nan).",
+        "joint_reactions_source.sto says of each joint whether its load is measured, derived, a prior or absent (nan).",
     ]
     _write(path, "Joint reactions", estimate, names, np.column_stack(columns), notes)
 
@@ -127,7 +127,7 @@ def write_joint_sources(estimate: Estimate, path: Path) -> None:
 
 def write_foot_sources(estimate: Estimate, path: Path) -> None:
     """``feet_source.sto``: a column a foot, ``ground_force_r``, with the code of where its wrench comes from."""
-    names = [f"ground_force_{_SIDES.get(foot, foot)}" for foot in estimate.foot_names]
+    names = [force_stem(foot) for foot in estimate.foot_names]
     write_sources(path, "Sources of the feet's ground reaction", estimate, names, foot_sources(estimate.data))
 
 
@@ -146,15 +146,15 @@ def write_feet(estimate: Estimate, path: Path) -> None:
         loaded = np.asarray(np.isfinite(point).all(axis=1))
         torque = wrench[:, 3:].copy()
         torque[loaded] = np.column_stack([0.0 * free[loaded], free[loaded], 0.0 * free[loaded]])
-        side = _SIDES.get(foot, foot)
-        names += [f"ground_force_{side}_v{a}" for a in AXES] + [f"ground_force_{side}_p{a}" for a in AXES]
-        names += [f"ground_torque_{side}_{a}" for a in AXES]
+        stem = force_stem(foot)
+        names += [f"{stem}_v{a}" for a in AXES] + [f"{stem}_p{a}" for a in AXES]
+        names += [f"{stem.replace('force', 'torque', 1)}_{a}" for a in AXES]
         unknown = np.isnan(wrench).any(axis=1)
         columns += [wrench[:, :3], np.where(loaded[:, None], point, np.where(unknown, np.nan, 0.0)[:, None]), torque]
     notes = [
         "Forces in N at points in m, torques in N m, of the ground on the feet; adjusted.",
         f"Frame: {estimate.ground.in_words}.",
-        "feet_source.sto says of each foot whether its force is measured, derived or absent (nan).",
+        "feet_source.sto says of each foot whether its force is measured, derived, a prior or absent (nan).",
     ]
     _write(path, "Ground reaction of the feet", estimate, names, np.hstack(columns), notes)
 

@@ -6,9 +6,18 @@ from pathlib import Path
 
 import numpy as np
 
-from dynakin.results.estimate import COMPONENTS, Estimate
+from dynakin.results.estimate import AXES, COMPONENTS, Estimate
 from dynakin.results.files.storage import write_storage
+from dynakin.results.measures.feet import foot_sources
 from dynakin.results.measures.sources import ABSENT, NOTES, moment_sources
+
+_SIDES = {"right": "r", "left": "l"}
+"""OpenSim's names of the sides in the columns of ground forces; another foot keeps its own name."""
+
+
+def force_stem(foot: str) -> str:
+    """What OpenSim calls the ground's force on a foot: ``ground_force_r``."""
+    return f"ground_force_{_SIDES.get(foot, foot)}"
 
 
 def moment_columns(estimate: Estimate) -> list[str]:
@@ -72,7 +81,7 @@ def write_moments(estimate: Estimate, path: Path) -> None:
         in_degrees=False,
         notes=[
             "Moments in N m, forces in N. In a model that lumps both sides, leg moments are the sum of both legs.",
-            "moments_source.sto says of each whether it is measured, derived or absent (nan).",
+            "moments_source.sto says of each whether it is measured, derived, a prior or absent (nan).",
         ],
     )
 
@@ -83,7 +92,7 @@ def write_moment_sources(estimate: Estimate, path: Path) -> None:
 
 
 def write_sources(path: Path, title: str, estimate: Estimate, names: list[str], codes: np.ndarray) -> None:
-    """A table of codes (T, N), 0 measured, 1 derived, 2 absent, which the header explains."""
+    """A table of codes (T, N) of `results.measures.sources`, which the header explains."""
     write_storage(path, title, estimate.time, names, codes.astype(float), in_degrees=False, notes=NOTES)
 
 
@@ -91,7 +100,8 @@ def write_deviations(estimate: Estimate, path: Path) -> None:
     """``uncertainty.sto``: one standard deviation of all that the other motion files hold.
 
     Columns ``NAME``, ``NAME_speed``, ``NAME_acceleration`` in degrees or metres (a second, a second squared), moments
-    as in ``moments.sto``, ``fx`` ... ``mz`` in N and N m; what an estimate does not hold has no column.
+    as in ``moments.sto``, ``fx`` ... ``mz`` in N and N m, the feet's forces (``ground_force_r_vx`` ...) in N; what an
+    estimate does not hold has no column.
     """
     names: list[str] = []
     columns: list[np.ndarray] = []
@@ -108,6 +118,11 @@ def write_deviations(estimate: Estimate, path: Path) -> None:
         known = np.isfinite(values).any(axis=0)
         names += [name for name, seen in zip(COMPONENTS, known, strict=True) if seen]
         columns.append(values[:, known])
+    if "foot_wrench_sd" in estimate.data:
+        forces = estimate.data["foot_wrench_sd"].transpose("time", "foot", "component").values[:, :, :3]
+        forces = np.where((foot_sources(estimate.data) == ABSENT)[:, :, None], np.nan, forces)
+        names += [f"{force_stem(foot)}_v{axis}" for foot in estimate.foot_names for axis in AXES]
+        columns.append(forces.reshape(len(forces), -1))
     write_storage(
         path,
         "Standard deviations",
@@ -117,7 +132,8 @@ def write_deviations(estimate: Estimate, path: Path) -> None:
         in_degrees=True,
         notes=[
             "One standard deviation, as the filter believes. Degrees, metres, seconds, N, N m.",
-            "Of moments that are derived or absent (moments_source.sto) too, nan where absent.",
+            "Of moments and feet's forces that are derived or a prior too (moments_source.sto, feet_source.sto); nan "
+            "where absent.",
         ],
     )
 

@@ -31,15 +31,17 @@ _UNITS = {
     "n_rows": "1",
     "log_likelihood": "1",
 }
+_SAID = "derived: from the motion; prior: how several contacts divide the load is assumed"
 _FLAGS = {
-    "moment_source": (MEANINGS, "where each moment comes from; derived: from the motion"),
-    "joint_source": (MEANINGS, "where each joint's load comes from; derived: from the motion"),
-    "foot_contact": (("none", "plate", "unmeasured"), "contact of each foot"),
+    "moment_source": (MEANINGS, f"where each moment comes from; {_SAID}"),
+    "joint_source": (MEANINGS, f"where each joint's load comes from; {_SAID}"),
+    "foot_source": (MEANINGS, f"where each foot's wrench comes from; {_SAID}"),
+    "foot_contact": (("none", "plate", "unmeasured", "shared_plate"), "contact of each foot"),
     "verdict": (("missing", "accepted", "refused"), "what became of each sensor"),
 }
-"""Codes by CF's conventions for flags: what 0, 1 and 2 mean, and of what."""
+"""Codes by CF's conventions for flags: what 0, 1, ... mean, and of what."""
 _FLAGGED = {"moments": "moment_source", "moments_sd": "moment_source", "joint_loads": "joint_source"} | dict.fromkeys(
-    ("foot_wrench", "foot_wrench_sd"), "foot_contact"
+    ("foot_wrench", "foot_wrench_sd"), "foot_source"
 )
 _PARAMETER_NUMBERS = ("value", "sd", "initial", "table", "lower", "upper")
 

@@ -21,11 +21,9 @@ FLIGHT = 0.05
 
 
 def foot_sources(data: xr.Dataset) -> sources.Codes:
-    """(T, F) codes of `results.measures.sources` of the feet's wrenches: in the air they are known to be zero."""
-    contact = data["foot_contact"].transpose("time", "foot").values
+    """(T, F) codes of `results.measures.sources` of the feet's wrenches; in the air they are known to be zero."""
     known = np.isfinite(data["foot_wrench"].transpose("time", "foot", "component").values).all(axis=2)
-    codes = np.where(contact == UNMEASURED, sources.DERIVED, sources.MEASURED)
-    return np.where(known, codes, sources.ABSENT).astype(np.uint8)
+    return np.where(known, data["foot_source"].transpose("time", "foot").values, sources.ABSENT).astype(np.uint8)
 
 
 def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str, Any] | None:
@@ -33,10 +31,11 @@ def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str,
 
     Returns:
         ``adjustment_rms``: by foot and component, N and N m about the joint by which the foot hangs, over the frames
-        in which all contacts are measured, this one too; ``remainder_rms``, about the ground's origin, over the
-        ``flight_frames``, in which nothing touches the ground; ``derived_frames`` and ``unknown_frames``: those in
-        which a foot's wrench is derived, or not known; ``left_at_root``: the largest force (N) and moment about the
-        root (N m) that no contact gives, ``grounded`` where all contacts are measured and in ``flight``; ``verdict``.
+        in which all contacts are measured and this one alone is; ``remainder_rms``, about the ground's origin, over the
+        ``flight_frames``, in which nothing touches the ground; ``derived_frames``, ``prior_frames`` and
+        ``unknown_frames``: those in which a foot's wrench is derived, a prior, or not known; ``left_at_root``: the
+        largest force (N) and moment about the root (N m) that no contact gives, ``grounded`` where all contacts are
+        measured (each, or the sum of two) and in ``flight``; ``verdict``.
     """
     if not estimate.foot_names or "foot_wrench" not in estimate.data:
         return None
@@ -49,8 +48,8 @@ def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str,
     codes = foot_sources(estimate.data)[window]
     told = np.isfinite(remainder).all(axis=1)
     flight = (contact == NO_CONTACT).all(axis=1) & told
-    grounded = (contact != UNMEASURED).all(axis=1) & (contact == ON_PLATE).any(axis=1) & told
-    grounded &= _root_measured(estimate)[window]
+    grounded = (contact != UNMEASURED).all(axis=1) & (contact != NO_CONTACT).any(axis=1) & told
+    grounded &= _nothing_else_bears(estimate)[window]
     known = (contact == ON_PLATE) & grounded[:, None] & np.isfinite(adjusted).all(axis=2)  # not where it is lost
     rms = {
         name: dict(zip(COMPONENTS, _rms(adjusted[known[:, k], k]), strict=True)) if known[:, k].any() else None
@@ -65,6 +64,7 @@ def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str,
         "remainder_rms": dict(zip(COMPONENTS, _rms(remainder[flight]), strict=True)) if flight.any() else None,
         "flight_frames": int(flight.sum()),
         "derived_frames": int((codes == sources.DERIVED).any(axis=1).sum()),
+        "prior_frames": int((codes == sources.PRIOR).any(axis=1).sum()),
         "unknown_frames": int((codes == sources.ABSENT).any(axis=1).sum()),
         "left_at_root": left,
     }
@@ -85,14 +85,14 @@ def _root(estimate: Estimate) -> np.ndarray:
     return np.asarray(estimate.data["joint_centres"].transpose("time", "joint", "axis").values[:, root])
 
 
-def _root_measured(estimate: Estimate) -> npt.NDArray[np.bool_]:
-    """(T,) frames in which every contact is: feet may stand on plates while a seat bears the rest."""
+def _nothing_else_bears(estimate: Estimate) -> npt.NDArray[np.bool_]:
+    """(T,) frames in which no undeclared contact is noticed: feet may stand on plates while a seat bears the rest."""
     data = estimate.data
     if "coordinate_segment" not in data.coords:
         return np.ones(len(estimate.time), dtype=bool)
     roots = data["joint_segment"].values[data["joint_parent"].values < 0]
     own = np.isin(data["coordinate_segment"].values, roots)
-    return np.asarray((sources.moment_sources(data)[:, own] == sources.MEASURED).all(axis=1))
+    return np.asarray((sources.moment_sources(data)[:, own] != sources.ABSENT).all(axis=1))
 
 
 def _rms(values: np.ndarray) -> list[float]:
@@ -122,10 +122,8 @@ def _words(figures: dict[str, Any], grounded: int, frames: int, weight_n: float)
                 for name, own in figures["adjustment_rms"].items()
                 if own is not None
             ]
-            text.append(
-                f"No residual is left at the root {where}: the plates' wrenches were changed instead, RMS of the "
-                f"component that was changed most: {', '.join(changed)}."
-            )
+            most = f", RMS of the component that was changed most: {', '.join(changed)}" if changed else ""
+            text.append(f"No residual is left at the root {where}: the plates' wrenches were changed instead{most}.")
         else:
             text.append(
                 f"{_up_to(left['grounded'])} of residual are left at the root {where}: no contact accounts for them."
@@ -139,6 +137,11 @@ def _words(figures: dict[str, Any], grounded: int, frames: int, weight_n: float)
         )
     if count := figures["derived_frames"]:
         text.append(f"In {count} of {frames} frames one contact was not measured: what depends on it is derived.")
+    if count := figures["prior_frames"]:
+        text.append(
+            f"In {count} of {frames} frames several contacts were not measured each on its own: how they divide the "
+            "load is assumed, and what depends on that is a prior."
+        )
     if count := figures["unknown_frames"]:
         text.append(f"In {count} of {frames} frames the force on a foot is not known: what depends on it is absent.")
     return " ".join(text)

@@ -1,8 +1,9 @@
-"""Where a moment or a force comes from: measured, derived from the motion, or absent; and what that says in words.
+"""Where a moment or a force comes from: measured, derived, a prior, or absent; and what that says in words.
 
-A moment depends on the ground's reaction at every contact that lies behind its joint. Where one of these is not
-measured, but all others are, it follows from the motion and is *derived*; where that cannot be said either, it is
-*absent* (NaN).
+A moment depends on the external force at every contact that lies behind its joint. Where one contact is not measured,
+but all others are, its force follows from the motion and is *derived*. Where several are not measured, or two share a
+plate, only their sum is known: how they divide it is assumed, and what depends on that is a *prior*, with the deviation
+of the assumption. What a contact that nobody declared can reach is *absent* (NaN).
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from dynakin.recordings.feet.contact import SHARED_PLATE, UNMEASURED
 from dynakin.results.estimate import Estimate
 from dynakin.results.naming import listed, sentence, words
 
@@ -20,12 +22,12 @@ Array = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.uint8]
 
 MEASURED, DERIVED, PRIOR, ABSENT = range(4)
-"""Codes of ``moment_source`` and ``joint_source``."""
+"""Codes of ``moment_source``, ``joint_source`` and ``foot_source``, the worse the larger."""
 MEANINGS = ("measured", "derived", "prior", "absent")
 NOTES = (
     "0 measured: the ground's reaction behind it is measured, or there is none (a foot in the air, an arm).",
     "1 derived: from the motion, because one contact behind it is not measured.",
-    "2 prior: several contacts behind it are not measured each on its own; how they divide the load is assumed.",
+    "2 prior: several contacts are not measured each on its own; how they divide the load is assumed.",
     "3 absent: not known, the value is nan.",
 )
 """What the codes say, for the headers of files."""
@@ -50,8 +52,22 @@ def joint_sources(data: xr.Dataset) -> Codes:
     return _sources(data, "joint_source", "joint_loads", "joint")
 
 
+def contact_sources(contact: Codes, undeclared: npt.NDArray[np.bool_] | None = None) -> Codes:
+    """Codes (T, C) of contacts' forces, by their status (T, C) (`recordings.feet.contact`).
+
+    Args:
+        undeclared: (T,) frames in which something bears the person that no plate measures: one more contact whose share
+            nobody measures.
+    """
+    unmeasured = contact == UNMEASURED
+    unknown = unmeasured.sum(axis=1) + (0 if undeclared is None else undeclared)
+    codes = np.where(unmeasured, np.where(unknown > 1, PRIOR, DERIVED)[:, None], MEASURED)
+    return np.where(contact == SHARED_PLATE, PRIOR, codes).astype(np.uint8)
+
+
 def wrench_sources(data: xr.Dataset) -> Codes:
-    """(T, 6) of the estimated total wrench: derived from the motion alone where the plates do not measure it."""
+    """(T, 6) of the estimated total wrench: derived from the motion alone where the plates do not measure it. How
+    contacts divide it does not matter, so no prior is in it."""
     estimated = data["wrench_estimated"].transpose("time", "component").values
     codes = np.zeros(estimated.shape, dtype=np.uint8)
     if "wrench_measured" in data:
@@ -123,9 +139,8 @@ def _side(segment: str) -> str:
 
 
 def moment_figures(estimate: Estimate, lost: str = "") -> dict[str, Any]:
-    """The block ``moments`` of ``metrics.json``: in how many frames of the recording the moments are measured, derived
-    and absent, by coordinate and by leg (where one of its moments is not measured, the leg is not), why, and in words
-    by leg and joint.
+    """The block ``moments`` of ``metrics.json``: in how many frames of the recording the moments are measured, derived,
+    a prior and absent, by coordinate and by leg (as the worst of its moments), why, and in words by leg and joint.
 
     Args:
         lost: the sentence on frames in which the person was lost.
@@ -139,14 +154,16 @@ def moment_figures(estimate: Estimate, lost: str = "") -> dict[str, Any]:
         found = [str(text).removeprefix("Warning: ") for text in estimate.config.get("ground", {}).get("reasons", [])]
         reasons = [sentence(text) for text in [*found, *([lost] if lost else [])]]
     names = estimate.coordinate_names
+    moving = {str(name) for name in data["element"].values}
+    spoken = {leg: [k for k in own if names[k] in moving] or own for leg, own in groups.items()}  # not of locked joints
     return {
         "what": "frames of the whole recording; derived: from the motion, because one contact behind the joint is not "
-        "measured; absent: not known",
+        "measured; prior: how several contacts divide the load is assumed; absent: not known",
         "frames": len(sources),
         "legs": legs,
         "coordinates": {name: _count(sources[:, k]) for k, name in enumerate(names)},
         "reasons": list(dict.fromkeys(reasons)),
-        "verdict": _words({leg: _by_joint(sources, names, own) for leg, own in groups.items()}, len(sources)),
+        "verdict": _words({leg: _by_joint(sources, names, own) for leg, own in spoken.items()}, len(sources)),
     }
 
 
@@ -162,7 +179,7 @@ def _count(codes: Codes) -> dict[str, int]:
 
 
 def _by_joint(sources: Codes, names: list[str], columns: list[int]) -> dict[str, dict[str, int]]:
-    """Counts by joint of a leg: of one with several coordinates, where one is not measured the joint is not."""
+    """Counts by joint of a leg: of one with several coordinates, the worst of them counts."""
     joints: dict[str, list[int]] = {}
     for k in columns:
         stem = names[k].removesuffix("_r").removesuffix("_l")
@@ -174,23 +191,28 @@ def _by_joint(sources: Codes, names: list[str], columns: list[int]) -> dict[str,
 def _words(legs: dict[str, dict[str, dict[str, int]]], frames: int) -> str:
     """By leg, and by joint where these differ, those that are measured longest first."""
     what = "Moments" if "" in legs else "Leg moments"
-    for meaning, how in (("measured", "measured"), ("derived", "derived from the motion"), ("absent", "absent")):
+    for meaning in MEANINGS:
         if all(count[meaning] == frames for joints in legs.values() for count in joints.values()):
-            return f"{what}: {how} in all {frames} frames."
+            return f"{what}: {_how(meaning)} in all {frames} frames."
     each, of = [], f" of {frames} frames"
     for leg, joints in legs.items():
         alike: dict[tuple[int, ...], list[str]] = {}
         for joint, count in joints.items():
             alike.setdefault(tuple(count[meaning] for meaning in MEANINGS), []).append(joint)
         parts = []
-        for (measured, derived, absent), names in sorted(alike.items(), reverse=True):
-            said = [f"measured in {measured}{of}"] if measured or not (derived or absent) else []
-            said += [f"derived from the motion in {derived}{'' if said else of}"] if derived else []
-            said += [f"absent in {absent}{'' if said else of}"] if absent else []
-            of = ""
+        for counts, names in sorted(alike.items(), reverse=True):
+            said = []
+            for meaning, number in zip(MEANINGS, counts, strict=True):
+                if number or (meaning == "measured" and not any(counts)):
+                    said.append(f"{_how(meaning)} in {number}{of}")
+                    of = ""
             parts.append((f"{listed(names)} " if len(alike) > 1 else "") + listed(said))
         each.append(f"{leg}{':' if leg and len(alike) > 1 else ''} {', '.join(parts)}".strip())
     return f"{what}: {'; '.join(each)}."
+
+
+def _how(meaning: str) -> str:
+    return {"derived": "derived from the motion", "prior": "estimated with a prior"}.get(meaning, meaning)
 
 
 def _sources(data: xr.Dataset, name: str, of: str, across: str) -> Codes:

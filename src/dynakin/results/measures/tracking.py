@@ -41,7 +41,7 @@ _NO_ESTIMATE = ("doubtful", "lost", "restarted")
 _KEPT = ("_measured", "_covariance")
 _RECORD = {"state", "state_sd", "foot_contact", "verdict", "tracking", "constrained", "lost"}
 _RECORD |= {"constraints_met", "step_us"}
-_SOURCES = {"moment_source", "joint_source"}
+_SOURCES = {"moment_source", "joint_source", "foot_source"}
 
 
 def tracking_of(estimate: Estimate) -> Tracking:
