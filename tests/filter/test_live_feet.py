@@ -9,8 +9,8 @@ import pytest
 
 from dynakin import Estimator, Subject, load_model
 from dynakin.errors import ModelError
+from dynakin.filter.expected import expected_loads, root_path
 from dynakin.filter.samples import Sample, recording_arrays
-from dynakin.filter.total_wrench import foot_wrenches
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.recording import Recording
 from dynakin.simulation.trial import simulate
@@ -21,11 +21,13 @@ def test_step_by_step_moments_bands_and_the_delayed_are_those_of_the_run() -> No
     model = load_model("fullbody", Subject(mass_kg=70.0, height_m=1.75, sex="male"))
     live = Estimator(model, lag=4).start(recording)
     initial = live.calibrated
-    feet = foot_wrenches(foot_loads(recording, initial.ground, initial.foot_markers), initial, live.noise)
-    for k, sample in enumerate(_samples(recording)):
-        part = replace(feet, **{name: getattr(feet, name)[k : k + 1] for name in ("wrench", "covariance", "contact")})
-        now = live.step(sample, part)
     markers, wrench = recording_arrays(recording, initial)
+    loads = foot_loads(recording, initial.ground, initial.foot_markers)
+    feet = expected_loads(loads, initial, live.noise, root_path(initial, markers), np.zeros(len(markers), bool))
+    arrays_of = [name for name, values in vars(feet).items() if isinstance(values, np.ndarray)]
+    for k, sample in enumerate(_samples(recording)):
+        part = replace(feet, **{name: getattr(feet, name)[k : k + 1] for name in arrays_of})
+        now = live.step(sample, part)
     arrays = Estimator(model).start(initial).run_arrays(recording.time, markers, wrench, feet=feet)
     np.testing.assert_allclose(now.moments, arrays["moments"][-1], atol=1e-6)
     np.testing.assert_allclose(live.deviations()["moments"], arrays["moments_sd"][-1], rtol=1e-6, atol=1e-9)

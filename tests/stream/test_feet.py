@@ -6,13 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from dynakin.filter.foot_wrenches import FootWrenches
 
 import dynakin
 from dynakin.bindings import _core
+from dynakin.filter.contacts import ContactLoads
 from dynakin.recordings.feet.assignment import foot_loads
-from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
+from dynakin.recordings.feet.contact import ON_PLATE, SHARED_PLATE, UNMEASURED
 from dynakin.recordings.feet.soles import FootShape
+from dynakin.recordings.recording import Plate
 from dynakin.settings import presets
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.trial import simulate
@@ -39,6 +40,11 @@ def session(source: Replay, lag: int = 0, standing_s: float = 2.0) -> tuple[Live
     )
     live.run()
     return live, frames, said
+
+
+def wrench_of(plate: Plate) -> np.ndarray:
+    """(T, 6), laboratory frame."""
+    return np.hstack([plate.force, plate.moment])
 
 
 @pytest.fixture(scope="module")
@@ -79,12 +85,13 @@ def test_live_equals_offline_in_space(trial: SimulatedTrial, squat: tuple[Live, 
     part = slice(begin, begin + len(frames))
     recording = trial.recording
     assert frames[-1].estimate.time_s == pytest.approx(3.5)  # no frame is lost
+    loads = [wrench_of(p)[part] for p in recording.plates]
     states = offline_states(
         live,
         recording.time[part],
         recording.marker_names,
         recording.markers[part],
-        recording.total_wrench()[part],
+        np.stack(loads, axis=1),
     )
     np.testing.assert_allclose(np.stack([f.state for f in frames]), states, atol=1e-8)
 
@@ -101,9 +108,14 @@ def test_smoothed_moments_and_bands_are_those_with_the_feet(squat: tuple[Live, l
     assert np.sqrt(np.mean((now - smoothed)[50:] ** 2)) < 5.0
     told = [f.deviations["moments"][knees] for f in frames if f.deviations is not None]
     assert told and np.all(np.array(told) > 0.0)
-    plain = _core.moment_jacobian(live.tracker.core_model, live.tracker.state)
-    without = np.sqrt(np.einsum("ij,jk,ik->i", plain, live.tracker.covariance, plain))
-    assert (np.abs(live.tracker.deviations()["moments"] - without)[knees] > 0.02 * without[knees]).all()
+    model, x, P = live.tracker.core_model, live.tracker.state, live.tracker.covariance
+    _, loads = live.tracker._stepped[-1]
+    assert loads is not None
+    with_feet = _core.contact_moments(model, x, loads, 0, np.asfortranarray(P))["moments_sd"]
+    np.testing.assert_allclose(live.tracker.deviations()["moments"], with_feet, rtol=1e-9)
+    plain = _core.moment_jacobian(model, x)
+    without = np.sqrt(np.einsum("ij,jk,ik->i", plain, P, plain))
+    assert (np.abs(with_feet - without)[knees] > 0.01 * without[knees]).all()
 
 
 @pytest.mark.parametrize("seed", [1, pytest.param(2, marks=pytest.mark.nightly)])
@@ -143,7 +155,7 @@ class Standing:
             x, z = FootShape.of(own, forward).middle(own)[0]
             self.middles.append(np.array([x, 0.0, z]))
 
-    def look(self, push: float, point: np.ndarray) -> tuple[FootWrenches, bool]:
+    def look(self, push: float, point: np.ndarray) -> tuple[ContactLoads, bool]:
         """A vertical force in N at a point of the ground frame."""
         force, ground = np.array([0.0, push, 0.0]), self.initial.ground
         wrench = np.concatenate([force, np.cross(point * [1.0, 0.0, 1.0], force)])
@@ -157,9 +169,11 @@ def test_two_feet_on_one_plate_share_it_as_offline_and_it_is_said_once(trial: Si
     right, left = person.middles
     for _ in range(3):
         found, known = person.look(700.0, 0.75 * right + 0.25 * left)
-    assert known and found.contact.tolist() == [[ON_PLATE, ON_PLATE, NO_CONTACT]]  # last: elsewhere
-    np.testing.assert_allclose(found.wrench[0, :2, 1], [525.0, 175.0], atol=1.0)
-    assert np.sqrt(found.covariance[0, 0, 1, 1]) > 100.0  # the division is unsure
+    assert known and found.contact.tolist() == [[SHARED_PLATE, SHARED_PLATE, ON_PLATE]]  # last: the residual
+    push = found.wrench[0, :2, 1]
+    assert push.sum() == pytest.approx(700.0, abs=7.3)  # as the plate measures: 1 % and 2 N
+    assert push[0] > push[1] and np.abs(push - [525.0, 175.0]).max() < np.sqrt(found.covariance[0, 1, 1])  # the lever's
+    assert np.sqrt(found.covariance[0, 1, 1]) > 100.0  # the division is unsure
     assert person.feet.news() == [
         "Both feet stand on one: its wrench is divided between them by its centre of pressure."
     ]
@@ -169,11 +183,11 @@ def test_two_feet_on_one_plate_share_it_as_offline_and_it_is_said_once(trial: Si
 def test_a_foot_beside_the_plate_is_not_measured(trial: SimulatedTrial) -> None:
     person = Standing(trial)
     found, known = person.look(350.0, person.middles[0])
-    assert not known and found.contact.tolist() == [[ON_PLATE, UNMEASURED, NO_CONTACT]]
+    assert not known and found.contact.tolist() == [[ON_PLATE, UNMEASURED, ON_PLATE]]
     np.testing.assert_allclose(found.wrench[0, 0, 1], 350.0)
     person.feet = LiveFeet(person.initial, presets.default(), ("one",), {"one": "left"})  # the user knows better
     found, known = person.look(350.0, person.middles[0])
-    assert not known and found.contact.tolist() == [[UNMEASURED, ON_PLATE, NO_CONTACT]]
+    assert not known and found.contact.tolist() == [[UNMEASURED, ON_PLATE, ON_PLATE]]
 
 
 def test_a_load_where_nobody_stands_is_not_the_person(trial: SimulatedTrial) -> None:

@@ -143,7 +143,7 @@ def _about(point: Array, sd: Array) -> Array:
 def _divide(t: int, feet: npt.NDArray[np.intp], priors: list[Prior], wrench: Array, errors: Array) -> None:
     """A frame's plate among the feet on it, in place: their priors, given the sum that it measures."""
     each = {k: priors[k].spread[t] @ priors[k].spread[t].T for k in feet}
-    plate = np.max([errors[t, k, :, k] for k in feet], axis=0)
+    plate = plate_errors(wrench[t, feet].sum(axis=0)[None])[0]
     S = np.sum(list(each.values()), axis=0) + plate
     lacks = np.sum([wrench[t, k] - priors[k].mean[t] for k in feet], axis=0)
     gains = {k: np.linalg.solve(S, each[k]).T for k in feet}
