@@ -64,6 +64,17 @@ def test_level_floor_and_stairs_up_and_down_give_every_stance_its_plate(rise: fl
     assert loads.total_known[made.recording.time > 0.5].all()
 
 
+@pytest.mark.parametrize("rise", [0.0, 0.17, -0.19])
+def test_without_plates_a_foot_that_is_loaded_may_bear_and_is_never_in_the_air(rise: float) -> None:
+    feet = walk(6, 0.30, rise=rise)
+    made = steps(lasting(6), feet, plates_of(feet))
+    loads = found(replace(made, recording=made.recording.with_plates(())))
+    loaded = made.push > 50.0
+    assert loads.soles.bears[loaded].mean() > 0.98 and not loads.aloft[loaded].any()
+    assert loads.soles.bears[~loaded].mean() < 0.6 and (loads.reason == SWING).mean(axis=0).min() > 0.1
+    assert not loads.total_known.any()
+
+
 def test_a_plate_on_a_step_has_its_pressure_on_its_own_surface() -> None:
     """0.5 m up, 70 N forwards move it by 50 mm on the floor's plane."""
     feet = {"right": [Stance(0.0, 2.0, 0.0, 0.1, 0.5, ("p0",))], "left": [Stance(0.0, 2.0, 0.0, -0.1, 0.5, ("p1",))]}

@@ -102,8 +102,8 @@ def known_ground(
         )
         return Ground(loads, np.zeros(n, dtype=bool), False, None, (text,), (text,))
     # steps off the plates: their mean load is no mass
-    mass, feet = (None if initial.feet else initial.weighed_kg), foot_markers(initial)
-    check = check_plates(recording, initial.ground, mass, feet)
+    mass = None if initial.feet else initial.weighed_kg
+    check = check_plates(recording, initial.ground, mass, foot_markers(initial), loads)
     if check.refusal:
         raise RecordingError(f"{recording.path or recording.name}: {check.refusal}")
     notes, reasons = list(check.messages), list[str]()

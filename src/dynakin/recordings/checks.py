@@ -9,7 +9,9 @@ from itertools import combinations, pairwise
 
 import numpy as np
 
+from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import NEAR_M, foot_places
+from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.limits import beyond_limits
@@ -81,6 +83,7 @@ def check_plates(
     ground: GroundFrame,
     mass_kg: float | None = None,
     foot_markers: Mapping[str, Sequence[str]] | None = None,
+    loads: FootLoads | None = None,
 ) -> PlateCheck:
     """Check the plates while the person stands still: the vertical force is positive and near m g, each
     centre of pressure lies under a foot, the force is near vertical, the free moment acts about the vertical
@@ -95,6 +98,7 @@ def check_plates(
         ground: gives the vertical; its origin does not matter.
         mass_kg: declared body mass, None if it is to come from the plates.
         foot_markers: foot -> names of the markers on it; where not given no pressure is held against a foot.
+        loads: the assignment of plates to these feet, where a run has it already.
     """
     if not recording.plates:
         return PlateCheck(False, None, None, (), "no force plates in this recording, expected at least one")
@@ -103,8 +107,10 @@ def check_plates(
     frames = standing if standing is not None else slice(None)
     mass = _check_vertical(recording, ground, mass_kg, standing, findings)
     feet = _feet(recording, ground, foot_markers or {}, findings)
+    if loads is None:
+        loads = foot_loads(recording, ground, foot_markers or {})
     under: dict[str, str] = {}
-    for plate in recording.plates:
+    for p, plate in enumerate(recording.plates):
         if (beyond := beyond_limits(plate, recording, ground)) is not None:
             findings.refuse(beyond)
         push = ground.vectors_to_ground(plate.force)[frames, 1]
@@ -112,7 +118,7 @@ def check_plates(
         if not len(loaded):
             findings.say(f"{plate.name} carries nothing ({'standing' if standing else 'the whole recording'}).")
             continue
-        foot = _check_pressure(plate, loaded, feet, ground, findings)
+        foot = _check_pressure(plate, loaded, feet, _owner(loads, loaded, p), ground, findings)
         _check_free_moment(plate, loaded, ground, findings)
         _check_level(plate, ground, findings)
         if standing is not None and foot in under:
@@ -199,10 +205,23 @@ def _feet(
     return feet
 
 
+def _owner(loads: FootLoads, frames: np.ndarray, p: int) -> str | None:
+    """The foot that stands on a plate in most of these frames."""
+    counts = loads.on[frames, :, p].sum(axis=0)
+    most = int(np.argmax(counts)) if len(counts) else 0
+    return loads.feet[most] if len(counts) and counts[most] > 0.5 * len(frames) else None
+
+
 def _check_pressure(
-    plate: Plate, loaded: np.ndarray, feet: dict[str, Array], ground: GroundFrame, findings: _Findings
+    plate: Plate,
+    loaded: np.ndarray,
+    feet: dict[str, Array],
+    owner: str | None,
+    ground: GroundFrame,
+    findings: _Findings,
 ) -> str | None:
-    """Compare with the feet; gives the foot that stands on the plate, None where both or none do."""
+    """Compare with the feet; gives the foot that stands on the plate (``owner``, the nearest one where none is known),
+    None where both or none do."""
     cop = ground.points_to_ground(plate.cop[loaded])[:, [0, 2]]
     if not feet or not np.isfinite(cop).any():
         return None
@@ -210,7 +229,7 @@ def _check_pressure(
     medians = {foot: float(np.nanmedian(d)) for foot, d in distances.items() if np.isfinite(d).any()}
     if not medians:
         return None
-    foot = min(medians, key=lambda name: medians[name])
+    foot = owner if owner in medians else min(medians, key=lambda name: medians[name])
     nearest = np.fmin.reduce([distances[name] for name in medians])
     # While nobody stands still one plate may carry one foot after the other: each frame's nearest foot
     # counts.

@@ -26,7 +26,7 @@ from dynakin.recordings.feet.contact import (
 from dynakin.recordings.feet.loads import SHARED, FootLoads, divided
 from dynakin.recordings.feet.soles import EARLY_S, PASSING_S, FootShape, Soles, smooth_step
 from dynakin.recordings.hull import distance_to_hull
-from dynakin.recordings.plates.ground_plate import FLAT_FRAMES, GroundPlate
+from dynakin.recordings.plates.ground_plate import FLAT_FRAMES, GroundPlate, level_pressure
 from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N
 from dynakin.settings.noise import Noise
 
@@ -214,8 +214,9 @@ class LiveFeet:
     def _plates(self, wrenches: Array) -> list[GroundPlate]:
         loads = self.initial.ground.wrench_to_ground(wrenches)
         known = np.isfinite(loads).all(axis=1) & ~self._range.at_end(loads[:, 1])
+        cop = level_pressure(loads, self._floor_m)
         return [
-            GroundPlate.at_height(name, loads[[p]], known[[p]], None, self._floor_m)
+            GroundPlate(name, loads[[p]], cop[[p]], known[[p]], None, self._floor_m)
             for p, name in enumerate(self.plates)
         ]
 

@@ -12,6 +12,7 @@ from dynakin.errors import ModelError
 from dynakin.model.calibration.lumping import PlacedPart
 from dynakin.model.plan import ModelPlan
 from dynakin.recordings.frame import GroundFrame
+from dynakin.recordings.plates.ground_plate import level_pressure
 from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.recordings.recording import Recording
 
@@ -109,5 +110,5 @@ def first_centre_of_pressure(recording: Recording, ground: GroundFrame) -> Array
     loaded = wrench[np.isfinite(wrench).all(axis=1) & (wrench[:, 1] > LOADED_N)]
     if not len(loaded):
         return np.zeros(3)
-    force, moment = loaded[:, 1].mean(), loaded[:, 3:].mean(axis=0)
-    return np.array([moment[2] / force, 0.0, -moment[0] / force])
+    x, z = level_pressure(loaded.mean(axis=0)[None], 0.0)[0]
+    return np.array([x, 0.0, z])

@@ -245,13 +245,19 @@ class _Assignment:
         return np.asarray((distance_to_hull(cop, both) < BETWEEN_M) & apart & own.stands & other.stands)
 
     def upon(self, plate: GroundPlate, foot: FootContact, frames: slice) -> Flags:
-        """Frames in which all touching markers of a foot lie within a plate's edges, on its level; none where these are
-        not known."""
+        """Frames in which all touching markers of a foot lie within a plate's edges, on its level, or higher where no
+        other foot stands on that: on a box; none where edges are not known."""
         touching = foot.touching[frames]
         if plate.corners is None or plate.height_m is None:
             return np.zeros(len(touching), dtype=bool)
         inside = plate.beyond(foot.outline[frames]) == 0.0
         level = np.abs(foot.support_m[frames] - plate.height_m) < SAME_LEVEL_M
+        others = [
+            other.stands[frames] & (np.abs(other.support_m[frames] - plate.height_m) < SAME_LEVEL_M)
+            for other in self.contacts.values()
+            if other is not foot
+        ]
+        level |= (foot.support_m[frames] > plate.height_m) & ~np.any([np.zeros_like(level), *others], axis=0)
         return np.asarray(level & touching.any(axis=1) & (inside | ~touching).all(axis=1))
 
     def beyond_edges(self, foot: FootContact, frames: slice) -> Flags:

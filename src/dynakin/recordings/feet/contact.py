@@ -243,48 +243,65 @@ class _Foot:
         )
 
     def contact(self) -> FootContact:
+        """What was found."""
         stands = self.stands
+        stances = tuple(runs(stands))
+        levels = [self._level(first, end) for first, end in stances]
         with np.errstate(invalid="ignore"):
-            high, fast = self.rise > ALOFT_M, self.speed > SLOW_M_S
-            low = np.asarray((self.rise < ALOFT_M).any(axis=1))
+            over = self.rise - self._between(stances, levels)[:, None]
+            high, fast = over > ALOFT_M, self.speed > SLOW_M_S
+            low = np.asarray((np.minimum(over, self.rise) < ALOFT_M).any(axis=1))
         unseen = ~np.isfinite(self.rise)
         moves = np.asarray(self.seen & (fast | unseen).all(axis=1))
         aloft = np.asarray(moves & (high | unseen).all(axis=1))
-        stances = tuple(runs(stands))
         under = np.stack(self.near, axis=1) if self.near else np.zeros((len(stands), 0), dtype=bool)
-        support = self._support(stances)
+        support = self._between(stances, self._heights(stances, levels))
         return FootContact(
             self.outline, self.rise, self.seen, under, support, self.belt, self.touching, stands, stances, low, moves,
             aloft,
         )  # fmt: skip
 
-    def _support(self, stances: Sequence[tuple[int, int]]) -> Array:
-        """(T,) m, height of the support: its level by the lift of the foot, anchored where a plate carries it."""
-        least, levels, anchors = float(np.min(self.flat)), [], []
-        for first, end in stances:
-            own = self.level[first:end]
-            lift = float(np.nanmedian(own)) if np.isfinite(own).any() else 0.0
-            levels.append(lift)
-            for near, plate in zip(self.near, self.plates, strict=True):
-                carried = np.count_nonzero(near[first:end] & plate.loaded[first:end]) > 0.5 * (end - first)
-                if (
-                    carried
-                    and plate.height_m is not None
-                    and -0.5 * UNDER_MARKERS_M < least + lift - plate.height_m < SHOE_M
-                ):
-                    anchors.append((plate.height_m - lift, plate.height_m, lift))
-        if anchors:
-            base = float(np.median([anchor for anchor, _, _ in anchors]))
-        else:
-            base = self.floor_m if -UNDER_MARKERS_M < least - self.floor_m < SHOE_M else least - UNDER_MARKERS_M
+    def _level(self, first: int, end: int) -> float:
+        """How much higher than its lowest place the foot stands in a stance, m."""
+        own = self.level[first:end]
+        return float(np.nanmedian(own)) if np.isfinite(own).any() else 0.0
+
+    def _between(self, stances: Sequence[tuple[int, int]], values: Sequence[float]) -> Array:
+        """(T,) the stances' own values, and straight lines from one to the next."""
         if not stances:
-            return np.full(len(self.lift), base)
-        heights = np.array(levels) + base
-        for k, height in enumerate(heights):
-            exact = [plate for _, plate, lift in anchors if lift == levels[k] and abs(plate - height) < SAME_LEVEL_M]
-            heights[k] = exact[0] if exact else height
+            return np.full(len(self.lift), values[0] if len(values) else 0.0)
         at = [edge for first, end in stances for edge in (first, end - 1)]
-        return np.asarray(np.interp(np.arange(len(self.lift)), at, np.repeat(heights, 2)))
+        return np.asarray(np.interp(np.arange(len(self.lift)), at, np.repeat(values, 2)))
+
+    def _heights(self, stances: Sequence[tuple[int, int]], levels: Sequence[float]) -> list[float]:
+        """Heights (m) of what each stance stands on: of the plate that carries it, or by its level over the others;
+        that of the lowest place alone, where there is no stance."""
+        least = float(np.min(self.flat))
+        plates: list[float | None] = []
+        for (first, end), level in zip(stances, levels, strict=True):
+            found = None
+            for near, plate in zip(self.near, self.plates, strict=True):
+                carries = np.count_nonzero(near[first:end] & plate.loaded[first:end]) > 0.5 * (end - first)
+                if carries and plate.height_m is not None and self._on(least + level, plate.height_m):
+                    found = plate.height_m
+            plates.append(found)
+        known = [height - level for height, level in zip(plates, levels, strict=True) if height is not None]
+        if known:
+            base = float(np.median(known))
+        else:
+            base = self.floor_m if self._on(least, self.floor_m) else least - UNDER_MARKERS_M
+        if not stances:
+            return [base]
+        own = [base + level for level in levels]
+        return [
+            plate if plate is not None and abs(plate - height) < SAME_LEVEL_M else height
+            for plate, height in zip(plates, own, strict=True)
+        ]
+
+    @staticmethod
+    def _on(lowest_m: float, surface_m: float) -> bool:
+        """Whether a foot whose lowest marker is so high may stand on a surface."""
+        return -UNDER_MARKERS_M < lowest_m - surface_m < SHOE_M
 
 
 def filled_by_others(points: Array) -> Array:

@@ -44,7 +44,7 @@ def plate_findings(
     Args:
         time: (T,) s. on: (T, F, P) feet on plates, as they were assigned.
     """
-    if any(contact is None for contact in contacts):
+    if not contacts or any(contact is None for contact in contacts):
         return []
     swapped = exchanged(contacts, plates)
     said = [
@@ -63,7 +63,7 @@ def plate_findings(
 
 def exchanged(contacts: Contacts, plates: Sequence[GroundPlate]) -> list[tuple[int, int]]:
     """Pairs of plates each of whose data were measured where the other lies."""
-    if any(contact is None for contact in contacts):
+    if not contacts or any(contact is None for contact in contacts):
         return []
     pairs = combinations(range(len(plates)), 2)
     return [(p, q) for p, q in pairs if _are_exchanged(plates[p], plates[q], contacts)]

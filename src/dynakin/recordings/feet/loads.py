@@ -38,6 +38,7 @@ class FootLoads:
             what no foot puts on it, or (`with_undeclared`) the motion needs what the plates do not have.
         aloft: (T, F) feet that are surely in the air, by their markers alone.
         soles: where the feet's soles are, when they may bear load, and where it is expected.
+        on: (T, F, P) which foot stands on which plate: the run's one assignment.
         messages: sentences with times. reasons: those of them that say why something is not measured.
     """
 
@@ -49,6 +50,7 @@ class FootLoads:
     elsewhere: Flags
     aloft: Flags
     soles: Soles
+    on: Flags
     messages: tuple[str, ...] = ()
     reasons: tuple[str, ...] = ()
 
@@ -154,6 +156,7 @@ def divided(
         np.zeros(n, dtype=bool),
         aloft,
         soles,
+        on,
     )
     return loads.with_undeclared(elsewhere)
 

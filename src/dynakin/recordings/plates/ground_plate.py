@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
@@ -41,34 +42,24 @@ class GroundPlate:
 
     @classmethod
     def of(cls, plate: Plate, ground: GroundFrame) -> GroundPlate:
-        """The plate, turned to the ground frame."""
+        """The plate, turned to the ground frame; on the ground's own plane where its height is not known."""
         wrench = ground.wrench_to_ground(np.hstack([plate.force, plate.moment]))
         known = np.asarray(np.isfinite(wrench).all(axis=1)) & ~saturated(wrench[:, 1])
         corners = None if plate.corners is None else ground.points_to_ground(plate.corners)[:, [0, 2]]
-        return cls.at_height(plate.name, wrench, known, corners, surface_height(plate, ground))
+        height = surface_height(plate, ground)
+        return cls(plate.name, wrench, level_pressure(wrench, height or 0.0), known, corners, height)
 
-    @classmethod
-    def at_height(
-        cls, name: str, wrench: Array, known: Flags, corners: Array | None, height_m: float | None
-    ) -> GroundPlate:
-        """With its centre of pressure from its wrench; on the ground's own plane where its height is not known."""
-        surface = Surface(np.array([0.0, height_m or 0.0, 0.0]), np.array([0.0, 1.0, 0.0]))
-        filled = np.nan_to_num(wrench)
-        cop, _ = centre_of_pressure(filled[:, :3], filled[:, 3:], surface, LOADED_N)
-        cop[filled[:, 1] < LOADED_N] = np.nan
-        return cls(name, wrench, cop[:, [0, 2]], known, corners, height_m)
-
-    @property
+    @cached_property
     def push(self) -> Array:
         """(T,) N, vertical; 0 where it is not measured."""
         return np.asarray(np.nan_to_num(self.wrench[:, 1]))
 
-    @property
+    @cached_property
     def loaded(self) -> Flags:
         """(T,) its centre of pressure is known."""
         return np.asarray(self.push > LOADED_N)
 
-    @property
+    @cached_property
     def pressed(self) -> Flags:
         """(T,) it is not empty."""
         return np.asarray(self.push > UNLOADED_N)
@@ -83,6 +74,15 @@ class GroundPlate:
             raise ValueError(f"{self.name}: expected corners")
         flat = points.reshape(-1, 2)
         return distance_to_hull(flat, np.broadcast_to(self.corners, (len(flat), 4, 2))).reshape(points.shape[:2])
+
+
+def level_pressure(wrench: Array, height_m: float) -> Array:
+    """Centres of pressure (T, 2) m [X, Z] of wrenches (T, 6) on a level plane; NaN where they are not loaded."""
+    surface = Surface(np.array([0.0, height_m, 0.0]), np.array([0.0, 1.0, 0.0]))
+    filled = np.nan_to_num(wrench)
+    cop = centre_of_pressure(filled[:, :3], filled[:, 3:], surface, LOADED_N)[0][:, [0, 2]]
+    cop[filled[:, 1] < LOADED_N] = np.nan
+    return cop
 
 
 def saturated(push: Array) -> Flags:

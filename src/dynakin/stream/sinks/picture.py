@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from dynakin.bindings import _core
 from dynakin.filter.step import Labelled
+from dynakin.recordings.plates.ground_plate import level_pressure
 from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.stream.sinks.base import LiveFrame, Started, Status
 
@@ -145,4 +146,5 @@ def arrow(wrench: Array) -> Array:
     """Centre of pressure (3,) m on the ground's plane y = 0 and force (3,) N of a wrench (6,); NaN where unloaded."""
     if not np.isfinite(wrench).all() or wrench[1] < LOADED_N:
         return np.full(6, np.nan)
-    return np.array([wrench[5] / wrench[1], 0.0, -wrench[3] / wrench[1], *wrench[:3]])
+    x, z = level_pressure(wrench[None], 0.0)[0]
+    return np.array([x, 0.0, z, *wrench[:3]])
