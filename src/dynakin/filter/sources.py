@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
@@ -14,7 +16,9 @@ Flags = npt.NDArray[np.bool_]
 Codes = npt.NDArray[np.uint8]
 
 
-def with_sources(data: xr.Dataset, feet: ContactLoads | None, undeclared: Flags) -> xr.Dataset:
+def with_sources(
+    data: xr.Dataset, feet: ContactLoads | None, undeclared: Flags, soles: Collection[str] = ()
+) -> xr.Dataset:
     """The dataset of an estimate with ``moment_source`` and ``joint_source``, and NaN where a source is unknown.
 
     A load that depends on one unmeasured contact is derived from the motion, on several it is not known. Where
@@ -26,6 +30,7 @@ def with_sources(data: xr.Dataset, feet: ContactLoads | None, undeclared: Flags)
         data: with the joints' tree and, of floating models, the core's ``moment_source``.
         feet: contacts (T, F) and the segments on which they act; None of a model that stands on its root.
         undeclared: (T,) frames in which something bears the person that no plate measures.
+        soles: segments on which the ground acts.
     """
     segments = [str(name) for name in data["joint_segment"].values]
     parents = data["joint_parent"].values
@@ -39,7 +44,7 @@ def with_sources(data: xr.Dataset, feet: ContactLoads | None, undeclared: Flags)
         at = [segments.index(name) for name in feet.segments]
         joints = _behind(feet.contact, at, parents)
         moments = data["moment_source"].transpose("time", "coordinate").values.copy()
-        legs = _below_the_thighs([segments.index(name) for name in dict.fromkeys(feet.segments)], parents)
+        legs = _below_the_thighs([segments.index(name) for name in soles], parents)
     joints[np.ix_(undeclared, ~legs)] = ABSENT
     if feet is not None:  # a foot on no plate may be what it bears
         joints[undeclared[:, None] & (joints != MEASURED)] = ABSENT
