@@ -17,6 +17,7 @@ from dynakin.simulation.motions.motion_file import CUTOFF_HZ
 from dynakin.simulation.motions.registry import MOTIONS, MOTIONS_IN_SPACE
 from dynakin.simulation.output import SimulatedTrial, check_trial_folder
 from dynakin.simulation.sensors.sizes import load_sensors
+from dynakin.simulation.support import PLATES
 from dynakin.simulation.trial import simulate as simulate_trial
 
 _MOTIONS = f"{', '.join(MOTIONS)} (fullbody: {', '.join(MOTIONS_IN_SPACE)})"
@@ -27,7 +28,9 @@ def simulate(
     model: Annotated[str, typer.Option(help=f"Model whose coordinates move: {' or '.join(BODIES)}.")] = "sagittal7",
     motion: Annotated[str, typer.Option(help=f"{_MOTIONS}, or a coordinates file (.mot, .sto).")] = "squat",
     seed: Annotated[int, typer.Option(help="Of everything that is drawn at random, from 0.")] = 1,
-    duration: Annotated[float | None, typer.Option(help="Length, s; else 20 s (gait: 4 s), or all of a file.")] = None,
+    duration: Annotated[
+        float | None, typer.Option(help="Length, s; else as the motion takes, or all of a file.")
+    ] = None,
     rate: Annotated[float, typer.Option("--rate", help="Frames per second.")] = 100.0,
     mass: Annotated[float, typer.Option("--mass", help="Body mass, kg.")] = 70.0,
     height: Annotated[float, typer.Option("--height", help="Body height, m.")] = 1.75,
@@ -39,6 +42,8 @@ def simulate(
         float, typer.Option("--motion-cutoff-hz", help="Low-pass on a coordinates file, Hz.")
     ] = CUTOFF_HZ,
     markers: Annotated[str | None, typer.Option(help="Set that fullbody wears: opencap or plug-in-gait.")] = None,
+    plates: Annotated[str, typer.Option(help=f"What of fullbody has a plate: {', '.join(PLATES)}.")] = "feet",
+    rail: Annotated[float, typer.Option(help="Push of fullbody's hands on a rail, of body weight, to 0.3.")] = 0.0,
 ) -> None:
     """Simulate a trial whose truth is known, and write recording and truth."""
     check_trial_folder(output)
@@ -57,6 +62,8 @@ def simulate(
             spread=Spread().times(spread),
             motion_cutoff_hz=motion_cutoff,
             markers=markers,
+            plates=plates,
+            rail=rail,
         )
         folder = trial.save(output)
     console = out()
@@ -88,8 +95,9 @@ def _contents(trial: SimulatedTrial, folder: Path) -> Table:
         f"{len(recording.marker_names)} markers, {recording.n_frames} frames at {recording.rate:.6g} Hz"
         + (f", {len(faults)} gaps, swaps and flying markers" if faults else ""),
     )
-    rows.add_row(str(folder / "forces.mot"), f"{len(recording.plates)} force plates")
-    rows.add_row(str(folder / "truth_*.mot, .sto"), "coordinates, speeds, accelerations, moments, wrench")
+    if recording.plates:
+        rows.add_row(str(folder / "forces.mot"), f"{len(recording.plates)} force plates")
+    rows.add_row(str(folder / "truth_*.mot, .sto"), "coordinates, speeds, accelerations, moments, wrench, contacts")
     rows.add_row(str(folder / "truth.json"), "settings, lengths, inertial parameters, marker places, faults")
     rows.add_row(str(folder / "truth.nc"), "every array of the truth")
     return rows
@@ -98,7 +106,8 @@ def _contents(trial: SimulatedTrial, folder: Path) -> Table:
 def _how_to_run(trial: SimulatedTrial, folder: Path) -> str:
     who = trial.truth.subject
     sex = f" --sex {who.sex}" if who.sex else ""
+    forces = f" --forces {folder / 'forces.mot'}" if trial.recording.plates else ""
     return (
-        f"To estimate it: dynakin run {folder / 'markers.trc'} --forces {folder / 'forces.mot'} "
+        f"To estimate it: dynakin run {folder / 'markers.trc'}{forces} "
         f"--model {trial.settings['model']} --mass {who.mass_kg:g} --height {who.height_m:g}{sex} -o OUT"
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from dynakin.errors import ConfigError
 from dynakin.simulation.bodies.body import Contact, SimulatedBody
 from dynakin.simulation.mechanics import Dynamics, Motion, TreeMotion, dynamics, kinematics
 from dynakin.simulation.motions.movement import Movement, Seat
-from dynakin.simulation.support import pressed, split_between
+from dynakin.simulation.support import carried_by_contacts, pressed
 
 Array = NDArray[np.float64]
 
@@ -23,13 +23,15 @@ SIDEWAYS_SHARE = 0.06  # of the vertical force: the feet stand apart and push ou
 class MechanicalState:
     """All that is true of the body over time: its motion, the forces, and what each contact carries of them, (T, 6)
     about the ground origin by the contact's name; plates: the contacts below which they lie, and what presses on
-    each."""
+    each; segments: on which each contact acts, points: where (T, 3) m, both of a body in space only."""
 
     motion: Motion
     moving: TreeMotion
     forces: Dynamics
     carried: dict[str, Array]
     plates: tuple[tuple[Contact, Array], ...]
+    segments: dict[str, str] = field(default_factory=dict)
+    points: dict[str, Array] = field(default_factory=dict)
 
 
 def mechanical_state(body: SimulatedBody, movement: Movement, time: Array) -> MechanicalState:
@@ -47,11 +49,10 @@ def mechanical_state(body: SimulatedBody, movement: Movement, time: Array) -> Me
             )
     moving = kinematics(body.tree, motion)
     forces = dynamics(body.tree, motion, moving)
+    if movement.support is not None:
+        return _in_space(body, movement, time, MechanicalState(motion, moving, forces, {}, ()))
     contacts = contacts_of(body, movement.seat)
-    if movement.support is None:
-        carried = share_wrench(forces.wrench, body.feet, movement.seat)
-    else:
-        carried = list(split_between(forces.wrench, movement.support(time)))
+    carried = share_wrench(forces.wrench, body.feet, movement.seat)
     outside: dict[str, Array] = {}
     for contact, wrench in zip(contacts, carried, strict=True):
         if contact.segment is not None:
@@ -59,12 +60,31 @@ def mechanical_state(body: SimulatedBody, movement: Movement, time: Array) -> Me
     if outside:
         forces = replace(dynamics(body.tree, motion, moving, outside), wrench=forces.wrench)
     by_name = {c.name: w for c, w in zip(contacts, carried, strict=True)}
-    plates = tuple(zip(contacts, carried, strict=True))
-    if movement.support is not None:
-        plates = tuple(
-            (Contact(f.plate, f.plate, None, f.centre), pressed(by_name, time, f)) for f in movement.footings
-        )
-    return MechanicalState(motion, moving, forces, by_name, plates)
+    return MechanicalState(motion, moving, forces, by_name, tuple(zip(contacts, carried, strict=True)))
+
+
+def _in_space(body: SimulatedBody, movement: Movement, time: Array, state: MechanicalState) -> MechanicalState:
+    """The state with what hands, feet and seat carry, each on its segment."""
+    assert movement.support is not None
+    hands = {} if movement.held is None else movement.held(time, state.moving)
+    rest = state.forces.wrench
+    for hand in hands.values():
+        rest = rest - hand.wrench
+    carried, points = carried_by_contacts(rest, movement.support(time))
+    carried |= {name: hand.wrench for name, hand in hands.items()}
+    points |= {name: hand.point for name, hand in hands.items()}
+    known = {foot.name: foot.segment for foot in body.feet} | dict(movement.segments)
+    segments = {name: segment for name in carried if (segment := known[name]) is not None}
+    outside: dict[str, Array] = {}
+    for name, segment in segments.items():
+        outside[segment] = outside.get(segment, 0.0) + carried[name]
+    forces = replace(
+        dynamics(body.tree, state.motion, state.moving, outside), wrench=state.forces.wrench
+    )  # the sum of all that acts on the person, as the motion takes it
+    plates = tuple(
+        (Contact(f.plate, f.plate, None, f.centre, f.half_m), pressed(carried, time, f)) for f in movement.footings
+    )
+    return replace(state, forces=forces, carried=carried, plates=plates, segments=segments, points=points)
 
 
 def contacts_of(body: SimulatedBody, seat: Seat | None) -> tuple[Contact, ...]:

@@ -42,7 +42,8 @@ def save_trial(trial: SimulatedTrial, folder: str | Path) -> Path:
 
     Files: markers.trc (m) and forces.mot (each plate's force, point of application and free moment, laboratory
     frame), which `dynakin.read` takes; truth_coordinates.mot, truth_speeds.sto, truth_accelerations.sto (degrees,
-    m), truth_moments.sto, truth_wrench.sto (N m, N; ground frame, about its origin); truth.json (settings,
+    m), truth_moments.sto, truth_wrench.sto and of each contact truth_contacts.sto (N m, N; ground frame, about its
+    origin); truth.json (settings,
     parameters, marker places, faults); truth.nc (every array, labelled). The same trial gives the same bytes.
 
     Raises:
@@ -51,7 +52,8 @@ def save_trial(trial: SimulatedTrial, folder: str | Path) -> Path:
     folder = Path(folder).absolute()
     with replacing(folder, kind=TRIAL) as made:
         for name, write in _WRITERS.items():
-            write(trial, made / name)
+            if name != "forces.mot" or trial.recording.plates:
+                write(trial, made / name)
     return folder
 
 
@@ -143,6 +145,18 @@ def _write_wrench(trial: SimulatedTrial, path: Path) -> None:
     )
 
 
+def _write_contacts(trial: SimulatedTrial, path: Path) -> None:
+    """right_foot_fx and so on: a contact's six components after those of the one before."""
+    data = trial.truth.data
+    notes = [f"Truth of {trial.recording.name}. On person, N and N m about the ground origin, ground frame."]
+    for name in data["contact"].values:
+        on = trial.truth.contacts.get(str(name))
+        notes += [f"{name} acts on {on}."] if on else []
+    names = [f"{str(c).replace(' ', '_')}_{k}" for c in data["contact"].values for k in data["component"].values]
+    values = data["contact_wrench"].transpose("time", "contact", "component").values.reshape(len(data["time"]), -1)
+    write_storage(path, "Contact wrenches", data["time"].values, names, values, in_degrees=False, notes=notes)
+
+
 def _write_truth(trial: SimulatedTrial, path: Path) -> None:
     truth = trial.truth
     content: dict[str, Any] = {
@@ -160,6 +174,7 @@ def _write_truth(trial: SimulatedTrial, path: Path) -> None:
             name: {"gain": e.gain.tolist(), "drift_per_s": e.drift.tolist()}
             for name, e in (truth.plate_errors or {}).items()
         },
+        "contacts": [{"name": name, "segment": segment} for name, segment in truth.contacts.items()],
         "repetitions": [asdict(r) for r in truth.repetitions],
         "faults": [asdict(f) for f in truth.faults],
     }
@@ -196,6 +211,7 @@ _WRITERS: dict[str, Callable[[SimulatedTrial, Path], None]] = {
     "truth_accelerations.sto": _coordinate_writer("accelerations", "Accelerations", " per second squared"),
     "truth_moments.sto": _write_moments,
     "truth_wrench.sto": _write_wrench,
+    "truth_contacts.sto": _write_contacts,
     "truth.json": _write_truth,
     "truth.nc": _write_arrays,
 }

@@ -21,6 +21,7 @@ NAMES = (
     "flying",
     "plate_gain",
     "plate_drift",
+    "rail",
 )
 
 

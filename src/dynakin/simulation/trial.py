@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,19 +19,22 @@ from dynakin.simulation.contacts import mechanical_state
 from dynakin.simulation.mechanics import Motion
 from dynakin.simulation.motions.motion_file import CUTOFF_HZ
 from dynakin.simulation.motions.movement import Movement
+from dynakin.simulation.motions.rail import hold_rail
 from dynakin.simulation.motions.registry import choose_movement
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.plates import sense_plates
 from dynakin.simulation.sensors.sensed_markers import sense_markers
 from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.streams import Streams
+from dynakin.simulation.support import PLATES, one_plate, plates_that_measure
 from dynakin.simulation.truth import Truth, all_parameters, label_arrays
 
 Array = NDArray[np.float64]
 
 GROUND_IN_LABORATORY = (-0.12, -0.60)  # x and z (m) of the ground origin; the floor is y = 0
 SYNTHETIC_S = 20.0  # duration of a motion that has no end of its own
-GAIT_S = 4.0  # of walking across a laboratory
+# Of walking across a laboratory, on a belt, over steps, of one jump.
+USUAL_S = {"gait": 4.0, "belt": 10.0, "steps": 5.0, "steps-down": 5.0, "drop-jump": 5.0}
 LONGEST_FRAMES = 2_000_000
 
 
@@ -47,6 +52,8 @@ def simulate(
     spread: Spread | None = None,
     motion_cutoff_hz: float = CUTOFF_HZ,
     markers: str | None = None,
+    plates: str = "feet",
+    rail: float = 0.0,
 ) -> SimulatedTrial:
     """A trial of a subject who does not exist, so that all that is to be estimated is known.
 
@@ -56,20 +63,25 @@ def simulate(
     Args:
         model: "sagittal7", "squat7" or "fullbody", drawn around the table; or a body of your own, planar or spatial,
             whose subject then stands for mass, height, sex and spread.
-        motion: "squat", "sit-to-stand" or "sway", of "fullbody" "squat" or "gait"; a coordinates file (.mot, .sto)
-            with the model's coordinate names; or a function of times (T,) s that gives a `Motion`.
+        motion: "squat", "sit-to-stand" or "sway", of "fullbody" "squat", "gait", "belt", "steps", "sit" or
+            "drop-jump"; a coordinates file (.mot, .sto) with the model's coordinate names; or a function of times
+            (T,) s that gives a `Motion`.
         seed: of everything that is drawn.
-        duration_s, rate_hz: length and frame rate; the first frame is at 0 s. None: 20 s, or all of a file.
+        duration_s, rate_hz: length and frame rate; the first frame is at 0 s. None: 20 s, or all of a file, or as
+            long as the motion takes.
         mass_kg, height_m, sex: "male", "female" or None (mean of both), as for `dynakin.Subject`.
         noise: of the sensors; None: `SensorNoise()`, ``SensorNoise.none()`` for perfect ones.
         spread: of the subject around the anthropometric table; None: `Spread()`.
         motion_cutoff_hz: of the low-pass on a coordinates file.
         markers: set that "fullbody" carries, "opencap" (where None) or "plug-in-gait"; the others have one each.
+        plates: of "fullbody", what has one: "feet" (each its own), "all" (the seat too), "shared" (one below both
+            feet), "right" or "left" (one foot only) or "none". Belts of "belt" are plates: one a foot, or "shared".
+        rail: of "fullbody", how hard hands push on a rail that no plate measures, over body weight, 0 to 0.3.
 
     Raises:
         ConfigError: a value that makes no trial; the message names the argument.
     """
-    asked_s = (GAIT_S if motion == "gait" else SYNTHETIC_S) if duration_s is None else duration_s
+    asked_s = USUAL_S.get(str(motion), SYNTHETIC_S) if duration_s is None else duration_s
     for key, value in (("rate_hz", rate_hz), ("duration_s", asked_s)):
         if not 0.0 < value < np.inf:
             raise ConfigError(f"simulation: {key} is {value:g}, expected a positive number")
@@ -78,20 +90,27 @@ def simulate(
     streams = Streams(seed)
     body = choose_body(model, streams, mass_kg, height_m, sex, spread, markers)
     movement = choose_movement(motion, body, streams["motion"], asked_s, motion_cutoff_hz)
+    movement = _on_plates(movement, plates)
+    if rail != 0.0:
+        movement = hold_rail(movement, body, streams["rail"], rail, asked_s)
     time = _frames(_length(duration_s, movement, asked_s), rate_hz)
     state = mechanical_state(body, movement, time)
     seen = sense_markers(streams, body, time, state.motion, state.moving, noise)
     x, z = (0.0, 0.0) if body.in_space else GROUND_IN_LABORATORY
     origin_L = np.array([x, -body.floor_m, z])
     late = state if noise.plate_lag_s == 0.0 else mechanical_state(body, movement, time - noise.plate_lag_s)
-    plates, errors = sense_plates(streams, late.plates, time, origin_L, noise)
+    sensed, errors = sense_plates(streams, late.plates, time, origin_L, noise)
+    if movement.support is not None:
+        measure = plates_that_measure(movement.footings, plates)  # after drawing: what is left keeps its noise
+        sensed = tuple(plate for plate in sensed if plate.name in measure)
+        errors = {name: error for name, error in errors.items() if name in measure}
     recording = Recording(
         name=f"simulated_{movement.name.replace('-', '_')}_{seed}",
         path=None,
         time=time,
         marker_names=seen.names,
         markers=origin_L + seen.markers,
-        plates=plates,
+        plates=sensed,
         length_unit="m",
         notes=(f"Simulated {body.name}, seed {seed}: {movement.description or movement.name}.",),
         subject={"mass_kg": body.subject.mass_kg, "height_m": body.subject.height_m},
@@ -106,8 +125,9 @@ def simulate(
         faults=seen.faults,
         plate_errors=errors,
         repetitions=movement.repetitions,
+        contacts=state.segments,
     )
-    settings = {
+    settings: dict[str, Any] = {
         "model": body.name,
         "motion": movement.name,
         "seed": int(seed),
@@ -119,6 +139,8 @@ def simulate(
         "spread": None if isinstance(model, SimulatedBody) else dict(vars(spread)),
         "sensors": noise.as_dict(),
     }
+    if body.in_space:
+        settings |= {"plates": plates, "rail": float(rail), "belt_m_s": float(movement.belt_m_s)}
     return SimulatedTrial(recording, truth, settings)
 
 
@@ -135,6 +157,16 @@ def simulate_squat(
 ) -> SimulatedTrial:
     """Squats of ``sagittal7``: `simulate` with its first two arguments settled."""
     return simulate("sagittal7", "squat", seed, duration_s, rate_hz, mass_kg, height_m, sex, noise=noise, spread=spread)
+
+
+def _on_plates(movement: Movement, plates: str) -> Movement:
+    if plates not in PLATES:
+        raise ConfigError(f"simulation: plates is {plates!r}, expected one of {', '.join(PLATES)}")
+    if movement.support is None:
+        if plates != "feet":
+            raise ConfigError(f"simulation: plates is {plates!r}, expected 'feet' but for the motions of fullbody")
+        return movement
+    return replace(movement, footings=one_plate(movement.footings)) if plates == "shared" else movement
 
 
 def _length(duration_s: float | None, movement: Movement, otherwise_s: float) -> float:

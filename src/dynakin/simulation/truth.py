@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 import xarray as xr
@@ -29,16 +29,18 @@ class Truth:
     Attributes:
         data: coordinates, speeds, accelerations, moments (time, coordinate), named and signed as in the model;
             wrench (time, component), ground on person, about the ground origin, and contact_wrench (time,
-            contact, component) of each foot and the seat; markers (time, marker, axis) on the bones, and
-            soft_tissue, the displacement of each marker from there; joint_centres (time, joint, axis);
-            kinetic_energy, potential_energy (time). Moments are net joint moments: what a seat carries no joint
-            below it supplies.
+            contact, component) of each foot, the seat and each hand; in space contact_segment (contact) and
+            contact_point (time, contact, axis), where it presses or pulls (NaN where a foot or seat is not loaded);
+            markers (time, marker, axis) on the bones, and soft_tissue, the displacement of each marker from there;
+            joint_centres (time, joint, axis); kinetic_energy, potential_energy (time). Moments are net joint
+            moments: what a seat carries no joint below it supplies.
         parameters: lengths and inertial parameters by the names of the filter's state (length/shank,
             inertia/shank/izz), and where markers truly are (marker/r_knee/x, m, in their segment's frame, by
             their names in the recording).
         origin_L: (3,) m, the ground origin in the laboratory frame, whose axes are those of the ground frame.
         sites: where the markers are put on; subject, tree: who was measured.
-        faults: gaps, swaps and flying markers; plate_errors: by plate; repetitions: of the movement, where known.
+        faults: gaps, swaps and flying markers; plate_errors: by plate; repetitions: of the movement, where known;
+            contacts: segment by contact, of a body in space.
     """
 
     data: xr.Dataset
@@ -50,6 +52,7 @@ class Truth:
     faults: tuple[Fault, ...] = ()
     plate_errors: dict[str, PlateErrors] | None = None
     repetitions: tuple[Repetition, ...] = ()
+    contacts: Mapping[str, str] = field(default_factory=dict)
 
 
 def label_arrays(
@@ -64,6 +67,10 @@ def label_arrays(
     bone = marker_positions(sites, moving)
     centres = {name: moving.segments[segment].point(place) for name, (segment, place) in body.joint_centres.items()}
     by_coordinate, by_marker = ("time", "coordinate"), ("time", "marker", "axis")
+    points = {}
+    if state.points:
+        stacked = np.stack([state.points[name] for name in carried], axis=1)
+        points["contact_point"] = (("time", "contact", "axis"), stacked, {"units": "m"})
     unit, force = ("rad", "N m") if not body.translations else ("rad or m", "N m or N")
     return xr.Dataset(
         {
@@ -77,6 +84,7 @@ def label_arrays(
                 np.stack(list(carried.values()), axis=1),
                 {"units": "N, N m"},
             ),
+            **points,
             "markers": (by_marker, bone, {"units": "m"}),
             "soft_tissue": (by_marker, marker_positions(sites, moving, displacement) - bone, {"units": "m"}),
             "joint_centres": (
@@ -92,6 +100,7 @@ def label_arrays(
             "coordinate": list(motion.names),
             "component": ["fx", "fy", "fz", "mx", "my", "mz"],
             "contact": list(carried),
+            **({"contact_segment": ("contact", list(state.segments.values()))} if state.segments else {}),
             "marker": [site.name for site in sites],
             "joint": np.array(list(centres), dtype=str),
             "axis": ["x", "y", "z"],

@@ -24,13 +24,15 @@ class Contact:
     """Where the person meets a force plate.
 
     name: "right foot"; plate: name of the plate below; segment: on which it acts, None where the tree's root
-    is that contact (a chain fixed at the toe); centre: (3,) m, middle of the plate's top, ground frame.
+    is that contact (a chain fixed at the toe); centre: (3,) m, middle of the plate's top, ground frame; half_m: half
+    the plate's length and width.
     """
 
     name: str
     plate: str
     segment: str | None
     centre: Array
+    half_m: tuple[float, float] = (0.30, 0.20)
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from dynakin.errors import ConfigError
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.bodies.whole_body import SIDES, Sole, hip_in_pelvis
 from dynakin.simulation.mechanics import Motion, dynamics, kinematics
-from dynakin.simulation.motions.movement import Movement
+from dynakin.simulation.motions.movement import Movement, Reach
 from dynakin.simulation.motions.posed import carried_frame
 from dynakin.simulation.motions.walk import FITTED, TOE_OFF, Walk, Waves, posture, support_of, walking_motion
 from dynakin.simulation.support import Footing, Support
@@ -57,14 +57,33 @@ def gait_movement(rng: np.random.Generator, body: SimulatedBody, duration_s: flo
     Raises:
         ConfigError: too short, or the subject cannot walk so.
     """
+    return gait_on_floor(rng, body, duration_s)[1]
+
+
+def gait_on_floor(rng: np.random.Generator, body: SimulatedBody, duration_s: float) -> tuple[Walk, Movement]:
+    """How the subject walks, and the movement.
+
+    Raises:
+        ConfigError: too short, or the subject cannot walk so.
+    """
     if not duration_s >= SHORTEST_S:
         raise ConfigError(f"simulated gait: duration_s is {duration_s:g}, expected at least {SHORTEST_S:g} s")
     walk = draw_walk(rng, body, duration_s)
-    fitted = fit(walk, body)
+    return walk, walk_over_plates(walk, body)
+
+
+def walk_over_plates(walk: Walk, body: SimulatedBody, reach: Reach | None = None) -> Movement:
+    """The walk, fitted, with its arms as they swing or as they ``reach``.
+
+    Raises:
+        ConfigError: the subject cannot walk so.
+    """
+    fitted = fit(walk, body, reach)
     sole = Sole.of(body.subject)
 
     def at(time: Array) -> Motion:
-        return walking_motion(walk, body, time, fitted)
+        motion = walking_motion(walk, body, time, fitted)
+        return motion if reach is None else reach(time, motion)
 
     def support(time: Array) -> Support:
         return support_of(walk, sole, time)
@@ -78,7 +97,10 @@ def gait_movement(rng: np.random.Generator, body: SimulatedBody, duration_s: flo
             Footing(f"plate {n}", centre, ((foot, walk.lands(k), walk.lands(k) + TOE_OFF * walk.stride_s),))
         )
     description = f"walking at {walk.speed:.2f} m/s over {_PLATES} plates, one foot on each"
-    return Movement("gait", at, description, support=support, footings=tuple(footings))
+    return Movement(
+        "gait", at, description, support=support, footings=tuple(footings),
+        refitted=lambda reach: walk_over_plates(walk, body, reach),
+    )  # fmt: skip
 
 
 # Knee flexion over a stride from contact on (part of it, deg): as in Perry & Burnfield 2010, ch. 5, but not straighter
@@ -99,7 +121,7 @@ _FRAMES = 40  # of half a stride
 _MOST_ROUNDS = 12
 
 
-def fit(walk: Walk, body: SimulatedBody) -> dict[str, Array]:
+def fit(walk: Walk, body: SimulatedBody, reach: Reach | None = None) -> dict[str, Array]:
     """What is fitted of a walk, by `FITTED`: first legs of the length that they should have, then balance as well.
 
     Raises:
@@ -113,15 +135,15 @@ def fit(walk: Walk, body: SimulatedBody) -> dict[str, Array]:
     x = np.array([start[name] for name in FITTED])
     middle = x.copy()
     for balanced in (False, True):
-        best = _residuals(walk, body, x[None], middle, balanced)[0]
+        best = _residuals(walk, body, x[None], middle, balanced, reach)[0]
         for _ in range(_MOST_ROUNDS):
             moved = np.vstack([x, x + 1e-5 * np.eye(len(x))])
-            rows = _residuals(walk, body, moved, middle, balanced)
+            rows = _residuals(walk, body, moved, middle, balanced, reach)
             jacobian = (rows[1:] - rows[0]).T / 1e-5
             step = np.linalg.lstsq(jacobian, -rows[0], rcond=None)[0]
             for part in (1.0, 0.5, 0.25, 0.1, 0.02):
                 try:
-                    found = _residuals(walk, body, (x + part * step)[None], middle, balanced)[0]
+                    found = _residuals(walk, body, (x + part * step)[None], middle, balanced, reach)[0]
                 except ConfigError:  # a leg does not reach
                     continue
                 if found @ found < best @ best:
@@ -135,7 +157,9 @@ def fit(walk: Walk, body: SimulatedBody) -> dict[str, Array]:
     return {name: np.asarray(value) for name, value in zip(FITTED, x, strict=True)}
 
 
-def _residuals(walk: Walk, body: SimulatedBody, values: Array, middle: Array, balanced: bool) -> Array:
+def _residuals(
+    walk: Walk, body: SimulatedBody, values: Array, middle: Array, balanced: bool, reach: Reach | None
+) -> Array:
     """Rows (K, R) for K sets of values (K, N): half a stride is enough, the other half is its mirror image."""
     sets, frames = len(values), _FRAMES
     part = np.arange(frames) / (2.0 * frames)
@@ -157,6 +181,7 @@ def _residuals(walk: Walk, body: SimulatedBody, values: Array, middle: Array, ba
         rows.append((length - wanted) / np.where(np.abs((own + 0.17) % 1.0 - 0.36) < 0.36, _STANDING_M, _SWINGING_M))
     if balanced:
         motion = walking_motion(walk, body, time, fitted)
+        motion = motion if reach is None else reach(time, motion)
         wrench = dynamics(body.tree, motion, kinematics(body.tree, motion)).wrench
         x, z = wrench[:, 5] / wrench[:, 1], -wrench[:, 3] / wrench[:, 1]
         support = support_of(walk, Sole.of(body.subject), time)

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from dynakin.simulation.jets import Jet
-from dynakin.simulation.mechanics import Motion
+from dynakin.simulation.mechanics import Motion, TreeMotion
 from dynakin.simulation.support import Footing, Support
 
 Array = NDArray[np.float64]
@@ -43,6 +43,18 @@ class Seat:
 
 
 @dataclass(frozen=True)
+class Hand:
+    """What a hand takes: wrench (T, 6) about the ground origin, at point (T, 3) m."""
+
+    wrench: Array
+    point: Array
+
+
+Reach = Callable[[Array, Motion], Motion]
+"""Times (T,) s and a motion -> the motion with arms that reach for something."""
+
+
+@dataclass(frozen=True)
 class Movement:
     """Coordinates as functions of time that are at least twice differentiable.
 
@@ -55,6 +67,11 @@ class Movement:
         end_s: last time at which it is known, None where it has no end.
         support: times (T,) s -> how the feet stand; None: as the body's contacts say.
         footings: the plates below them, where ``support`` is given.
+        held: times and the moving segments -> wrenches (T, 6) about the ground origin that hands take from what they
+            hold, by contact.
+        segments: of contacts that are no feet, by name.
+        refitted: the same movement in balance with arms as somebody else leads them, for one whose balance is fitted.
+        belt_m_s: speed at which what the feet stand on moves backward.
     """
 
     name: str
@@ -65,6 +82,10 @@ class Movement:
     end_s: float | None = None
     support: Callable[[Array], Support] | None = None
     footings: tuple[Footing, ...] = ()
+    held: Callable[[Array, TreeMotion], Mapping[str, Hand]] | None = None
+    segments: Mapping[str, str] = field(default_factory=dict)
+    refitted: Callable[[Reach], Movement] | None = None
+    belt_m_s: float = 0.0
 
 
 def in_order(names: Sequence[str], jets: Mapping[str, Jet]) -> Motion:

@@ -13,12 +13,16 @@ from dynakin.errors import ConfigError
 from dynakin.files import is_file
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.mechanics import Motion
+from dynakin.simulation.motions.belt import belt_movement
+from dynakin.simulation.motions.drop_jump import drop_jump
 from dynakin.simulation.motions.gait import gait_movement
 from dynakin.simulation.motions.motion_file import file_movement
 from dynakin.simulation.motions.movement import Movement
+from dynakin.simulation.motions.sit_in_space import sit_in_space
 from dynakin.simulation.motions.sit_to_stand import sit_to_stand_movement
 from dynakin.simulation.motions.squat import squat_movement
 from dynakin.simulation.motions.squat_in_space import squat_in_space
+from dynakin.simulation.motions.steps import steps_down, steps_up
 from dynakin.simulation.motions.sway import sway_movement
 
 Array = NDArray[np.float64]
@@ -32,6 +36,11 @@ MOTIONS: dict[str, Callable[[np.random.Generator, SimulatedBody, float], Movemen
 MOTIONS_IN_SPACE: dict[str, Callable[[np.random.Generator, SimulatedBody, float], Movement]] = {
     "squat": squat_in_space,
     "gait": gait_movement,
+    "belt": belt_movement,
+    "sit": sit_in_space,
+    "steps": steps_up,
+    "steps-down": steps_down,
+    "drop-jump": drop_jump,
 }
 """Those of the whole body in space."""
 

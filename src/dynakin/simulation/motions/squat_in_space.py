@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +40,8 @@ _TONES = 4
 class Stance:
     """How somebody squats: half the distance between the ankles (m), feet turned out and the shanks' torsion (rad), and
     what the lowest posture adds sideways: pelvis_list, pelvis_rotation, lumbar_bending, lumbar_rotation (rad), z (m);
-    how much more (1 = all) either arm moves."""
+    how much more (1 = all) either arm moves. ankle, knee, lumbar and arms_deg: angles (deg) while standing, and what
+    the lowest posture adds."""
 
     half_width_m: float
     toe_out: float
@@ -48,6 +49,10 @@ class Stance:
     sideways: Mapping[str, float]
     shift_m: float
     arms: tuple[float, float]
+    ankle: tuple[float, float] = _ANKLE
+    knee: tuple[float, float] = _KNEE
+    lumbar: tuple[float, float] = _LUMBAR
+    arms_deg: Mapping[str, tuple[float, float]] = field(default_factory=lambda: dict(_ARMS))
 
 
 def draw_stance(rng: np.random.Generator, body: SimulatedBody) -> Stance:
@@ -68,19 +73,21 @@ def draw_stance(rng: np.random.Generator, body: SimulatedBody) -> Stance:
 
 
 @dataclass(frozen=True)
-class _Sway:
+class Sway:
     """Frequencies (Hz) and phases by what sways."""
 
     tones: Mapping[str, tuple[Array, Array]]
 
     @classmethod
-    def draw(cls, rng: np.random.Generator) -> _Sway:
+    def draw(cls, rng: np.random.Generator) -> Sway:
+        """A person's own."""
         return cls({
             name: (rng.uniform(0.08, 0.35, _TONES), rng.uniform(0.0, 2.0 * np.pi, _TONES))
             for name in (*_SWAY_DEG, *_SWAY_M)
         })  # fmt: skip
 
     def of(self, name: str, time: Array) -> Jet:
+        """What it adds, rad or m."""
         size = _SWAY_M[name] if name in _SWAY_M else float(np.deg2rad(_SWAY_DEG[name]))
         return sinusoids(time, np.full(_TONES, size), *self.tones[name])
 
@@ -95,61 +102,72 @@ def squat_in_space(rng: np.random.Generator, body: SimulatedBody, duration_s: fl
         ConfigError: too short, or the subject cannot squat so.
     """
     squats = draw_squats(rng, duration_s)
-    stance, sway = draw_stance(rng, body), _Sway.draw(rng)
+    stance, sway = draw_stance(rng, body), Sway.draw(rng)
     tilt = _balance(body, stance)
 
     def at(time: Array) -> Motion:
         level, arms = squat_signals(time, squats)
-        jets, shift = _upper_body(stance, level, arms, sway, time)
+        jets, shift = upper_body(stance, level, arms, sway, time)
         jets["pelvis_tilt"] = polynomial(level, tilt) + sway.of("pelvis_tilt", time)
-        x, y, z = _mid_hip(body, stance, level)
+        x, y, z = mid_hip(body, stance, level)
         hips = (x + sway.of("x", time), y, z + shift + sway.of("z", time))
-        return _posed(body, stance, jets, hips)
+        return posed_on_feet(body, stance, jets, hips)
 
-    centres = {side: _ankle(stance, sign) * [1.0, 0.0, 1.0] for side, sign in SIDES}
-    ahead = Sole.of(body.subject).ball[0] * 0.5
+    pressed = feet_press(body, stance)
 
     def support(time: Array) -> Support:
-        right, left = (
-            np.tile(centres[side] + ahead * np.array([np.cos(stance.toe_out), 0.0, sign * np.sin(stance.toe_out)]),
-                    (len(time), 1))
-            for side, sign in SIDES
-        )  # fmt: skip
+        right, left = (np.tile(pressed[side], (len(time), 1)) for side, _ in SIDES)
         return Support(right, left)
 
-    always = (-np.inf, np.inf)
-    footings = tuple(
-        Footing(plate, centres[side] + [_PLATE_AHEAD_M, 0.0, 0.0], ((foot, *always),))
-        for plate, side, foot in (("plate 1", "r", "right foot"), ("plate 2", "l", "left foot"))
-    )
     return Movement(
         "squat",
         at,
         f"{len(squats)} repetitions of varying depth and pace",
         tuple(Repetition(s.start_s, s.end_s, s.depth) for s in squats),
         support=support,
-        footings=footings,
+        footings=plates_below(stance),
     )
 
 
-def _ankle(stance: Stance, sign: float) -> Array:
+def feet_press(body: SimulatedBody, stance: Stance) -> dict[str, Array]:
+    """By side, where (3,) m a foot presses when the person is in balance."""
+    ahead = Sole.of(body.subject).ball[0] * 0.5
+    return {
+        side: flat_ankle(stance, sign) * [1.0, 0.0, 1.0]
+        + ahead * np.array([np.cos(stance.toe_out), 0.0, sign * np.sin(stance.toe_out)])
+        for side, sign in SIDES
+    }
+
+
+def plates_below(stance: Stance) -> tuple[Footing, ...]:
+    """One a foot."""
+    return tuple(
+        Footing(plate, flat_ankle(stance, sign) * [1.0, 0.0, 1.0] + [_PLATE_AHEAD_M, 0.0, 0.0],
+                ((foot, -np.inf, np.inf),))
+        for plate, sign, foot in (("plate 1", 1.0, "right foot"), ("plate 2", -1.0, "left foot"))
+    )  # fmt: skip
+
+
+def flat_ankle(stance: Stance, sign: float) -> Array:
+    """Place (3,) m of an ankle, on the floor; sign: 1 right, -1 left."""
     return np.asarray(STANDS_AT + np.array([0.0, 0.0, sign * stance.half_width_m]))
 
 
-def _posed(body: SimulatedBody, stance: Stance, jets: Mapping[str, Jet], hips: Point) -> Motion:
+def posed_on_feet(body: SimulatedBody, stance: Stance, jets: Mapping[str, Jet], hips: Point) -> Motion:
+    """All coordinates, feet flat where they stand."""
     time = hips[0].value
     rest = constant(time, 0.0)
     height = ankle_height(body.subject)
     feet: dict[str, SegmentMotion] = {}
     for side, sign in SIDES:
-        x, _, z = (constant(time, float(v)) for v in _ankle(stance, sign))
+        x, _, z = (constant(time, float(v)) for v in flat_ankle(stance, sign))
         turned = constant(time, -sign * stance.toe_out)
         feet[f"foot_{side}"] = foot_about((x, constant(time, height), z), turned, rest, np.zeros(3))
     torsion = {f"tibial_torsion_{side}": constant(time, stance.torsion) for side, _ in SIDES}
     return whole_motion(body.tree, {**jets, **torsion}, hips, hip_in_pelvis(body.subject, 0.0), feet)
 
 
-def _mid_hip(body: SimulatedBody, stance: Stance, level: Jet) -> Point:
+def mid_hip(body: SimulatedBody, stance: Stance, level: Jet) -> Point:
     """Middle of the hip centres over shanks and thighs that lean as in the plane; what the wide stance costs of the
     height while standing is taken off everywhere."""
     L = body.subject.lengths
@@ -158,10 +176,10 @@ def _mid_hip(body: SimulatedBody, stance: Stance, level: Jet) -> Point:
         Segment("shank", None, nothing, (Axis("ankle", (0.0, 0.0, -1.0)),), 1.0, nothing, np.eye(3)),
         Segment("thigh", "shank", L["shank"] * up, (Axis("knee", (0.0, 0.0, 1.0)),), 1.0, nothing, np.eye(3)),
     ]
-    jets = {"ankle": _between(_ANKLE, level), "knee": _between(_KNEE, level)}
+    jets = {"ankle": _between(stance.ankle, level), "knee": _between(stance.knee, level)}
     standing = {
-        "ankle": _between(_ANKLE, constant(np.zeros(1), 0.0)),
-        "knee": _between(_KNEE, constant(np.zeros(1), 0.0)),
+        "ankle": _between(stance.ankle, constant(np.zeros(1), 0.0)),
+        "knee": _between(stance.knee, constant(np.zeros(1), 0.0)),
     }
     thigh, upright = (kinematics(plane, in_order(("ankle", "knee"), j)).segments["thigh"] for j in (jets, standing))
     top = L["thigh"] * up
@@ -182,14 +200,16 @@ def _between(angles_deg: tuple[float, float], level: Jet) -> Jet:
     return float(np.deg2rad(angles_deg[1])) * level + float(np.deg2rad(angles_deg[0]))
 
 
-def _upper_body(stance: Stance, level: Jet, arms: Jet, sway: _Sway | None, time: Array) -> tuple[dict[str, Jet], Jet]:
+def upper_body(stance: Stance, level: Jet, arms: Jet, sway: Sway | None, time: Array) -> tuple[dict[str, Jet], Jet]:
     """Coordinates above the hips but the pelvis' tilt, and the pelvis' shift to the right (m)."""
-    jets = {"lumbar_extension": _between(_LUMBAR, level)}
+    jets = {"lumbar_extension": _between(stance.lumbar, level)}
     jets |= {name: size * level for name, size in stance.sideways.items()}
     jets["neck_extension"] = float(np.deg2rad(_GAZE * -35.0)) * level
     jets |= {name: constant(time, 0.0) for name in ("neck_bending", "neck_rotation")}
     for (side, _), more in zip(SIDES, stance.arms, strict=True):
-        jets |= {f"{name}_{side}": _between((low, more * added), arms) for name, (low, added) in _ARMS.items()}
+        jets |= {
+            f"{name}_{side}": _between((low, more * added), arms) for name, (low, added) in stance.arms_deg.items()
+        }
     for name in _SWAY_DEG:
         if sway is not None and name in jets:
             jets[name] = jets[name] + sway.of(name, time)
@@ -203,14 +223,29 @@ def _balance(body: SimulatedBody, stance: Stance) -> Array:
         ConfigError: no tilt does.
     """
     levels = np.linspace(0.0, 1.0, 9)
+    tilt = balanced_tilt(body, stance, levels, np.full_like(levels, over_feet_x(body, stance)))
+    return np.asarray(np.polynomial.polynomial.polyfit(levels, tilt, _DEGREE), dtype=float)
+
+
+def over_feet_x(body: SimulatedBody, stance: Stance) -> float:
+    """Where the centre of mass is over the feet, m."""
+    return float(STANDS_AT[0] + _OVER_FOOT * Sole.of(body.subject).tip_x * np.cos(stance.toe_out))
+
+
+def balanced_tilt(body: SimulatedBody, stance: Stance, levels: Array, target: Array) -> Array:
+    """The pelvis' tilt (rad) that has the centre of mass at x = ``target`` (m), at levels from 0 standing to 1 lowest,
+    all (N,).
+
+    Raises:
+        ConfigError: no tilt does.
+    """
     rest = np.zeros_like(levels)
     level = Jet(levels, rest, rest)
-    target = STANDS_AT[0] + _OVER_FOOT * Sole.of(body.subject).tip_x * np.cos(stance.toe_out)
 
     def beyond(tilt: Array) -> Array:
-        jets, shift = _upper_body(stance, level, level, None, levels)
-        x, y, z = _mid_hip(body, stance, level)
-        motion = _posed(body, stance, jets | {"pelvis_tilt": Jet(tilt, rest, rest)}, (x, y, z + shift))
+        jets, shift = upper_body(stance, level, level, None, levels)
+        x, y, z = mid_hip(body, stance, level)
+        motion = posed_on_feet(body, stance, jets | {"pelvis_tilt": Jet(tilt, rest, rest)}, (x, y, z + shift))
         moving = kinematics(body.tree, motion)
         weighted = sum(s.mass * moving.segments[s.name].point(s.com)[:, 0] for s in body.tree)
         return np.asarray(weighted / body.subject.mass_kg - target)
@@ -219,7 +254,7 @@ def _balance(body: SimulatedBody, stance: Stance) -> Array:
     off_before, off = beyond(before), beyond(tilt)
     for _ in range(20):  # secants
         if np.abs(off).max() < 1e-9:
-            return np.asarray(np.polynomial.polynomial.polyfit(levels, tilt, _DEGREE), dtype=float)
+            return tilt
         step = -off * (tilt - before) / np.where(off == off_before, 1.0, off - off_before)
         before, off_before = tilt, off
         tilt = tilt + np.clip(step, -0.3, 0.3)

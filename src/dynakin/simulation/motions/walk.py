@@ -4,7 +4,7 @@ trunk and arms of a few harmonics of the stride."""
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 FLAT, HEEL_OFF, TOE_OFF = 0.15, 0.33, 0.60
 BOTH = TOE_OFF - 0.5  # both feet stand
 _PITCHED, _LEVELLED, _LANDS = 0.69, 0.62, 0.99  # the foot is pitched most; it turns back; it has its landing pitch
+_CLIMBS = 0.75  # of the swing, in which a foot changes its height
+_UP, _DOWN = (-0.06, 0.52), (-0.50, 0.02)  # when the pelvis does, from the landing on the other level on
 _ROLLS = (0.05, 0.48)  # the centre of pressure goes from the heel to the ball
 # What is fitted, by name: amplitudes of cosine and sine of a harmonic of the stride, m or rad, or constants.
 HARMONICS = {"x": (2, 4, 6, 8), "y": (2, 4), "z": (1, 3, 5), "lumbar_rotation": (1, 3)}
@@ -45,6 +47,7 @@ class Walk:
             (the left one's half a stride later).
         first: step (even: right) that lands at ``lands_s`` and there ``at`` (3,) m is the ankle of a flat foot but for
             its half_width.
+        climbs: step -> how much higher (m) it stands than the one before; those that are not named stand level.
     """
 
     stride_s: float
@@ -57,6 +60,7 @@ class Walk:
     waves: Mapping[str, Waves]
     lands_s: float
     at: Array
+    climbs: Mapping[int, float] = field(default_factory=dict)
 
     @property
     def speed(self) -> float:
@@ -70,7 +74,26 @@ class Walk:
     def foothold(self, k: int, height: float = 0.0) -> Array:
         """Place (3,) m of the ankle of the flat foot, or of the floor below it."""
         sign = 1.0 if k % 2 == 0 else -1.0
-        return np.asarray(self.at + np.array([k * self.step_m, height, sign * self.half_width_m]))
+        return np.asarray(self.at + np.array([k * self.step_m, height + self.level(k), sign * self.half_width_m]))
+
+    def level(self, k: int) -> float:
+        """Height of what step k stands on, m."""
+        return float(sum(rise for step, rise in self.climbs.items() if step <= k))
+
+    def climbing(self, time: Array, k: int) -> Jet:
+        """The height (m) that the foot of step k gains until it lands next: early on the way up, late on the way
+        down, so that it passes the edge."""
+        rise = self.level(k + 2) - self.level(k)
+        start = TOE_OFF if rise >= 0.0 else 1.0 - _CLIMBS * (1.0 - TOE_OFF)
+        return rise * swift_step(time, self.lands(k) + start * self.stride_s, _CLIMBS * (1.0 - TOE_OFF) * self.stride_s)
+
+    def lift(self, time: Array) -> Jet:
+        """Height (m) that the pelvis has gained: pushed up by the leg that has landed, let down by the one behind."""
+        total = constant(time, 0.0)
+        for k, rise in self.climbs.items():
+            start, end = _UP if rise >= 0.0 else _DOWN
+            total = total + rise * self.phased(time, k, start, end)
+        return total
 
     def steps(self, side: str, time: Array) -> list[int]:
         """The right or left steps that matter at these times."""
@@ -97,13 +120,15 @@ def foot_motion(
     sign = 1.0 if side == "r" else -1.0
     steps = walk.steps(side, time)
     pitch = constant(time, walk.landing)
-    onward, on_ball, raised = (constant(time, 0.0) for _ in range(3))
+    onward, on_ball, raised, climbed = (constant(time, 0.0) for _ in range(4))
     for k in steps:
         pitch = pitch - walk.landing * swift_step(time, walk.lands(k), FLAT * walk.stride_s)
         pitch = pitch - fitted["pitch"] * walk.phased(time, k, HEEL_OFF, _PITCHED)
         pitch = pitch + (fitted["pitch"] + walk.landing) * walk.phased(time, k, _LEVELLED, _LANDS)
         swing = walk.swing(time, k)
         onward = onward + 2.0 * walk.step_m * swing
+        if walk.climbs:
+            climbed = climbed + walk.climbing(time, k)
         on_ball = on_ball + walk.phased(time, k, FLAT, HEEL_OFF) - swing
         raised = raised + walk.phased(time, k, TOE_OFF, 0.80) - walk.phased(time, k, 0.80, 1.0)
     yaw, turned = constant(time, -sign * walk.toe_out), _turned(-sign * walk.toe_out)
@@ -116,6 +141,8 @@ def foot_motion(
     heel, ball = (point_of(about[name]) for name in ("heel", "ball"))
     x, y, z = (h + on_ball * (b - h) for h, b in zip(heel, ball, strict=True))
     x, y = x + onward, y + fitted["lift"] * raised
+    if walk.climbs:
+        y = y + climbed
     origin, velocity, acceleration = (
         np.stack([getattr(jet, key) for jet in (x, y, z)], axis=1) for key in ("value", "rate", "second")
     )
@@ -135,17 +162,18 @@ def support_of(walk: Walk, sole: Sole, time: Array, push: float = 0.5) -> Suppor
     for side, sign in SIDES:
         steps = walk.steps(side, time)
         along = constant(time, 0.0)
-        onward = constant(time, 0.0)
+        onward, climbed = constant(time, 0.0), constant(time, 0.0)
         start, length = 0.6 * sole.heel[0], 0.75 * sole.ball[0] - 0.6 * sole.heel[0]
         for k in steps:
             swing = walk.swing(time, k)
             along = along + walk.phased(time, k, *_ROLLS) - swing
             onward = onward + 2.0 * walk.step_m * swing
+            climbed = climbed + walk.climbing(time, k)
             load = walk.phased(time, k, 0.0, BOTH) - walk.phased(time, k, 0.5, TOE_OFF)
             share = share + load if side == "r" else share
         forward = _turned(-sign * walk.toe_out)[:, 0]
         place = walk.foothold(steps[0]) + np.outer(start + length * along.value, forward)
-        presses[side] = place + np.outer(onward.value, [1.0, 0.0, 0.0])
+        presses[side] = place + np.outer(onward.value, [1.0, 0.0, 0.0]) + np.outer(climbed.value, [0.0, 1.0, 0.0])
     return Support(presses["r"], presses["l"], np.clip(share.value, 0.0, 1.0), push)
 
 
@@ -185,6 +213,8 @@ def posture(
     travel = Jet(walk.speed * (time - walk.lands_s), np.full_like(time, walk.speed), rest)
     x = travel + waves("x") + given["x0"] + float(walk.at[0])
     y = waves("y") + given["y0"]
+    if walk.climbs:
+        y = y + walk.lift(time) + float(walk.at[1])
     z = waves("z") + float(walk.at[2])
     sole, height = Sole.of(body.subject), ankle_height(body.subject)
     feet = {f"foot_{side}": foot_motion(walk, sole, height, side, time, given) for side, _ in SIDES}

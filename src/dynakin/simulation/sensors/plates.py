@@ -16,8 +16,6 @@ from dynakin.simulation.streams import Streams
 
 Array = NDArray[np.float64]
 
-_HALF_LENGTH_M, _HALF_WIDTH_M = 0.30, 0.20
-
 
 @dataclass(frozen=True)
 class PlateErrors:
@@ -48,7 +46,9 @@ def sense_plates(
         own = draw_plate_errors(streams["plate_gain"], streams["plate_drift"], noise)
         centre_L = contact.centre + origin_L
         plates.append(
-            measure(streams["plate_noise"], time, wrench, contact.plate, centre_L, origin_L, own, noise),
+            measure(
+                streams["plate_noise"], time, wrench, contact.plate, centre_L, origin_L, own, noise, contact.half_m
+            ),
         )
         errors[contact.plate] = own
     return tuple(plates), errors
@@ -63,11 +63,12 @@ def measure(
     origin: Array,
     errors: PlateErrors,
     noise: SensorNoise,
+    half_m: tuple[float, float],
 ) -> Plate:
     """The plate's signals in the laboratory frame: gain, drift, white noise and rounding on its six channels.
 
     wrench: (T, 6) true, about the ground origin; centre, origin: (3,) m, the middle of the plate's top and the
-    ground origin, laboratory.
+    ground origin, laboratory; half_m: half the plate's length and width.
     """
     about_centre = wrench[:, 3:] + np.cross(origin - centre, wrench[:, :3])
     channels = np.hstack([wrench[:, :3], about_centre]) * errors.gain + np.outer(time - time[0], errors.drift)
@@ -75,9 +76,7 @@ def measure(
     about_centre = channels[:, 3:] + noise.plate_moment_sd_nm * rng.standard_normal((len(wrench), 3))
     force, about_centre = _rounded(force, noise.plate_step_n), _rounded(about_centre, noise.plate_step_nm)
     moment = about_centre + np.cross(centre, force)
-    corners = centre + np.array(
-        [[x * _HALF_LENGTH_M, 0.0, z * _HALF_WIDTH_M] for x, z in ((1, 1), (1, -1), (-1, -1), (-1, 1))]
-    )
+    corners = centre + np.array([[x * half_m[0], 0.0, z * half_m[1]] for x, z in ((1, 1), (1, -1), (-1, -1), (-1, 1))])
     return plate_from_wrench(
         name,
         force,
