@@ -300,7 +300,7 @@ class _Belts:
 
 
 class _Range:
-    """Whether plates are at the end of their range, as `recordings.feet.loads.saturated` finds it afterwards."""
+    """Whether plates are at the end of their range; afterwards it is `recordings.plates.ground_plate.saturated`."""
 
     def __init__(self, plates: int) -> None:
         self._top = np.full(plates, JUDGED_N)
