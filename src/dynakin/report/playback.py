@@ -99,7 +99,7 @@ def playback(estimate: Estimate) -> Playback:
         curve_label=label,
         last=len(frames) - 1,
         end_time=f"{estimate.time[frames[-1]]:.2f} s",
-        feet=estimate.foot_names,
+        feet=estimate.contact_names,
         has_reaction=bool(len(forces)),
         has_measured=bool(np.isfinite(arrays["measured_sizes"]).any()),
         has_mass_centre="mass_centre" in arrays,
@@ -153,7 +153,7 @@ def _arrows(estimate: Estimate, arrays: dict[str, Array]) -> list[dict[str, Any]
     """Adds points of action (mm), forces and their sizes (N) to ``arrays``; what to draw of them, measured ones
     behind."""
     entries: list[dict[str, Any]] = []
-    feet, modelled = estimate.foot_names, estimate.modelled_axes()
+    feet, modelled = estimate.contact_names, estimate.modelled_axes()
     derived = foot_sources(estimate.data) if feet else wrench_sources(estimate.data).max(axis=1, keepdims=True)
     arrays["derived"] = (derived == DERIVED).astype(float)
     for kind, name in (("measured", "foot_wrench_measured"), ("estimated", "foot_wrench")):

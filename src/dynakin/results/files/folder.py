@@ -36,6 +36,7 @@ OPTIONAL_FILES = (
     "joint_reactions_source.sto",
     "feet.sto",
     "feet_source.sto",
+    "feet_sd.sto",
     "angles.sto",
     "failures.log",
 )
