@@ -22,7 +22,11 @@ def live(made: Made) -> list[FootLoads]:
     recording = made.recording
     segments = {name: f"foot_{side}" for side, names in FOOT_MARKERS.items() for name in names}
     spec = SimpleNamespace(markers=[SimpleNamespace(segment=segments.get(n, "body")) for n in recording.marker_names])
-    initial: Any = SimpleNamespace(feet={side: f"foot_{side}" for side in FOOT_MARKERS}, spec=spec, ground=LABORATORY)
+    spec.segments = [SimpleNamespace(name="body", parent="ground")] + [
+        SimpleNamespace(name=f"foot_{side}", parent="body") for side in FOOT_MARKERS
+    ]
+    feet_of = {side: f"foot_{side}" for side in FOOT_MARKERS}
+    initial: Any = SimpleNamespace(feet=feet_of, contacts={}, spec=spec, ground=LABORATORY)
     feet = LiveFeet(initial, presets.default(), tuple(plate.name for plate in recording.plates), {})
     velocity = np.gradient(recording.markers, recording.time, axis=0)
     assert marker_velocities(recording).shape == velocity.shape

@@ -39,6 +39,7 @@ _SHORT_S = 6.0
     "preset",
     "estimate",
     *OF_THE_LABORATORY,
+    "contacts",
     "table",
     model="Model: fullbody (if not given), squat7, sagittal7, or a .toml or .osim file of your own.",
 )

@@ -27,7 +27,7 @@ Scheduler = Annotated[str | None, typer.Option(help="Address of the Dask cluster
 
 OF_A_MODEL = ("model", "markers", "static", "mass_kg", "height_m", "sex")
 OF_THE_LABORATORY = ("side", "vertical", "forward")
-OF_THE_PLATES = ("table", "plate_filter_hz", "force_threshold_n")
+OF_THE_PLATES = ("contacts", "table", "plate_filter_hz", "force_threshold_n")
 
 
 def with_settings(*keys: str, **meanings: str) -> Callable[[Command], Command]:
@@ -82,11 +82,17 @@ def _estimate(text: str) -> list[str]:
     return [] if text.strip() == "none" else [part.strip() for part in text.split(",") if part.strip()]
 
 
+def _contacts(text: str) -> list[Any]:
+    """`--contact seat,rail=hand_r` as a list; what is wrong with it is said with the settings."""
+    parts = [part.strip().partition("=") for part in text.split(",") if part.strip()]
+    return [{"name": name, "segment": segment} if equals else name for name, equals, segment in parts]
+
+
 def _same(value: Any) -> Any:
     return value
 
 
-_READ: dict[str, Callable[[Any], Any]] = {"forward": _forward, "estimate": _estimate}
+_READ: dict[str, Callable[[Any], Any]] = {"forward": _forward, "estimate": _estimate, "contacts": _contacts}
 
 
 @with_settings("preset")

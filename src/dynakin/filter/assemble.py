@@ -49,7 +49,12 @@ def assemble(
         undeclared: (T,) frames in which something bears the person that no plate measures.
     """
     data = _dataset(arrays, model, initial, recording, measured, feet)
-    data = with_sources(data, feet, np.zeros(len(recording.time), dtype=bool) if undeclared is None else undeclared)
+    data = with_sources(
+        data,
+        feet,
+        np.zeros(len(recording.time), dtype=bool) if undeclared is None else undeclared,
+        initial.feet.values(),
+    )
     if feet is not None:
         data = data.isel(foot=[name != RESIDUAL for name in feet.names])
     for name, covariance in zip(("initial_covariance", "final_covariance"), covariances, strict=True):
@@ -154,7 +159,11 @@ def _dataset(
         "joint_segment": ("joint", segments),
     }
     if feet is not None:
-        coords |= {"foot": list(feet.names), "foot_segment": ("foot", list(feet.segments))}
+        coords |= {
+            "foot": list(feet.names),
+            "foot_segment": ("foot", list(feet.segments)),
+            "foot_declared": ("foot", np.array([name in initial.contacts for name in feet.names], dtype=bool)),
+        }
         data |= _feet(arrays, feet)
     return xr.Dataset(data, coords=coords)
 

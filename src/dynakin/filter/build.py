@@ -43,6 +43,7 @@ def estimator_of(settings: Settings, lag: int = 0) -> Estimator:
         forward=settings.forward,
         estimate=settings.estimate,
         plates=settings.plates,
+        contacts=settings.contacts,
         loads=settings.loads,
         parameters=identified_of(settings),
         lag=lag,

@@ -14,11 +14,12 @@ from dynakin.filter.alignment import PASSES, run_in_step
 from dynakin.filter.assemble import assemble
 from dynakin.filter.augment import initial_covariance
 from dynakin.filter.contacts import ContactLoads
-from dynakin.filter.expected import expected_loads, root_path
+from dynakin.filter.expected import ContactPaths, expected_loads
 from dynakin.filter.samples import in_step, recording_arrays
 from dynakin.filter.total_wrench import Ground, doubtful_mass, known_ground
 from dynakin.filter.tracker import Progress, Tracker, whether_to_smooth
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.model.calibration.contacts import with_contacts
 from dynakin.model.calibration.loads import with_loads
 from dynakin.model.definition import Definition
 from dynakin.model.identified import IdentifiedSubject, with_identified
@@ -27,6 +28,7 @@ from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.tracking import without_lost
 from dynakin.settings import presets
+from dynakin.settings.contacts import DeclaredContact, declared
 from dynakin.settings.model import QUANTITIES, Bounds, Priors, Quantity
 from dynakin.settings.noise import Noise
 from dynakin.settings.strict import nearest
@@ -61,7 +63,10 @@ class Estimator:
         vertical, forward: laboratory directions, found in the recording where "auto".
         estimate: kinds of parameters to estimate, of "lengths", "markers", "soft_tissue" and "inertia"; the others stay
             as they are at the start (displacements of skin are then noise of the markers).
-        plates: plate -> "right" or "left", where a floating model's own assignment of plates to feet is wrong.
+        plates: plate -> "right", "left" or a declared contact, where a floating model's own assignment of plates to
+            feet is wrong.
+        contacts: what else bears or pulls the person: names ("seat", "hand_right", a segment of the model), or mappings
+            with ``name`` and ``segment``.
         loads: known masses that the person carries; the subject's mass is then needed, without them.
         parameters: an identified subject (`model.identified`), whose values and deviations the filter starts from.
         lag: frames by which `Tracker.delayed` lies behind `Tracker.step`, for smoothing while it is measured; 0: none.
@@ -76,6 +81,7 @@ class Estimator:
     forward: str | tuple[float, float, float]
     estimate: tuple[Quantity, ...]
     plates: Mapping[str, str]
+    contacts: tuple[DeclaredContact, ...]
     lag: int
     loads: tuple[CarriedLoad, ...]
     parameters: IdentifiedSubject | None
@@ -92,6 +98,7 @@ class Estimator:
         forward: str | tuple[float, float, float] = "auto",
         estimate: Sequence[Quantity] = QUANTITIES,
         plates: Mapping[str, str] | None = None,
+        contacts: Sequence[str | Mapping[str, str] | DeclaredContact] = (),
         lag: int = 0,
         loads: Sequence[CarriedLoad] = (),
         parameters: IdentifiedSubject | None = None,
@@ -116,6 +123,7 @@ class Estimator:
             "forward": forward,
             "estimate": tuple(kind for kind in QUANTITIES if kind in estimate),
             "plates": dict(plates or {}),
+            "contacts": declared(contacts),
             "lag": lag,
             "loads": tuple(loads),
             "parameters": parameters,
@@ -141,7 +149,7 @@ class Estimator:
         )
         if self.parameters is not None:
             calibrated = with_identified(calibrated, self.parameters)
-        return with_loads(calibrated, self.loads)
+        return with_contacts(with_loads(calibrated, self.loads), self.contacts)
 
     def start(self, source: Recording | CalibratedModel, *, static: Recording | None = None) -> Tracker:
         """A tracker that is ready for its first sample, of a recording to calibrate on or of a calibrated model.
@@ -207,9 +215,8 @@ class Estimator:
         if feet is not None:
             on_feet = feet(calibrated)
         elif ground.loads is not None:
-            on_feet = expected_loads(
-                ground.loads, calibrated, self.noise, root_path(calibrated, markers), ground.undeclared
-            )
+            paths = ContactPaths.of(calibrated).at(markers)
+            on_feet = expected_loads(ground.loads, calibrated, self.noise, paths, ground.undeclared, ground.bears)
         try:
             doubt = doubtful_mass(wrench, calibrated.weighed_kg, ground.load_ratio)
             passes = 0 if doubt else PASSES
@@ -253,6 +260,7 @@ class Estimator:
         return {
             "model": str(self.model.path if self.model.path.parent.name != "builtin" else self.model.name),
             "side": self.side,
+            "contacts": [contact.model_dump(mode="json", exclude_none=True) for contact in self.contacts],
             "loads": [load.model_dump(mode="json") for load in self.loads],
             "identified": None if self.parameters is None else self.parameters.use,
             "vertical": self.vertical,

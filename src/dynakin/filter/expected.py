@@ -8,6 +8,7 @@ and their deviations say how far it does (docs/derivations.md, section 15).
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -19,6 +20,7 @@ from dynakin.recordings.feet import loads as on_plates
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.plates.pressure import LOADED_N
+from dynakin.settings.contacts import SEAT
 from dynakin.settings.noise import Noise
 from dynakin.units import GRAVITY_M_S2
 
@@ -38,6 +40,14 @@ FREE_MOMENT_M = 0.01
 """Free moment over push: 5 to 10 N m of a grown person's foot."""
 UNDECLARED_SD = 3.0
 """Part of the weight, and as many metres of it, that something undeclared may bear: as good as anything."""
+SEAT_MEAN, SEAT_SD = np.array([0.0, 0.4, 0.0]), np.array([0.1, 0.4, 0.1])
+"""Parts of the weight: forwards, upwards, to the right."""
+SEAT_MOMENT_M = np.array([0.06, 0.02, 0.06])
+"""Moment over the weight: a centre of pressure within 0.12 m of half of it."""
+BELOW_PELVIS_M = 0.2
+"""How far below the middle of the pelvis' markers it acts: those are a hand's breadth above the hips."""
+HAND_SD, HAND_MOMENT_M = np.full(3, 0.2), np.full(3, 0.02)
+"""The same of anything else, at its segment's markers: a decimetre of a fifth of the weight."""
 _WHITE_N, _WHITE_NM = 5.0, 2.0  # of a wrench that is a state
 _LEAST_HEIGHT_M = 0.3  # of the pelvis over the sole, for the direction
 
@@ -59,23 +69,37 @@ class Prior(NamedTuple):
 
 
 def expected_loads(
-    loads: FootLoads, initial: CalibratedModel, noise: Noise, root: Array, undeclared: Flags
+    loads: FootLoads, initial: CalibratedModel, noise: Noise, paths: Array, undeclared: Flags, bears: Flags
 ) -> ContactLoads:
-    """The feet's wrenches and, last, the residual: what neither they nor the model explain, on the root.
+    """The feet's wrenches, those of the declared contacts and, last, the residual: what neither they nor the model
+    explain, on the root.
 
     Args:
-        root: (T, 3) m, where the root segment is. undeclared: (T,) frames in which something else bears the person.
+        paths: (T, 1 + C, 3) m, where the root is and where the C declared contacts act (`ContactPaths`).
+        undeclared: (T,) frames in which something else bears the person.
+        bears: (T, C) frames in which a declared contact may bear; where plates measure it, these say.
     """
-    weight = initial.weighed_kg * GRAVITY_M_S2
-    contact = np.vectorize(_CONTACT.get, otypes=[np.uint8])(loads.reason)
-    frames, F = contact.shape
-    wrench = np.nan_to_num(np.where((contact == NO_CONTACT)[..., None], 0.0, loads.wrench))
-    wrench = np.concatenate([wrench, np.zeros((frames, 1, 6))], axis=1)
-    errors, effects = np.zeros((frames, F + 1, 6, F + 1, 6)), np.zeros((frames, 6, F, 6))
+    weight, root, C = initial.weighed_kg * GRAVITY_M_S2, paths[:, 0], len(initial.contacts)
+    feet = np.vectorize(_CONTACT.get, otypes=[np.uint8])(loads.reason)
+    frames, F = feet.shape
+    K = F + C
+    contact = np.concatenate([feet, np.where(bears, UNMEASURED, NO_CONTACT).astype(np.uint8)], axis=1)
+    wrench = np.zeros((frames, K + 1, 6))
+    wrench[:, :F] = np.nan_to_num(loads.wrench)
+    for k, name in enumerate(initial.contacts, start=F):
+        if (measured := loads.others.get(name)) is not None:
+            contact[:, k] = np.where(measured.any(axis=1), ON_PLATE, NO_CONTACT)
+            contact[np.isnan(measured).any(axis=1), k] = UNMEASURED
+            wrench[:, k] = np.nan_to_num(measured)
+    wrench[:, :K][contact == NO_CONTACT] = 0.0
+    errors, effects = np.zeros((frames, K + 1, 6, K + 1, 6)), np.zeros((frames, 6, K, 6))
     shared: list[Prior] = []
-    for k in range(F):
+    for k in range(K):
         errors[:, k, :, k] = plate_errors(wrench[:, k])
-        prior = foot_prior(loads, k, weight, root)
+        if k < F:
+            prior = foot_prior(loads, k, weight, root)
+        else:
+            prior = declared_prior(list(initial.contacts)[k - F], weight, paths[:, 1 + k - F])
         shared.append(prior)
         off = contact[:, k] == UNMEASURED
         wrench[off, k], effects[off, :, k] = prior.mean[off], prior.spread[off]
@@ -83,15 +107,15 @@ def expected_loads(
     for t in np.flatnonzero((contact == SHARED_PLATE).any(axis=1)):
         _divide(int(t), np.flatnonzero(contact[t] == SHARED_PLATE), shared, wrench, errors)
     size = [noise.residual_force_sd_n] * 3 + [noise.residual_moment_sd_nm] * 3
-    errors[:, F, :, F] = _about(root, np.where(undeclared[:, None], UNDECLARED_SD * weight, size))
+    errors[:, K, :, K] = _about(root, np.where(undeclared[:, None], UNDECLARED_SD * weight, size))
     residual = np.where(undeclared, UNMEASURED, ON_PLATE if all(size) else NO_CONTACT)
     pelvis = next(s.name for s in initial.spec.segments if s.parent == "ground")
     return ContactLoads(
-        names=(*loads.feet, RESIDUAL),
-        segments=(*(initial.feet[foot] for foot in loads.feet), pelvis),
+        names=(*loads.feet, *initial.contacts, RESIDUAL),
+        segments=(*(initial.feet[foot] for foot in loads.feet), *initial.contacts.values(), pelvis),
         wrench=wrench,
-        covariance=errors.reshape(frames, 6 * F + 6, 6 * F + 6),
-        effects=effects.reshape(frames, 6, 6 * F),
+        covariance=errors.reshape(frames, 6 * K + 6, 6 * K + 6),
+        effects=effects.reshape(frames, 6, 6 * K),
         contact=np.column_stack([contact, residual]).astype(np.uint8),
         known=~undeclared,
     )
@@ -134,6 +158,16 @@ def foot_prior(loads: FootLoads, k: int, weight: float, root: Array) -> Prior:
     return Prior((X @ (weight * share[:, None] * direction)[..., None])[..., 0], X @ spread)
 
 
+def declared_prior(name: str, weight: float, place: Array) -> Prior:
+    """Of a declared contact at (T, 3) m: a seat pushes upwards and bears up to nine tenths of the weight, others push
+    or pull in any direction. The six numbers are those of `foot_prior`, about the place."""
+    mean, force, moment = (SEAT_MEAN, SEAT_SD, SEAT_MOMENT_M) if name == SEAT else (np.zeros(3), HAND_SD, HAND_MOMENT_M)
+    push = np.zeros((len(place), 6, 1))
+    push[:, :3, 0] = weight * np.asarray(mean)
+    X = carry(place)
+    return Prior((X @ push)[..., 0], X @ np.diag(weight * np.concatenate([force, moment])))
+
+
 def _about(point: Array, sd: Array) -> Array:
     """(T, 6, 6) about the ground's origin of independent errors sd, (6,) or (T, 6), about a point (T, 3)."""
     spread = carry(point) * np.broadcast_to(sd, (len(point), 6))[:, None]
@@ -153,11 +187,46 @@ def _divide(t: int, feet: npt.NDArray[np.intp], priors: list[Prior], wrench: Arr
             errors[t, k, :, j] = (each[k] if j == k else 0.0) - gains[k] @ each[j]
 
 
-def root_path(initial: CalibratedModel, markers: Array) -> Array:
-    """(T, 3) m: middle of the root segment's markers (T, M, 3) of the model, drawn over gaps by straight lines."""
-    root = next(s.name for s in initial.spec.segments if s.parent == "ground")
-    own = [k for k, marker in enumerate(initial.spec.markers) if marker.segment == root]
-    places = markers[:, own] if own else markers
+@dataclass(frozen=True)
+class ContactPaths:
+    """Where the root and the declared contacts are: by which markers of the model, and how far below them (m)."""
+
+    markers: tuple[list[int], ...]
+    below_m: tuple[float, ...]
+
+    @classmethod
+    def of(cls, initial: CalibratedModel) -> ContactPaths:
+        """Those of a calibrated model."""
+        root = next(s.name for s in initial.spec.segments if s.parent == "ground")
+        own = marked_segments(initial)
+        below = [BELOW_PELVIS_M if name == SEAT else 0.0 for name in initial.contacts]
+        return cls((own[root], *(own[segment] for segment in initial.contacts.values())), (0.0, *below))
+
+    def at(self, markers: Array) -> Array:
+        """(T, 1 + C, 3) m, of the model's markers (T, M, 3) m, drawn over gaps by straight lines."""
+        paths = [
+            _middle(markers[:, own]) - [0.0, below, 0.0] for own, below in zip(self.markers, self.below_m, strict=True)
+        ]
+        return np.stack(paths, axis=1)
+
+
+def marked_segments(initial: CalibratedModel) -> dict[str, list[int]]:
+    """Segment -> numbers of its markers, those of the nearest segment towards the root that has some where it has none;
+    all markers where there is no such segment."""
+    parents = {s.name: s.parent for s in initial.spec.segments}
+    segments = [marker.segment for marker in initial.spec.markers]
+
+    def of(segment: str) -> list[int]:
+        own = [k for k, name in enumerate(segments) if name == segment]
+        if own or segment not in parents:
+            return own or list(range(len(segments)))
+        return of(parents[segment])
+
+    return {name: of(name) for name in parents}
+
+
+def _middle(places: Array) -> Array:
+    """(T, 3) m of points (T, K, 3)."""
     seen: Flags = np.asarray(np.isfinite(places).all(axis=2))
     with np.errstate(invalid="ignore"):
         path = np.where(seen[..., None], places, 0.0).sum(axis=1) / seen.sum(axis=1, keepdims=True)

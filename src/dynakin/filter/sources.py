@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
@@ -14,7 +16,9 @@ Flags = npt.NDArray[np.bool_]
 Codes = npt.NDArray[np.uint8]
 
 
-def with_sources(data: xr.Dataset, feet: ContactLoads | None, undeclared: Flags) -> xr.Dataset:
+def with_sources(
+    data: xr.Dataset, feet: ContactLoads | None, undeclared: Flags, soles: Collection[str] = ()
+) -> xr.Dataset:
     """The dataset of an estimate with ``foot_source``, ``moment_source`` and ``joint_source``, and NaN where absent.
 
     A load is as good as the worst of the contacts behind its joint (`contact_sources`). Where something undeclared
@@ -26,6 +30,7 @@ def with_sources(data: xr.Dataset, feet: ContactLoads | None, undeclared: Flags)
         data: with the joints' tree and, of floating models, the core's ``moment_source``.
         feet: contacts (T, F) and the segments on which they act; None of a model that stands on its root.
         undeclared: (T,) frames in which something bears the person that no plate measures.
+        soles: segments on which the ground acts.
     """
     segments = [str(name) for name in data["joint_segment"].values]
     parents = data["joint_parent"].values
@@ -40,7 +45,10 @@ def with_sources(data: xr.Dataset, feet: ContactLoads | None, undeclared: Flags)
         for name in ("foot_wrench", "foot_wrench_sd"):
             if name in data:
                 data[name] = data[name].where(data["foot_source"] != ABSENT)
-        joints, legs = _joint_codes(feet, undeclared, segments, parents)
+        joints = _behind(
+            contact_sources(feet.contact, undeclared), [segments.index(name) for name in feet.segments], parents
+        )
+        legs = _below_the_thighs([segments.index(name) for name in soles], parents)
         moments = data["moment_source"].transpose("time", "coordinate").values.copy()
     joints[np.ix_(undeclared, ~legs)] = ABSENT
     moments[undeclared[:, None] & (joints[:, moved] == ABSENT)] = ABSENT
@@ -58,18 +66,20 @@ def with_sources(data: xr.Dataset, feet: ContactLoads | None, undeclared: Flags)
 class LiveSources:
     """The same of a model's moments, frame by frame."""
 
-    def __init__(self, spec: _core.ModelSpec) -> None:
+    def __init__(self, spec: _core.ModelSpec, soles: Collection[str]) -> None:
         self._segments = [segment.name for segment in spec.segments]
         self._parents = np.array([_place(self._segments, segment.parent) for segment in spec.segments])
         self._moved = [self._segments.index(name) for name in moved_segments(spec)]
+        self._legs = _below_the_thighs([self._segments.index(name) for name in soles], self._parents)
 
     def moments(self, feet: ContactLoads | None) -> Codes:
         """(C,) codes of a frame's moments by its contacts (T = 1); measured, as far as anybody knows, without any."""
         if feet is None:
             return np.full(len(self._moved), MEASURED, dtype=np.uint8)
         undeclared = ~feet.known
-        joints, legs = _joint_codes(feet, undeclared, self._segments, self._parents)
-        joints[np.ix_(undeclared, ~legs)] = ABSENT
+        at = [self._segments.index(name) for name in feet.segments]
+        joints = _behind(contact_sources(feet.contact, undeclared), at, self._parents)
+        joints[np.ix_(undeclared, ~self._legs)] = ABSENT
         return np.asarray(joints[0, self._moved])
 
 
@@ -84,16 +94,6 @@ def moved_segments(spec: _core.ModelSpec) -> list[str]:
 
 def _place(names: list[str], name: str) -> int:
     return names.index(name) if name in names else -1
-
-
-def _joint_codes(
-    feet: ContactLoads, undeclared: Flags, segments: list[str], parents: npt.NDArray[np.int_]
-) -> tuple[Codes, Flags]:
-    """(T, J) codes of the joints' loads by the contacts behind them, and (J,) which joints are of a leg."""
-    contacts = contact_sources(feet.contact, undeclared)
-    joints = _behind(contacts, [segments.index(name) for name in feet.segments], parents)
-    joints[undeclared[:, None] & (joints != MEASURED)] = ABSENT  # a foot on no plate may be what bears the person
-    return joints, _below_the_thighs([segments.index(name) for name in dict.fromkeys(feet.segments)], parents)
 
 
 def _behind(contacts: Codes, at: list[int], parents: npt.NDArray[np.int_]) -> Codes:

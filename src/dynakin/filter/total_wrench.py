@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import runs
 from dynakin.errors import RecordingError
-from dynakin.filter.closure import EXCESS, Closure, closure
+from dynakin.filter.closure import EXCESS, LASTING, Closure, closure
+from dynakin.filter.declared import bearing, may_bear
+from dynakin.filter.expected import ContactPaths
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.checks import PlateCheck, check_plates
 from dynakin.recordings.feet import loads as on_plates
@@ -46,6 +48,7 @@ class Ground:
         loads: of each foot; None of a model that stands on its root.
         undeclared: (T,) frames in which something bears or pulls the person that no plate measures (a seat, a rail, a
             cable), wherever it acts: of the moments only those between the plates and the thighs are known.
+        bears: (T, C) frames in which each declared contact bears, or may, where no plate measures it.
         usable: whether the plates are used at all.
         load_ratio: what they carry over what the declared mass needs (`Closure`); None where that is not known.
         notes: what there is to say. reasons: those of them that say why something is not measured.
@@ -53,6 +56,7 @@ class Ground:
 
     loads: FootLoads | None
     undeclared: Flags
+    bears: Flags
     usable: bool
     load_ratio: float | None
     notes: tuple[str, ...]
@@ -94,13 +98,21 @@ def known_ground(
     n = recording.n_frames
     loads = None
     if initial.feet:
-        loads = foot_loads(recording, initial.ground, foot_markers(initial), assigned=assigned)
+        loads = foot_loads(
+            recording, initial.ground, foot_markers(initial), assigned=assigned, others=list(initial.contacts)
+        )
+    names = list(initial.contacts)
+    by_plate = [loads is not None and name in loads.others for name in names]
+    may = np.zeros((n, 0), dtype=bool)
+    if names:
+        paths, floor = ContactPaths.of(initial).at(markers), float(np.nanmin(markers[..., 1]))
+        may = may_bear(initial, paths, floor, float(paths[:, 0, 1].max()) - floor) & ~np.array(by_plate)
     if not recording.plates:
         text = (
             "No force plates: the ground reaction follows from the motion where one foot may stand, and where both may "
             "how they divide it is assumed; inertial parameters stay as the table has them."
         )
-        return Ground(loads, np.zeros(n, dtype=bool), False, None, (text,), (text,))
+        return Ground(loads, np.zeros(n, dtype=bool), may, False, None, (text,), (text,))
     # steps off the plates: their mean load is no mass
     mass = None if initial.feet else initial.weighed_kg
     check = check_plates(recording, initial.ground, mass, foot_markers(initial), loads)
@@ -118,12 +130,17 @@ def known_ground(
         reasons += loads.reasons
     found = closure(initial, recording.time, markers, wrench, claimed)
     if found is None:
-        flight = np.zeros(n, dtype=bool) if loads is None else loads.aloft.all(axis=1)  # which weighs nobody
-        foreign = _foreign_load(check, wrench, claimed & ~flight, initial, tolerance)
+        bears = may
+        flies = loads is not None and bool(loads.aloft.all(axis=1).any())  # which weighs nobody
+        foreign = None if flies or names else _foreign_load(check, wrench, claimed, initial, tolerance)
         undeclared |= foreign is not None
         reasons += [foreign] if foreign else []
         notes.append(UNJUDGED)
     else:
+        bears = bearing(found, may, names, by_plate, claimed, recording.rate)
+        if bears.any():
+            reasons.append(_declared_in_words(found, bears, names, recording.time))
+            found = replace(found, undeclared=found.undeclared & ~bears.any(axis=1))
         undeclared |= found.undeclared | _nearly_all(found)
         if found.undeclared.any():
             text, beside = _undeclared_in_words(found, recording, initial, markers, wrench)
@@ -133,7 +150,10 @@ def known_ground(
                 f"In {found.unjudged} of {n} frames too few markers are seen to check that the plates carry the person."
             )
     if loads is not None:
-        before, loads = loads, loads.with_undeclared(undeclared).without(beside)
+        before, loads = (
+            loads,
+            loads.with_borne(np.asarray(bears.any(axis=1))).with_undeclared(undeclared).without(beside),
+        )
         for k, foot in enumerate(loads.feet):
             light = (loads.reason[:, k] != before.reason[:, k]) & (before.reason[:, k] == on_plates.MEASURED)
             if (light & ~beside[:, k]).any():
@@ -146,12 +166,27 @@ def known_ground(
     if loads is not None or used < n:
         notes.append(f"The total wrench is measured in {used} of {n} frames.")
     ratio = None if found is None else found.load_ratio
-    return Ground(loads, undeclared, used > 0, ratio, (*notes, *reasons), tuple(reasons))
+    return Ground(loads, undeclared, bears, used > 0, ratio, (*notes, *reasons), tuple(reasons))
 
 
 def _nearly_all(found: Closure) -> bool:
     judged = np.isfinite(found.excess[:, 1])
     return bool(np.count_nonzero(found.undeclared & judged) > _NEARLY_ALL * np.count_nonzero(judged))
+
+
+def _declared_in_words(found: Closure, bears: Flags, names: list[str], time: Array) -> str:
+    """A sentence on when declared contacts bear, and on how much the plates lack there."""
+    spans = [
+        f"the {name} from {', '.join(f'{time[a]:.2f} to {time[b - 1]:.2f} s' for a, b in runs(bears[:, c]))}"
+        for c, name in enumerate(names)
+        if bears[:, c].any()
+    ]
+    excess = np.abs(found.excess[bears.any(axis=1)])
+    size = f" (up to {np.nanmax(excess):.0f} N by the motion)" if np.isfinite(excess).any() else ""
+    return (
+        f"Declared contacts bear what the plates lack{size}: {' and '.join(spans)}. The total wrench is not measured "
+        "there; what depends on these contacts is derived from the motion."
+    )
 
 
 def _undeclared_in_words(
@@ -195,7 +230,8 @@ def _undeclared_in_words(
     return (
         f"Warning: the plates carry up to {abs(size):.0f} N {'less' if size > 0.0 else 'more'} "
         f"{'upwards' if axis == 1 else 'sideways'} than the motion needs ({abs(size) / weight:.0%} of the weight, "
-        f"expected within {EXCESS:.0%}): something that no plate measures bears or pulls the person there (a seat, a "
+        f"expected within {EXCESS:.0%}, and {LASTING:.0%} for longer than a second): something that no plate "
+        "measures bears or pulls the person there (a seat, a "
         f"rail, a box, a foot off its plate){near}, from {', '.join(spans)}. The total wrench is left out there."
     ), beside
 

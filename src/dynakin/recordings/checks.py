@@ -118,6 +118,9 @@ def check_plates(
         if not len(loaded):
             findings.say(f"{plate.name} carries nothing ({'standing' if standing else 'the whole recording'}).")
             continue
+        if p in loads.given:
+            findings.say(f"{plate.name} bears the {loads.given[p]}, as given.")
+            continue
         foot = _check_pressure(plate, loaded, feet, _owner(loads, loaded, p), ground, findings)
         _check_free_moment(plate, loaded, ground, findings)
         _check_level(plate, ground, findings)

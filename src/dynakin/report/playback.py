@@ -104,7 +104,7 @@ def playback(estimate: Estimate) -> Playback:
         curve_label=label,
         last=len(frames) - 1,
         end_time=f"{estimate.time[frames[-1]]:.2f} s",
-        feet=estimate.foot_names,
+        feet=estimate.contact_names,
         has_reaction=bool(len(forces)),
         has_measured=bool(np.isfinite(arrays["measured_sizes"]).any()),
         has_mass_centre="mass_centre" in arrays,
@@ -159,7 +159,7 @@ def _arrows(estimate: Estimate, arrays: dict[str, Array]) -> list[dict[str, Any]
     """Adds points of action (mm), forces and their sizes (N) to ``arrays``; what to draw of them, measured ones
     behind."""
     entries: list[dict[str, Any]] = []
-    feet, modelled = estimate.foot_names, estimate.modelled_axes()
+    feet, modelled = estimate.contact_names, estimate.modelled_axes()
     total = wrench_sources(estimate.data)
     total = total[:, (total != ABSENT).any(axis=0)].max(axis=1, initial=0, keepdims=True)  # what is modelled
     arrays["sources"] = (foot_sources(estimate.data) if feet else total).astype(float)

@@ -112,6 +112,13 @@ class Estimate:
     @property
     def foot_names(self) -> list[str]:
         """The feet whose wrenches the moments were made with; none in a model that stands on its root."""
+        declared = self.data.coords.get("foot_declared")
+        names = self.contact_names
+        return names if declared is None else [n for n, other in zip(names, declared.values, strict=True) if not other]
+
+    @property
+    def contact_names(self) -> list[str]:
+        """The feet, and after them the contacts that were declared beside them: all of the dimension ``foot``."""
         return [str(name) for name in self.data["foot"].values] if "foot" in self.data.coords else []
 
     @property

@@ -11,6 +11,7 @@ from pydantic import Field, model_validator
 from dynakin.errors import ConfigError, DynakinError
 from dynakin.files import is_file
 from dynakin.settings import presets
+from dynakin.settings.contacts import DeclaredContact, check_names
 from dynakin.settings.model import QUANTITIES, Bounds, OpenSimOptions, Priors, Quantity
 from dynakin.settings.noise import Noise
 from dynakin.settings.strict import Strict, read_toml, validate
@@ -23,6 +24,7 @@ _OPTIONS = {
     "mass_kg": ("--mass",),
     "height_m": ("--height",),
     "smooth": ("--smooth/--live-like",),
+    "contacts": ("--contact",),
 }
 # Keys that name files: relative to the configuration file that they stand in.
 _PATHS = ("trial", "forces", "static", "parameters", "output")
@@ -73,8 +75,12 @@ class Settings(Strict, use_attribute_docstrings=True):
     estimate: tuple[Quantity, ...] = QUANTITIES
     """Which parameters are estimated, of lengths, markers (their places), soft_tissue (displacements) and inertia; as
     an option with commas, or none. The others stay as they are at the start."""
-    plates: dict[str, Literal["right", "left"]] | None = Field(default=None, examples=[{"plate 1": "right"}])
-    """Which foot stands on a plate ("plate 1" = "right"), for floating models. Not given: found."""
+    plates: dict[str, str] | None = Field(default=None, examples=[{"plate 1": "right"}])
+    """What bears on a plate, for floating models: a foot ("plate 1" = "right"), or a declared contact ("plate 3" =
+    "seat"). Not given: the foot that stands on it."""
+    contacts: tuple[DeclaredContact, ...] = ()
+    """What else bears or pulls the person, measured or not, for floating models: "seat", "hand_right", a segment of the
+    model, or {name = "rail", segment = "hand_r"}; as an option with commas, seat,rail=hand_r."""
     vertical: str = "auto"
     """Axis of the laboratory that points up: auto (found), or one of +X -X +Y -Y +Z -Z."""
     forward: str | tuple[float, float, float] = "auto"
@@ -147,6 +153,7 @@ class Settings(Strict, use_attribute_docstrings=True):
         try:
             self.subject()
             self.noise_settings()
+            check_names(self.contacts)
             if self.loads and self.mass_kg is None:
                 raise ConfigError("loads: the plates carry them too, expected mass_kg, the person's own")
         except DynakinError as error:

@@ -9,8 +9,10 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.bindings import _core
+from dynakin.errors import ConfigError
 from dynakin.filter.contacts import ContactLoads
-from dynakin.filter.expected import expected_loads, root_path
+from dynakin.filter.declared import may_bear
+from dynakin.filter.expected import ContactPaths, expected_loads
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.assignment import BETWEEN_M
 from dynakin.recordings.feet.belt import WINDOW_S, one_velocity
@@ -47,7 +49,7 @@ class LiveFeet:
     stance that no plate has carried yet is off the plates.
 
     Args:
-        assigned: plate -> "right" or "left", where it is known.
+        assigned: plate -> "right", "left" or a declared contact, where it is known.
     """
 
     def __init__(
@@ -55,8 +57,15 @@ class LiveFeet:
     ) -> None:
         self.initial, self.noise, self.plates = initial, noise, plates
         self.feet = tuple(initial.feet)
-        self._assigned = {p: self.feet.index(assigned[name]) for p, name in enumerate(plates) if name in assigned}
+        given = {p: assigned[name] for p, name in enumerate(plates) if name in assigned}
+        if unknown := [name for name in given.values() if name not in (*self.feet, *initial.contacts)]:
+            expected = ", ".join((*self.feet, *initial.contacts))
+            raise ConfigError(f"plates: {unknown[0]!r} is given a plate, expected one of {expected}")
+        self._assigned = {p: self.feet.index(name) for p, name in given.items() if name in self.feet}
+        self._given = {p: name for p, name in given.items() if name in initial.contacts}
         segments = [marker.segment for marker in initial.spec.markers]
+        self._paths = ContactPaths.of(initial)
+        self._highest, self._lowest = -np.inf, np.inf  # of the root, and of all markers
         own = [np.flatnonzero([s == initial.feet[foot] for s in segments]) for foot in self.feet]
         F, P, M = len(self.feet), len(plates), len(segments)
         self._own = np.full((F, max(map(len, own), default=0)), M)  # markers of each foot, filled up with M: none
@@ -97,9 +106,14 @@ class LiveFeet:
         ahead[offset : offset + size] += dt * state[speeds : speeds + size]
         before, places = _core.marker_positions(model, state), _core.marker_positions(model, ahead)
         loads = self.loads(time_s, places, (places - before) / dt, wrenches)
-        root = root_path(self.initial, places[None])
+        paths = self._paths.at(places[None])
+        self._lowest = min(self._lowest, float(places[:, 1].min()))
+        self._highest = max(self._highest, float(paths[0, 0, 1]))
+        bears = may_bear(self.initial, paths, self._lowest, self._highest - self._lowest)
+        bears &= ~np.array([name in loads.others for name in self.initial.contacts], dtype=bool)
         undeclared = loads.elsewhere & (wrenches is not None)
-        return expected_loads(loads, self.initial, self.noise, root, undeclared), bool(loads.total_known[0])
+        whole = bool(loads.total_known[0] and not bears.any())
+        return expected_loads(loads, self.initial, self.noise, paths, undeclared, bears), whole
 
     def loads(self, time_s: float, places: Array, velocity: Array, wrenches: Array | None) -> FootLoads:
         """The same as loads (T = 1).
@@ -113,6 +127,7 @@ class LiveFeet:
         aloft = moves & ~bears & (stands.sum() > stands)  # high alone may be a pedal: no later stance is known yet
         self._near[~bears], self._loaded[~bears] = 0, 0
         plates = [] if wrenches is None else self._plates(wrenches)
+        given = self._given if plates else {}
         if plates:
             self._assign(plates, outlines, bears, low)
             loaded = np.array([plate.loaded[0] for plate in plates])
@@ -122,7 +137,9 @@ class LiveFeet:
         on = self._owners[:, : len(plates)]
         soles = self._soles(outlines, bears, time_s, places)
         seen_none = np.zeros_like(off)  # the model shows all of them
-        loads = divided(self.feet, plates, soles, self._marked, on[None], off[None], seen_none[None], aloft[None])
+        loads = divided(
+            self.feet, plates, soles, self._marked, on[None], off[None], seen_none[None], aloft[None], given
+        )
         for p in np.flatnonzero(on.sum(axis=0) > 1) if (loads.reason == SHARED).any() else ():
             self._say(
                 f"Both feet stand on {self.plates[p]}: its wrench is divided between them by its centre of pressure."
@@ -236,6 +253,7 @@ class LiveFeet:
             near |= apart & (distance_to_hull(cops, both) < BETWEEN_M)
         for p, foot in self._assigned.items():
             near[:, p] = np.arange(F) == foot
+        near[:, list(self._given)] = False
         loaded = np.array([plate.loaded[0] for plate in plates])
         self._loaded += touches[:, None] & loaded
         self._near += touches[:, None] & loaded & near

@@ -67,6 +67,7 @@ def case_of(
         config.forward,
         config.estimate,
         config.plates,
+        config.contacts,
         config.loads,
         identified_of(config),
         config.smooth,

@@ -13,6 +13,7 @@ from dynakin.model.identified import IdentifiedSubject
 from dynakin.recordings.smoothing import CUTOFF_HZ
 from dynakin.results.measures.angles import Signs
 from dynakin.settings import presets
+from dynakin.settings.contacts import DeclaredContact
 from dynakin.settings.model import QUANTITIES, Bounds, Priors, Quantity
 from dynakin.settings.noise import Noise
 from dynakin.settings.subject import CarriedLoad
@@ -26,7 +27,8 @@ class Setup:
         definition: what `load_model` returns.
         noise: settings of each filter that is compared, by the name of its preset.
         cutoff_hz: of the reference methods' zero-lag low-pass, Hz.
-        priors, bounds, side, vertical, forward, estimate, plates, loads, parameters: as `Estimator` takes them.
+        priors, bounds, side, vertical, forward, estimate, plates, contacts, loads, parameters: as `Estimator` takes
+            them.
         smooth: as `Estimator.run`. zero, signs: of the joint angles, as in a run's configuration.
     """
 
@@ -40,6 +42,7 @@ class Setup:
     forward: str | tuple[float, float, float] = "auto"
     estimate: tuple[Quantity, ...] = QUANTITIES
     plates: Mapping[str, str] | None = None
+    contacts: tuple[DeclaredContact, ...] = ()
     loads: tuple[CarriedLoad, ...] = ()
     parameters: IdentifiedSubject | None = None
     smooth: bool | None = None
@@ -64,6 +67,7 @@ class Setup:
             forward=self.forward,
             estimate=self.estimate,
             plates=self.plates,
+            contacts=self.contacts,
             loads=self.loads,
             parameters=self.parameters,
         )

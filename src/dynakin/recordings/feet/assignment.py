@@ -45,32 +45,34 @@ def foot_loads(
     foot_markers: Mapping[str, Sequence[str]],
     *,
     assigned: Mapping[str, str] | None = None,
+    others: Sequence[str] = (),
 ) -> FootLoads:
     """Give each plate's load to the foot that stands on it.
 
     Args:
         ground: the frame and origin of the wrenches.
         foot_markers: foot -> names of the markers on it, and on its toes.
-        assigned: plate -> foot, where the user knows better (the whole recording).
+        assigned: plate -> foot or declared contact, where the user knows better (the whole recording).
+        others: names of the contacts that are declared.
 
     Raises:
-        ConfigError: `assigned` names a plate or foot that there is not.
+        ConfigError: `assigned` names a plate, foot or contact that there is not.
     """
     fixed = dict(assigned or {})
-    _check_assigned(fixed, recording, tuple(foot_markers))
+    _check_assigned(fixed, recording, (*foot_markers, *others))
     plates = [GroundPlate.of(plate, ground) for plate in recording.plates]
     contacts = foot_contacts(recording, ground, foot_markers, plates)
     forward = ground.vectors_to_ground(ground.forward)[[0, 2]]
     return _Assignment(recording, tuple(foot_markers), contacts, plates, fixed).loads(forward)
 
 
-def _check_assigned(fixed: dict[str, str], recording: Recording, feet: tuple[str, ...]) -> None:
+def _check_assigned(fixed: dict[str, str], recording: Recording, bearers: tuple[str, ...]) -> None:
     names = [plate.name for plate in recording.plates]
     for plate, foot in fixed.items():
         if plate not in names:
             raise ConfigError(f"plates: {plate!r} is not in {recording.name}; expected one of {', '.join(names)}")
-        if foot not in feet:
-            raise ConfigError(f"plates: {plate!r} is given to {foot!r}, expected one of {', '.join(feet)}")
+        if foot not in bearers:
+            raise ConfigError(f"plates: {plate!r} is given to {foot!r}, expected one of {', '.join(bearers)}")
 
 
 def to_the_end(owners: Flags, pressed: Flags, steps: list[list[tuple[int, int]]]) -> Flags:
@@ -105,6 +107,9 @@ class _Assignment:
     ) -> None:
         self.recording, self.feet, self.contacts, self.plates, self.fixed = recording, feet, contacts, plates, fixed
         n, F, P = recording.n_frames, len(feet), len(plates)
+        self.given = {
+            p: fixed[plate.name] for p, plate in enumerate(plates) if fixed.get(plate.name, feet[0]) not in feet
+        }
         self.on = np.zeros((n, F, P), dtype=bool)  # this foot stands on this plate
         self.off = np.zeros((n, F), dtype=bool)  # it may stand off the plates
         self.hidden = np.zeros((n, F), dtype=bool)  # nobody sees it, and it may stand anywhere
@@ -126,7 +131,9 @@ class _Assignment:
             self.doubtful(p, plate)
             if any(p in pair for pair in swapped):
                 self.on[:, :, p] = False
-            if plate.name in fixed:
+            if p in self.given:
+                self.on[:, :, p] = False
+            elif plate.name in fixed:
                 self.on[:, :, p] = False
                 self.on[:, feet.index(fixed[plate.name]), p] = plate.pressed
 
@@ -225,7 +232,7 @@ class _Assignment:
         """Whether a press that is nobody's is only to be had by a foot that nobody sees: it is judged, and all others
         are seen, and not at its centre of pressure."""
         press = slice(start, stop)
-        if self.on[press, :, p].any() or not (self.plates[p].push[press] > JUDGED_N).any():
+        if p in self.given or self.on[press, :, p].any() or not (self.plates[p].push[press] > JUDGED_N).any():
             return False
         here = self.contacts[self.feet[k]].seen[press] & self.plates[p].loaded[press]
         if (here & ~self.under[press, k, p]).any():
@@ -306,10 +313,13 @@ class _Assignment:
         contacts = [self.contacts.get(foot) for foot in self.feet]
         marked = np.array([contact is not None for contact in contacts], dtype=bool)
         soles = Soles.of(contacts, forward, self.recording.rate, self.recording.n_frames)
-        loads = divided(self.feet, self.plates, soles, marked, self.on, self.off, self.hidden, self.aloft())
+        loads = divided(self.feet, self.plates, soles, marked, self.on, self.off, self.hidden, self.aloft(), self.given)
         reasons = [*self.off_in_words(), *(text for p in range(len(self.plates)) for text in self.lost_in_words(p))]
         said = [*self.belt_in_words(), *(text for p in range(len(self.plates)) for text in self.owners_in_words(p))]
-        said += plate_findings(self.recording.time, self.feet, contacts, self.plates, soles, self.on)
+        own = [p for p in range(len(self.plates)) if p not in self.given]
+        said += plate_findings(
+            self.recording.time, self.feet, contacts, [self.plates[p] for p in own], soles, self.on[:, :, own]
+        )
         if missing := [foot for foot in self.feet if foot not in self.contacts]:
             said.append(f"No markers of the {' and '.join(missing)} foot: it is taken to stand on the plates alone.")
         return replace(loads, messages=(*said, *reasons), reasons=tuple(reasons))
@@ -346,6 +356,8 @@ class _Assignment:
 
     def owners_in_words(self, p: int) -> list[str]:
         plate, owners, found = self.plates[p], self.on[:, :, p], list[str]()
+        if p in self.given:
+            found.append(f"{plate.name} carries the {self.given[p]} (given).")
         for k, foot in enumerate(self.feet):
             if owners[:, k].any():
                 how = "given" if plate.name in self.fixed else "by its centre of pressure"
@@ -366,7 +378,7 @@ class _Assignment:
             "total wrench is left out there."
             for a, b in runs(~plate.known)
         ]
-        if len(self.contacts) == len(self.feet):
+        if len(self.contacts) == len(self.feet) and p not in self.given:
             alone = ~self.on[:, :, p].any(axis=1) & (plate.push > JUDGED_N) & ~self.hidden.any(axis=1)
             found += [
                 f"Warning: {plate.name} carries up to {np.nanmax(plate.wrench[a:b, 1]):.0f} N where no foot stands, "

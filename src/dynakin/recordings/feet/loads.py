@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +11,7 @@ import numpy.typing as npt
 from dynakin.arrays import runs
 from dynakin.recordings.feet.soles import Soles
 from dynakin.recordings.plates.ground_plate import GroundPlate
-from dynakin.recordings.plates.pressure import JUDGED_N, LOADED_N
+from dynakin.recordings.plates.pressure import JUDGED_N, LOADED_N, UNLOADED_N
 from dynakin.recordings.recording import Array
 
 Flags = npt.NDArray[np.bool_]
@@ -39,6 +39,8 @@ class FootLoads:
         aloft: (T, F) feet that are surely in the air, by their markers alone.
         soles: where the feet's soles are, when they may bear load, and where it is expected.
         on: (T, F, P) which foot stands on which plate: the run's one assignment.
+        given: number of a plate -> the declared contact that bears on it, where it is no foot's.
+        others: declared contact -> (T, 6) wrench of the plates that were given to it, as ``wrench``.
         messages: sentences with times. reasons: those of them that say why something is not measured.
     """
 
@@ -51,6 +53,8 @@ class FootLoads:
     aloft: Flags
     soles: Soles
     on: Flags
+    given: Mapping[int, str] = field(default_factory=dict)
+    others: Mapping[str, Array] = field(default_factory=dict)
     messages: tuple[str, ...] = ()
     reasons: tuple[str, ...] = ()
 
@@ -70,6 +74,10 @@ class FootLoads:
             all_measured=self.all_measured & ~frames,
             elsewhere=self.elsewhere | frames,
         )
+
+    def with_borne(self, frames: Flags) -> FootLoads:
+        """The same where contacts that are declared bear the person in these frames (T,) beside the plates."""
+        return replace(self, total_known=self.total_known & ~frames, all_measured=self.all_measured & ~frames)
 
     def without(self, feet: Flags) -> FootLoads:
         """The same where these feet (T, F) may reach beyond their plates: what these measure is not all of them."""
@@ -109,6 +117,7 @@ def divided(
     off: Flags,
     hidden: Flags,
     aloft: Flags,
+    given: Mapping[int, str] | None = None,
 ) -> FootLoads:
     """The plates' wrenches given to the feet that stand on them.
 
@@ -116,12 +125,20 @@ def divided(
         marked: (F,) the foot has markers.
         on: (T, F, P) this foot stands on this plate. off: (T, F) it may stand off the plates. hidden: (T, F) it may
             stand anywhere: nobody sees it. aloft: (T, F) it is surely in the air.
+        given: number of a plate -> the declared contact that bears on it, where it is no foot's.
     """
     n, F = off.shape
     elsewhere = np.full(n, not plates)
     wrench, reason = np.zeros((n, F, 6)), np.full((n, F), SWING, dtype=np.int8)
     total_known = np.full(n, bool(plates))
+    others: dict[str, Array] = {}
     for p, plate in enumerate(plates):
+        if given and p in given:
+            total_known &= plate.known
+            bears = np.linalg.norm(np.nan_to_num(plate.wrench[:, :3]), axis=1) > UNLOADED_N
+            share = np.where(bears[:, None], plate.wrench, 0.0)
+            others[given[p]] = others.get(given[p], 0.0) + np.where(plate.known[:, None], share, np.nan)
+            continue
         owners = on[:, :, p]
         count = owners.sum(axis=1)
         for k in range(F):
@@ -157,6 +174,8 @@ def divided(
         aloft,
         soles,
         on,
+        dict(given or {}),
+        others,
     )
     return loads.with_undeclared(elsewhere)
 

@@ -71,7 +71,7 @@ def foot_section(page: Page) -> Section | None:
         lines=(MEASURED_LINE, *side_key(estimate), *source_key(foot_sources(estimate.data))),
         band=BAND if "foot_wrench_sd" in estimate.data else "",
         tables=[table for table in (_adjustments(figures),) if table.rows],
-        parts=[part for foot in estimate.foot_names if (part := _foot_part(estimate, foot)).panels],
+        parts=[part for foot in estimate.contact_names if (part := _foot_part(estimate, foot)).panels],
     )
 
 
@@ -92,10 +92,11 @@ _CONTACTS = {
     SHARED_PLATE: "on one plate with another contact, so that only the sum is measured",
     UNMEASURED: "on the ground but not measured",
 }
+_NO_FOOT = {NO_CONTACT: "no contact", UNMEASURED: "in contact but not measured"}
 
 
 def _foot_part(estimate: Estimate, foot: str) -> Section:
-    k = estimate.foot_names.index(foot)
+    k = estimate.contact_names.index(foot)
     measured, adjusted = (values_of(estimate, name)[:, k] for name in ("foot_wrench_measured", "foot_wrench"))
     sd = values_of(estimate, "foot_wrench_sd")[:, k] if "foot_wrench_sd" in estimate.data else None
     contact, source = estimate.data["foot_contact"].sel(foot=foot).values, foot_sources(estimate.data)[:, k]
@@ -124,19 +125,22 @@ def _foot_part(estimate: Estimate, foot: str) -> Section:
     for axis, j in (("forward", 0), ("to the right", 2)):
         add(f"Centre of pressure, {axis}", "mm", 1000.0 * seen[:, j], 1000.0 * made[:, j], least=20.0)
     add("Free moment about the vertical", "N m", seen_free, made_free, least=2.0)
+    is_foot = foot in estimate.foot_names
     shares = [
         f"{share} in {number(100.0 * float(np.mean(contact == code)), '%', digits=2)} of the frames"
-        for code, share in _CONTACTS.items()
+        for code, share in (_CONTACTS if is_foot else _CONTACTS | _NO_FOOT).items()
         if (contact == code).any()
     ]
-    return Section(f"foot-{foot}", f"{sentence(foot)} foot", sentence(", ".join(shares)) + ".", panels)
+    title = f"{sentence(foot)} foot" if is_foot else sentence(foot)
+    return Section(f"foot-{foot}", title, sentence(", ".join(shares)) + ".", panels)
 
 
 def _peak(estimate: Estimate, foot: str, values: np.ndarray, unit: str) -> str:
     """The largest of the whole measured stances, or, of who stays on the feet, of the time after the adaptation."""
     window = evaluation_window(estimate.time)
     stances = compared_stances(estimate, window)
-    parts = [values[window]] if stances is None else [values[part] for part in stances[foot]]
+    own = None if stances is None else stances.get(foot)
+    parts = [values[window]] if own is None else [values[part] for part in own]
     known = [part for part in parts if np.isfinite(part).all()]
     if not known:
         return "no stance measured from end to end, so no peak"

@@ -70,7 +70,7 @@ def write_centre_of_pressure(estimate: Estimate, path: Path) -> None:
     """``centre_of_pressure.sto``: ``total_px`` ... m and, where the feet's wrenches are known, ``right_px`` ...; NaN
     below the threshold. What a planar model does not give has no column."""
     names, columns = [], []
-    for foot in (None, *estimate.foot_names):
+    for foot in (None, *estimate.contact_names):
         point, free = foot_pressure(estimate, foot)
         for label, values in zip(("px", "py", "pz", "free_moment"), [*point.T, free], strict=True):
             if np.isfinite(values).any() or foot is not None:
@@ -126,13 +126,15 @@ def write_joint_sources(estimate: Estimate, path: Path) -> None:
 
 
 def write_foot_sources(estimate: Estimate, path: Path) -> None:
-    """``feet_source.sto``: a column a foot, ``ground_force_r``, with the code of where its wrench comes from."""
-    names = [force_stem(foot) for foot in estimate.foot_names]
+    """``feet_source.sto``: a column a foot, ``ground_force_r``, and a declared contact, ``ground_force_seat``, with the
+    code of where its wrench comes from."""
+    names = [force_stem(foot) for foot in estimate.contact_names]
     write_sources(path, "Sources of the feet's ground reaction", estimate, names, foot_sources(estimate.data))
 
 
 def write_feet(estimate: Estimate, path: Path) -> None:
-    """``feet.sto``: the feet's wrenches as used for the moments, as OpenSim's external loads take them.
+    """``feet.sto``: the feet's wrenches, and those of declared contacts, as used for the moments, as OpenSim's external
+    loads take them.
 
     ``ground_force_r_vx`` ... N, ``ground_force_r_px`` ... m, ``ground_torque_r_x`` ... N m. Below the threshold the
     point is the ground's origin and the torque all of the moment about it, so force, point and torque always give the
@@ -140,7 +142,7 @@ def write_feet(estimate: Estimate, path: Path) -> None:
     """
     names: list[str] = []
     columns: list[np.ndarray] = []
-    for foot in estimate.foot_names:
+    for foot in estimate.contact_names:
         wrench = estimate.data["foot_wrench"].sel(foot=foot).transpose("time", "component").values
         point, free = foot_pressure(estimate, foot)
         loaded = np.asarray(np.isfinite(point).all(axis=1))
@@ -152,7 +154,8 @@ def write_feet(estimate: Estimate, path: Path) -> None:
         unknown = np.isnan(wrench).any(axis=1)
         columns += [wrench[:, :3], np.where(loaded[:, None], point, np.where(unknown, np.nan, 0.0)[:, None]), torque]
     notes = [
-        "Forces in N at points in m, torques in N m, of the ground on the feet; adjusted.",
+        "Forces in N at points in m, torques in N m, of the ground on the feet; adjusted. Declared contacts (a "
+        "seat) by their names, at points on the floor.",
         f"Frame: {estimate.ground.in_words}.",
         "feet_source.sto says of each foot whether its force is measured, derived, a prior or absent (nan).",
     ]

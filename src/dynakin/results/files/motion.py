@@ -121,7 +121,7 @@ def write_deviations(estimate: Estimate, path: Path) -> None:
     if "foot_wrench_sd" in estimate.data:
         forces = estimate.data["foot_wrench_sd"].transpose("time", "foot", "component").values[:, :, :3]
         forces = np.where((foot_sources(estimate.data) == ABSENT)[:, :, None], np.nan, forces)
-        names += [f"{force_stem(foot)}_v{axis}" for foot in estimate.foot_names for axis in AXES]
+        names += [f"{force_stem(foot)}_v{axis}" for foot in estimate.contact_names for axis in AXES]
         columns.append(forces.reshape(len(forces), -1))
     write_storage(
         path,

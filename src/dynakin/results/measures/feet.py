@@ -72,6 +72,35 @@ def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str,
     return figures | {"verdict": _words(figures, int(grounded.sum()), len(contact), FLIGHT * weight)}
 
 
+def contact_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str, Any]:
+    """Of each declared contact, over the frames ``window``; empty where none was declared.
+
+    Returns:
+        by name: ``frames`` in which it bears, and of these those that are ``measured``, ``derived``, ``prior`` and
+        ``absent``; the mean force ``force_n{fx, fy, fz}`` in them, the ``largest_n`` of its size, and ``sd_n{fx, fy,
+        fz}``, the RMS of the standard deviations; None where it never bears.
+    """
+    found: dict[str, Any] = {}
+    for name in estimate.contact_names[len(estimate.foot_names) :]:
+        own = estimate.data.sel(foot=name)
+        bears = window & (own["foot_contact"].values != NO_CONTACT)
+        codes = foot_sources(estimate.data)[bears, estimate.contact_names.index(name)]
+        force, sd = (
+            own[key].transpose("time", "component").values[bears, :3] for key in ("foot_wrench", "foot_wrench_sd")
+        )
+        known = np.isfinite(force).all(axis=1)
+        counts = {what: int(np.sum(codes == code)) for code, what in enumerate(sources.MEANINGS)}
+        axes, some = COMPONENTS[:3], bool(known.any())
+        found[name] = {
+            "frames": int(bears.sum()),
+            **counts,
+            "force_n": dict(zip(axes, force[known].mean(axis=0).tolist(), strict=True)) if some else None,
+            "largest_n": float(np.linalg.norm(force[known], axis=1).max()) if some else None,
+            "sd_n": dict(zip(axes, _rms(sd[known]), strict=True)) if some else None,
+        }
+    return found
+
+
 def _joints(estimate: Estimate) -> np.ndarray:
     """(T, F, 3) m: where each foot's segment hangs."""
     segments = [str(name) for name in estimate.data["joint_segment"].values]

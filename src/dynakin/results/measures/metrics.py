@@ -16,7 +16,7 @@ from dynakin.results.measures.adaptation import adaptation
 from dynakin.results.measures.bounds import parameter_bounds
 from dynakin.results.measures.consistency import Consistency, consistency, mismatch_in_words, speed_mismatch
 from dynakin.results.measures.facing import facing
-from dynakin.results.measures.feet import foot_figures
+from dynakin.results.measures.feet import contact_figures, foot_figures
 from dynakin.results.measures.fit import WrenchFit, marker_rms_mm, wrench_fit
 from dynakin.results.measures.posterior import posterior_figures
 from dynakin.results.measures.power import work
@@ -71,6 +71,7 @@ def compute_metrics(estimate: Estimate, failures: Failures | None = None) -> dic
         "angles": lambda: _angles(estimate),
         "asymmetry": lambda: asymmetry(estimate, window),
         "feet": lambda: foot_figures(estimate, window),
+        "contacts": lambda: contact_figures(estimate, window),
         "events": lambda: _events(estimate),
         "timing": lambda: asdict(estimate.timing),
     }

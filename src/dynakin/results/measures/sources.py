@@ -105,9 +105,11 @@ def legs_of(data: xr.Dataset) -> list[str]:
     parents = [int(parent) for parent in data["joint_parent"].values]
     legs = [""] * len(segments)
     if "foot_segment" in data.coords:
+        others = data["foot_declared"].values if "foot_declared" in data.coords else np.zeros(data.sizes["foot"], bool)
         chains = {
             str(foot): _up_from(segments.index(str(segment)), parents)
-            for foot, segment in zip(data["foot"].values, data["foot_segment"].values, strict=True)
+            for foot, segment, declared in zip(data["foot"].values, data["foot_segment"].values, others, strict=True)
+            if not declared
         }
         for foot, chain in chains.items():
             shared = {k for other, every in chains.items() if other != foot for k in every}

@@ -1,0 +1,66 @@
+"""When declared contacts bear or pull the person: where the plates lack something, or nobody can say."""
+
+from __future__ import annotations
+
+import numpy as np
+import numpy.typing as npt
+from scipy import ndimage
+
+from dynakin.arrays import runs
+from dynakin.filter.closure import Closure
+from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.settings.contacts import SEAT
+
+Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+
+LOW = 0.85
+"""Part of its greatest height over the floor below which a pelvis may be on a seat: standing on one's toes is above, a
+bar stool below."""
+STANDING = 0.53
+"""Height of the middle of the pelvis' markers over that of the person, of who is seen seated only."""
+MARGIN_S = 0.15
+"""How long before and after the excess is seen the contact comes and goes: it is smoothed over that."""
+
+
+def may_bear(initial: CalibratedModel, paths: Array, floor_m: float, tallest_m: float) -> Flags:
+    """(T, C) frames in which each declared contact may bear, by the markers alone: a seat where the pelvis is low.
+
+    Args:
+        paths: (T, 1 + C, 3) m, of `ContactPaths`. floor_m: height of the floor. tallest_m: greatest height of the
+            root over it.
+    """
+    tallest = max(tallest_m, STANDING * (initial.height_m or 0.0))
+    low = paths[:, 0, 1] - floor_m < LOW * tallest
+    every = np.ones(len(paths), dtype=bool)
+    return (
+        np.stack([low if name == SEAT else every for name in initial.contacts], axis=1)
+        if initial.contacts
+        else (np.zeros((len(paths), 0), dtype=bool))
+    )
+
+
+def bearing(found: Closure, may: Flags, names: list[str], measured: list[bool], claimed: Flags, rate: float) -> Flags:
+    """(T, C) frames in which each declared contact bears, of those (``measured``) that no plate measures.
+
+    What the plates lack is taken for theirs, as far as they can: a seat pushes upwards, where the pelvis is low. Where
+    nobody can judge, they bear where they may.
+
+    Args:
+        may: (T, C) of `may_bear`. claimed: (T,) frames in which the plates' sum was compared with the motion.
+    """
+    bears = np.zeros_like(may)
+    judged = np.isfinite(found.excess[:, 1])
+    reach = np.ones(2 * round(MARGIN_S * rate) + 1, dtype=bool)
+    nearest = ndimage.distance_transform_edt(~judged, return_distances=False, return_indices=True)[0]
+    for c, name in enumerate(names):
+        if measured[c]:
+            continue
+        for first, end in runs(found.undeclared):
+            excess = found.excess[first:end, 1]
+            upwards = not np.isfinite(excess).any() or float(np.nanmean(excess)) > 0.0
+            if name != SEAT or (upwards and may[first:end, c].mean() > 0.5):
+                bears[first:end, c] = True
+        bears[:, c] = ndimage.binary_dilation(bears[:, c], structure=reach)
+        bears[:, c] = np.where(judged, bears[:, c], np.where(claimed, bears[nearest, c], may[:, c]))
+    return bears
