@@ -204,7 +204,8 @@ def test_equals_the_slow_distribution(name, seed):
     assert np.abs(found["moments"][root]).max() < 1e-9 * np.abs(wrenches).max()
     if d.touches[-1]:  # the residual acts on the root: without it the root's moments are its own
         external[0] -= wrenches[-1]
-        assert np.abs(_core.joint_moments(d.model, d.x, external)[root]).max() > 1e-3
+        left = _core.joint_moments(d.model, d.x, external)[root]
+        close(left[:3], wrenches[-1][:3], 1e-10)  # ROOT's first three are translations along the ground's axes
 
 
 @pytest.mark.parametrize("name", CASES)

@@ -68,7 +68,7 @@ class Monitor:
         on_plates = "none"
         if self._plates:
             others = "left out" if whole else "incomplete"
-            plates = {"accepted": "used", "refused": "refused"}.get(verdicts[-1], others)
+            plates = {"accepted": "used" if whole else "incomplete", "refused": "refused"}.get(verdicts[-1], others)
             on_plates = "silent" if fused.wrenches is None else plates if self._used else "left out"
         at = [k for k in self._bounded if not self.initial.lower[k] < state[k] < self.initial.upper[k]]
         recent = self._recent
