@@ -54,7 +54,7 @@ def mass_centre(initial: CalibratedModel, time: Array, markers: Array) -> MassCe
         return None
     axes = np.array(initial.spec.markers[0].measured)
     bridged, seen = _bridged(time, markers, axes, rate)
-    weights = _Weights(initial)
+    weights = CentreWeights(initial)
     found = MassCentre(np.zeros((len(time), 3)), np.zeros((len(time), 3)), np.zeros(len(time), dtype=bool))
     reach, end = round(_REACH_S * rate), round(_END_S * rate)
     for first, last in _pieces(time, rate):
@@ -109,7 +109,7 @@ def _second_derivative(path: Array, rate: float) -> Array:
     return np.asarray(np.gradient(np.gradient(smooth, 1.0 / rate, axis=0), 1.0 / rate, axis=0))
 
 
-class _Weights:
+class CentreWeights:
     """Weights, of sum 1, by which markers give the centre of mass: least squares over many postures of the model.
 
     With all markers of our models it is within 2 to 3 mm where every angle turns by 23 deg.

@@ -31,6 +31,7 @@ from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import FLAT_FRAMES, GroundPlate, level_pressure
 from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N
 from dynakin.settings.noise import Noise
+from dynakin.stream.closure import DELAY_S, LiveClosure
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -88,16 +89,24 @@ class LiveFeet:
         self._near, self._loaded = np.zeros((F, P), dtype=int), np.zeros((F, P), dtype=int)  # frames of this stance
         self._owners = np.zeros((F, P), dtype=bool)  # of the plates that are pressed
         self._range = _Range(P)
+        self._closure: LiveClosure | None = None
         self._said: set[str] = set()
         self._to_say: list[str] = []
 
     def look(
-        self, model: _core.Model, state: Array, time_s: float, wrenches: Array | None
+        self,
+        model: _core.Model,
+        state: Array,
+        time_s: float,
+        wrenches: Array | None,
+        markers: Array | None = None,
     ) -> tuple[ContactLoads, bool]:
         """The feet's wrenches at a time (T = 1), and whether the sum of the plates is the total wrench.
 
         Args:
-            state: (n,) before the step. wrenches: (P, 6) N and N m, laboratory frame, or None.
+            state: (n,) before the step. wrenches: (P, 6) N and N m, laboratory frame, or None. markers: (M, 3) m as
+                measured, of the model, ground frame, NaN missing: without them nobody asks whether something undeclared
+                bears the person.
         """
         dt = float(np.clip(time_s - self._time, *_DT_S))
         offset, size = model.layout.blocks["coordinates"]
@@ -111,9 +120,25 @@ class LiveFeet:
         self._highest = max(self._highest, float(paths[0, 0, 1]))
         bears = may_bear(self.initial, paths, self._lowest, self._highest - self._lowest)
         bears &= ~np.array([name in loads.others for name in self.initial.contacts], dtype=bool)
+        if markers is not None and wrenches is not None:
+            loads = self._closed(loads, time_s, np.where(np.isfinite(markers), markers, places), wrenches, bears)
         undeclared = loads.elsewhere & (wrenches is not None)
         whole = bool(loads.total_known[0] and not bears.any())
         return expected_loads(loads, self.initial, self.noise, paths, undeclared, bears), whole
+
+    def _closed(self, loads: FootLoads, time_s: float, markers: Array, wrenches: Array, bears: Flags) -> FootLoads:
+        """The same where the plates do not carry what the motion of the centre of mass needs, `DELAY_S` ago."""
+        if self._closure is None:
+            self._closure = LiveClosure(self.initial)
+        whole = bool(loads.total_known[0] and not bears.any())
+        force = self.initial.ground.wrench_to_ground(wrenches)[:, :3].sum(axis=0) if whole else None
+        if not self._closure.look(time_s, markers, force):
+            return loads
+        self._say(
+            f"Something that no plate measures bears or pulls the person (a seat, a rail, a box): noticed {DELAY_S:g} "
+            "s after the motion shows it. What it can reach is absent for as long as that is so."
+        )
+        return loads.with_undeclared(np.ones(1, dtype=bool))
 
     def loads(self, time_s: float, places: Array, velocity: Array, wrenches: Array | None) -> FootLoads:
         """The same as loads (T = 1).

@@ -10,7 +10,7 @@ import numpy as np
 
 from dynakin.errors import DivergenceError, DynakinError, ModelError, StreamError
 from dynakin.filter.estimator import Estimator
-from dynakin.filter.samples import Sample
+from dynakin.filter.samples import Sample, sample_arrays
 from dynakin.filter.tracker import Tracker
 from dynakin.recordings.recording import Recording
 from dynakin.stream.feet import LiveFeet
@@ -322,7 +322,8 @@ class Live:
         sample, feet, whole = fused.sample, None, True
         if self._feet is not None:
             wrenches = fused.wrenches if self._use_plates else None
-            feet, whole = self._feet.look(tracker.core_model, tracker.state, sample.time_s, wrenches)
+            markers, _ = sample_arrays(sample, tracker.calibrated)
+            feet, whole = self._feet.look(tracker.core_model, tracker.state, sample.time_s, wrenches, markers)
         if not (whole and self._use_plates):
             sample = Sample(sample.time_s, sample.markers)
         try:

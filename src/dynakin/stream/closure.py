@@ -1,0 +1,70 @@
+"""Do the plates carry the person, at this moment? What `filter.closure` asks of a whole recording, some tenths of a
+second later."""
+
+from __future__ import annotations
+
+from collections import deque
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.filter.closure import EDGE, EXCESS
+from dynakin.filter.mass_centre import CentreWeights
+from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.units import GRAVITY_M_S2
+
+Array = npt.NDArray[np.float64]
+
+WINDOW_S = 0.3
+"""The centre of mass' path over it is fitted by a parabola; what is found is of its middle, so `DELAY_S` ago."""
+DELAY_S = 0.5 * WINDOW_S
+_LEAST_FRAMES = 6
+
+
+class LiveClosure:
+    """Whether something that no plate measures bears or pulls the person.
+
+    The acceleration that a parabola has is the true one's mean over the window, weighted by (h² - t²)², h half of the
+    window: the plates' sum is taken with the same weights, so that the two are of one time and one bandwidth. What
+    bears less than a fifth of the weight is not noticed live: a mass that is somewhat wrong looks like it.
+    """
+
+    def __init__(self, initial: CalibratedModel) -> None:
+        self._mass = initial.weighed_kg
+        self._weights = CentreWeights(initial).of(np.arange(len(initial.spec.markers)))
+        self._axes = np.array(initial.spec.wrench_measured[:3])
+        self._kept: deque[tuple[float, Array, Array]] = deque()
+        self.bears = False
+
+    def look(self, time_s: float, markers: Array, force: Array | None) -> bool:
+        """The next frame: whether something undeclared bears, `DELAY_S` ago. While nobody can judge it stays as it was.
+
+        Args:
+            markers: (M, 3) m, of the model, ground frame, all known. force: (3,) N, the plates' sum, ground frame; None
+                where it is not all that is declared to bear the person.
+        """
+        if self._weights is None:
+            return False
+        if force is None or not np.isfinite(force).all():
+            self._kept.clear()
+            return self.bears
+        self._kept.append((time_s, self._weights @ markers, force))
+        while self._kept[0][0] < time_s - WINDOW_S - 1e-9:
+            self._kept.popleft()
+        time = np.array([at for at, _, _ in self._kept])
+        if len(time) < _LEAST_FRAMES or time[-1] - time[0] < 0.9 * WINDOW_S:
+            return self.bears
+        excess = np.where(self._axes, self._excess(time), 0.0)
+        size = float(np.abs(excess).max()) / (self._mass * GRAVITY_M_S2)
+        self.bears = size > (EDGE if self.bears else EXCESS)
+        return self.bears
+
+    def _excess(self, time: Array) -> Array:
+        """(3,) N: what the motion needs less what the plates carry."""
+        half = 0.5 * (time[-1] - time[0])
+        t = (time - time[0] - half) / half
+        path, force = (np.stack([row[k] for row in self._kept]) for k in (1, 2))
+        acceleration = 2.0 * np.polynomial.polynomial.polyfit(t, path, 2)[2] / half**2
+        weights = (1.0 - t**2) ** 2
+        need = self._mass * (acceleration + np.array([0.0, GRAVITY_M_S2, 0.0]))
+        return np.asarray(need - weights @ force / weights.sum())
