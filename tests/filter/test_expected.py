@@ -73,7 +73,10 @@ def person() -> Any:
         SimpleNamespace(name="foot_l", parent="pelvis"),
     ]
     return SimpleNamespace(
-        weighed_kg=MASS_KG, feet={"right": "foot_r", "left": "foot_l"}, spec=SimpleNamespace(segments=segments)
+        weighed_kg=MASS_KG,
+        feet={"right": "foot_r", "left": "foot_l"},
+        contacts={},
+        spec=SimpleNamespace(segments=segments),
     )
 
 
@@ -81,7 +84,7 @@ def expected(loads: FootLoads, undeclared: np.ndarray | None = None, **noise: fl
     n = len(loads.reason)
     asked = np.zeros(n, bool) if undeclared is None else undeclared
     chosen = NOISE.model_copy(update=noise) if noise else NOISE
-    return expected_loads(loads, person(), chosen, np.tile(ROOT, (n, 1)), asked)
+    return expected_loads(loads, person(), chosen, np.tile(ROOT, (n, 1, 1)), asked, np.zeros((n, 0), bool))
 
 
 def drawn_prior(seed: int, frame: int = 1, foot: int = 1) -> np.ndarray:

@@ -9,7 +9,7 @@ import pytest
 
 from dynakin import Estimator, Subject, load_model
 from dynakin.errors import ModelError
-from dynakin.filter.expected import expected_loads, root_path
+from dynakin.filter.expected import ContactPaths, expected_loads
 from dynakin.filter.samples import Sample, recording_arrays
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.recording import Recording
@@ -23,7 +23,8 @@ def test_step_by_step_moments_bands_and_the_delayed_are_those_of_the_run() -> No
     initial = live.calibrated
     markers, wrench = recording_arrays(recording, initial)
     loads = foot_loads(recording, initial.ground, initial.foot_markers)
-    feet = expected_loads(loads, initial, live.noise, root_path(initial, markers), np.zeros(len(markers), bool))
+    paths, nothing = ContactPaths.of(initial).at(markers), np.zeros((len(markers), 0), bool)
+    feet = expected_loads(loads, initial, live.noise, paths, np.zeros(len(markers), bool), nothing)
     arrays_of = [name for name, values in vars(feet).items() if isinstance(values, np.ndarray)]
     for k, sample in enumerate(_samples(recording)):
         part = replace(feet, **{name: getattr(feet, name)[k : k + 1] for name in arrays_of})
