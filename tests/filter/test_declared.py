@@ -18,6 +18,7 @@ from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
 from dynakin.results.files.body import write_body_files
 from dynakin.results.files.config import write_config
+from dynakin.results.files.motion import write_deviations
 from dynakin.results.measures.feet import contact_figures, foot_sources
 from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED
 from dynakin.settings.settings import Settings, read_keys
@@ -92,9 +93,10 @@ def test_a_declared_seat_is_in_the_files(tmp_path: Path) -> None:
     assert figures["derived"] == figures["frames"] > 50 and figures["measured"] == figures["absent"] == 0
     assert 0.2 * WEIGHT < figures["force_n"]["fy"] < 0.6 * WEIGHT and figures["sd_n"]["fy"] > 1.0
     write_body_files(estimate, tmp_path)
+    write_deviations(estimate, tmp_path / "uncertainty.sto")
     for name, column in (
         ("feet.sto", "ground_force_seat_vy"),
-        ("feet_sd.sto", "ground_force_seat_vy"),
+        ("uncertainty.sto", "ground_force_seat_vy"),
         ("feet_source.sto", "ground_force_seat"),
     ):
         assert column in (tmp_path / name).read_text(), name
