@@ -79,6 +79,7 @@ def estimate_of(data: Trial, feet: ContactLoads | None, smooth: bool = False) ->
         names=tuple(layout.names),
         dimensionless=frozenset(),
         feet={},
+        contacts={},
         soft_tissue_m=np.zeros(len(SPEC.markers)),
         x0=data.x0,
         sd0=prior_sd(layout),

@@ -109,7 +109,7 @@ def test_smoothed_moments_and_bands_are_those_with_the_feet(squat: tuple[Live, l
     told = [f.deviations["moments"][knees] for f in frames if f.deviations is not None]
     assert told and np.all(np.array(told) > 0.0)
     model, x, P = live.tracker.core_model, live.tracker.state, live.tracker.covariance
-    _, loads = live.tracker._stepped[-1]
+    _, loads, _ = live.tracker._stepped[-1]
     assert loads is not None
     with_feet = _core.contact_moments(model, x, loads, 0, np.asfortranarray(P))["moments_sd"]
     np.testing.assert_allclose(live.tracker.deviations()["moments"], with_feet, rtol=1e-9)

@@ -167,12 +167,13 @@ class LiveFeet:
         )
         for p in np.flatnonzero(on.sum(axis=0) > 1) if (loads.reason == SHARED).any() else ():
             self._say(
-                f"Both feet stand on {self.plates[p]}: its wrench is divided between them by its centre of pressure."
+                f"Both feet stand on {self.plates[p]}: its wrench is divided between them by where each one's load "
+                "is expected."
             )
         if plates and not loads.total_known[0]:
             self._say(
                 "The plates do not carry all of the person (a foot off the plates, a load where nobody stands, a plate "
-                "at the end of its range): the total wrench is left out for as long as that is so."
+                "at the end of its range): what they do not carry is estimated for as long as that is so."
             )
         return loads
 

@@ -116,7 +116,7 @@ def make_walker(withheld: tuple[int, ...] = (), *, code: int = DERIVED) -> Estim
         foot_segment=("foot", ["foot_r", "foot_l"]),
         element=names,
     )
-    messages = ["The left foot stands off the plates from 1.70 to 2.30 s: the total wrench is left out there."]
+    messages = ["The left foot stands off the plates from 1.70 to 2.30 s: what it carries is estimated there."]
     return replace(
         made,
         data=data,

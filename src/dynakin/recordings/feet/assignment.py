@@ -107,9 +107,8 @@ class _Assignment:
     ) -> None:
         self.recording, self.feet, self.contacts, self.plates, self.fixed = recording, feet, contacts, plates, fixed
         n, F, P = recording.n_frames, len(feet), len(plates)
-        self.given = {
-            p: fixed[plate.name] for p, plate in enumerate(plates) if fixed.get(plate.name, feet[0]) not in feet
-        }
+        owners = [fixed.get(plate.name) for plate in plates]
+        self.given = {p: owner for p, owner in enumerate(owners) if owner is not None and owner not in feet}
         self.on = np.zeros((n, F, P), dtype=bool)  # this foot stands on this plate
         self.off = np.zeros((n, F), dtype=bool)  # it may stand off the plates
         self.hidden = np.zeros((n, F), dtype=bool)  # nobody sees it, and it may stand anywhere
@@ -341,7 +340,7 @@ class _Assignment:
     def off_in_words(self) -> list[str]:
         if not self.plates:
             return []
-        time, found, out = self.recording.time, list[str](), "the total wrench is left out there."
+        time, found, out = self.recording.time, list[str](), "what it carries is estimated there."
         for k, foot in enumerate(self.feet):
             found += [
                 f"The {foot} foot stands off the plates from {time[a]:.2f} to {time[b - 1]:.2f} s: {out}"
@@ -367,15 +366,15 @@ class _Assignment:
             time = self.recording.time
             found.append(
                 f"Both feet stand on {plate.name} in {len(both)} frames from {time[both[0]]:.2f} to "
-                f"{time[both[-1]]:.2f} s: its wrench is divided between them by its centre of pressure."
+                f"{time[both[-1]]:.2f} s: its wrench is divided between them by where each one's load is expected."
             )
         return found
 
     def lost_in_words(self, p: int) -> list[str]:
         plate, time = self.plates[p], self.recording.time
         found = [
-            f"{plate.name} is not measured or at the end of its range from {time[a]:.2f} to {time[b - 1]:.2f} s: the "
-            "total wrench is left out there."
+            f"{plate.name} is not measured or at the end of its range from {time[a]:.2f} to {time[b - 1]:.2f} s: "
+            "what it carries is estimated there."
             for a, b in runs(~plate.known)
         ]
         if len(self.contacts) == len(self.feet) and p not in self.given:
