@@ -129,6 +129,7 @@ def test_metrics_hold_the_keys_of_the_design(estimate: Estimate) -> None:
         "angles",
         "asymmetry",
         "feet",
+        "contacts",
         "window",
         "markers",
         "wrench",

@@ -20,6 +20,8 @@ from dynakin.studies.tuning.settings import check_setting
 DEFAULT: dict[str, Any] = {
     "coordinate_variance": 0.0,
     "speed_variance": 0.0,
+    "residual_force_sd_n": 12.0,
+    "residual_moment_sd_nm": 4.0,
     "acceleration_variance": 0.0,
     "length_variance": 0.0,
     "marker_place_variance_m2": 0.0,
@@ -58,6 +60,8 @@ DEFAULT: dict[str, Any] = {
 PAPER: dict[str, Any] = {
     "coordinate_variance": 1000.0,
     "speed_variance": 100.0,
+    "residual_force_sd_n": 0.0,
+    "residual_moment_sd_nm": 0.0,
     "acceleration_variance": 1000.0,
     "length_variance": 0.0,
     "marker_place_variance_m2": 0.0001,

@@ -176,7 +176,7 @@ def test_two_feet_on_one_plate_share_it_by_their_priors_and_it_is_said_once(tria
     assert push[0] > push[1] and apart.max() < 1.96 * np.sqrt(found.covariance[0, 1, 1])
     assert np.sqrt(found.covariance[0, 1, 1]) > 15.0  # the division is unsure, the sum to 7 N
     assert person.feet.news() == [
-        "Both feet stand on one: its wrench is divided between them by its centre of pressure."
+        "Both feet stand on one: its wrench is divided between them by where each one's load is expected."
     ]
     assert person.feet.news() == []
 

@@ -13,9 +13,9 @@ from dynakin.cli.console import out, print_error, table
 from dynakin.pipeline.result import Result
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.bounds import counts_in_words
-from dynakin.results.measures.sources import UNKNOWN
+from dynakin.results.measures.sources import MEANINGS, UNKNOWN
 from dynakin.results.measures.tracking import why_lost
-from dynakin.results.naming import sentence
+from dynakin.results.naming import listed, sentence
 from dynakin.results.records import NOT_SMOOTHED, doubts_mass
 
 
@@ -24,6 +24,8 @@ def print_summary(result: Result, folder: Path) -> None:
     console, estimate, metrics = out(), result.estimate, result.metrics()
     moments = metrics["moments"] or UNKNOWN
     _print_moments(console, moments)
+    for name, found in (metrics["contacts"] or {}).items():
+        console.print(f"  {_contact_in_words(name, found)}", style="dim")
     warnings = [
         message
         for message in estimate.messages
@@ -63,6 +65,17 @@ def _print_moments(console: Console, moments: dict[str, Any]) -> None:
     console.print(moments["verdict"], style="" if whole else "yellow")
     for reason in moments["reasons"]:
         console.print(f"  {reason}", style="dim")
+
+
+def _contact_in_words(name: str, found: dict[str, Any]) -> str:
+    """What came of a declared contact, and what that rests on."""
+    if not found["frames"]:
+        return f"The {name}, declared, bears nothing in this recording."
+    how = listed([f"{what} in {found[what]}" for what in MEANINGS if found[what]])
+    size = ""
+    if found["largest_n"] is not None:
+        size = f", up to {found['largest_n']:.0f} N (standard deviation {found['sd_n']['fy']:.0f} N upwards)"
+    return f"The {name}, declared, bears in {found['frames']} frames ({how}){size}; all of it on its one segment."
 
 
 def _figures(estimate: Estimate, metrics: dict[str, Any]) -> Table:

@@ -136,7 +136,7 @@ def _dataset(
     data["state_sd"] = (("time", "element"), arrays["state_sd"])
     for name in ("nis", "n_rows", "log_likelihood", "constrained", "constraints_met", "tracking", "step_us"):
         data[name] = ("time", arrays[name])
-    data |= _sensors(arrays)
+    data |= _sensors(arrays, np.asarray(np.isnan(measured[1]).all(axis=1)))
     if initial.feet or any(any(marker.soft_tissue) for marker in spec.markers):
         data["soft_tissue_amplitude"] = ("marker", initial.soft_tissue_m, {"units": "m"})
     data |= _body(arrays, model, axes, modelled, feet)
@@ -168,14 +168,20 @@ def _dataset(
     return xr.Dataset(data, coords=coords)
 
 
-def _sensors(arrays: Mapping[str, Array]) -> dict[str, Any]:
-    """What each sensor said against what was expected of it; the core numbers 3 channels a marker, then the plates'."""
-    data: dict[str, Any] = {"verdict": (("time", "sensor"), arrays["verdicts"])}
-    data["test_ratio"] = (("time", "sensor"), arrays["test_ratio"])
+def _sensors(arrays: Mapping[str, Array], unmeasured: npt.NDArray[np.bool_]) -> dict[str, Any]:
+    """What each sensor said against what was expected of it; the core numbers 3 channels a marker, then the plates'.
+
+    Args:
+        unmeasured: (T,) frames in which priors stand for what plates do not measure: no word of a sensor.
+    """
+    verdicts, ratio = arrays["verdicts"].copy(), arrays["test_ratio"].copy()
+    verdicts[unmeasured, -1], ratio[unmeasured, -1] = 0, np.nan
+    data: dict[str, Any] = {"verdict": (("time", "sensor"), verdicts)}
+    data["test_ratio"] = (("time", "sensor"), ratio)
     for name in ("innovation", "innovation_sd"):
         markers = arrays[name][:, :-6]
         data[f"markers_{name}"] = (("time", "marker", "axis"), markers.reshape(len(markers), -1, 3))
-        data[f"wrench_{name}"] = (("time", "component"), arrays[name][:, -6:])
+        data[f"wrench_{name}"] = (("time", "component"), np.where(unmeasured[:, None], np.nan, arrays[name][:, -6:]))
     return data
 
 

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.filter.samples import in_step
-from dynakin.recordings.feet.contact import NO_CONTACT
+from dynakin.recordings.feet.contact import NO_CONTACT, UNMEASURED
 
 Array = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.uint8]
@@ -122,14 +122,23 @@ class ContactLoads:
         states = np.repeat(touches[:, : self.effects.shape[2] // 6], 6, axis=1)
         return total, covariance, np.where(states[:, None], self.effects, 0.0)
 
+    @property
+    def undeclared(self) -> Flags:
+        """(T,) frames in which something bears the person that is none of these contacts."""
+        if self.names[-1] != RESIDUAL:
+            return ~self.known
+        return np.asarray(self.contact[:, -1] == UNMEASURED)
+
     def in_step(self, time: Array, delay_s: float) -> ContactLoads:
-        """What belongs to each time (T,) s where the plates lag by ``delay_s``; contacts by the nearest frame."""
+        """What belongs to each time (T,) s where the plates lag by ``delay_s``; contacts and priors by the nearest
+        frame."""
         if delay_s == 0.0:
             return self
         wrench = np.stack([in_step(time, self.wrench[:, k], delay_s) for k in range(len(self.names))], axis=1)
         nearest = np.clip(np.searchsorted(time, time + delay_s - 0.5 * np.median(np.diff(time))), 0, len(time) - 1)
         contact = self.contact[nearest]
-        wrench = np.where((contact == NO_CONTACT)[..., None], 0.0, wrench)
+        same = (contact == self.contact) & (contact != UNMEASURED)  # else plates and priors would be mixed
+        wrench = np.where(same[..., None], wrench, self.wrench[nearest])
         return replace(
             self,
             wrench=wrench,

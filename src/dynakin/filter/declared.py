@@ -61,6 +61,6 @@ def bearing(found: Closure, may: Flags, names: list[str], measured: list[bool], 
             upwards = not np.isfinite(excess).any() or float(np.nanmean(excess)) > 0.0
             if name != SEAT or (upwards and may[first:end, c].mean() > 0.5):
                 bears[first:end, c] = True
-        bears[:, c] = ndimage.binary_dilation(bears[:, c], structure=reach)
+        bears[:, c] = ndimage.binary_dilation(bears[:, c], structure=reach) & (may[:, c] | bears[:, c])
         bears[:, c] = np.where(judged, bears[:, c], np.where(claimed, bears[nearest, c], may[:, c]))
     return bears

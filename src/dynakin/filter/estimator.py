@@ -184,7 +184,7 @@ class Estimator:
                 it would be live. None: smoothed wherever the noise settings have a smoother, else a message says so.
             feet: for models with a floating root: gives the wrench of each foot once the model is measured and its
                 ground frame known, instead of the plates' own division by `foot_loads`. Moments are those that the
-                feet's wrenches leave, adjusted so that nothing is left at the root; the state does not depend on it.
+                feet's wrenches leave, and their sum is the total wrench that the filter takes.
             progress: called with (frames done, frames in all) now and then.
 
         Raises:
@@ -236,7 +236,7 @@ class Estimator:
         covariances = (initial_covariance(calibrated, self.noise), tracker.covariance)
         estimate = assemble(
             arrays, tracker.core_model, calibrated, recording, (markers, wrench), config, notes, covariances, on_feet,
-            ground.undeclared,
+            on_feet.undeclared if on_feet is not None and feet is None else ground.undeclared,
         )  # fmt: skip
         return Tracked(without_lost(estimate), tracker)
 

@@ -117,7 +117,7 @@ def expected_loads(
         covariance=errors.reshape(frames, 6 * K + 6, 6 * K + 6),
         effects=effects.reshape(frames, 6, 6 * K),
         contact=np.column_stack([contact, residual]).astype(np.uint8),
-        known=~undeclared,
+        known=~undeclared & ((contact != NO_CONTACT).any(axis=1) | (residual != NO_CONTACT)),
     )
 
 

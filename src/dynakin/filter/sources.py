@@ -76,7 +76,7 @@ class LiveSources:
         """(C,) codes of a frame's moments by its contacts (T = 1); measured, as far as anybody knows, without any."""
         if feet is None:
             return np.full(len(self._moved), MEASURED, dtype=np.uint8)
-        undeclared = ~feet.known
+        undeclared = feet.undeclared
         at = [self._segments.index(name) for name in feet.segments]
         joints = _behind(contact_sources(feet.contact, undeclared), at, self._parents)
         joints[np.ix_(undeclared, ~self._legs)] = ABSENT

@@ -232,7 +232,7 @@ def _undeclared_in_words(
         f"{'upwards' if axis == 1 else 'sideways'} than the motion needs ({abs(size) / weight:.0%} of the weight, "
         f"expected within {EXCESS:.0%}, and {LASTING:.0%} for longer than a second): something that no plate "
         "measures bears or pulls the person there (a seat, a "
-        f"rail, a box, a foot off its plate){near}, from {', '.join(spans)}. The total wrench is left out there."
+        f"rail, a box, a foot off its plate){near}, from {', '.join(spans)}. The plates' sum is not used there."
     ), beside
 
 

@@ -100,8 +100,8 @@ class Tracker:
             feet: for models with a floating root: the feet's wrenches in this frame (T = 1). Moments, deviations and
                 those of `delayed` are then what these leave, as in `Estimator.run`. Without them the moments of a
                 floating model have no ground reaction in them, and are no joint moments of a person on the ground: use
-                `Estimator.run`, or `dynakin.stream.Live`, which finds the feet's wrenches. The state does not depend
-                on it.
+                `Estimator.run`, or `dynakin.stream.Live`, which finds the feet's wrenches. Their sum
+                is then the total wrench that the filter takes, instead of the sample's plates.
 
         Raises:
             RecordingError: the sample is older than the one before, or holds something else than numbers in the shapes

@@ -44,6 +44,8 @@ def paper() -> Noise:
         plate_force_sd_n=0.0,
         plate_moment_sd_nm=0.0,
         plate_time_s=1.0,
+        residual_force_sd_n=0.0,
+        residual_moment_sd_nm=0.0,
         plate_load_tolerance=None,
         plate_delay_sd_s=0.0,
         total_mass_variance_kg2=1e-4,

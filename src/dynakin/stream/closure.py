@@ -18,6 +18,8 @@ Array = npt.NDArray[np.float64]
 WINDOW_S = 0.3
 """The centre of mass' path over it is fitted by a parabola; what is found is of its middle, so `DELAY_S` ago."""
 DELAY_S = 0.5 * WINDOW_S
+KEPT_S = 0.5
+"""How long something undeclared is remembered while nobody can judge: a person who leaves a chair walks off."""
 _LEAST_FRAMES = 6
 
 
@@ -34,10 +36,11 @@ class LiveClosure:
         self._weights = CentreWeights(initial).of(np.arange(len(initial.spec.markers)))
         self._axes = np.array(initial.spec.wrench_measured[:3])
         self._kept: deque[tuple[float, Array, Array]] = deque()
-        self.bears = False
+        self.bears, self._judged_s = False, -np.inf
 
     def look(self, time_s: float, markers: Array, force: Array | None) -> bool:
-        """The next frame: whether something undeclared bears, `DELAY_S` ago. While nobody can judge it stays as it was.
+        """The next frame: whether something undeclared bears, `DELAY_S` ago. While nobody can judge it stays as it was,
+        for `KEPT_S`.
 
         Args:
             markers: (M, 3) m, of the model, ground frame, all known. force: (3,) N, the plates' sum, ground frame; None
@@ -47,6 +50,7 @@ class LiveClosure:
             return False
         if force is None or not np.isfinite(force).all():
             self._kept.clear()
+            self.bears &= time_s - self._judged_s < KEPT_S
             return self.bears
         self._kept.append((time_s, self._weights @ markers, force))
         while self._kept[0][0] < time_s - WINDOW_S - 1e-9:
@@ -56,7 +60,7 @@ class LiveClosure:
             return self.bears
         excess = np.where(self._axes, self._excess(time), 0.0)
         size = float(np.abs(excess).max()) / (self._mass * GRAVITY_M_S2)
-        self.bears = size > (EDGE if self.bears else EXCESS)
+        self.bears, self._judged_s = size > (EDGE if self.bears else EXCESS), time_s
         return self.bears
 
     def _excess(self, time: Array) -> Array:

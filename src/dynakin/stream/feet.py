@@ -186,7 +186,7 @@ class LiveFeet:
                 points = outlines[[f]][:, own < len(self._floor)]
                 self._shapes.append(FootShape.of(points, self._forward))
         self._since = np.where(bears, np.fmin(self._since, time_s), np.nan)
-        lowest = float(np.append(self._standing, np.inf)[self._own].min())
+        lowest = float(np.append(self._standing, np.inf)[self._own].min(initial=np.inf))
         middle, half = np.full((1, F, 3), np.nan), np.stack([shape.half_m for shape in self._shapes])
         pressure, covariance = middle.copy(), np.tile(np.eye(2), (1, F, 1, 1))
         for f in np.flatnonzero(self._marked).tolist():
@@ -240,7 +240,7 @@ class LiveFeet:
         a plate is loaded under them."""
         stands = self._touched == self._time_before
         for f in range(len(self.feet)):
-            lift = float(height[f].min())
+            lift = float(height[f].min(initial=np.inf))
             keeps = bool(slow[f].any()) and abs(lift - self._kept[f]) < LEVEL_M_S * RESTS_S
             if not keeps:
                 self._kept[f], self._kept_since[f], self._level[f] = lift, time_s, 0.0

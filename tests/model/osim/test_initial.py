@@ -63,11 +63,11 @@ def test_what_is_estimated_is_a_choice(folder: Path, squats: Recording) -> None:
         return dynakin.Estimator(load_opensim(path, **options), noise, estimate=estimate).start(squats).calibrated
 
     nothing = started(())
-    assert len(nothing.names) == 3 * 31  # toes have no markers
+    assert len(nothing.names) == 3 * 31 + 2 * 6  # toes have no markers; six states a foot
     assert [c.name for c in nothing.spec.coordinates if c.locked] == ["mtp_angle_r", "mtp_angle_l"]
-    assert len(started((), lock_unseen=False).names) == 3 * 33
+    assert len(started((), lock_unseen=False).names) == 3 * 33 + 2 * 6
     places = started(("markers",))
-    assert len(places.names) == 3 * 31 + 3 * 45
+    assert len(places.names) == 3 * 31 + 3 * 45 + 2 * 6
     # Of a place that is held, what is not known of it is noise of its marker.
     assert (nothing.unmodelled_m > places.unmodelled_m).all()
     few = started(("lengths",), scale=("femur_r", "femur_l"), share_sides=False)

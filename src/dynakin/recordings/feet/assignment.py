@@ -72,7 +72,10 @@ def _check_assigned(fixed: dict[str, str], recording: Recording, bearers: tuple[
         if plate not in names:
             raise ConfigError(f"plates: {plate!r} is not in {recording.name}; expected one of {', '.join(names)}")
         if foot not in bearers:
-            raise ConfigError(f"plates: {plate!r} is given to {foot!r}, expected one of {', '.join(bearers)}")
+            raise ConfigError(
+                f"plates: {plate!r} is given to {foot!r}, expected one of {', '.join(bearers)}, or a contact that is "
+                "declared (contacts)"
+            )
 
 
 def to_the_end(owners: Flags, pressed: Flags, steps: list[list[tuple[int, int]]]) -> Flags:

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import runs
 from dynakin.recordings.feet.soles import Soles
 from dynakin.recordings.plates.ground_plate import GroundPlate
 from dynakin.recordings.plates.pressure import JUDGED_N, LOADED_N, UNLOADED_N
@@ -82,7 +81,8 @@ class FootLoads:
     def without(self, feet: Flags) -> FootLoads:
         """The same where these feet (T, F) may reach beyond their plates: what these measure is not all of them."""
         reason = np.where(feet, np.int8(UNKNOWN), self.reason)
-        wrench = np.where(feet[..., None], np.nan, self.wrench)
+        _alone_is_unknown(reason)
+        wrench = np.where((reason == UNKNOWN)[..., None], np.nan, self.wrench)
         known = ~feet.any(axis=1)
         return replace(
             self,
@@ -93,19 +93,10 @@ class FootLoads:
         )
 
 
-def to_the_end(owners: Flags, pressed: Flags) -> Flags:
-    """Owners (T, F) of a plate, each kept from the first to the last frame of a press (T,) that has owners at all.
-
-    A centre of pressure is far off while a foot sets down or leaves; what the plate carries there is still that foot's.
-    """
-    owners = owners.copy()
-    owned: Flags = np.asarray(owners.any(axis=1))
-    for first, end in runs(pressed):
-        inside = np.flatnonzero(owned[first:end]) + first
-        if len(inside):
-            owners[first : inside[0]] = owners[inside[0]]
-            owners[inside[-1] + 1 : end] = owners[inside[-1]]
-    return owners
+def _alone_is_unknown(reason: npt.NDArray[np.int8]) -> None:
+    """A foot that shares its plate with one that may also stand beside it has no sum to share, in place (T, F)."""
+    shared = reason == SHARED
+    reason[shared & (shared.sum(axis=1, keepdims=True) == 1)] = UNKNOWN
 
 
 def divided(
@@ -148,10 +139,9 @@ def divided(
         both = np.flatnonzero(count > 1)
         share = _shares(plate, both, owners, soles.middle)
         for k in range(F):
-            wrench[both, k] += np.nan_to_num(share[:, k])
+            wrench[both, k] += share[:, k]
             of = both[owners[both, k]]
             reason[of, k] = np.maximum(reason[of, k], SHARED)
-            reason[both[np.isnan(share[:, k]).any(axis=1)], k] = UNKNOWN  # divided, nobody knows how
         total_known &= plate.known
         reason[~plate.known[:, None] & owners] = UNKNOWN
         nobodys = (count == 0) & (plate.push > JUDGED_N)
@@ -161,6 +151,7 @@ def divided(
     total_known &= ~elsewhere
     reason[off] = OFF_PLATE
     reason[hidden & (reason == SWING)] = UNKNOWN
+    _alone_is_unknown(reason)
     total_known &= ~off.any(axis=1) & ~hidden.any(axis=1)
     wrench[(reason == OFF_PLATE) | (reason == UNKNOWN)] = np.nan
     all_measured = total_known & ((reason != SHARED) & (reason != UNKNOWN)).all(axis=1)
@@ -181,15 +172,18 @@ def divided(
 
 
 def _shares(plate: GroundPlate, frames: npt.NDArray[np.intp], owners: Flags, middle: Array) -> Array:
-    """(K, F, 6) of a plate under two feet: force by the lever between the feet, each at its own middle; NaN of one that
-    nobody sees, and of what stands beside it."""
+    """(K, F, 6) of a plate under two feet: force by the lever between the feet, each at its own middle; in equal parts
+    where one of them is not seen."""
     found = np.zeros((len(frames), owners.shape[1], 6))
     for row, t in enumerate(frames):
         own = np.flatnonzero(owners[t])[:2]
         points = middle[t, own]
         along = (points[1] - points[0])[[0, 2]]
         lever = (plate.cop[t] - points[0, [0, 2]]) @ along / max(float(along @ along), 1e-9)
-        part = float(np.clip(lever, 0.0, 1.0)) if np.isfinite(lever) else 0.5
+        if not np.isfinite(lever):
+            found[row, own] = 0.5 * plate.wrench[t]
+            continue
+        part = float(np.clip(lever, 0.0, 1.0))
         F, M = plate.wrench[t, :3], plate.wrench[t, 3:]
         parts = (1.0 - part, part)
         rest = M - np.sum([s * np.cross(c, F) for s, c in zip(parts, points, strict=True)], axis=0)

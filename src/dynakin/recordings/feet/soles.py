@@ -35,10 +35,10 @@ PRESSURE_REACH, ROLLED_M, FLAT_TILT_M = 0.55, 0.012, -0.006
 """The centre of pressure lies 0.55 of half the sole's length behind or before its middle once heel or toe are some
 12 mm above the other, measured from their lowest places: plates of `walking1`, `squats1` and `DJ1`; the walks of three
 other laboratories have 0.5 to 0.6 (0.7 of the simulated one in `truth3d`)."""
-ROLLED_SD, FLAT_SD, ACROSS_SD = 0.3, 0.375, 0.45
+ROLLED_SD, FLAT_SD, ACROSS_SD = 0.42, 0.52, 0.63
 """How far it may lie from there, as parts of half the sole's length once the foot has rolled, of that more while it is
-flat, where some mm of skin decide, and of half its width. Twice what the plates of these recordings show: a foot that
-is not of these keeps its say."""
+flat, where some mm of skin decide, and of half its width. Three times what the plates of these recordings show: a foot
+that is not of these keeps its say, and moments of a leg beside a plate are best so (`truth3d`)."""
 _UNSEEN_SD = 0.6  # of half the length, where a foot's markers do not show how it lies
 
 
@@ -85,7 +85,9 @@ class Soles:
             middle[:, k] = np.stack([place[:, 0], foot.support_m, place[:, 1]], axis=1)
             pressure[:, k] = middle[:, k] + np.stack([ahead[:, 0], np.zeros(frames), ahead[:, 1]], axis=1)
             bears[:, k] = foot.bears(rate)
-            stance[:, k] = stance_weights(foot.stances, rate, frames)
+            stance[:, k] = np.where(
+                foot.seen, stance_weights(foot.stances, rate, frames), 1.0
+            )  # unseen: it may bear all
         return cls(middle, half, bears, stance, pressure, covariance)
 
 

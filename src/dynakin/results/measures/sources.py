@@ -161,7 +161,8 @@ def moment_figures(estimate: Estimate, lost: str = "") -> dict[str, Any]:
     moving = {str(name) for name in data["element"].values}
     spoken = {leg: [k for k in own if names[k] in moving] or own for leg, own in groups.items()}  # not of locked joints
     return {
-        "what": "frames of the whole recording; derived: from the motion, because one contact behind the joint is not "
+        "what": "frames of the whole recording; measured: by plates, or nothing touches (a foot in the air); "
+        "derived: from the motion, because one contact behind the joint is not "
         "measured; prior: how several contacts divide the load is assumed; absent: not known",
         "frames": len(sources),
         "legs": legs,
