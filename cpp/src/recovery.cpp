@@ -82,9 +82,9 @@ Tracking Recovery::correct(const MarkerRef& markers, const Vector6& wrench) {
   return tracking;
 }
 
-// A landing changes speeds within a few frames by more than the jerk that is declared for moving allows: several markers
-// at once are then refused, rightly placed. Where a denser jerk over the last moments would have at most half as many
-// refused, it was an impact; markers that are astray stay so.
+// A landing changes speeds within a few frames by more than the jerk that is declared for moving allows: several
+// markers at once are then refused, rightly placed. Where a denser jerk over the last moments would have at most half
+// as many refused, it was an impact; markers that are astray stay so.
 void Recovery::expect_impact() {
   constexpr int least = 3;
   constexpr double times = 30.0, lasts_s = 0.04;  // speeds by 0.8 m/s and 4 rad/s, of the jerk declared for walking
