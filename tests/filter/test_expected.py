@@ -89,7 +89,7 @@ def expected(loads: FootLoads, undeclared: np.ndarray | None = None, **noise: fl
 
 def drawn_prior(seed: int, frame: int = 1, foot: int = 1) -> np.ndarray:
     """(N, 6) wrenches of the prior of an unmeasured foot."""
-    prior = foot_prior(make_believe(), foot, WEIGHT, np.tile(ROOT, (len(REASONS), 1)))
+    prior = foot_prior(make_believe(), foot, WEIGHT, np.tile(ROOT, (len(REASONS), 1)), np.zeros(len(REASONS), bool))
     states = np.random.default_rng(seed).normal(size=(200_000, 6))
     return prior.mean[frame] + states @ prior.spread[frame].T
 
@@ -118,7 +118,7 @@ def test_the_weight_is_divided_by_stance_and_a_foot_that_sets_down_is_surer() ->
     stance = np.tile([0.25, 1.0], (len(REASONS), 1))
     loads = replace(loads, soles=replace(loads.soles, stance=stance))
     root = np.tile(ROOT, (len(REASONS), 1))
-    first, second = (foot_prior(loads, k, WEIGHT, root) for k in range(2))
+    first, second = (foot_prior(loads, k, WEIGHT, root, np.zeros(len(root), bool)) for k in range(2))
     assert first.mean[0, 1] == pytest.approx(0.2 * WEIGHT) and second.mean[0, 1] == pytest.approx(0.8 * WEIGHT)
     assert first.spread[0, 1, 1] == pytest.approx(0.15 * WEIGHT) and second.spread[0, 1, 1] == pytest.approx(
         0.45 * WEIGHT
@@ -174,7 +174,7 @@ def test_the_parts_of_a_shared_plate_are_the_prior_given_their_sum(shared_n: flo
     loads, t = make_believe(shared_n=shared_n), 3
     found = expected(loads)
     root = np.tile(ROOT, (len(REASONS), 1))
-    priors = [foot_prior(loads, k, WEIGHT, root) for k in range(2)]
+    priors = [foot_prior(loads, k, WEIGHT, root, np.zeros(len(root), bool)) for k in range(2)]
     mean = np.concatenate([p.mean[t] for p in priors])
     P = np.zeros((12, 12))
     for k, p in enumerate(priors):

@@ -37,6 +37,8 @@ from dynakin.settings.subject import CarriedLoad
 Array = npt.NDArray[np.float64]
 Feet = Callable[[CalibratedModel], ContactLoads | None]
 
+CLOCK_SHARE = 0.6
+"""Part of the frames in which the plates must measure the whole for their delay to be estimated."""
 LARGEST_LAG = 1000
 """Frames. Each step goes back over all of them and each keeps its covariance: a whole body's take half a gigabyte, and
 no camera's frame is so long that a step would end within it."""
@@ -208,9 +210,10 @@ class Estimator:
         where = recording.path or recording.name
         if problem := rate_problem(recording.time):
             raise RecordingError(f"{where}: {problem}")
-        tracker = self.start(recording, static=static)
-        calibrated = tracker.calibrated
+        calibrated = self.calibrate(recording, static=static)
         markers, wrench, ground = self._measured(recording, calibrated)
+        tracker = Tracker(calibrated, self._noise_for(ground), self.estimate, self.lag)
+        calibrated = tracker.calibrated
         on_feet = None
         if feet is not None:
             on_feet = feet(calibrated)
@@ -233,12 +236,18 @@ class Estimator:
             raise RecordingError(f"{where}: {error}") from None
         config = self.settings() | {"smooth": smooth, "ground_reasons": list(ground.reasons)}
         notes = [*ground.notes, *([doubt] if doubt else clock if ground.usable else []), *unsmoothed]
-        covariances = (initial_covariance(calibrated, self.noise), tracker.covariance)
+        covariances = (initial_covariance(calibrated, tracker.noise), tracker.covariance)
         estimate = assemble(
             arrays, tracker.core_model, calibrated, recording, (markers, wrench), config, notes, covariances, on_feet,
             on_feet.undeclared if on_feet is not None and feet is None else ground.undeclared,
         )  # fmt: skip
         return Tracked(without_lost(estimate), tracker)
+
+    def _noise_for(self, ground: Ground) -> Noise:
+        """Without a delay of the plates where these measure the whole too seldom: priors follow the markers' clock."""
+        if ground.loads is None or ground.loads.total_known.mean() >= CLOCK_SHARE:
+            return self.noise
+        return self.noise.changed(plate_delay_sd_s=0.0)
 
     def _measured(self, recording: Recording, calibrated: CalibratedModel) -> tuple[Array, Array, Ground]:
         markers, wrench = recording_arrays(recording, calibrated, gaps=self.noise.recover)

@@ -34,6 +34,9 @@ PLATE_GAIN, PLATE_TURN_RAD, PLATE_PLACE_M = 0.01, 0.005, 0.002
 """Errors that grow with the load: of a plate's gain, how it lies turned, and where it lies."""
 PUSH_SD, PUSH_LEAST_SD = 0.4, 0.05
 """Part of the weight by which a foot's push may differ from its share of it, in full stance and at its ends."""
+ALONE_SD, ALONE_LOAD = 1.5, 1.5
+"""The same push in full stance, and the load by which shear and moments go, of a foot that is the only contact without
+a plate: the motion says what it bears, in running up to 3 times the weight, and a prior would be in its way."""
 SHEAR_SD = 0.12
 """The same of its force across the line to the pelvis, which the ground's reaction follows in walking and running."""
 FREE_MOMENT_M = 0.01
@@ -97,7 +100,7 @@ def expected_loads(
     for k in range(K):
         errors[:, k, :, k] = plate_errors(wrench[:, k])
         if k < F:
-            prior = foot_prior(loads, k, weight, root)
+            prior = foot_prior(loads, k, weight, root, (contact == UNMEASURED).sum(axis=1) == 1)
         else:
             prior = declared_prior(list(initial.contacts)[k - F], weight, paths[:, 1 + k - F])
         shared.append(prior)
@@ -131,8 +134,8 @@ def plate_errors(wrench: Array) -> Array:
     return _about(pressure, np.stack([shear, lift, shear, moment, moment, moment], axis=1))
 
 
-def foot_prior(loads: FootLoads, k: int, weight: float, root: Array) -> Prior:
-    """Of foot number k, by its sole and its stance.
+def foot_prior(loads: FootLoads, k: int, weight: float, root: Array, alone: Flags) -> Prior:
+    """Of foot number k, by its sole and its stance; alone (T,): it is the only contact that no plate measures.
 
     The six numbers are, in order: shear along X; push, along the line from the centre of pressure to the root; shear
     along Z; the two coordinates of the centre of pressure, with the free moment between them.
@@ -147,8 +150,10 @@ def foot_prior(loads: FootLoads, k: int, weight: float, root: Array) -> Prior:
     direction = np.concatenate([to_root / np.maximum(to_root[:, [1]], _LEAST_HEIGHT_M), np.zeros_like(root)], axis=1)
     direction[:, 1] = 1.0
     load = weight * (PUSH_LEAST_SD + PUSH_SD * stance) / (PUSH_LEAST_SD + PUSH_SD)  # the weight, in full stance
+    load *= np.where(alone, ALONE_LOAD, 1.0)
+    push_sd = weight * (PUSH_LEAST_SD + np.where(alone, ALONE_SD, PUSH_SD) * stance)
     spread = np.zeros((len(root), 6, 6))
-    spread[:, :, 1] = (PUSH_LEAST_SD + PUSH_SD) * load[:, None] * direction
+    spread[:, :, 1] = push_sd[:, None] * direction
     spread[:, 0, 0] = spread[:, 2, 2] = SHEAR_SD * load
     spread[:, 4, 4] = FREE_MOMENT_M * load
     L = load[:, None, None] * np.linalg.cholesky(spread_m2)
