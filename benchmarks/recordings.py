@@ -353,6 +353,14 @@ def tables(runs: list[Run]) -> Iterator[str]:
             yield f"| `{each.trial.name}` | {reference.what} | {joint} | {cells[0]} | {cells[1]} |"
 
 
+def put_between(marks: tuple[str, str], lines: list[str]) -> None:
+    """Into the page, in the place of what stands between these marks."""
+    text = PAGE.read_text(encoding="utf-8")
+    before, rest = text.split(marks[0], 1)
+    after = rest.split(marks[1], 1)[1]
+    PAGE.write_text("\n".join([before + marks[0], "", *lines, "", marks[1] + after]), encoding="utf-8")
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", help="parts of recordings' names; all where none is given")
@@ -367,10 +375,7 @@ def main() -> None:
     lines = list(tables(runs))
     print("\n".join(lines))
     if asked.write:
-        text = PAGE.read_text(encoding="utf-8")
-        before, rest = text.split(MARKS[0], 1)
-        after = rest.split(MARKS[1], 1)[1]
-        PAGE.write_text("\n".join([before + MARKS[0], "", *lines, "", MARKS[1] + after]), encoding="utf-8")
+        put_between(MARKS, lines)
 
 
 if __name__ == "__main__":

@@ -44,7 +44,7 @@ from dynakin.recordings.recording import Plate, Recording
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.trial import simulate
 from dynakin.units import GRAVITY_M_S2
-from recordings import DATA, PAGE, ROOT, TRIALS
+from recordings import DATA, PAGE, ROOT, TRIALS, put_between
 
 KEPT = ROOT / "build" / "withheld"
 MARKS = ("<!-- withheld: begin -->", "<!-- withheld: end -->")
@@ -322,10 +322,7 @@ def main() -> None:
     output.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
     print(f"{output}, {content['seconds']:.0f} s of estimates")
     if asked.write:
-        text = PAGE.read_text(encoding="utf-8")
-        before, rest = text.split(MARKS[0], 1)
-        after = rest.split(MARKS[1], 1)[1]
-        PAGE.write_text("\n".join([before + MARKS[0], "", *lines, "", MARKS[1] + after]), encoding="utf-8")
+        put_between(MARKS, lines)
 
 
 if __name__ == "__main__":

@@ -96,19 +96,23 @@ def expected_loads(
             wrench[:, k] = np.nan_to_num(measured)
     wrench[:, :K][contact == NO_CONTACT] = 0.0
     errors, effects = np.zeros((frames, K + 1, 6, K + 1, 6)), np.zeros((frames, 6, K, 6))
-    shared: list[Prior] = []
+    unmeasured = contact == UNMEASURED
+    alone = unmeasured.sum(axis=1) == 1
+    priors: dict[int, Prior] = {}
     for k in range(K):
         errors[:, k, :, k] = plate_errors(wrench[:, k])
+        off = unmeasured[:, k]
+        if not (off | (contact[:, k] == SHARED_PLATE)).any():
+            continue  # nobody asks for its prior
         if k < F:
-            prior = foot_prior(loads, k, weight, root, (contact == UNMEASURED).sum(axis=1) == 1)
+            prior = foot_prior(loads, k, weight, root, alone)
         else:
             prior = declared_prior(list(initial.contacts)[k - F], weight, paths[:, 1 + k - F])
-        shared.append(prior)
-        off = contact[:, k] == UNMEASURED
+        priors[k] = prior
         wrench[off, k], effects[off, :, k] = prior.mean[off], prior.spread[off]
         errors[off, k, :, k] = _about(root[off], np.array([_WHITE_N] * 3 + [_WHITE_NM] * 3))
     for t in np.flatnonzero((contact == SHARED_PLATE).any(axis=1)):
-        _divide(int(t), np.flatnonzero(contact[t] == SHARED_PLATE), shared, wrench, errors)
+        _divide(int(t), np.flatnonzero(contact[t] == SHARED_PLATE), priors, wrench, errors)
     size = [noise.residual_force_sd_n] * 3 + [noise.residual_moment_sd_nm] * 3
     errors[:, K, :, K] = _about(root, np.where(undeclared[:, None], UNDECLARED_SD * weight, size))
     residual = np.where(undeclared, UNMEASURED, ON_PLATE if all(size) else NO_CONTACT)
@@ -179,7 +183,7 @@ def _about(point: Array, sd: Array) -> Array:
     return np.asarray(spread @ np.swapaxes(spread, 1, 2))
 
 
-def _divide(t: int, feet: npt.NDArray[np.intp], priors: list[Prior], wrench: Array, errors: Array) -> None:
+def _divide(t: int, feet: npt.NDArray[np.intp], priors: dict[int, Prior], wrench: Array, errors: Array) -> None:
     """A frame's plate among the feet on it, in place: their priors, given the sum that it measures."""
     each = {k: priors[k].spread[t] @ priors[k].spread[t].T for k in feet}
     plate = plate_errors(wrench[t, feet].sum(axis=0)[None])[0]

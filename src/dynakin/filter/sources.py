@@ -41,13 +41,12 @@ def with_sources(
         moments = np.tile(np.where(blind, DERIVED, MEASURED)[:, None], (1, len(moved)))
         legs = np.zeros(len(segments), dtype=bool)
     else:
-        data = data.assign(foot_source=(("time", "foot"), contact_sources(feet.contact, undeclared)))
+        contacts = contact_sources(feet.contact, undeclared)
+        data = data.assign(foot_source=(("time", "foot"), contacts))
         for name in ("foot_wrench", "foot_wrench_sd"):
             if name in data:
                 data[name] = data[name].where(data["foot_source"] != ABSENT)
-        joints = _behind(
-            contact_sources(feet.contact, undeclared), [segments.index(name) for name in feet.segments], parents
-        )
+        joints = _behind(contacts, [segments.index(name) for name in feet.segments], parents)
         legs = _below_the_thighs([segments.index(name) for name in soles], parents)
         moments = data["moment_source"].transpose("time", "coordinate").values.copy()
     joints[np.ix_(undeclared, ~legs)] = ABSENT
