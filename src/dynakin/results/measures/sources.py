@@ -174,9 +174,21 @@ def moment_figures(estimate: Estimate, lost: str = "") -> dict[str, Any]:
 
 def _groups(data: xr.Dataset) -> dict[str, list[int]]:
     """Columns by leg; all of a model whose legs are not distinguished."""
-    legs = legs_of(data)
-    groups = {leg: [k for k, own in enumerate(legs) if own == leg] for leg in dict.fromkeys(legs) if leg}
+    legs, toes = legs_of(data), _toes(data)
+    groups = {
+        leg: [k for k, own in enumerate(legs) if own == leg and k not in toes] for leg in dict.fromkeys(legs) if leg
+    }
     return groups or {"": list(range(len(legs)))}
+
+
+def _toes(data: xr.Dataset) -> set[int]:
+    """Columns of coordinates that move what hangs on a foot: absent when it bears load, which says nothing of a leg."""
+    if "foot_segment" not in data.coords or "joint_parent" not in data.coords:
+        return set()
+    segments = [str(name) for name in data["joint_segment"].values]
+    feet = {segments.index(str(name)) for name in data["foot_segment"].values}
+    hung = {segments[k] for k, parent in enumerate(data["joint_parent"].values) if int(parent) in feet - {0}}
+    return {k for k, name in enumerate(data["coordinate_segment"].values) if str(name) in hung}
 
 
 def _count(codes: Codes) -> dict[str, int]:
