@@ -133,11 +133,10 @@ def write_c3d(
         c3d["data"]["analogs"] = channels[None]
         if analog_units:
             c3d.add_parameter("ANALOG", "UNITS", list(analog_units))
-        width = 8 if 3 in kinds else 6
-        listed = np.zeros((width, len(kinds)))
+        sizes = [{3: 8, 5: 8, 6: 12, 7: 8}.get(kind, 6) for kind in kinds]
+        listed = np.zeros((max(sizes, default=6), len(kinds)))
         at = 1
-        for k, kind in enumerate(kinds):
-            size = 8 if kind == 3 else 6
+        for k, size in enumerate(sizes):
             listed[:size, k] = np.arange(at, at + size)
             at += size
         c3d.add_parameter("FORCE_PLATFORM", "USED", [len(kinds)])
