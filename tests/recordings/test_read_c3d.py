@@ -284,7 +284,7 @@ def test_a_plate_that_cannot_be_read_does_not_take_the_others_along(tmp_path: Pa
         body(),
         kinds=[21, 2],
         channels=np.vstack([np.zeros_like(channels_of(2)), channels_of(2)]),
-        corners=[turned(R_LP) + [0, 700.0, 0], turned(R_LP)],
+        corners=[turned(R_LP) + np.array([0, 700.0, 0]), turned(R_LP)],
         origins=[origin_of(2), origin_of(2)],
     )
     recording = read(path)
@@ -295,9 +295,7 @@ def test_a_plate_that_cannot_be_read_does_not_take_the_others_along(tmp_path: Pa
 def test_channels_without_a_calibration_are_taken_as_calibrated(tmp_path: Path) -> None:
     """Motion Analysis' files have type 4 and an empty matrix."""
     common = {"corners": [turned(R_LP)], "analog_units": ["N"] * 3 + ["Nmm"] * 3}
-    path = write_c3d(
-        tmp_path / "a.c3d", body(), kinds=[4], channels=channels_of(2), origins=[origin_of(2)], **common
-    )  # type: ignore[arg-type]
+    path = write_c3d(tmp_path / "a.c3d", body(), kinds=[4], channels=channels_of(2), origins=[origin_of(2)], **common)  # type: ignore[arg-type]
     recording = read(path)
     np.testing.assert_allclose(recording.total_wrench()[3], expected_wrench(R_LP), rtol=1e-5, atol=2e-2)
     assert "plate 1 has no calibration in the file: its channels are taken as calibrated." in recording.notes

@@ -122,7 +122,7 @@ def even_times(time: Array, rate_in_header: float | None = None) -> tuple[Array,
     if rounded_to is None or slope <= 0.0 or rounded_to <= _ROUGH * slope or (np.diff(time) < 0).any():
         return time, []
     for rate in (rate_in_header, float(np.rint(1.0 / slope)), 1.0 / slope):
-        if rate is None or not rate > 0.0:
+        if rate is None or not rate > 0.0 or np.abs(np.diff(time) - 1.0 / rate).max() >= (1.0 - 1e-6) * rounded_to:
             continue
         low, high = (time - k / rate).max() - 0.55 * rounded_to, (time - k / rate).min() + 0.55 * rounded_to
         if low <= high:
