@@ -118,7 +118,8 @@ def even_times(time: Array, rate_in_header: float | None = None) -> tuple[Array,
         return time, []
     rounded_to = next((10.0**-d for d in range(7) if np.abs(time - np.round(time, d)).max() < 1e-9), None)
     k = np.arange(len(time))
-    slope = float(np.polyfit(k, time, 1)[0])
+    centred = k - k.mean()
+    slope = float(centred @ time / (centred @ centred))  # s a frame, by least squares
     if rounded_to is None or slope <= 0.0 or rounded_to <= _ROUGH * slope or (np.diff(time) < 0).any():
         return time, []
     for rate in (rate_in_header, float(np.rint(1.0 / slope)), 1.0 / slope):
