@@ -107,8 +107,8 @@ def make(folder: Path) -> None:
 
 
 def _as_they_come(folder: Path) -> None:
-    """The same text files as other programs write them: decimal commas, semicolons, doubled tabs, UTF-16, rounded times,
-    a doubled name."""
+    """The same text files as other programs write them: decimal commas, semicolons, doubled tabs, UTF-16, rounded
+    times, a doubled name."""
     trc, csv = ((folder / name).read_text() for name in ("markers_squat.trc", "markers_squat.csv"))
     (folder / "markers_commas.trc").write_text(re.sub(r"(?<=\d)\.(?=\d)", ",", trc))
     (folder / "markers_tabs.trc").write_text(re.sub(r"(?m)^(\d.*)$", lambda m: m[1].replace("\t", "\t\t"), trc))
