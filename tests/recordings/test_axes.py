@@ -1,5 +1,5 @@
-"""The usual axes of laboratories, any heading: up and forward are found on copies of the real recordings that are turned
-to each of them."""
+"""The usual axes of laboratories, any heading: up and forward are found on copies of the real recordings that are
+turned to each of them."""
 
 from __future__ import annotations
 
