@@ -143,6 +143,24 @@ def test_units_of_length(tmp_path: Path, unit: str | None, factor: float, said: 
     assert recording.length_unit == ("mm" if factor == 1.0 else "m")
 
 
+@pytest.mark.parametrize(("padding", "described"), [(0, 127), (0, 128), (1, 0), (3, 255), (2, 20)])
+def test_parameters_that_ezc3d_cannot_read_are_written_anew(tmp_path: Path, padding: int, described: int) -> None:
+    analog = np.arange(8.0 * T)[None]
+    groups = {"PROCESSING": {"Bodymass": 70.0}, "ANALOG": {"LABELS": ["EMG"]}}
+    path = made_c3d(
+        tmp_path / "a.c3d", BODY, groups, analog=analog, per_frame=8, analog_rate=790.0, padding=padding,
+        description="d" * described,
+    )  # fmt: skip
+    before = path.read_bytes()
+    recording = read(path)
+    assert recording.marker_names == tuple(BODY) and recording.subject == {"mass_kg": 70.0}
+    np.testing.assert_allclose(recording.marker("C7"), 1e-3 * BODY["C7"], rtol=1e-6)
+    np.testing.assert_array_equal(recording.analog[0].values, analog[0])
+    assert path.read_bytes() == before
+    with pytest.raises(RecordingError, match="where the next record begins"):
+        read(made_c3d(tmp_path / "b.c3d", BODY, padding=4))
+
+
 # --- events and analog channels
 
 

@@ -99,7 +99,7 @@ def test_the_whole_file_is_read(tmp_path: Path, whole: bytes) -> None:
         ("LABELS", "dimension", 255, "reaches up to byte"),
         ("UNITS", "offset", 40, "where the next record begins"),
         ("UNITS", "offset", 1, "expected an end by byte"),  # points into itself: a walk that would not advance
-        ("USED", "description", 0xFF, "has a description of 255 bytes, expected at most 127"),  # segmentation fault
+        ("USED", "description", 0xFF, "expected an end by byte"),  # segmentation fault
         ("USED", "type", 3, "has type 3, expected -1, 1, 2 or 4"),
         ("USED", "group", 0, "is in group 0, expected 1 to 127"),
     ],

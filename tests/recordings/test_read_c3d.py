@@ -141,6 +141,36 @@ def test_type_4_calibration_mixes_channels(tmp_path: Path) -> None:
     np.testing.assert_allclose(read(path).total_wrench()[5], expected_wrench(R_LP), rtol=1e-5, atol=1e-2)
 
 
+@pytest.mark.parametrize("kind", [4, 5, 7])
+@pytest.mark.parametrize("layout", ["by column", "by row", "in a larger one", "channels first"])
+def test_layouts_of_the_calibration(tmp_path: Path, kind: int, layout: str) -> None:
+    """A file gives its matrices by column, or says ByRow; those of plates of several types have one size."""
+    matrix = calibration_of(kind)
+    assert matrix is not None
+    rows, columns = matrix.shape
+    stored = matrix
+    if layout == "by row":
+        stored = matrix.ravel().reshape((rows, columns), order="F")
+    elif layout == "in a larger one":
+        stored = np.full((12, 12), np.nan)
+        stored[:rows, :columns] = matrix
+    elif layout == "channels first":
+        if rows == columns:
+            pytest.skip("a square matrix does not show which is first")
+        stored = matrix.T
+    path = write_c3d(
+        tmp_path / "a.c3d",
+        body(),
+        kinds=[kind],
+        channels=channels_of(kind),
+        corners=[turned(R_LP)],
+        origins=[origin_of(kind)],
+        calibration=stored,
+        by_row=layout == "by row",
+    )
+    np.testing.assert_allclose(read(path).total_wrench()[5], expected_wrench(R_LP), rtol=1e-4, atol=2e-2)
+
+
 def test_units_of_channels_and_metres(tmp_path: Path) -> None:
     channels = channels_of(2)
     channels[3:] *= 1e-3

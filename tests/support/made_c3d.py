@@ -27,6 +27,8 @@ def made_c3d(
     per_frame: int = 1,
     analog_rate: float | None = None,
     first: int = 1,
+    padding: int = 0,
+    description: str = "",
 ) -> Path:
     """A file of an Intel processor.
 
@@ -38,6 +40,8 @@ def made_c3d(
         seen: (T, N), False: residual -1.
         analog: (C, T * per_frame), None: no ANALOG group.
         first: number of the first frame, from 1.
+        padding: bytes between a parameter and the next one, which the format's guide does not have.
+        description: of every parameter.
     """
     named = list(points.items()) if isinstance(points, Mapping) else list(points)
     places = np.stack([place for _, place in named], axis=1)  # (T, N, 3)
@@ -61,9 +65,9 @@ def made_c3d(
         }
     for group, entries in (groups or {}).items():
         made[group] = {key: value for key, value in (made.get(group, {}) | dict(entries)).items() if value is not None}
-    data_block = 2 + len(_section(made)) // BLOCK
+    data_block = 2 + len(_section(made, padding, description)) // BLOCK
     made["POINT"]["DATA_START"] = data_block
-    section = _section(made)
+    section = _section(made, padding, description)
     last = first + n_frames - 1
     header = struct.pack(
         "<BBHHHHHfHHf", 2, 0x50, n_points, len(channels) * per_frame * (analog is not None), min(first, 65535),
@@ -82,14 +86,14 @@ def made_c3d(
     return path
 
 
-def _section(groups: Groups) -> bytes:
+def _section(groups: Groups, padding: int, description: str) -> bytes:
     out = b""
     for number, (group, entries) in enumerate(groups.items(), 1):
         out += struct.pack("bb", len(group), -number) + group.encode() + struct.pack("<HB", 3, 0)
         for name, value in entries.items():
-            content = _content(value)
+            content = _content(value) + bytes([len(description)]) + description.encode() + b"\xaa" * padding
             out += struct.pack("bb", len(name), number) + name.encode()
-            out += struct.pack("<H", 2 + len(content) + 1) + content + b"\0"
+            out += struct.pack("<H", 2 + len(content)) + content
     out += b"\0\0"
     blocks = (len(out) + 4) // BLOCK + 1
     return (struct.pack("BBBB", 1, 0x50, blocks, 84) + out).ljust(blocks * BLOCK, b"\0")

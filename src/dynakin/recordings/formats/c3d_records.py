@@ -22,6 +22,7 @@ from dynakin.files import require_file
 _TYPES = {-1: 1, 1: 1, 2: 2, 4: 4}  # text, byte, integer, float: bytes per value
 _MAX_DIMENSIONS = 7
 _MAX_DESCRIPTION = 127  # ezc3d reads the length as a signed byte
+_MOST_PADDING = 3  # bytes: some programs begin their records at even or at fourth bytes
 
 
 @dataclass(frozen=True)
@@ -61,8 +62,9 @@ Correction = tuple[int, bytes]
 Groups = dict[str, dict[str, Record]]
 
 
-def read_records(section: bytes, start: int, path: Path, *, dec: bool) -> Groups:
-    """Parameters by group and name, upper case.
+def read_records(section: bytes, start: int, path: Path, *, dec: bool) -> tuple[Groups, list[Correction]]:
+    """Parameters by group and name, upper case, and the section written anew where ezc3d could not read it: records
+    with a few bytes of padding behind them, descriptions of 128 characters or more (these are cut).
 
     Args:
         section: bytes from the start of the parameter section to where the data begin.
@@ -74,6 +76,7 @@ def read_records(section: bytes, start: int, path: Path, *, dec: bool) -> Groups
     """
     names: dict[int, str] = {}
     found: dict[int, dict[str, Record]] = {}
+    anew = bytearray(section[:4])
     at = 4
     while True:
         length, group = struct.unpack("bb", _take(section, at, 2, start, path, "the next record"))
@@ -96,18 +99,16 @@ def read_records(section: bytes, start: int, path: Path, *, dec: bool) -> Groups
             names.setdefault(-group, name)
             end = here + 2
         else:
-            record, end = _parameter(inside, here + 2, start, path, what, dec)
+            record, end = _parameter(inside, here + 2, start + len(anew) - at, path, what, dec)
             found.setdefault(group, {})[name] = record
-        description = _take(inside, end, 1, start, path, what)[0]
-        if description > _MAX_DESCRIPTION:
-            raise RecordingError(
-                f"{path}: damaged C3D parameters, {what} has a description of {description} bytes, "
-                f"expected at most {_MAX_DESCRIPTION}"
-            )
-        end += 1 + len(_take(inside, end + 1, description, start, path, what))
+        length = _take(inside, end, 1, start, path, what)[0]
+        description = _take(inside, end + 1, length, start, path, what)[:_MAX_DESCRIPTION]
+        content = section[here + 2 : end] + bytes([len(description)]) + description
+        end += 1 + length
+        anew += section[at:here] + struct.pack("<H", (2 + len(content)) if offset else 0) + content
         if offset == 0:
             break
-        if end != following:  # ezc3d refuses that too, but does not say where
+        if not end <= following <= end + _MOST_PADDING:  # ezc3d refuses that too, but does not say where
             raise RecordingError(
                 f"{path}: damaged C3D parameters, {what} ends at byte {start + end}, "
                 f"expected byte {start + following}, where the next record begins"
@@ -116,7 +117,8 @@ def read_records(section: bytes, start: int, path: Path, *, dec: bool) -> Groups
     groups: Groups = {}
     for number, name in sorted(names.items()):
         groups.setdefault(name, found.get(number, {}))  # of two groups with one name ezc3d takes the first
-    return groups
+    same = section.startswith(anew)
+    return groups, [] if same else [(start, bytes(anew.ljust(len(section), b"\0")))]
 
 
 def _parameter(section: bytes, at: int, start: int, path: Path, what: str, dec: bool) -> tuple[Record, int]:
@@ -194,7 +196,9 @@ def check_c3d_file(path: Path) -> tuple[list[str], list[Correction]]:
         )
     if header.data_start < _BLOCK:
         raise RecordingError(f"{path}: found data in block {header.data_start // _BLOCK + 1}, expected 2 or later")
-    return check_counts(header, read_records(section, start, path, dec=processor == _DEC), size, path)
+    groups, rewritten = read_records(section, start, path, dec=processor == _DEC)
+    notes, corrections = check_counts(header, groups, size, path)
+    return notes, rewritten + corrections
 
 
 def _header(head: bytes, *, dec: bool) -> Header:
