@@ -89,8 +89,11 @@ def _recording(recording: Recording) -> Rows:
         ),
         ("Gaps", _gaps(recording)),
     ]
-    subject = [f"{key.replace('_', ' in ')} {value:g}" for key, value in recording.subject.items()]
+    subject = [_measure(key, value) for key, value in recording.subject.items()]
     rows += [("In the file", f"{', '.join(subject)}.")] if subject else []
+    if recording.events:
+        kinds = list(dict.fromkeys(f"{event.side} {event.label}".strip().casefold() for event in recording.events))
+        rows.append(("In the file", f"{len(recording.events)} events ({', '.join(kinds)})."))
     for plate in recording.plates:
         size = np.linalg.norm(plate.force, axis=1)
         if not np.isfinite(size).any():
@@ -196,3 +199,10 @@ def _to_add(case: Case, ready: Prepared | None, refusal: DynakinError | None) ->
     if refusal is None and ready.ground.undeclared.any() and not settings.contacts:
         found.append("--contact seat (hand_right, ...): if that is what bears the person where no plate does.")
     return found
+
+
+def _measure(key: str, value: float) -> str:
+    """ "mass_kg" -> "mass 85 kg", "knee_width_m_r" -> "right knee width 0.139 m"."""
+    side = {"_r": "_r", "_l": "_l"}.get(key[-2:], "")
+    stem, _, unit = key.removesuffix(side).rpartition("_")
+    return f"{words(stem + side)} {value:g} {unit}"
