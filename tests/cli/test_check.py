@@ -5,9 +5,12 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from dynakin.cli.app import main
+from dynakin.results.files.markers import write_trc
+from dynakin.results.files.storage import write_storage
 from dynakin.simulation.trial import simulate
 
 Said = pytest.CaptureFixture[str]
@@ -21,14 +24,6 @@ def told(capsys: Said) -> tuple[str, str]:
 
 def ran(arguments: list[str], out: Path) -> int:
     return main(["run", *arguments, "-o", str(out)])
-
-
-@pytest.fixture(scope="module")
-def walk(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A simulated walk and squat as files, forces beside them, as `dynakin simulate` writes them."""
-    folder = tmp_path_factory.mktemp("walk")
-    assert main(["simulate", "squat", "--model", "fullbody", "--duration", "4", "-o", str(folder)]) == 0
-    return folder
 
 
 def test_what_is_there_and_what_run_would_do(data_dir: Path, capsys: Said) -> None:
@@ -74,3 +69,39 @@ def test_check_promises_what_run_keeps(data_dir: Path, tmp_path: Path, capsys: S
         assert words in first and words in found
     assert "right: plate 4 0.34 to 1.07 s; plate 2 1.37 to 2.13 s; off the plates 2.48 to 2.68 s." in found
     assert "--static Static_trial.c3d (found beside the recording)" in found
+
+
+def test_forces_beside_a_recording_are_named_and_do_what_is_said(tmp_path: Path, capsys: Said) -> None:
+    made = simulate("fullbody", "squat", 1, 5.0).recording
+    trial = tmp_path / "squat1.trc"
+    write_trc(trial, made.time, list(made.marker_names), made.markers, unit="mm")
+    columns, values = [], []
+    for number, plate in enumerate(made.plates, 1):
+        for stem, part in (("v", plate.force), ("p", np.nan_to_num(plate.cop)), ("m", plate.free_moment)):
+            columns += [f"ground_force_{number}_{stem}{axis}" for axis in "xyz"]
+            values.append(part)
+    forces = tmp_path / "squat1_grf.mot"
+    write_storage(forces, "forces", made.time, columns, np.hstack(values), in_degrees=False)
+    main(["check", str(trial), "--mass", "70"])
+    assert "--forces squat1_grf.mot (found beside the recording)" in told(capsys)[0]
+    assert main(["check", str(trial), "--mass", "70", "--forces", str(forces)]) == 0
+    found, _ = told(capsys)
+    assert "Leg moments: measured in all" in found and "--forces" not in found
+    assert "1 under the right foot" in found or "2 under the right foot" in found
+    assert "Held: knee adduction (both sides)" in found
+
+
+def test_a_planar_model_is_checked_as_it_runs(tmp_path: Path, capsys: Said) -> None:
+    """Without plates it is refused, as `run` refuses it; a file that nobody can read too."""
+    made = simulate("sagittal7", "squat", 1, 5.0).recording
+    trial = tmp_path / "squat.trc"
+    write_trc(trial, made.time, list(made.marker_names), made.markers, unit="mm")
+    options = [str(trial), "--model", "sagittal7", "--mass", "70"]
+    assert main(["check", *options]) == 1
+    _, checked = told(capsys)
+    assert "no force plates" in checked
+    assert ran(options, tmp_path / "out") == 2
+    assert told(capsys)[1] == checked
+    trial.write_text("nothing")
+    assert main(["check", *options]) == 1
+    assert main(["check", *options, "--side", "middle"]) == 2
