@@ -195,7 +195,7 @@ def _to_add(case: Case, ready: Prepared | None, refusal: DynakinError | None) ->
         return found
     messages = ready.calibrated.messages
     if refusal is None and starting(messages, ("Warning: mass",)):
-        found.append("--mass KG: by the mean of a movement only.")
+        found.append("--mass KG: it is only estimated (Subject, above).")
     if any("estimated from" in text for text in starting(messages, ("Height",))):
         found.append("--height M: estimated from the markers.")
     if starting(messages, ("Sex not given",)):

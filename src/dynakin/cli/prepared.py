@@ -121,7 +121,7 @@ def _spans(loads: FootLoads, k: int, names: Sequence[str], rate: float) -> list[
                 here = " and ".join(name for name, stands in zip(names, row, strict=True) if stands)
                 words[here + (" (shared)" if code == SHARED else "")] = of_code & (on == row).all(axis=1)
         elif code != SWING:
-            words[REASONS[code]] = of_code
+            words[REASONS[code] if names else "on the floor"] = of_code
     least = _LEAST_S * rate
     found = [(a, b, what) for what, frames in words.items() for a, b in runs(frames) if b - a >= least]
     return sorted(found)
