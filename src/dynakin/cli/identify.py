@@ -42,11 +42,11 @@ def identify(
     if compare:
         _compare(paths)
         return
-    if not paths or "model" not in given or output is None:
-        raise ConfigError("identify: expected TRIAL..., --model NAME and -o subject.toml (or --compare A B)")
+    if not paths or output is None:
+        raise ConfigError("identify: expected TRIAL... and -o subject.toml (or --compare A B)")
     _check_trials(paths)
     _check_output(output)
-    settings = Settings.of({}, "identify", ("model",), given)
+    settings = Settings.of({}, "identify", (), given)
     recordings, standing = _read(paths, forces or [], settings.static)
     estimator = estimator_of(settings)
     with progress_bar("identifying") as progress:

@@ -66,8 +66,8 @@ def with_sources(
     return found
 
 
-class LiveSources:
-    """The same of a model's moments, frame by frame."""
+class ContactSources:
+    """The same of a model's moments by its contacts alone: what a live step says, and `Prepared` of a recording."""
 
     def __init__(self, spec: _core.ModelSpec, soles: Collection[str]) -> None:
         self._segments = [segment.name for segment in spec.segments]
@@ -77,15 +77,16 @@ class LiveSources:
         self._legs = _below_the_thighs([self._segments.index(name) for name in soles], self._parents)
 
     def moments(self, feet: ContactLoads | None) -> Codes:
-        """(C,) codes of a frame's moments by its contacts (T = 1); measured, as far as anybody knows, without any."""
+        """(T, C) codes of the moments by the contacts; of a model without any one row: measured, as far as anybody
+        knows."""
         if feet is None:
-            return np.full(len(self._moved), MEASURED, dtype=np.uint8)
+            return np.full((1, len(self._moved)), MEASURED, dtype=np.uint8)
         undeclared = feet.undeclared
         at = [self._segments.index(name) for name in feet.segments]
         joints = _behind(contact_sources(feet.contact, undeclared), at, self._parents)
         joints[np.ix_(undeclared, ~self._legs)] = ABSENT
         joints[_beyond(feet, self._soles, self._segments, self._parents)] = ABSENT
-        return np.asarray(joints[0, self._moved])
+        return np.asarray(joints[:, self._moved])
 
 
 def moved_segments(spec: _core.ModelSpec) -> list[str]:

@@ -28,11 +28,7 @@ _OPTIONS = {
 }
 # Keys that name files: relative to the configuration file that they stand in.
 _PATHS = ("trial", "forces", "static", "parameters", "output")
-NEEDED = {
-    "trial": "TRIAL",
-    "model": "--model NAME (fullbody, sagittal7, squat7, a .toml or .osim file)",
-    "output": "-o OUT",
-}
+NEEDED = {"trial": "TRIAL", "output": "-o OUT"}
 
 
 class Settings(Strict, use_attribute_docstrings=True):
@@ -42,8 +38,8 @@ class Settings(Strict, use_attribute_docstrings=True):
     """Recording to estimate: .c3d, .trc or .csv.
 
     Paths are relative to this file."""
-    model: str = Field(examples=["squat7"])
-    """Model: fullbody, squat7, sagittal7, or a .toml or .osim file of your own."""
+    model: str = Field(default="fullbody", examples=["squat7"])
+    """Model: fullbody (where none is given), squat7, sagittal7, or a .toml or .osim file of your own."""
     output: Path = Field(default=Path(), examples=["out/squat"])
     """Folder for the results. It is replaced if it holds an earlier output, and refused if it holds anything else."""
 

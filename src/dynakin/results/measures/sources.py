@@ -8,6 +8,7 @@ of the assumption. What a contact that nobody declared can reach is *absent* (Na
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -149,15 +150,22 @@ def moment_figures(estimate: Estimate, lost: str = "") -> dict[str, Any]:
     Args:
         lost: the sentence on frames in which the person was lost.
     """
-    data = estimate.data
-    sources = moment_sources(data)
+    said = [str(text) for text in estimate.config.get("ground", {}).get("reasons", [])]
+    return source_figures(estimate.data, moment_sources(estimate.data), [*said, *([lost] if lost else [])])
+
+
+def source_figures(data: xr.Dataset, sources: Codes, reasons: Sequence[str]) -> dict[str, Any]:
+    """`moment_figures` of codes (T, C).
+
+    Args:
+        data: with the coordinates of an estimate; none of its variables is read. reasons: sentences.
+    """
     groups = _groups(data)
     legs = {name: _count(sources[:, columns].max(axis=1)) for name, columns in groups.items()}
-    reasons: list[str] = []
+    why: list[str] = []
     if any(count["measured"] < len(sources) for count in legs.values()):
-        found = [str(text).removeprefix("Warning: ") for text in estimate.config.get("ground", {}).get("reasons", [])]
-        reasons = [sentence(text) for text in [*found, *([lost] if lost else [])]]
-    names = estimate.coordinate_names
+        why = [sentence(text.removeprefix("Warning: ")) for text in reasons]
+    names = [str(name) for name in data["coordinate"].values]
     moving = {str(name) for name in data["element"].values}
     spoken = {leg: [k for k in own if names[k] in moving] or own for leg, own in groups.items()}  # not of locked joints
     return {
@@ -167,7 +175,7 @@ def moment_figures(estimate: Estimate, lost: str = "") -> dict[str, Any]:
         "frames": len(sources),
         "legs": legs,
         "coordinates": {name: _count(sources[:, k]) for k, name in enumerate(names)},
-        "reasons": list(dict.fromkeys(reasons)),
+        "reasons": list(dict.fromkeys(why)),
         "verdict": _words({leg: _by_joint(sources, names, own) for leg, own in spoken.items()}, len(sources)),
     }
 
