@@ -49,8 +49,8 @@ def study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     model = _segments_renamed((package / "builtin" / "sagittal7.toml").read_text(), "thigh", "thigh/leg")
     assert model.count("thigh/leg") == 2
     (folder / "model.toml").write_text(model)
-    markers = (package / "markers" / "opencap.toml").read_text()
-    (folder / "markers.toml").write_text(markers.replace('_knee"', '_A/B"').replace('"KNEE"', '"A/B"'))
+    markers = (package / "markers" / "sets" / "opencap.toml").read_text()
+    (folder / "markers.toml").write_text(markers.replace('_knee"', '_A/B"'))
     return folder
 
 

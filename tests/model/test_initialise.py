@@ -139,7 +139,7 @@ def test_a_needed_marker_absent_everywhere(standing_person: Recording) -> None:
     lacking = without(standing_person, "R_ankle", "L_ankle")
     with pytest.raises(ModelError) as error:
         load_model("sagittal7", PERSON, "opencap").calibrate(lacking)
-    for word in ("segment 'shank'", "'ankle'", "marker ANKLE", "r_ankle", "L_ankle", "R_toe"):
+    for word in ("segment 'shank'", "'ankle'", "marker ANK ", "r_ankle", "L_ankle", "R_toe"):
         assert word in error.value.message
 
 
@@ -187,7 +187,7 @@ def test_mass_is_needed_and_height_is_estimated(standing_person: Recording) -> N
     assert found.height_m == pytest.approx((places["R_Shoulder"][1] - lowest) / 0.818, abs=1e-9)
     text = " ".join(found.messages)
     assert "Height" in text
-    assert "not given, estimated from SHOULDER" in text
+    assert "not given, estimated from SHO " in text
     assert "Sex not given: regressions and table are the mean of both sexes" in text
 
 
@@ -301,9 +301,9 @@ def test_a_users_own_spatial_tree(tmp_path: Path, standing_person: Recording) ->
     """Given a free-floating leg in space with a locked axis, when measured, then its coordinates are the
     leg's."""
     (tmp_path / "leg.toml").write_text(SPATIAL, encoding="utf-8")
-    source = Path(load_model("sagittal7").path).parents[1] / "markers" / "opencap.toml"
+    source = Path(load_model("sagittal7").path).parents[1] / "markers" / "sets" / "opencap.toml"
     hips = "".join(f'\n{s}_hip = [{{ mean = ["HJC"], sides = "{s}" }}]' for s in ("left", "right"))
-    text = source.read_text(encoding="utf-8").replace("\n[landmarks]\n", f"\n[landmarks]{hips}\n")
+    text = source.read_text(encoding="utf-8") + f"\n[landmarks]{hips}\n"
     (tmp_path / "set.toml").write_text(text, encoding="utf-8")
     definition = load_model(tmp_path / "leg.toml", PERSON, tmp_path / "set.toml")
     for side, sign in (("right", 1.0), ("left", -1.0)):

@@ -81,20 +81,20 @@ def test_unknown_names_suggest_the_nearest() -> None:
 @pytest.mark.parametrize(
     ("old", "new", "words"),
     [
-        ('name = "SH2"\n', 'name = "SH2"\nalias = ["x"]\n', ['"SH2"', "'alias'"]),
-        ("variance = 15e-3", "variance = -1", ['"SH2"', "variance"]),
-        (
-            'knee = [{ mean = ["KNEE"] }]',
-            'knee = [{ mean = ["KNEES"] }]',
-            ["landmarks.knee", "did you mean 'KNEE'"],
-        ),
-        ('knee = [{ mean = ["KNEE"] }]', 'knee = [{ mean = ["knee"] }]', ["knee -> knee is a circle"]),
-        ('heel_toe = ["CALC", "TOE"]', 'heel_toe = ["CALC", "TOW"]', ["heel_toe", "did you mean 'TOE'"]),
-        ('source = "Harrington', 'note = "Harrington', ["landmarks.hip", "'note'"]),
+        ("SHO = ", "SHOO = ", ["places", "did you mean 'SHO'"]),
+        ("[clusters]\nshank", "[clusters]\nshnak", ["clusters", "did you mean 'shank'"]),
+        ('"{r,L}_knee"', '"{r}_knee"', ["'{r}_knee'", "right and left in braces"]),
+        ('"{r,L}_knee"', '{ names = "{r,L}_knee", alias = "x" }', ['"KNE"', "'alias'"]),
+        ('"{r,L}_knee"', '{ names = "{r,L}_knee", variance = -1 }', ['"KNE"', "variance"]),
+        ("[places]", "places = 3\n[other]", ["tables of names"]),
+        ("[places]", 'heel_toe = ["HEE", "TOW"]\n[places]', ["heel_toe", "did you mean 'TOE'"]),
+        ("[places]", '[landmarks]\nknee = [{ mean = ["KNES"] }]\n[places]', ["landmarks.knee", "did you mean 'KNE'"]),
+        ("[places]", '[landmarks]\nknee = [{ mean = ["knee"] }]\n[places]', ["knee -> knee is a circle"]),
+        ("[places]", '[landmarks]\nhip = [{ mean = ["KNE"], note = "x" }]\n[places]', ["landmarks.hip", "'note'"]),
     ],
 )
 def test_a_wrong_marker_set_names_the_key(tmp_path: Path, old: str, new: str, words: list[str]) -> None:
-    path = changed(tmp_path, "markers", "opencap", old, new)
+    path = changed(tmp_path, "markers/sets", "opencap", old, new)
     with pytest.raises(ModelError) as error:
         load_marker_set(path)
     for word in [str(path), *words]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from dynakin.errors import ModelError
 from dynakin.files import is_file
+from dynakin.model.markers.anatomy import expanded
 from dynakin.model.markers.schema import Marker, MarkerSetFile
 from dynakin.recordings.landmarks import FacingPairs, plain_name
 from dynakin.recordings.recording import Recording
@@ -19,7 +20,7 @@ from dynakin.settings.strict import nearest, read_toml, validate
 MarkerKey = tuple[str, str]
 """(name of the marker in its set, "right", "left" or "centre")."""
 
-_FOLDER = resources.files("dynakin.model") / "markers"
+_FOLDER = resources.files("dynakin.model") / "markers" / "sets"
 
 
 def available_marker_sets() -> list[str]:
@@ -41,7 +42,14 @@ def load_marker_set(name_or_path: str | Path) -> MarkerSetFile:
             f"marker set {name!r}: unknown{nearest(name, known)}; expected {', '.join(known)} or a .toml "
             "file that exists"
         )
-    return validate(MarkerSetFile, read_toml(path), str(path))
+    data = read_toml(path)
+    try:
+        whole = expanded(data)
+    except (TypeError, AttributeError, KeyError):
+        raise ModelError(f"{path}: places and clusters: expected tables of names") from None
+    except ValueError as error:
+        raise ModelError(f"{path}: {error}") from None
+    return validate(MarkerSetFile, whole, str(path))
 
 
 @dataclass(frozen=True)
@@ -57,12 +65,13 @@ class MarkerMatch:
     def facing_pairs(self) -> FacingPairs:
         """The recorded names of the markers that show where the person faces."""
         chosen = (self.marker_set.heel_toe, self.marker_set.pelvis_back_front)
+
+        def of_side(name: str, side: str) -> str | None:
+            return self.names.get((name, side)) or self.names.get((name, "centre"))
+
+        sides = ("right", "left")
         found = [
-            tuple(
-                (self.names[pair[0], side], self.names[pair[1], side])
-                for side in ("right", "left")
-                if (pair[0], side) in self.names and (pair[1], side) in self.names
-            )
+            tuple((back, front) for s in sides if (back := of_side(pair[0], s)) and (front := of_side(pair[1], s)))
             for pair in (entry or ("", "") for entry in chosen)
         ]
         return FacingPairs(found[0], found[1])

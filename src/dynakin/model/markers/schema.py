@@ -4,7 +4,7 @@ recipes."""
 from __future__ import annotations
 
 from graphlib import CycleError, TopologicalSorter
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -176,11 +176,14 @@ class Recipe(Strict):
 
 
 class MarkerSetFile(Strict):
-    """A whole marker set."""
+    """A whole marker set: its places and clusters, or all of its markers and landmarks written out."""
 
     schema_version: Literal[1]
     name: Name
     description: str = ""
+    source: str = ""  # where the set is published
+    places: dict[str, Any] = Field(default={})  # place of the body (anatomy.toml) -> names in recordings
+    clusters: dict[str, Any] = Field(default={})  # segment -> markers that only follow it; see anatomy.expanded
     heel_toe: tuple[str, str] | None = None  # markers that show where the person faces: foot,
     pelvis_back_front: tuple[str, str] | None = None  # and pelvis
     height_marker: str = ""  # marker whose height over the floor gives the body height if none is given

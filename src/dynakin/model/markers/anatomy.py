@@ -1,0 +1,129 @@
+"""Places of the body that marker sets share: a set that names them gets their numbers and their landmarks."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from dynakin.settings.strict import nearest, read_toml
+
+_FILE = resources.files("dynakin.model") / "markers" / "anatomy.toml"
+_SIDED = re.compile(r"\{([^{},]*),([^{},]*)\}")
+
+
+@cache
+def anatomy() -> dict[str, Any]:
+    """The contents of anatomy.toml: ``places``, ``clusters``, ``landmarks``, ``in_space`` and keys of a whole set."""
+    return read_toml(Path(str(_FILE)))
+
+
+def sided(pattern: str) -> dict[str, str]:
+    """Names in recordings by side: "{R,L}KNE" is RKNE on the right and LKNE on the left, a plain name in the centre.
+
+    Raises:
+        ValueError: braces that do not hold a right and a left spelling.
+    """
+    if not re.search(r"[{}]", pattern):
+        return {"centre": pattern}
+    names = {"right": _SIDED.sub(r"\1", pattern), "left": _SIDED.sub(r"\2", pattern)}
+    if re.search(r"[{}]", names["right"]) or names["right"] == names["left"]:
+        raise ValueError(f'{pattern!r}: expected a plain name, or right and left in braces, such as "{{R,L}}KNE"')
+    return names
+
+
+def expanded(data: Mapping[str, Any]) -> dict[str, Any]:
+    """A marker set's file with its places and clusters written out as markers, and the landmarks that follow.
+
+    What the file gives itself stands: its own numbers and markers, its own recipes for a landmark instead.
+
+    Raises:
+        ValueError: a place or segment that anatomy.toml does not have (the nearest is named), or a wrong name pattern.
+    """
+    shared = anatomy()
+    rest = {key: value for key, value in data.items() if key not in ("places", "clusters")}
+    if "places" not in data:
+        return rest  # a set that gives all of itself
+    markers: list[Any] = []
+    for place, names in data["places"].items():
+        known = shared["places"].get(place)
+        if known is None:
+            raise ValueError(
+                f"places: {place!r} is no place of the body{nearest(place, shared['places'])}; expected "
+                f"{', '.join(shared['places'])}"
+            )
+        numbers = {key: value for key, value in known.items() if key != "description"}
+        markers.append({"name": place, **numbers, **_entry(names)})
+    for segment, names in data.get("clusters", {}).items():
+        if segment not in shared["clusters"]:
+            raise ValueError(
+                f"clusters: {segment!r} is no segment{nearest(segment, shared['clusters'])}; expected "
+                f"{', '.join(shared['clusters'])}"
+            )
+        for entry in names:
+            given = _entry(entry)
+            name = _SIDED.sub("", entry["names"] if isinstance(entry, dict) else entry).strip("._- ")
+            markers.append({"name": name, "segment": segment, **shared["clusters"][segment], **given})
+    rest["markers"] = [*markers, *rest.get("markers", ())]
+    there = {marker["name"] for marker in rest["markers"] if isinstance(marker, dict) and "name" in marker}
+    own = {key: rest.get(key, {}) for key in ("landmarks", "in_space")}
+    plain = _possible({**shared["landmarks"], **own["landmarks"]}, there, own["landmarks"])
+    both = _possible({**plain, **shared["in_space"], **own["in_space"]}, there, {**own["landmarks"], **own["in_space"]})
+    rest["landmarks"] = plain
+    rest["in_space"] = {name: both[name] for name in (*shared["in_space"], *own["in_space"]) if name in both}
+    for key in ("heel_toe", "pelvis_back_front"):
+        pair = next((pair for pair in shared[key] if set(pair) <= there), None)
+        if pair is not None:
+            rest.setdefault(key, pair)
+    if shared["height_marker"] in there and "height_marker" not in rest:
+        rest |= {key: shared[key] for key in ("height_marker", "height_fraction", "height_source")}
+    return rest
+
+
+def _entry(given: str | Iterable[str] | Mapping[str, Any]) -> dict[str, Any]:
+    """Keys of a marker from its names, or from ``names`` and other numbers than the shared ones."""
+    found: dict[str, Any] = {}
+    names = given
+    if isinstance(given, Mapping):
+        found = {key: value for key, value in given.items() if key != "names"}
+        names = given.get("names", ())
+    for pattern in (names,) if isinstance(names, str) else names:
+        for side, name in sided(pattern).items():
+            found.setdefault(side, []).append(name)
+    return found
+
+
+def _possible(landmarks: Mapping[str, Any], markers: set[str], own: Mapping[str, Any]) -> dict[str, Any]:
+    """Recipes without those of the shared ones that need a place or landmark which the set does not have."""
+    kept = dict(landmarks)
+    while True:
+        known = markers | set(kept)
+        next_kept = {
+            name: fits
+            for name, recipes in kept.items()
+            if (fits := recipes if name in own else [r for r in recipes if _needs(r) <= known])
+        }
+        if next_kept == kept:
+            return kept
+        kept = next_kept
+
+
+def _needs(recipe: Any) -> set[str]:
+    """Markers and landmarks that a recipe as read from TOML starts from; of one of another shape nothing is asked."""
+    if not isinstance(recipe, dict):
+        return set()
+    names: set[str] = set(recipe.get("mean", ()))
+    for way, keys in (
+        ("pelvis", ("asis", "psis")),
+        ("polar", ("origin", "along", "scale")),
+        ("fraction", ("between",)),
+        ("offset", ("origin", "along", "asis", "foot", "square_to", "bend", "scale")),
+    ):
+        given = recipe.get(way, {})
+        for key in keys if isinstance(given, dict) else ():
+            value = given.get(key, ())
+            names |= {value} if isinstance(value, str) else set(value)
+    return names - {""}
