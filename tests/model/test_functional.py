@@ -1,6 +1,6 @@
 """Joint centres and axes from functional trials, on simulated persons and real recordings.
 
-Thresholds were set on seeds 1 to 12; those here are others.
+Thresholds were set on seeds 1 to 12, deviations on 101 to 130; those here are others.
 """
 
 from __future__ import annotations
@@ -10,22 +10,32 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from tests.support.functional_trials import STANDING, functional_trial
 
 from dynakin.errors import ModelError
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.model.calibration.functional import JointMotion, angle_deg, joint_axis, joint_centre
+from dynakin.model.calibration.frames import Trial
+from dynakin.model.calibration.functional import (
+    JointMotion,
+    angle_deg,
+    functional_landmarks,
+    joint_axis,
+    joint_centre,
+)
+from dynakin.model.calibration.landmarks import LandmarkFinder
 from dynakin.model.definition import ModelDefinition, load_model
+from dynakin.model.markers.marker_set import load_marker_set, match_markers
+from dynakin.recordings.frame import find_laboratory_frame
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Array, Recording
 from dynakin.recordings.rigidity import rigid_motion
 from dynakin.settings.subject import Subject
 from dynakin.simulation.sensors.sizes import SensorNoise
-from tests.support.functional_trials import STANDING, functional_trial
 
 PELVIS = ("r.ASIS", "L.ASIS", "r.PSIS", "L.PSIS")
 THIGH = ("r_knee", "r_thigh1", "r_thigh2", "r_thigh3", "r_thigh4")
 SHANK = ("r_ankle", "r_sh2", "r_sh3", "r_shank_antsup")
-SEEDS = range(101, 107)
+SEEDS = range(201, 209)
 WHO = Subject(mass_kg=70.0, height_m=1.75, sex="male")
 REAL = Path("/work/shared/data/functional")
 
@@ -43,6 +53,12 @@ def definition(**functional: Recording) -> ModelDefinition:
 
 def renamed(recording: Recording, names: dict[str, str]) -> Recording:
     return replace(recording, marker_names=tuple(names.get(name, name) for name in recording.marker_names))
+
+
+def blank(recording: Recording, *names: str) -> Recording:
+    markers = recording.markers.copy()
+    markers[:, [recording.marker_names.index(name) for name in names]] = np.nan
+    return replace(recording, markers=markers)
 
 
 @pytest.mark.parametrize(("noise", "within_mm", "within_deg"), [
@@ -67,13 +83,8 @@ def test_soft_tissue_and_deviations() -> None:
         errors[1, k], stated[1, k] = angle_deg(line.direction, axis, True), line.sd_deg
     rms, expected = np.sqrt((errors**2).mean(axis=1)), np.sqrt((stated**2).mean(axis=1))
     print("rms error (mm, deg)", rms, "stated", expected)
-    assert rms[0] < 10.0 and rms[1] < 5.0
+    assert rms[0] < 12.0 and rms[1] < 5.0
     assert (rms < 1.5 * expected).all() and (rms > 0.4 * expected).all()
-
-
-def calibrated(seed: int, **functional: Recording) -> CalibratedModel:
-    standing, _, _ = functional_trial(seed, "hip", replace(SensorNoise(), hip_regression_sd_m=0.02))
-    return definition(**functional).calibrate(standing)
 
 
 def _hip(found: CalibratedModel) -> Array:
@@ -82,20 +93,24 @@ def _hip(found: CalibratedModel) -> Array:
 
 
 def test_a_regression_that_is_off_is_replaced() -> None:
-    """The hip in the pelvis comes nearer to where it is; the sentence says by how much the regression is off."""
-    gained = []
-    for seed in SEEDS[:3]:
-        noise = replace(SensorNoise(), hip_regression_sd_m=0.02)
+    """Hip centres 12 mm off along each axis come nearer to where they are; the sentence says by how much they move."""
+    noise, errors = replace(SensorNoise(), hip_regression_sd_m=0.012), []
+    for seed in SEEDS[:4]:
         hip, centre, _ = functional_trial(seed, "hip", noise)
-        before, after = calibrated(seed), calibrated(seed, hip_r=hip)
-        asis = np.median([hip.marker(name)[STANDING] for name in PELVIS[:2]], axis=(0, 1))
-        truth = float(np.linalg.norm(centre - asis))
-        gained.append([abs(float(np.linalg.norm(_hip(one))) - truth) for one in (before, after)])
-        said = next(text for text in after.messages if text.startswith("Hip centre right: from simulated"))
-        assert "standard deviation" in said and "from the marker set's" in said
-        assert not any(text.startswith("Hip centre") for text in before.messages)
-    before_m, after_m = np.sqrt((np.array(gained) ** 2).mean(axis=0))
-    assert after_m < 0.012 and after_m < before_m
+        match = match_markers(load_marker_set("opencap"), hip.marker_names, [True] * len(hip.marker_names), hip.name)
+        ground = find_laboratory_frame(hip, vertical="auto", forward="auto", pairs=match.facing_pairs)
+        trial = Trial.of(hip, match, ground).facing()
+        finder = LandmarkFinder(match, "both", "male", planar=False, in_space=True, height_m=1.75)
+        before = finder.find_in_space(trial.median(STANDING))
+        after, said = functional_landmarks({"hip_r": hip}, before, finder, trial, STANDING)
+        truth = trial.ground.points_to_ground(centre)
+        errors.append([float(np.linalg.norm(one["hip_r"] - truth)) for one in (before, after)])
+        moved = 1e3 * float(np.linalg.norm(after["hip_r"] - before["hip_r"]))
+        assert f"{moved:.1f} mm from the marker set's" in said[0] and "standard deviation" in said[0]
+        assert np.allclose(after["hip"], 0.5 * (after["hip_r"] + after["hip_l"]))
+        assert np.array_equal(after["hip_l"], before["hip_l"]) and np.array_equal(after["knee_r"], before["knee_r"])
+    before_m, after_m = np.sqrt((np.array(errors) ** 2).mean(axis=0))
+    assert after_m < 0.014 and after_m < 0.7 * before_m, (before_m, after_m)
 
 
 def test_the_knee_turns_about_the_axis_found() -> None:
@@ -113,13 +128,14 @@ def test_the_knee_turns_about_the_axis_found() -> None:
 
 def test_markers_that_the_set_does_not_know() -> None:
     """A thigh of which the set knows one marker is found by those that lie along it and move with it."""
-    hip, centre, _ = functional_trial(103, "hip", SensorNoise())
-    names = {f"r_thigh{k}": f"X{k}" for k in (1, 2, 3, 4)}
-    known, unknown = (
-        next(t for t in definition(hip_r=one).calibrate(one).messages if t.startswith("Hip centre right"))
-        for one in (hip, renamed(hip, names))
-    )
-    assert known == unknown
+    hip, _, _ = functional_trial(203, "hip", SensorNoise())
+    unknown = renamed(hip, {f"r_thigh{k}": f"X{k}" for k in (1, 2, 3, 4)})
+    found = []
+    for one in (hip, unknown):
+        after, before = definition(hip_r=one).calibrate(one), definition().calibrate(one)
+        assert any(text.startswith("Hip centre right: from simulated") for text in after.messages)
+        found.append(_hip(after) - _hip(before))
+    assert np.linalg.norm(found[1] - found[0]) < 0.010 and np.linalg.norm(found[1]) > 1e-4
 
 
 def test_refusals_say_what_to_do() -> None:
@@ -128,18 +144,16 @@ def test_refusals_say_what_to_do() -> None:
     knee, _, _ = functional_trial(104, "knee", noise)
     small, _, _ = functional_trial(104, "hip", noise, size=0.3)
     stiff, _, _ = functional_trial(104, "knee", noise, size=0.2)
-    swapped = renamed(
-        good, {"r_thigh1": "r_thigh4", "r_thigh4": "r_thigh1", "r_thigh2": "r_knee", "r_knee": "r_thigh2"}
-    )
-    bare = renamed(good, {f"r_thigh{k}": f"far{k}" for k in (1, 2, 3, 4)})
-    bare = replace(bare, markers=np.where(np.char.startswith(bare.marker_names, "far")[:, None], np.nan, bare.markers))
+    few = blank(good, "r_thigh3", "r_thigh4")
+    swapped = renamed(few, {"r_thigh1": "r_thigh2", "r_thigh2": "r_knee", "r_knee": "r_thigh1"})
+    bare = blank(good, *(f"r_thigh{k}" for k in (1, 2, 3, 4)))
     for joint, trial, words in (
         ("hip_r", small, "about two axes"),
         ("knee_r", stiff, "the knee turns through"),
         ("hip_l", good, "the thigh turns through"),
         ("hip_r", knee, "deg or more about two axes"),
         ("hip_r", swapped, "labels swapped"),
-        ("hip_r", bare, "1 markers of the right thigh"),
+        ("hip_r", bare, "2 markers of the right thigh"),
     ):
         with pytest.raises(ModelError, match=words) as caught:
             definition(**{joint: trial}).calibrate(good)
@@ -161,7 +175,7 @@ def test_real_hip_and_knee() -> None:
 
     pelvis, thigh = ("RASIS", "LASIS", "RPSIS", "LPSIS"), ("RTHI1", "RTHI2", "RTHI3")
     found = joint_centre(JointMotion.between(rigid_motion(*motion(hip, pelvis)), rigid_motion(*motion(hip, thigh))))
-    assert 5.0 < 1e3 * found.residual_m < 12.0 and 6.0 < 1e3 * found.sd_m < 16.0
+    assert 5.0 < 1e3 * found.residual_m < 12.0 and 6.0 < 1e3 * found.sd_m < 20.0
     assert np.percentile(rigid_motion(*motion(hip, (*thigh, "RLFE"))).misfit_m, 90) > 0.025
     shank = ("RLEG1", "RLEG2", "RLEG3")
     line = joint_axis(JointMotion.between(rigid_motion(*motion(knee, thigh)), rigid_motion(*motion(knee, shank))))

@@ -105,15 +105,16 @@ class JointAxis:
 def joint_centre(motion: JointMotion) -> Centre:
     """The point that moves least against both segments.
 
-    sd_m holds what the parts of the trial disagree on (jackknife over blocks, in which skin wanders) and what both
-    segments do, whose skin has moved since standing. On simulated persons it is 1.0 to 1.2 times the error.
+    sd_m holds what the parts of the trial disagree on (jackknife over blocks, in which skin wanders), what both
+    segments do, whose skin has moved since standing, and the residual, for skin that follows the motion. Without the
+    last it was 0.8 times the error of simulated persons (30 seeds).
     """
     a, b = _centres(motion)
     others = np.array([_centres(motion.part(frames))[0] for frames in motion.blocks_left_out()])
     variance = (_BLOCKS - 1) / _BLOCKS * float(((others - others.mean(axis=0)) ** 2).sum())
     apart = a - motion.turns @ b - motion.shifts
-    sd_m = float(np.sqrt(variance + ((a - b) ** 2).sum()))
-    return Centre(a, sd_m, float(np.sqrt((apart**2).sum(axis=1).mean())))
+    residual = float((apart**2).sum(axis=1).mean())
+    return Centre(a, float(np.sqrt(variance + ((a - b) ** 2).sum() + residual)), float(np.sqrt(residual)))
 
 
 def joint_axis(motion: JointMotion) -> JointAxis:
