@@ -10,7 +10,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from tests.support.functional_trials import STANDING, functional_trial
 
 from dynakin.errors import ModelError
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -31,6 +30,7 @@ from dynakin.recordings.recording import Array, Recording
 from dynakin.recordings.rigidity import rigid_motion
 from dynakin.settings.subject import Subject
 from dynakin.simulation.sensors.sizes import SensorNoise
+from support.functional_trials import STANDING, functional_trial
 
 PELVIS = ("r.ASIS", "L.ASIS", "r.PSIS", "L.PSIS")
 THIGH = ("r_knee", "r_thigh1", "r_thigh2", "r_thigh3", "r_thigh4")
