@@ -16,10 +16,12 @@ Node = tuple[str, str]
 """(place, side)."""
 
 _HEIGHT_M, _HEIGHT_SD_M = 1.70, 0.15
+_FLOOR_SD_M = 0.05  # soles, and a laboratory's floor that is not at zero
 _HEIGHTS_M = np.arange(1.1, 2.15, 0.07)
 _NO_PLACE = 14.0
 """Squared distance, in standard deviations, beyond which a marker has no place of the list."""
 _TURNS = 4
+_MIRRORED = 0.05  # of the height: how far from the mirror image of the other side's a marker may lie
 _NAMED_ODD = 0.12  # of the height: how far from its place a marker may lie that its name says
 
 
@@ -50,7 +52,7 @@ def fit_person(up: Array, named: Mapping[int, Node], forward: Array | None) -> S
     nodes, at, sd, rare = _template()
     index = {node: k for k, node in enumerate(nodes)}
     anchors = {k: index[node] for k, node in named.items() if node in index}
-    floor = float(up[:, 1].min()) - 0.012
+    lowest = float(up[:, 1].min()) - 0.012
     flat = up[:, [0, 2]]
     middle = np.median(flat, axis=0)
     if forward is not None:
@@ -61,7 +63,7 @@ def fit_person(up: Array, named: Mapping[int, Node], forward: Array | None) -> S
     best: Stature | None = None
     for start in turns:
         for height in _HEIGHTS_M:
-            turn, size, origin = start, float(height), middle
+            turn, size, origin, floor = start, float(height), middle, lowest
             for _ in range(_TURNS):
                 scaled = _scaled(up, turn, size, origin, floor)
                 cost = _costs(scaled, at, sd, rare, anchors)
@@ -69,9 +71,10 @@ def fit_person(up: Array, named: Mapping[int, Node], forward: Array | None) -> S
                 hit = columns < len(nodes)
                 if np.count_nonzero(hit) < 4:
                     break
-                turn, size, origin = _refit(up, at, sd, rows[hit], columns[hit], floor)
+                turn, size, origin, floor = _refit(up, at, sd, rows[hit], columns[hit])
             total = float(np.where(hit, cost[rows, np.minimum(columns, len(nodes) - 1)], _NO_PLACE).sum())
             total += ((size - _HEIGHT_M) / _HEIGHT_SD_M) ** 2
+            total += ((floor - lowest) / _FLOOR_SD_M) ** 2
             if not 1.0 < size < 2.3 or (best is not None and total >= best.cost):
                 continue
             found = [nodes[j] if j < len(nodes) else None for j in columns]
@@ -91,7 +94,19 @@ def lies_at(stature: Stature, marker: int, place: str) -> tuple[bool, str]:
     if about is None or "at" not in about:
         return True, side
     apart = np.array([x, y, abs(z)]) - about["at"]
-    return bool(np.linalg.norm(apart) < max(_NAMED_ODD, 2.5 * np.linalg.norm(about["sd"]))), side
+    return float(np.linalg.norm(apart)) < max(_NAMED_ODD, 2.5 * float(np.linalg.norm(about["sd"]))), side
+
+
+def alike_on_both_sides(stature: Stature, marker: int) -> bool:
+    """Whether the other side has a marker for the same place, and it lies there too; a place in the middle has none."""
+    node = stature.nodes[marker]
+    if node is None or node[1] == "centre":
+        return node is not None
+    mate = (node[0], "left" if node[1] == "right" else "right")
+    if mate not in stature.nodes:
+        return False
+    apart = stature.scaled[stature.nodes.index(mate)] * [1.0, 1.0, -1.0] - stature.scaled[marker]
+    return bool(np.linalg.norm(apart) < _MIRRORED)
 
 
 def segment_at(stature: Stature, marker: int) -> str | None:
@@ -113,7 +128,7 @@ def _template() -> tuple[list[Node], Array, Array, Array]:
     nodes: list[Node] = []
     at, sd, rare = [], [], []
     for place, about in places().items():
-        if "at" not in about:
+        if about.get("by_name_only"):
             continue
         x, y, z = about["at"]
         for side, sign in (("centre", 0.0),) if z == 0.0 else (("right", 1.0), ("left", -1.0)):
@@ -140,9 +155,9 @@ def _costs(scaled: Array, at: Array, sd: Array, rare: Array, anchors: Mapping[in
 
 
 def _refit(
-    up: Array, at: Array, sd: Array, rows: npt.NDArray[np.intp], columns: npt.NDArray[np.intp], floor: float
-) -> tuple[float, float, Array]:
-    """Turn (rad), size (m) and origin (2,) by least squares of what is assigned."""
+    up: Array, at: Array, sd: Array, rows: npt.NDArray[np.intp], columns: npt.NDArray[np.intp]
+) -> tuple[float, float, Array, float]:
+    """Turn (rad), size (m), origin (2,) m and height of the floor (m) by least squares of what is assigned."""
     weight = 1.0 / np.linalg.norm(sd[columns], axis=1) ** 2
     weight = weight / weight.sum()
     ours, theirs = up[rows], at[columns]
@@ -151,28 +166,29 @@ def _refit(
     p_mean, q_mean = weight @ p, weight @ q
     turn = float(np.angle(np.sum(weight * (p - p_mean) * np.conj(q - q_mean))))
     flat = float(np.sum(weight * np.real((p - p_mean) * np.conj(q - q_mean) * np.exp(-1j * turn))))
-    size = (flat + float(weight @ ((ours[:, 1] - floor) * theirs[:, 1]))) / float(
-        np.sum(weight * np.abs(q - q_mean) ** 2) + weight @ theirs[:, 1] ** 2
+    up_mean, at_mean = float(weight @ ours[:, 1]), float(weight @ theirs[:, 1])
+    upward = theirs[:, 1] - at_mean
+    size = (flat + float(weight @ ((ours[:, 1] - up_mean) * upward))) / float(
+        np.sum(weight * np.abs(q - q_mean) ** 2) + weight @ upward**2
     )
     origin = p_mean - size * np.exp(1j * turn) * q_mean
-    return turn, size, np.array([origin.real, origin.imag])
+    return turn, size, np.array([origin.real, origin.imag]), up_mean - size * at_mean
 
 
 def _mirror_plane(up: Array) -> list[float]:
     """Directions (rad) along the planes about which the markers are most alike on both sides."""
     scores = []
     angles = np.deg2rad(np.arange(0.0, 180.0, 4.0))
+    flat = up[:, [0, 2]]
     for angle in angles:
         along = np.array([np.cos(angle), np.sin(angle)])
-        across = np.array([-along[1], along[0]])
-        flat = up[:, [0, 2]]
-        side = flat @ across
+        side = flat @ np.array([-along[1], along[0]])
         points = np.stack([flat @ along, up[:, 1], side], axis=1)
-        best = np.inf
+        alike: list[float] = []
         for offset in np.median(side) + np.arange(-0.05, 0.051, 0.0125):
             mirrored = points * [1.0, 1.0, -1.0] + [0.0, 0.0, 2.0 * offset]
             apart = np.linalg.norm(points[:, None] - mirrored[None], axis=2).min(axis=1)
-            best = min(best, float(np.minimum(apart, 0.10).mean()))
-        scores.append(best)
+            alike.append(float(np.minimum(apart, 0.10).mean()))
+        scores.append(min(alike))
     first = int(np.argmin(scores))
     return [float(angles[first]), float(angles[first] + 0.5 * np.pi)]

@@ -46,7 +46,10 @@ _CENTRES = {
     "s": "SJC",
 }
 _CENTRE = re.compile(r"^(hip|knee|ankle|shoulder|[hkas])(jc|jointcent(?:er|re)|cent(?:er|re)|joint)(?:reg)?$")
-_QUALIFIED = r"(?:\d+|[a-d]|front|back|top|bottom|upper|lower|up|low|lat|med|ant|post|sup|inf|prox|dist|cluster|tracking|marker)*"
+_QUALIFIED = (
+    r"(?:\d+|[a-d]|front|back|top|bottom|upper|lower|up|low|lat|med|ant|post|sup|inf|prox|dist"
+    r"|cluster|tracking|marker)*"
+)
 
 
 @dataclass(frozen=True)
@@ -89,16 +92,16 @@ def said(name: str) -> Said | None:
     if len(known) == 1:
         place, segment, side = next(iter(known))
         return Said(place, segment or None, side, "sure", "name of a built-in set")
-    for side, rest in _readings(name):
+    for own_side, rest in _readings(name):
         place = _place(rest)
         if place is not None:
             centre = places().get(place, {}).get("at", (0.0, 0.0, 1.0))[2] == 0.0
-            if centre and side is not None:
+            if centre and own_side is not None:
                 continue  # the side's letter belongs to the word
-            return Said(place, None, "centre" if centre else side, "likely", f"its name: {rest}")
+            return Said(place, None, "centre" if centre else own_side, "likely", f"its name: {rest}")
         segment = _segment(rest)
         if segment is not None:
-            return Said(None, segment, side, "likely", f"its name: {rest}")
+            return Said(None, segment, own_side, "likely", f"its name: {rest}")
     return None
 
 
