@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,6 +12,7 @@ from dynakin.errors import ModelError
 from dynakin.model.calibration.body import check_body_mass, find_height, find_mass
 from dynakin.model.calibration.checks import check_masses, fixed_lengths, reach, refuse_moving_origin, report
 from dynakin.model.calibration.frames import Trial, choose_side
+from dynakin.model.calibration.functional import functional_landmarks
 from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder, slope
 from dynakin.model.calibration.lumping import PlacedPart, segment_bodies
 from dynakin.model.calibration.posture import Posture, find_geometry, find_posture, frame_landmarks
@@ -56,8 +58,11 @@ def measure(
     side: str,
     vertical: str,
     forward: str | tuple[float, float, float],
+    functional: Mapping[str, Recording],
 ) -> tuple[ModelPlan, Measured]:
     """The model filled with what the recording shows; arguments and errors as of ``Definition.calibrate``."""
+    if functional and not model.sided:
+        raise ModelError(f"functional is given, but model {model.name} is planar; expected a model in space (fullbody)")
     messages: list[str] = []
     marker_set = asked_markers or choose_marker_set(recording.marker_names)
     if asked_markers is None:
@@ -105,6 +110,9 @@ def measure(
     messages.append(f"Lengths and marker places: {which}.")
     standing = source.median(frames)
     landmarks = finder.find_in_space(standing) if model.sided else finder.find(standing)
+    if functional:
+        landmarks, how_found = functional_landmarks(functional, landmarks, finder, source, frames)
+        messages += how_found
 
     mass_kg, how = find_mass(
         subject,

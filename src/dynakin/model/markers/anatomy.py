@@ -65,7 +65,7 @@ def expanded(data: Mapping[str, Any]) -> dict[str, Any]:
             )
         for entry in names:
             given = _entry(entry)
-            name = _SIDED.sub("", entry["names"] if isinstance(entry, dict) else entry).strip("._- ")
+            name = _SIDED.sub("", entry.get("names", "") if isinstance(entry, dict) else entry).strip("._- ")
             markers.append({"name": name, "segment": segment, **shared["clusters"][segment], **given})
     rest["markers"] = [*markers, *rest.get("markers", ())]
     there = {marker["name"] for marker in rest["markers"] if isinstance(marker, dict) and "name" in marker}
