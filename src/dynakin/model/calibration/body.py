@@ -8,7 +8,9 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ModelError
+from dynakin.model.calibration.completion import Proportions
 from dynakin.model.calibration.frames import Trial
+from dynakin.model.calibration.landmarks import LandmarkFinder
 from dynakin.recordings.checks import check_plates
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.frame import GroundFrame
@@ -29,6 +31,10 @@ _BODY_MASS_INDEX = (10.0, 60.0)
 _OTHER_LEVEL_M = 0.08  # a heel that has left the floor, or a toe that dips, is nearer
 _STANDS_M_S = 0.1
 """Speed of the lowest marker below which a foot stands: in the air it points down, which adds 0.2 m to a height."""
+
+_HEIGHT_BY = ("asis", "hip", "knee_lateral", "knee")
+"""Landmarks that give a height by the proportions, the best first."""
+MEAN_HEIGHT_M, MEAN_BODY_MASS_INDEX = 1.70, 23.0
 
 
 def find_mass(
@@ -112,8 +118,14 @@ def check_body_mass(subject: Subject, mass_kg: float, height_m: float | None) ->
         )
 
 
-def find_height(subject: Subject, recordings: list[Recording], trial: Trial) -> tuple[float | None, str]:
+def find_height(
+    subject: Subject, recordings: list[Recording], trial: Trial, finder: LandmarkFinder | None = None
+) -> tuple[float | None, str]:
     """Height (m) and where it comes from; None with the reason where nothing gives it.
+
+    Args:
+        finder: of a model in space, which needs a height: where that marker does not give one, the highest landmark of
+            the proportions that is seen over a foot does, and without any it is a mean adult's, with a warning.
 
     Estimated from the marker set's ``height_marker`` (the acromion) where it is highest over the lowest marker of the
     recording, divided by its fraction of the body height: a person who never stands upright comes out too small, and
@@ -134,17 +146,46 @@ def find_height(subject: Subject, recordings: list[Recording], trial: Trial) -> 
     ]
     over = _over_the_foot(trial, tops) if tops else np.empty(0)
     if not len(over) or marker_set.height_fraction is None:
+        if finder is not None:
+            return _by_proportions(trial, finder)
         return None, f"height_m is not given and {marker_set.height_marker or 'no marker'} does not show it."
-    top, lowest = np.mean([np.nanpercentile(path[:, 1], 99.0) for path in tops]), "lowest marker"
-    reach = float(top - np.nanmin([np.nanpercentile(path[:, 1], 1.0) for path in _seen(trial)]))
-    if reach - np.percentile(over, 99.0) > _OTHER_LEVEL_M:
-        reach, lowest = float(np.percentile(over, 99.0)), "lowest marker of the same frame"
-    height = reach / marker_set.height_fraction
+    height, lowest = _over_lowest(trial, tops, over)
+    height /= marker_set.height_fraction
     return height, (
         f"Height {height:.2f} m: not given, estimated from {marker_set.height_marker} (where it is highest) "
         f"over the {lowest}, divided by {marker_set.height_fraction:g} "
         f"({marker_set.height_source})."
     )
+
+
+def _by_proportions(trial: Trial, finder: LandmarkFinder) -> tuple[float, str]:
+    """Height (m) from the highest landmark that needs no height itself, over a foot that stands."""
+    feet = [name for names in trial.match.foot_markers.values() for name in names]
+    for name in _HEIGHT_BY if feet else ():
+        keys = [key for key in finder.markers_of(name) if np.isfinite(trial.paths[key]).all(axis=1).any()]
+        tops = [trial.paths[key] for key in keys]
+        over = _over_the_foot(trial, tops) if tops else np.empty(0)
+        if not len(over):
+            continue
+        reach, lowest = _over_lowest(trial, tops, over)
+        fraction = float(Proportions.load().landmarks[f"{name}_r"][1])
+        return reach / fraction, (
+            f"Height {reach / fraction:.2f} m: not given, estimated from {name} (where it is highest) over the "
+            f"{lowest}, divided by {fraction:g} (proportions of an adult)."
+        )
+    return MEAN_HEIGHT_M, (
+        f"Warning: height {MEAN_HEIGHT_M:.2f} m assumed, of a mean adult: it is not given and no markers show it. What "
+        "no markers measure is of this size. Give the height if it is known."
+    )
+
+
+def _over_lowest(trial: Trial, tops: list[Array], over: Array) -> tuple[float, str]:
+    """Height (m) of markers over the lowest one, where they are highest, and which one that is."""
+    top, lowest = np.mean([np.nanpercentile(path[:, 1], 99.0) for path in tops]), "lowest marker"
+    reach = float(top - np.nanmin([np.nanpercentile(path[:, 1], 1.0) for path in _seen(trial)]))
+    if reach - np.percentile(over, 99.0) > _OTHER_LEVEL_M:
+        reach, lowest = float(np.percentile(over, 99.0)), "lowest marker of the same frame"
+    return reach, lowest
 
 
 def _seen(trial: Trial) -> list[Array]:

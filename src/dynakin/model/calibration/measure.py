@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from dynakin.errors import ModelError
 from dynakin.model.calibration.body import check_body_mass, find_height, find_mass
+from dynakin.model.calibration.completion import completed, free
 from dynakin.model.calibration.checks import check_masses, fixed_lengths, reach, refuse_moving_origin, report
 from dynakin.model.calibration.frames import Trial, choose_side
 from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder, slope
@@ -90,7 +91,8 @@ def measure(
     finder = LandmarkFinder(common, side, subject.sex, model.planar, in_space=model.sided)
     if model.sided:
         entries = [r for r in (static, recording) if r is not None]
-        finder.height_m, _ = find_height(subject, entries, source)
+        height_m, how_high = find_height(subject, entries, source, finder)
+        finder.height_m = height_m
         finder.sole = flat_slopes(source)
     needed = needed_markers(model, finder, locks)
     refuse_moving_origin(model, trial, finder)
@@ -103,7 +105,13 @@ def measure(
     source = trial if static is None else _at_origin(model, source, finder, frames)
     messages.append(f"Lengths and marker places: {which}.")
     standing = source.median(frames)
-    landmarks = finder.find_in_space(standing) if model.sided else finder.find(standing)
+    if model.sided:
+        found = completed(
+            model, table, locks, finder.find_in_space(standing), standing, finder.height_m or np.nan, trial.match.where
+        )
+        landmarks, added = found.landmarks, set(found.added)
+    else:
+        landmarks, added = finder.find(standing), set[str]()
 
     mass_kg, how = find_mass(
         subject,
@@ -111,8 +119,10 @@ def measure(
         source.match.foot_markers,
     )
     messages.append(how)
-    height_m, how = find_height(subject, [r for r in (static, recording) if r is not None], source)
-    messages.append(how)
+    if not model.sided:
+        height_m, how_high = find_height(subject, [r for r in (static, recording) if r is not None], source)
+    messages.append(how_high)
+    messages += found.messages if model.sided else []
     check_body_mass(subject, mass_kg, height_m)
     if subject.sex is None:
         messages.append(
@@ -129,7 +139,7 @@ def measure(
     check_masses(model, bodies, parts, mass_kg, height_m, messages)
     start = posture if model.sided else _first_posture(model, geometry, finder, trial, needed, posture, messages)
     plan = ModelPlan(
-        model, geometry, start.coordinates, fixed_lengths(model, bare), bodies,
+        model, geometry, start.coordinates, fixed_lengths(model, bare, added), bodies,
         {s.name: reach(model, s.name, geometry, parts[s.name]) for s in model.segments}, tuple(sites),
     )  # fmt: skip
     report(model, plan, mass_kg, messages)
@@ -151,10 +161,11 @@ def _common(match: MarkerMatch, other: MarkerMatch) -> MarkerMatch:
 
 
 def needed_markers(model: ModelFile, finder: LandmarkFinder, locks: dict[str, float | None]) -> set[MarkerKey]:
-    """Markers of every landmark that the lengths and frames need; refuses a recording without one of them."""
+    """Markers of every landmark that the lengths and frames need. In the plane a recording without one of them is
+    refused; in space the others are completed (`completion`)."""
     wanted: dict[str, str] = {}
     for segment in model.segments:
-        if segment.axes and all(locks.get(axis.coordinate) is not None for axis in segment.axes):
+        if not free(segment, locks):
             continue  # its pose follows from its parent's
         for name in frame_landmarks(segment):
             wanted.setdefault(name, f"segment {segment.name!r} of model {model.name}")
@@ -163,7 +174,10 @@ def needed_markers(model: ModelFile, finder: LandmarkFinder, locks: dict[str, fl
     keys: set[MarkerKey] = set()
     for name, why in wanted.items():
         own, plain = finder.of_side(name)
-        own.require(plain, why)
+        if not model.sided:
+            own.require(plain, why)
+        elif not own.known(plain):
+            continue
         keys |= own.markers_of(plain)
     for length in model.lengths:
         if length.between is not None and all(finder.known(name) for name in length.between):

@@ -14,7 +14,7 @@ from dynakin.model.markers.marker_set import MarkerKey, MarkerMatch
 from dynakin.model.markers.schema import Marker
 from dynakin.model.mirroring import SUFFIXES
 from dynakin.model.plan import Geometry, Site
-from dynakin.model.schema import ModelFile
+from dynakin.model.schema import ModelFile, WithoutMarkers
 
 
 @dataclass(frozen=True)
@@ -73,6 +73,10 @@ def find_locks(
     }
     bare: set[str] = set()
     messages: list[str] = []
+    marked = {name for name, count in counts.items() if count}
+    for segment in reversed(model.segments):  # children stand after their parents
+        if segment.name in marked:
+            marked.add(segment.parent)
     for name, count in counts.items():
         segment = by_name[name]
         if count == 1:
@@ -81,6 +85,10 @@ def find_locks(
         if count or all(locks.get(axis.coordinate) is not None for axis in segment.axes):
             continue
         rule = segment.without_markers
+        if model.sided and rule is None:
+            if segment.parent == "ground" or name in marked:
+                continue  # what hangs on it shows how it moves, as far as it does (`observed`)
+            rule = WithoutMarkers(lock_to=segment.parent)
         if rule is None:
             parts = {name, *segment.parts}
             fitting = [m for m in match.marker_set.markers if m.segment in parts and m.measures(not model.sided)]
