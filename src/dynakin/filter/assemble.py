@@ -54,6 +54,7 @@ def assemble(
         feet,
         np.zeros(len(recording.time), dtype=bool) if undeclared is None else undeclared,
         initial.feet.values(),
+        initial.held,
     )
     if feet is not None:
         data = data.isel(foot=[name != RESIDUAL for name in feet.names])
@@ -68,6 +69,7 @@ def assemble(
         "mass_kg": initial.mass_kg,
         "height_m": initial.height_m,
         "side": initial.side,
+        "held": dict(initial.held),
         "ground": {
             "vertical": initial.ground.vertical,
             "forward": initial.ground.forward.tolist(),

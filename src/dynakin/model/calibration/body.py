@@ -7,12 +7,16 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
+from scipy import ndimage
+
+from dynakin.arrays import runs
 from dynakin.errors import ModelError
 from dynakin.model.calibration.completion import Proportions
 from dynakin.model.calibration.frames import Trial
 from dynakin.model.calibration.landmarks import LandmarkFinder
 from dynakin.recordings.checks import check_plates
 from dynakin.recordings.feet.assignment import foot_loads
+from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Recording
 from dynakin.settings.subject import Subject
@@ -26,6 +30,9 @@ over 5 s are 4 %."""
 _STEADY = 0.3
 """Part of its mean by which the load may vary: squats do by a quarter. Running, a seat that bears part of the weight,
 a step off the plates or onto a box does by more."""
+_STRETCH_S, _SPEED_S = 0.15, 0.02
+"""Shortest stretch whose impulse counts: 0.05 m/s that the centre of mass gains beside the pelvis are 3 % of it; and the
+smoothing before the pelvis' path is differentiated."""
 _BODY_MASS_INDEX = (10.0, 60.0)
 """kg/m2; what lies beyond is no weight of a person of that height who stood on the plates."""
 _OTHER_LEVEL_M = 0.08  # a heel that has left the floor, or a toe that dips, is nearer
@@ -41,9 +48,17 @@ def find_mass(
     subject: Subject,
     trials: Sequence[tuple[Recording, GroundFrame]],
     foot_markers: Mapping[str, Sequence[str]],
+    pelvis: Sequence[str] = (),
+    height_m: float | None = None,
 ) -> tuple[float, str]:
     """Mass (kg) and where it comes from: given, from the plates while standing still, from the file, or, with a
-    warning, from the plates' mean over a movement that is long and steady enough.
+    warning, from the plates' mean over a movement that is long and steady enough, or from their impulse while they
+    bear all of the person.
+
+    Args:
+        pelvis: the recordings' names of the markers on it; its vertical speed stands for that of the centre of mass.
+        height_m: for a mean adult's mass, with a warning, where no trial has plates, and nothing is weighed; None: such
+            trials are refused.
 
     Raises:
         ModelError: none of these; the message says why the plates do not show it.
@@ -59,10 +74,15 @@ def find_mass(
         if check.refusal is not None:
             reasons.append(f"{recording.name}: {check.refusal}")
         elif check.mass_kg_from_plates is None:
-            mean, why = steady_load(recording, ground, foot_markers)
+            loads = foot_loads(recording, ground, foot_markers)
+            mean, why = steady_load(recording, loads)
             reasons.append(f"nobody stands still on the plates of {recording.name}, and {why}")
             if mean is not None:
-                means.append((mean, recording.name))
+                means.append((mean, f"the mean vertical force of {recording.name}, in which nobody stands still"))
+            elif (found := impulse_load(recording, ground, loads, pelvis)) is not None:
+                mean, seconds = found
+                text = f"the plates' impulse over the {seconds:.1f} s of {recording.name} in which they bear all of the "
+                means.append((mean, f"{text}person, and the speed that the pelvis gains"))
         else:
             mass = float(check.mass_kg_from_plates)
             return mass, f"Mass {mass:.2f} kg: from the plates of {recording.name} while standing still."
@@ -72,20 +92,50 @@ def find_mass(
             return mass_kg, f"Mass {mass_kg:.2f} kg: from the file {recording.name}."
     for mass, name in means:
         return mass, (
-            f"Warning: mass {mass:.2f} kg from the mean vertical force of {name}, in which nobody stands still; wrong "
-            "where anything but the plates bears the person. Give the mass if it is known."
+            f"Warning: mass {mass:.2f} kg from {name}; wrong where anything but the plates bears the person. Give the "
+            "mass if it is known."
+        )
+    if height_m is not None and not any(recording.plates for recording, _ in trials):
+        mass = MEAN_BODY_MASS_INDEX * height_m**2
+        return mass, (
+            f"Warning: mass {mass:.1f} kg assumed, of a mean adult of {height_m:.2f} m: it is not given, and there are no "
+            "plates. Forces and moments grow with it. Give the mass if it is known."
         )
     raise ModelError(
         f"mass_kg is not given and cannot be found ({'; '.join(reasons)}); expected mass_kg of the subject (--mass)"
     )
 
 
-def steady_load(
-    recording: Recording, ground: GroundFrame, foot_markers: Mapping[str, Sequence[str]]
-) -> tuple[float | None, str]:
+def impulse_load(
+    recording: Recording, ground: GroundFrame, loads: FootLoads, pelvis: Sequence[str]
+) -> tuple[float, float] | None:
+    """Mass (kg) that the plates' impulse says over the stretches in which every foot that stands is on a plate, and
+    their seconds: of force it takes m (g T + gained speed). None where these are too few or the pelvis is not seen."""
+    push = loads.wrench[..., 1].sum(axis=1)
+    names = [name for name in pelvis if name in recording.marker_names]
+    if not names or recording.n_frames < 2:
+        return None
+    height = ground.points_to_ground(np.stack([recording.marker(name) for name in names], axis=1))[..., 1].mean(axis=1)
+    seen = np.isfinite(height)
+    if np.count_nonzero(seen) < 2:
+        return None
+    path = np.interp(recording.time, recording.time[seen], height[seen])
+    speed = np.gradient(ndimage.gaussian_filter1d(path, _SPEED_S * recording.rate), recording.time)
+    known = loads.total_known & np.isfinite(push) & seen & (loads.on.any(axis=(1, 2)))
+    impulse, need, seconds = 0.0, 0.0, 0.0
+    for first, end in runs(known):
+        lasts = float(recording.time[end - 1] - recording.time[first])
+        if lasts < _STRETCH_S:
+            continue
+        impulse += float(np.trapezoid(push[first:end], recording.time[first:end]))
+        need += GRAVITY_M_S2 * lasts + float(speed[end - 1] - speed[first])
+        seconds += lasts
+    return (impulse / need, seconds) if seconds > 0.0 and impulse > 0.0 and need > 0.0 else None
+
+
+def steady_load(recording: Recording, loads: FootLoads) -> tuple[float | None, str]:
     """Mean load (kg) of the frames in which every foot that stands is on a plate, and why it is no weight; None where
     these are few, or it varies too much."""
-    loads = foot_loads(recording, ground, foot_markers)
     push = loads.wrench[..., 1].sum(axis=1)[loads.total_known]
     push = push[np.isfinite(push)]
     seconds = len(push) / recording.rate

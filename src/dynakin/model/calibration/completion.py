@@ -79,7 +79,8 @@ def wanted_landmarks(model: ModelFile, table: BodyTable, locks: Mapping[str, flo
         for point in (part.origin, part.length_from, part.length_to, part.axis_from, part.axis_to):
             names += [f"{end}{suffix}" for end in (point.start, point.end)]
     plain = [each for name in names for each in _sided(name)]
-    return list(dict.fromkeys(plain))
+    others = tuple(other for side, other in SUFFIXES.items() if segment.side not in (None, side))
+    return [name for name in dict.fromkeys(plain) if not (others and name.endswith(others))]
 
 
 def free(segment: Segment, locks: Mapping[str, float | None]) -> bool:
@@ -158,12 +159,9 @@ def completed(
         )
     _middles(found.landmarks, set(template.landmarks))
     if found.added:
-        homes: dict[str, list[str]] = {}
-        for name, home in found.added.items():
-            homes.setdefault(home, []).append(name)
         found.messages.append(
-            f"From the proportions of an adult of {height_m:.2f} m, because no markers give them: "
-            + "; ".join(f"{', '.join(names)} ({home})" for home, names in homes.items())
+            f"From the proportions of an adult of {height_m:.2f} m, or of the other side, because no markers give them: "
+            + ", ".join(sorted(found.added))
             + "."
         )
     return found

@@ -42,6 +42,7 @@ class Measured:
     messages: tuple[str, ...]
     trial: Trial
     unplaced: tuple[Candidate, ...]  # markers of a model in space that the calibration frames do not show
+    held: dict[str, str]  # coordinate -> why nothing shows it
     still: bool  # the person stands still in the calibration frames
 
 
@@ -117,6 +118,8 @@ def measure(
         subject,
         [(t.recording, t.ground) for t in ([source, trial] if static is not None else [trial])],
         source.match.foot_markers,
+        [name for key, name in source.match.names.items() if source.match.marker_set.marker(key[0]).segment == "pelvis"],
+        finder.height_m if model.sided else None,
     )
     messages.append(how)
     if not model.sided:
@@ -139,7 +142,7 @@ def measure(
     check_masses(model, bodies, parts, mass_kg, height_m, messages)
     start = posture if model.sided else _first_posture(model, geometry, finder, trial, needed, posture, messages)
     plan = ModelPlan(
-        model, geometry, start.coordinates, fixed_lengths(model, bare, added), bodies,
+        model, geometry, start.coordinates, fixed_lengths(model, set(bare), added), bodies,
         {s.name: reach(model, s.name, geometry, parts[s.name]) for s in model.segments}, tuple(sites),
     )  # fmt: skip
     report(model, plan, mass_kg, messages)
@@ -147,8 +150,9 @@ def measure(
     window = standing_window(source.recording)
     still = window is not None and window.start <= frames[0] < window.stop
     left = tuple(c for c in chosen if c.recorded not in placed_names)
+    held = {name: f"segment {segment} has no markers" for segment, names in bare.items() for name in names}
     trial = as_asked if model.floating else trial
-    return plan, Measured(trial.ground, side, mass_kg, height_m, parts, tuple(messages), trial, left, still)
+    return plan, Measured(trial.ground, side, mass_kg, height_m, parts, tuple(messages), trial, left, held, still)
 
 
 def _common(match: MarkerMatch, other: MarkerMatch) -> MarkerMatch:
