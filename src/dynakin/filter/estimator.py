@@ -221,7 +221,7 @@ class Estimator:
             paths = ContactPaths.of(calibrated).at(markers)
             on_feet = expected_loads(ground.loads, calibrated, self.noise, paths, ground.undeclared, ground.bears)
         try:
-            doubt = doubtful_mass(wrench, calibrated.weighed_kg, ground.load_ratio)
+            doubt = doubtful_mass(wrench, calibrated.weighed_kg, ground.load_ratio, calibrated.unseen_kg)
             passes = 0 if doubt else PASSES
             there, back = _shares(progress, recording.n_frames) if smooth else (progress, None)
             tracker, arrays, shift, clock = run_in_step(

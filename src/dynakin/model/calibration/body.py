@@ -33,6 +33,8 @@ a step off the plates or onto a box does by more."""
 _STRETCH_S, _SPEED_S = 0.15, 0.02
 """Shortest stretch whose impulse counts: 0.05 m/s that the centre of mass gains beside the pelvis are 3 % of it; and the
 smoothing before the pelvis' path is differentiated."""
+_APART = 0.15
+"""Part of the weight, RMS, by which the load may differ from what the pelvis' motion needs: walks and stairs differ by 0.03 to 0.08."""
 _BODY_MASS_INDEX = (10.0, 60.0)
 """kg/m2; what lies beyond is no weight of a person of that height who stood on the plates."""
 _OTHER_LEVEL_M = 0.08  # a heel that has left the floor, or a toe that dips, is nearer
@@ -113,8 +115,8 @@ def impulse_load(
     their seconds: of force it takes m (g T + gained speed). None where these are too few or the pelvis is not seen."""
     push = loads.wrench[..., 1].sum(axis=1)
     names = [name for name in pelvis if name in recording.marker_names]
-    if not names or recording.n_frames < 2:
-        return None
+    if not names or recording.n_frames < 2 or not loads.aloft.any(axis=0).all():
+        return None  # who does not step may pull at something all the time
     height = ground.points_to_ground(np.stack([recording.marker(name) for name in names], axis=1))[..., 1].mean(axis=1)
     seen = np.isfinite(height)
     if np.count_nonzero(seen) < 2:
@@ -123,6 +125,8 @@ def impulse_load(
     speed = np.gradient(ndimage.gaussian_filter1d(path, _SPEED_S * recording.rate), recording.time)
     known = loads.total_known & np.isfinite(push) & seen & (loads.on.any(axis=(1, 2)))
     impulse, need, seconds = 0.0, 0.0, 0.0
+    pushes, accelerations = list[Array](), list[Array]()
+    acceleration = np.gradient(speed, recording.time)
     for first, end in runs(known):
         lasts = float(recording.time[end - 1] - recording.time[first])
         if lasts < _STRETCH_S:
@@ -130,7 +134,15 @@ def impulse_load(
         impulse += float(np.trapezoid(push[first:end], recording.time[first:end]))
         need += GRAVITY_M_S2 * lasts + float(speed[end - 1] - speed[first])
         seconds += lasts
-    return (impulse / need, seconds) if seconds > 0.0 and impulse > 0.0 and need > 0.0 else None
+        pushes.append(push[first:end])
+        accelerations.append(acceleration[first:end])
+    if not (seconds > 0.0 and impulse > 0.0 and need > 0.0):
+        return None
+    mass = impulse / need
+    apart = np.concatenate(pushes) - mass * (GRAVITY_M_S2 + np.concatenate(accelerations))
+    if np.sqrt(np.mean(apart**2)) > _APART * mass * GRAVITY_M_S2:
+        return None
+    return mass, seconds
 
 
 def steady_load(recording: Recording, loads: FootLoads) -> tuple[float | None, str]:
@@ -218,7 +230,8 @@ def _by_proportions(trial: Trial, finder: LandmarkFinder) -> tuple[float, str]:
         if not len(over):
             continue
         reach, lowest = _over_lowest(trial, tops, over)
-        fraction = float(Proportions.load().landmarks[f"{name}_r"][1])
+        template = Proportions.load().landmarks
+        fraction = float(template[f"{name}_r"][1] - template["heel_r"][1])
         return reach / fraction, (
             f"Height {reach / fraction:.2f} m: not given, estimated from {name} (where it is highest) over the "
             f"{lowest}, divided by {fraction:g} (proportions of an adult)."
