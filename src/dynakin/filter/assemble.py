@@ -55,6 +55,7 @@ def assemble(
         np.zeros(len(recording.time), dtype=bool) if undeclared is None else undeclared,
         initial.feet.values(),
         initial.held,
+        initial.unmarked_feet.values(),
     )
     if feet is not None:
         data = data.isel(foot=[name != RESIDUAL for name in feet.names])

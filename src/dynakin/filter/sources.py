@@ -17,7 +17,12 @@ Codes = npt.NDArray[np.uint8]
 
 
 def with_sources(
-    data: xr.Dataset, feet: ContactLoads | None, undeclared: Flags, soles: Collection[str] = (), held: Collection[str] = ()
+    data: xr.Dataset,
+    feet: ContactLoads | None,
+    undeclared: Flags,
+    soles: Collection[str] = (),
+    held: Collection[str] = (),
+    unmarked: Collection[str] = (),
 ) -> xr.Dataset:
     """The dataset of an estimate with ``foot_source``, ``moment_source`` and ``joint_source``, and NaN where absent.
 
@@ -31,6 +36,7 @@ def with_sources(
         feet: contacts (T, F) and the segments on which they act; None of a model that stands on its root.
         undeclared: (T,) frames in which something bears the person that no plate measures.
         soles: segments on which the ground acts. held: coordinates that no marker shows, of which nothing is known.
+        unmarked: those of ``soles`` that no marker shows: what they carry is absent, with all that lies before it.
     """
     segments = [str(name) for name in data["joint_segment"].values]
     parents = data["joint_parent"].values
@@ -41,7 +47,7 @@ def with_sources(
         moments = np.tile(np.where(blind, DERIVED, MEASURED)[:, None], (1, len(moved)))
         legs = np.zeros(len(segments), dtype=bool)
     else:
-        contacts = contact_sources(feet.contact, undeclared)
+        contacts = _contacts(feet, undeclared, unmarked)
         data = data.assign(foot_source=(("time", "foot"), contacts))
         for name in ("foot_wrench", "foot_wrench_sd"):
             if name in data:
@@ -50,7 +56,7 @@ def with_sources(
         legs = _below_the_thighs([segments.index(name) for name in soles], parents)
         moments = data["moment_source"].transpose("time", "coordinate").values.copy()
     joints[np.ix_(undeclared, ~legs)] = ABSENT
-    moments[undeclared[:, None] & (joints[:, moved] == ABSENT)] = ABSENT
+    moments[joints[:, moved] == ABSENT] = ABSENT
     moments[:, np.isin(data["coordinate"].values, list(held))] = ABSENT
     known, carried = moments != ABSENT, joints != ABSENT
     found = data.assign(
@@ -66,7 +72,14 @@ def with_sources(
 class LiveSources:
     """The same of a model's moments, frame by frame."""
 
-    def __init__(self, spec: _core.ModelSpec, soles: Collection[str], held: Collection[str] = ()) -> None:
+    def __init__(
+        self,
+        spec: _core.ModelSpec,
+        soles: Collection[str],
+        held: Collection[str] = (),
+        unmarked: Collection[str] = (),
+    ) -> None:
+        self._unmarked = unmarked
         self._held = np.array([c.name in held for c in spec.coordinates], dtype=bool)
         self._segments = [segment.name for segment in spec.segments]
         self._parents = np.array([_place(self._segments, segment.parent) for segment in spec.segments])
@@ -79,9 +92,16 @@ class LiveSources:
             return np.where(self._held, ABSENT, MEASURED).astype(np.uint8)
         undeclared = feet.undeclared
         at = [self._segments.index(name) for name in feet.segments]
-        joints = _behind(contact_sources(feet.contact, undeclared), at, self._parents)
+        joints = _behind(_contacts(feet, undeclared, self._unmarked), at, self._parents)
         joints[np.ix_(undeclared, ~self._legs)] = ABSENT
         return np.where(self._held, ABSENT, joints[0, self._moved]).astype(np.uint8)
+
+
+def _contacts(feet: ContactLoads, undeclared: Flags, unmarked: Collection[str]) -> Codes:
+    """(T, C) codes of the contacts; absent of a foot that no marker shows."""
+    return np.where(np.isin(feet.segments, list(unmarked)), ABSENT, contact_sources(feet.contact, undeclared)).astype(
+        np.uint8
+    )
 
 
 def moved_segments(spec: _core.ModelSpec) -> list[str]:

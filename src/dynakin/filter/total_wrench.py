@@ -103,6 +103,14 @@ def known_ground(
         loads = foot_loads(
             recording, initial.ground, foot_markers(initial), assigned=assigned, others=list(initial.contacts)
         )
+        if initial.unmarked_feet:
+            loads = loads.without(np.tile(np.isin(loads.feet, list(initial.unmarked_feet)), (n, 1)))
+            sides = " and the ".join(initial.unmarked_feet)
+            text = (
+                f"No markers of the {sides} foot: what it carries is not known. Moments are those of a leg whose own foot is "
+                "on a plate, or in the air."
+            )
+            loads = replace(loads, reasons=(*loads.reasons, text))
     names = list(initial.contacts)
     by_plate = [loads is not None and name in loads.others for name in names]
     may = np.zeros((n, 0), dtype=bool)

@@ -102,6 +102,16 @@ class CalibratedModel:
         """Mass whose motion no marker shows, beyond that of head and hands."""
         return max(0.0, self.unmarked_kg - UNMARKED_SHARE * self.mass_kg)
 
+    @property
+    def unmarked_feet(self) -> dict[str, str]:
+        """Those of ``feet`` that no marker shows, nor what hangs on them."""
+        parents = {segment.name: segment.parent for segment in self.spec.segments}
+        marked = {marker.segment for marker in self.spec.markers}
+        for name in reversed(list(parents)):  # children stand after their parents
+            if name in marked and parents[name] in self.feet.values():
+                marked.add(parents[name])
+        return {side: name for side, name in self.feet.items() if name not in marked}
+
     def measured_plan(self) -> ModelPlan:
         """The plan.
 
