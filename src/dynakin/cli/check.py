@@ -17,7 +17,8 @@ from dynakin.cli.options import OF_A_MODEL, OF_THE_LABORATORY, Given, with_setti
 from dynakin.errors import DynakinError
 from dynakin.filter.build import definition_of
 from dynakin.model.definition import available_models
-from dynakin.model.markers.marker_set import available_marker_sets, foot_markers_of, load_marker_set
+from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
+from dynakin.model.markers.recognise import foot_markers_of
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.recordings.checks import check_plates
 from dynakin.recordings.frame import GroundFrame, find_ground_frame
