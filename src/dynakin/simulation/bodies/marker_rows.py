@@ -84,7 +84,7 @@ PLUG_IN_GAIT = MarkerList(
     ),
 )
 
-PAIRED = ("thigh", "shank", "foot", "upper_arm", "forearm")
+PAIRED = ("thigh", "shank", "foot", "upper_arm", "forearm", "hand")
 ON_KNEE, ON_ANKLE, ON_ELBOW = 0.0320, 0.0236, 0.0230  # sideways of the joint centre, over the height
 # The length along which a segment's markers are spread, and its part of the height on which the rows rest.
 _SPREAD = {"shank": 0.246, "thigh": 0.245, "torso": 0.260, "upper_arm": 0.186, "forearm": 0.146}
