@@ -17,7 +17,12 @@ Codes = npt.NDArray[np.uint8]
 
 
 def with_sources(
-    data: xr.Dataset, feet: ContactLoads | None, undeclared: Flags, soles: Collection[str] = ()
+    data: xr.Dataset,
+    feet: ContactLoads | None,
+    undeclared: Flags,
+    soles: Collection[str] = (),
+    held: Collection[str] = (),
+    unmarked: Collection[str] = (),
 ) -> xr.Dataset:
     """The dataset of an estimate with ``foot_source``, ``moment_source`` and ``joint_source``, and NaN where absent.
 
@@ -30,7 +35,8 @@ def with_sources(
         data: with the joints' tree and, of floating models, the core's ``moment_source``.
         feet: contacts (T, F) and the segments on which they act; None of a model that stands on its root.
         undeclared: (T,) frames in which something bears the person that no plate measures.
-        soles: segments on which the ground acts.
+        soles: segments on which the ground acts. held: coordinates that no marker shows, of which nothing is known.
+        unmarked: those of ``soles`` that no marker shows: what they carry is absent, with all that lies before it.
     """
     segments = [str(name) for name in data["joint_segment"].values]
     parents = data["joint_parent"].values
@@ -41,7 +47,7 @@ def with_sources(
         moments = np.tile(np.where(blind, DERIVED, MEASURED)[:, None], (1, len(moved)))
         legs = np.zeros(len(segments), dtype=bool)
     else:
-        contacts = contact_sources(feet.contact, undeclared)
+        contacts = _contacts(feet, undeclared, unmarked)
         data = data.assign(foot_source=(("time", "foot"), contacts))
         for name in ("foot_wrench", "foot_wrench_sd"):
             if name in data:
@@ -50,22 +56,31 @@ def with_sources(
         legs = _below_the_thighs([segments.index(name) for name in soles], parents)
         moments = data["moment_source"].transpose("time", "coordinate").values.copy()
     joints[np.ix_(undeclared, ~legs)] = ABSENT
-    moments[undeclared[:, None] & (joints[:, moved] == ABSENT)] = ABSENT
-    known, held = moments != ABSENT, joints != ABSENT
+    moments[joints[:, moved] == ABSENT] = ABSENT
+    moments[:, np.isin(data["coordinate"].values, list(held))] = ABSENT
+    known, carried = moments != ABSENT, joints != ABSENT
     found = data.assign(
         moment_source=(("time", "coordinate"), moments.astype(np.uint8)),
         joint_source=(("time", "joint"), joints.astype(np.uint8)),
     )
     for name in ("moments", "moments_sd"):
         found[name] = found[name].where(xr.DataArray(known, dims=("time", "coordinate")))
-    found["joint_loads"] = found["joint_loads"].where(xr.DataArray(held, dims=("time", "joint")))
+    found["joint_loads"] = found["joint_loads"].where(xr.DataArray(carried, dims=("time", "joint")))
     return found
 
 
 class LiveSources:
     """The same of a model's moments, frame by frame."""
 
-    def __init__(self, spec: _core.ModelSpec, soles: Collection[str]) -> None:
+    def __init__(
+        self,
+        spec: _core.ModelSpec,
+        soles: Collection[str],
+        held: Collection[str] = (),
+        unmarked: Collection[str] = (),
+    ) -> None:
+        self._unmarked = unmarked
+        self._held = np.array([c.name in held for c in spec.coordinates], dtype=bool)
         self._segments = [segment.name for segment in spec.segments]
         self._parents = np.array([_place(self._segments, segment.parent) for segment in spec.segments])
         self._moved = [self._segments.index(name) for name in moved_segments(spec)]
@@ -74,12 +89,19 @@ class LiveSources:
     def moments(self, feet: ContactLoads | None) -> Codes:
         """(C,) codes of a frame's moments by its contacts (T = 1); measured, as far as anybody knows, without any."""
         if feet is None:
-            return np.full(len(self._moved), MEASURED, dtype=np.uint8)
+            return np.where(self._held, ABSENT, MEASURED).astype(np.uint8)
         undeclared = feet.undeclared
         at = [self._segments.index(name) for name in feet.segments]
-        joints = _behind(contact_sources(feet.contact, undeclared), at, self._parents)
+        joints = _behind(_contacts(feet, undeclared, self._unmarked), at, self._parents)
         joints[np.ix_(undeclared, ~self._legs)] = ABSENT
-        return np.asarray(joints[0, self._moved])
+        return np.where(self._held, ABSENT, joints[0, self._moved]).astype(np.uint8)
+
+
+def _contacts(feet: ContactLoads, undeclared: Flags, unmarked: Collection[str]) -> Codes:
+    """(T, C) codes of the contacts; absent of a foot that no marker shows."""
+    return np.where(np.isin(feet.segments, list(unmarked)), ABSENT, contact_sources(feet.contact, undeclared)).astype(
+        np.uint8
+    )
 
 
 def moved_segments(spec: _core.ModelSpec) -> list[str]:

@@ -170,11 +170,12 @@ class ModelDefinition:
             self.model, self.subject, self.table, self.marker_set, recording, ground,
             static=static, side=side, vertical=vertical, forward=forward,
         )  # fmt: skip
-        messages, speeds = list(rest.messages), dict[str, float]()
+        messages, speeds, held = list(rest.messages), dict[str, float](), rest.held
         if plan.model.sided:
             begun = started(plan, rest.trial, rest.unplaced, rest.still)
             plan, speeds = begun.plan, begun.speeds
             messages += begun.messages
+            held = held | begun.held
         spec = to_core(plan)
         core = _core.Model(spec)
         names = list(core.layout.names)
@@ -212,6 +213,8 @@ class ModelDefinition:
             plan=plan,
             foot_markers=rest.trial.match.foot_markers,
             feet={s.side: s.name for s in plan.model.segments if s.side is not None and "foot" in s.parts},
+            unmarked_kg=sum(body.mass for name, body in plan.bodies.items() if name not in plan.marked()),
+            held=held,
         )
 
 
