@@ -21,7 +21,7 @@ Array = npt.NDArray[np.float64]
 _FILE = resources.files("dynakin.model") / "markers" / "standing.toml"
 _HEIGHT_M = 1.75  # of the person whose deviations standing.toml gives
 _PROPORTION_SD = 0.08  # of a distance: people are built differently
-_FRAMES = 120  # looked at, spread over the trial
+_FRAMES = 80  # looked at, spread over the trial
 _FEWEST_FRAMES = 3  # in which both of two markers are seen, to judge them by their distance
 _SKIN_SD_M, _SKIN_SHARE = 0.012, 0.05  # how far a distance on a segment varies over a trial
 _ACROSS_SHARE, _ACROSS_SD_M = 0.5, 0.03
@@ -32,9 +32,10 @@ _CAP = 5.0  # deviations beyond this say no more
 _CENTRAL = ("pelvis", "trunk", "head")
 _FRONT_BACK = (
     ("ASI", "PSI"), ("ASI", "SACR"), ("TOE", "HEE"), ("TOE", "ANK"), ("MT1", "HEE"), ("MT5", "HEE"), ("STRN", "T10"),
-    ("CLAV", "C7"), ("STRN", "C7"), ("CLAV", "T10"), ("FHD", "BHD"), ("SEL", "OCC"),
+    ("CLAV", "C7"), ("STRN", "C7"), ("CLAV", "T10"), ("FHD", "BHD"), ("SEL", "OCC"), ("NOS", "EAR"),
+    ("TOE", "HEL"), ("HAL", "HEE"), ("TOE", "AJ"), ("HAL", "AJ"), ("TO2", "HEE"), ("MT1", "AJ"), ("MT5", "AJ"),
 )  # fmt: skip
-_ANYWHERE = ("", "FRM", "WRA", "WRB", "WJ", "forearm")  # arms cross
+_ANYWHERE = ("", "FRM", "WRA", "WRB", "WRI", "WJ", "forearm")  # arms cross
 _SIGN = {"right": 1.0, "left": -1.0, "centre": 1.0}
 
 
@@ -152,19 +153,27 @@ class Found:
         """Of the places (T, n, 3) m of the markers."""
         n = places.shape[1]
         first, second = np.triu_indices(n, 1)
-        between = places[:, first] - places[:, second]
-        lengths = np.linalg.norm(between, axis=2)
-        low, middle, high = _quantiles(lengths, (0.16, 0.5, 0.84))
+        squares = np.zeros((len(places), len(first)))
+        for one in np.moveaxis(places, 2, 0):
+            squares += (one[:, first] - one[:, second]) ** 2
+        low, middle, high = (np.sqrt(level) for level in _quantiles(squares, (0.16, 0.5, 0.84)))
         forward = _majority(places, expected.forward)
         right = _sideways(forward, _majority(places, expected.up), _majority(places, expected.right))
         found = [middle, 0.5 * (high - low)]
         for axis in (right, forward):
-            found.append(_quantiles(np.einsum("tpc,tc->tp", between, axis), (0.5,))[0])
+            along = np.einsum("tnc,tc->tn", places, axis)
+            found.append(_quantiles(along[:, first] - along[:, second], (0.5,))[0])
         tables = [np.full((n, n), np.nan) for _ in found]
         for table, values, sign in zip(tables, found, (1.0, 1.0, -1.0, -1.0), strict=True):
             table[first, second] = values
             table[second, first] = sign * values
         return cls(*tables)
+
+
+    def ordered(self, order: npt.NDArray[np.intp]) -> Found:
+        """The same with the k-th name on marker ``order[k]``."""
+        pick = np.ix_(order, order)
+        return Found(self.distance[pick], self.spread[pick], self.right[pick], self.forward[pick])
 
 
 def _quantiles(values: Array, levels: Sequence[float]) -> list[Array]:
@@ -233,30 +242,40 @@ class Deviations:
         return np.asarray(self.total.sum(axis=1))
 
 
-def deviations(
-    found: Found, expected: Expected, height_m: float, order: npt.NDArray[np.intp] | None = None
-) -> Deviations:
-    """Deviations of what is found from what is expected, with the labels in another order where one is given.
-
-    Args:
-        order: (n,) the marker that is taken for the k-th.
-    """
-    n = len(expected.distance)
-    own = np.arange(n) if order is None else order
-    pick = np.ix_(own, own)
-    usual = expected.distance * height_m
-    distance = (found.distance[pick] - usual) / (expected.sd * height_m)
-    other = np.ix_(own[expected.mirror], own[expected.mirror])
-    uneven = (found.distance[pick] - found.distance[other]) / (_UNEVEN_SHARE * expected.sd * height_m + _UNEVEN_SD_M)
+def deviations(found: Found, expected: Expected, height_m: float) -> Deviations:
+    """Deviations of what is found from what is expected of a person of this height."""
+    mirror = np.ix_(expected.mirror, expected.mirror)
+    with np.errstate(invalid="ignore"):
+        uneven = found.distance - found.distance[mirror]
+        uneven = uneven / (_UNEVEN_SHARE * expected.sd * height_m + _UNEVEN_SD_M)
     uneven[~expected.even] = 0.0
+    others = _deviations(found, expected, height_m, slice(None))
+    return Deviations(np.nan_to_num(others[0]), np.nan_to_num(uneven), *(np.nan_to_num(part) for part in others[1:]))
+
+
+def _deviations(found: Found, expected: Expected, height_m: float, own: slice | int) -> list[Array]:
+    """Of distance, spread, right and forward, against the expectations of all markers or of one."""
+    usual = expected.distance[own] * height_m
+    distance = (found.distance - usual) / (expected.sd[own] * height_m)
     allowed = _SKIN_SD_M + _SKIN_SHARE * np.where(np.isfinite(usual), usual, found.distance)
-    spread = np.where(expected.rigid, found.spread[pick] / allowed, 0.0)
+    spread = np.where(expected.rigid[own], found.spread / allowed, 0.0)
     tables = []
-    for seen, wanted in ((found.right, expected.right), (found.forward, expected.forward)):
+    for seen, wanted in ((found.right, expected.right[own]), (found.forward, expected.forward[own])):
         apart = wanted * height_m
-        short = np.sign(apart) * (apart - seen[pick])
+        short = np.sign(apart) * (apart - seen)
         tables.append(np.maximum(short, 0.0) / np.maximum(_ACROSS_SHARE * np.abs(apart), _ACROSS_SD_M))
-    return Deviations(*(np.nan_to_num(table) for table in (distance, uneven, spread, *tables)))
+    return [distance, spread, *tables]
+
+
+def cost_under_names(found: Found, expected: Expected, height_m: float) -> Array:
+    """(n, n) what marker k would add to the cost under the name of i, all others keeping theirs and the evenness of both
+    sides aside."""
+    n = len(expected.distance)
+    cost = np.empty((n, n))
+    for i in range(n):
+        parts = _deviations(found, expected, height_m, i)
+        cost[i] = sum((np.minimum(np.abs(np.nan_to_num(part)), _CAP) ** 2).sum(axis=1) for part in parts)
+    return cost
 
 
 def body_height_m(found: Found, expected: Expected) -> float:

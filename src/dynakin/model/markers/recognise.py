@@ -235,7 +235,7 @@ def _misplaced(
     match: MarkerMatch, keys: Sequence[MarkerKey], found: Found, expected: Expected, height_m: float, order: np.ndarray
 ) -> dict[int, str]:
     """Markers at distances that no body has, and what shows it; one by one, the worst first."""
-    far = np.abs(deviations(found, expected, height_m, order).distance)
+    far = np.abs(deviations(found.ordered(order), expected, height_m).distance)
     known = np.isfinite(expected.distance) & np.isfinite(found.distance[np.ix_(order, order)])
     wrong: dict[int, str] = {}
     while True:

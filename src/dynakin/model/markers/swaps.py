@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import runs
-from dynakin.model.markers.geometry import Expected, Found, deviations
+from dynakin.model.markers.geometry import Deviations, Expected, Found, cost_under_names, deviations
 from dynakin.model.markers.match import MarkerKey, MarkerMatch
 from dynakin.recordings.recording import Recording
 
@@ -31,6 +31,7 @@ _GROUPS = (
     ("trunk", ("thorax", "abdomen")),
     ("head", ("head",)),
 )
+_SLACK = 4.0  # of a marker, in the quick estimate of what its exchange gains
 _OFF_M = 0.03  # a marker so far from its place on its segment is not where it was
 _MENDED = 0.5  # of that, at most, is left after the exchange
 _SHORTEST_S = 0.1
@@ -65,32 +66,40 @@ def swaps_throughout(
     """Exchanges that mend what contradicts a body, the clearest first, and the order of the markers after them."""
     order = np.arange(len(keys))
     swaps: list[Swap] = []
-    tried = list(_candidates(match, keys))
     while len(swaps) < _MOST:
-        now = deviations(found, expected, height_m, order)
-        share = now.of_marker
+        own = found.ordered(order)
+        now = deviations(own, expected, height_m)
         best, gain = None, _GAIN
-        for pairs, what in tried:
-            if sum(share[i] + share[j] for i, j in pairs) < _GAIN:
-                continue
-            other = _exchanged(order, pairs)
-            better = now.cost - deviations(found, expected, height_m, other).cost
-            if better > gain:
-                best, gain = (pairs, what, other), better
+        for pairs, what in _candidates(match, keys, _promise(own, expected, height_m, now)):
+            exchanged = _exchanged(len(keys), pairs)
+            after = deviations(own.ordered(exchanged), expected, height_m)
+            if now.cost - after.cost > gain:
+                best, gain = (pairs, what, exchanged, after), now.cost - after.cost
         if best is None:
             break
-        pairs, what, other = best
-        after = deviations(found, expected, height_m, other)
-        evidence = _evidence(match, keys, found, expected, height_m, (now.total - after.total), order, pairs)
+        pairs, what, exchanged, after = best
+        evidence = _evidence(match, keys, own, expected, height_m, now.total - after.total, pairs)
         swaps.append(Swap(tuple((keys[i], keys[j]) for i, j in pairs), what, evidence))
-        order = other
+        order = order[exchanged]
     return swaps, order
 
 
-def _candidates(match: MarkerMatch, keys: Sequence[MarkerKey]) -> Iterator[tuple[list[tuple[int, int]], str]]:
+def _promise(found: Found, expected: Expected, height_m: float, now: Deviations) -> Array:
+    """(n, n) about what the exchange of two markers gains, rather too much than too little."""
+    cost = cost_under_names(found, expected, height_m)
+    own = np.diag(cost)
+    uneven = 2.0 * (now.uneven**2).sum(axis=1)
+    both = _SLACK + uneven
+    return np.asarray(own[:, None] + own[None] - cost - cost.T + both[:, None] + both[None])
+
+
+def _candidates(
+    match: MarkerMatch, keys: Sequence[MarkerKey], promise: Array
+) -> Iterator[tuple[list[tuple[int, int]], str]]:
+    """Exchanges worth a trial: which with which, and words for them."""
     names = [match.names[key] for key in keys]
     spot = {key: k for k, key in enumerate(keys)}
-    for i, j in combinations(range(len(keys)), 2):
+    for i, j in np.argwhere(np.triu(promise > _GAIN, 1)).tolist():
         yield [(i, j)], f"{names[i]} and {names[j]}"
     for what, segments in _GROUPS:
         own = [name for name, side in keys if side == "right" and match.marker_set.marker(name).segment in segments]
@@ -102,8 +111,8 @@ def _candidates(match: MarkerMatch, keys: Sequence[MarkerKey]) -> Iterator[tuple
             )
 
 
-def _exchanged(order: Order, pairs: Sequence[tuple[int, int]]) -> Order:
-    other = order.copy()
+def _exchanged(n: int, pairs: Sequence[tuple[int, int]]) -> Order:
+    other = np.arange(n)
     for i, j in pairs:
         other[[i, j]] = other[[j, i]]
     return other
@@ -111,24 +120,23 @@ def _exchanged(order: Order, pairs: Sequence[tuple[int, int]]) -> Order:
 
 def _evidence(
     match: MarkerMatch, keys: Sequence[MarkerKey], found: Found, expected: Expected, height_m: float, gained: Array,
-    order: Order, pairs: Sequence[tuple[int, int]],
+    pairs: Sequence[tuple[int, int]],
 ) -> str:  # fmt: skip
     """The relation that the exchange mends most, in words."""
     own = sorted({k for pair in pairs for k in pair})
     i, j = np.unravel_index(int(np.argmax(gained[own])), (len(own), len(keys)))
     a, b = own[int(i)], int(j)
     one, other = (match.names[keys[k]] for k in (a, b))
-    p, q = order[a], order[b]
     for table, wanted, positive, negative in (
         (found.right, expected.right, "to the right", "to the left"),
         (found.forward, expected.forward, "in front", "behind"),
     ):
-        value = float(table[p, q])
+        value = float(table[a, b])
         if np.isfinite(wanted[a, b]) and np.isfinite(value) and value * wanted[a, b] < 0.0 and abs(value) > 0.02:
             return f"{one} lies {abs(value):.2f} m {positive if value > 0 else negative} of {other}".replace(
                 "in front of", "before"
             ).replace("behind of", "behind")
-    return distance_words(one, other, float(found.distance[p, q]), float(expected.distance[a, b]) * height_m)
+    return distance_words(one, other, float(found.distance[a, b]), float(expected.distance[a, b]) * height_m)
 
 
 def distance_words(one: str, other: str, found_m: float, usual_m: float) -> str:
