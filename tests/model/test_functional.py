@@ -23,7 +23,8 @@ from dynakin.model.calibration.functional import (
 )
 from dynakin.model.calibration.landmarks import LandmarkFinder
 from dynakin.model.definition import ModelDefinition, load_model
-from dynakin.model.markers.marker_set import load_marker_set, match_markers
+from dynakin.model.markers.marker_set import load_marker_set
+from dynakin.model.markers.match import match_markers
 from dynakin.recordings.frame import find_laboratory_frame
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Array, Recording

@@ -16,7 +16,9 @@ from dynakin.files import is_file
 from dynakin.model.calibration.calibrated import CalibratedModel, first_centre_of_pressure
 from dynakin.model.calibration.in_space import started
 from dynakin.model.calibration.measure import measure
-from dynakin.model.markers.marker_set import choose_marker_set, load_marker_set, match_markers
+from dynakin.model.markers.marker_set import load_marker_set
+from dynakin.model.markers.match import match_markers
+from dynakin.model.markers.recognise import choose_marker_set
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.model.opensim.definition import OpenSimDefinition, load_opensim
 from dynakin.model.schema import ModelFile

@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from dynakin.errors import ModelError
 from dynakin.model.calibration.frames import Trial
 from dynakin.model.calibration.landmarks import LandmarkFinder
-from dynakin.model.markers.marker_set import match_markers
+from dynakin.model.markers.match import match_markers
 from dynakin.recordings.landmarks import find_marker
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.rigidity import RigidMotion, distance_sd_m, rigid_motion

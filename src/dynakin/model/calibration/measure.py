@@ -18,7 +18,8 @@ from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder, slope
 from dynakin.model.calibration.lumping import PlacedPart, segment_bodies
 from dynakin.model.calibration.posture import Posture, find_geometry, find_posture, frame_landmarks
 from dynakin.model.calibration.sites import Candidate, as_marked, candidates, find_locks, place_sites
-from dynakin.model.markers.marker_set import MarkerKey, MarkerMatch, choose_marker_set, match_markers
+from dynakin.model.markers.match import MarkerKey, MarkerMatch
+from dynakin.model.markers.recognise import recognise
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.model.plan import Geometry, ModelPlan
 from dynakin.model.schema import ModelFile
@@ -66,13 +67,15 @@ def measure(
     if functional and not model.sided:
         raise ModelError(f"functional is given, but model {model.name} is planar; expected a model in space (fullbody)")
     messages: list[str] = []
-    marker_set = asked_markers or choose_marker_set(recording.marker_names)
-    if asked_markers is None:
-        messages.append(f"Marker set {marker_set.name}: chosen by the recording's marker names.")
+    recognised = recognise(recording, asked_markers)
+    messages += recognised.messages
 
     def matched(entry: Recording, frame: GroundFrame | None) -> Trial:
-        seen = [bool(np.isfinite(entry.marker(name)).all(axis=1).any()) for name in entry.marker_names]
-        match = match_markers(marker_set, entry.marker_names, seen, str(entry.path or entry.name))
+        match = recognised.match
+        if entry is not recording:
+            own = recognise(entry, match.marker_set)
+            messages.extend(f"{said} ({entry.name})" for said in own.messages)
+            match = own.match
         find = find_laboratory_frame if model.floating else find_ground_frame
         found = frame or find(entry, vertical=vertical, forward=forward, pairs=match.facing_pairs)
         return Trial.of(entry, match, found)
@@ -204,16 +207,15 @@ def needed_markers(model: ModelFile, finder: LandmarkFinder, locks: dict[str, fl
 def flat_slopes(trial: Trial) -> dict[str, float]:
     """Side -> slope (rad) of the line from heel to toe while that foot stands flat; none for a foot that never does."""
     found: dict[str, float] = {}
-    pair = trial.match.marker_set.heel_toe
     for side in SIDES:
-        names = [trial.match.names.get((name, side)) for name in pair or ()]
-        own = {side: [name for name in names if name]} if all(names) else {}
+        names = trial.match.heel_toe(side)
+        own = {side: list(names)} if names else {}
         contact = foot_contacts(trial.recording, trial.ground, own).get(side)
         if contact is None or contact.touching.shape[1] != 2:
             continue
         flat = contact.touching.all(axis=1)
         if flat.any():
-            heel, toe = (trial.ground.points_to_ground(trial.recording.marker(str(n))) for n in names)
+            heel, toe = (trial.ground.points_to_ground(trial.recording.marker(n)) for n in own[side])
             found[side] = float(np.median(slope((toe - heel)[flat])))
     return found
 

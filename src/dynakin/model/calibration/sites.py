@@ -10,7 +10,7 @@ from dynakin.errors import ModelError
 from dynakin.model.calibration.frames import FIRST_FRAMES, Trial
 from dynakin.model.calibration.landmarks import LandmarkFinder
 from dynakin.model.calibration.posture import Posture, find_posture, frame_landmarks
-from dynakin.model.markers.marker_set import MarkerKey, MarkerMatch
+from dynakin.model.markers.match import MarkerKey, MarkerMatch
 from dynakin.model.markers.schema import Marker
 from dynakin.model.mirroring import SUFFIXES
 from dynakin.model.plan import Geometry, Site
