@@ -35,11 +35,11 @@ def length_unit(word: str, raw: Array) -> tuple[float, Literal["mm", "m"], list[
             extent = (high - low).max(axis=1, initial=-np.inf)
         span = float(np.median(extent[np.isfinite(extent)])) if np.isfinite(extent).any() else 0.0
         factor = 1.0 if span < _METRES_BELOW else 1e-2 if span < _CENTIMETRES_BELOW else 1e-3
-        name = {1.0: "m", 1e-2: "cm", 1e-3: "mm"}[factor]
         found = f"The length unit {word!r} is not known" if word else "The file names no length unit"
-        notes.append(f"{found}: {name} taken, as the markers span {span:.4g} of them.")
-    if factor == 1e-2:
-        notes.append("The file is in centimetres; markers are written back in metres.")
+        word = {1.0: "m", 1e-2: "cm", 1e-3: "mm"}[factor]
+        notes.append(f"{found}: {word} taken, as the markers span {span:.4g} of them.")
+    if factor not in (1.0, 1e-3):
+        notes.append(f"The file is in {word}; markers are written back in metres.")
     return factor, ("mm" if factor == 1e-3 else "m"), notes
 
 
