@@ -29,6 +29,7 @@ from dynakin.simulation.trial import simulate
 Array = npt.NDArray[np.float64]
 SETS = available_marker_sets()
 KEYPOINTS = ("blazepose33", "body25", "coco17", "halpe26")
+NO_BACK_OF_PELVIS = (*KEYPOINTS, "motive-baseline")  # its tilt is that of an average person
 WHO = Subject(mass_kg=70.0, height_m=1.75, sex="male")
 SEED = 5
 
@@ -78,7 +79,7 @@ def test_a_set_says_what_it_is_and_where_from_and_no_name_stands_for_two_markers
 
 @pytest.mark.parametrize("name", SETS)
 def test_a_person_who_wears_it_is_found_and_measured(person: SimulatedTrial, name: str) -> None:
-    """Legs as they stand; thresholds by seeds 1 to 4, of which the worst set's were 3.1 and 7.4 deg."""
+    """Legs as they stand: limits by seed 1 (worst 2.1 deg, with the pelvis' tilt unseen 9.3), judged on another."""
     recording = wearing(person, name)
     marker_set = load_marker_set(name)
     match = match_markers(marker_set, recording.marker_names, [True] * len(recording.marker_names), "worn")
@@ -86,7 +87,7 @@ def test_a_person_who_wears_it_is_found_and_measured(person: SimulatedTrial, nam
     initial = measured(recording, name)
     if name == "rizzoli-trunk":  # no legs
         return
-    limit = 12.0 if name in KEYPOINTS else 5.0
+    limit = 15.0 if name in NO_BACK_OF_PELVIS else 4.0
     for joint in ("hip_flexion", "knee_angle", "ankle_angle"):
         if name == "coco17" and joint == "ankle_angle":  # no feet
             continue

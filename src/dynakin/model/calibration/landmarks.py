@@ -184,7 +184,9 @@ class LandmarkFinder:
         if recipe.offset is not None:
             return self._offset(recipe.offset, side, point, positions)
         if recipe.corner is not None:
-            return corner([point(name) for name in recipe.corner.arms], self._apart(recipe.corner.asis, side, positions))
+            return corner(
+                [point(name) for name in recipe.corner.arms], self._apart(recipe.corner.asis, side, positions)
+            )
         assert recipe.fraction is not None
         start, end = (point(source) for source in recipe.fraction.between)
         return start + by_sex(recipe.fraction.male, recipe.fraction.female, self.sex) * (end - start)

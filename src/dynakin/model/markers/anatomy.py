@@ -43,8 +43,8 @@ def expanded(data: Mapping[str, Any]) -> dict[str, Any]:
     without names is left out.
 
     Raises:
-        ValueError: a place or segment that anatomy.toml does not have, or a set to extend that there is not (the nearest
-            is named), or a wrong name pattern.
+        ValueError: a place or segment that anatomy.toml does not have, or no such set to extend (the nearest is named),
+            or a wrong name pattern.
     """
     shared = anatomy()
     if "extends" in data:
@@ -95,7 +95,9 @@ def _extended(data: Mapping[str, Any]) -> dict[str, Any]:
     folder, base = _FOLDER / "sets", data["extends"]
     known = sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
     if base not in known:
-        raise ValueError(f"extends: {base!r} is no built-in set{nearest(str(base), known)}; expected {', '.join(known)}")
+        raise ValueError(
+            f"extends: {base!r} is no built-in set{nearest(str(base), known)}; expected {', '.join(known)}"
+        )
     below = read_toml(Path(str(folder / f"{base}.toml")))
     if "extends" in below:
         raise ValueError(f"extends: {base!r} extends another set itself; expected one that stands alone")

@@ -1,8 +1,8 @@
 """Any marker set on the simulated whole body: where the places that sets name lie on it.
 
-Rows as in `marker_rows`: in the segment's own frame over the body height, from the joint by which the segment hangs (the
-pelvis: from the middle of the ASIS); lateral is outward. A place is worn under the first of its names. What is not worn:
-the knee alignment device, which nobody walks with.
+Rows as in `marker_rows`: in the segment's own frame over the body height, from the joint by which the segment hangs
+(the pelvis: from the middle of the ASIS); lateral is outward. A place is worn under the first of its names. What is not
+worn: the knee alignment device, which nobody walks with.
 """
 
 from __future__ import annotations
@@ -162,6 +162,3 @@ def _joint_sites(marker: Marker, joints: Mapping[str, Array]) -> list[Site]:
         for name in marker.aliases(side)[:1]:
             found.append(Site(name, part, region, joints[joint] * [1.0, 1.0, sign], True, driver))
     return found
-
-
-
