@@ -161,8 +161,8 @@ def put_on(subject: SimulatedSubject, rng: np.random.Generator, markers: str) ->
     """The sites of a marker set's markers; ``rng`` draws where each is put on.
 
     Args:
-        markers: "opencap" or "plug-in-gait": the lists of `marker_rows`, on which the validation's tables rest; any other
-            built-in set, or a .toml file: all that it names.
+        markers: "opencap" or "plug-in-gait": the lists of `marker_rows`, on which the validation's tables rest; any
+            other built-in set, or a .toml file: all that it names.
 
     Raises:
         ModelError: no such set, or a wrong file.
