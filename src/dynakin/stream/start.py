@@ -16,7 +16,7 @@ from dynakin.filter.tracker import Tracker
 from dynakin.model.calibration.body import steady_load
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition
-from dynakin.model.markers.marker_set import foot_markers_of
+from dynakin.model.markers.recognise import foot_markers_of
 from dynakin.recordings.checks import check_plates
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.frame import find_ground_frame

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ModelError
-from dynakin.model.markers.marker_set import MarkerKey, MarkerMatch
+from dynakin.model.markers.match import MarkerKey, MarkerMatch
 from dynakin.model.markers.schema import Offset, PelvisRegression, PolarRegression, Recipe, by_sex
 from dynakin.model.mirroring import SUFFIXES
 from dynakin.settings.subject import Sex
@@ -270,7 +270,7 @@ def off_sole(heel_to_toe: Array, flat: float | None) -> Array:
     return np.asarray(np.cos(pitch) * np.array([0.0, 1.0, 0.0]) - np.sin(pitch) * ahead)
 
 
-_BENT = 10.0
+BENT = 10.0
 """How much the plane of a bent limb counts against the body's middle plane: it takes over from 6 deg of bend."""
 
 
@@ -313,7 +313,7 @@ def offset_point(
             upper, middle, lower = (point(name) for name in offset.bend)
             a, b = lower - middle, upper - middle
             plane = np.cross(a, b) / (np.linalg.norm(a) * np.linalg.norm(b))  # to the right of a flexed arm
-            outward = across + _BENT * (plane if side == "right" else -plane)
+            outward = across + BENT * (plane if side == "right" else -plane)
         start, end = (point(name) for name in offset.square_to)
         line = (end - start) / np.linalg.norm(end - start)
         direction = -(outward - line * float(outward @ line))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,14 +10,16 @@ import numpy.typing as npt
 
 from dynakin.errors import ModelError
 from dynakin.model.calibration.body import check_body_mass, find_height, find_mass
-from dynakin.model.calibration.completion import completed, free
 from dynakin.model.calibration.checks import check_masses, fixed_lengths, reach, refuse_moving_origin, report
+from dynakin.model.calibration.completion import completed, free
 from dynakin.model.calibration.frames import Trial, choose_side
+from dynakin.model.calibration.functional import functional_landmarks
 from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder, slope
 from dynakin.model.calibration.lumping import PlacedPart, segment_bodies
 from dynakin.model.calibration.posture import Posture, find_geometry, find_posture, frame_landmarks
-from dynakin.model.calibration.sites import Candidate, candidates, find_locks, place_sites
-from dynakin.model.markers.marker_set import MarkerKey, MarkerMatch, choose_marker_set, match_markers
+from dynakin.model.calibration.sites import Candidate, as_marked, candidates, find_locks, place_sites
+from dynakin.model.markers.match import MarkerKey, MarkerMatch
+from dynakin.model.markers.recognise import recognise
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.model.plan import Geometry, ModelPlan
 from dynakin.model.schema import ModelFile
@@ -58,16 +61,21 @@ def measure(
     side: str,
     vertical: str,
     forward: str | tuple[float, float, float],
+    functional: Mapping[str, Recording],
 ) -> tuple[ModelPlan, Measured]:
     """The model filled with what the recording shows; arguments and errors as of ``Definition.calibrate``."""
+    if functional and not model.sided:
+        raise ModelError(f"functional is given, but model {model.name} is planar; expected a model in space (fullbody)")
     messages: list[str] = []
-    marker_set = asked_markers or choose_marker_set(recording.marker_names)
-    if asked_markers is None:
-        messages.append(f"Marker set {marker_set.name}: chosen by the recording's marker names.")
+    recognised = recognise(recording, asked_markers)
+    messages += recognised.messages
 
     def matched(entry: Recording, frame: GroundFrame | None) -> Trial:
-        seen = [bool(np.isfinite(entry.marker(name)).all(axis=1).any()) for name in entry.marker_names]
-        match = match_markers(marker_set, entry.marker_names, seen, str(entry.path or entry.name))
+        match = recognised.match
+        if entry is not recording:
+            own = recognise(entry, match.marker_set)
+            messages.extend(f"{said} ({entry.name})" for said in own.messages)
+            match = own.match
         find = find_laboratory_frame if model.floating else find_ground_frame
         found = frame or find(entry, vertical=vertical, forward=forward, pairs=match.facing_pairs)
         return Trial.of(entry, match, found)
@@ -80,16 +88,17 @@ def measure(
         messages.append(how)
     else:
         side = "both"
-    chosen, left_out = candidates(model, trial.match, side)
-    locks, bare, locked = find_locks(model, trial.match, chosen)
-    messages += left_out + locked
-
     source = trial
     if static is not None:
         source = matched(static, None).facing() if model.floating else matched(static, None)
     # A planar model starts from the trial's own landmarks; in space it starts from markers (pose_start).
     common = source.match if model.sided else _common(trial.match, source.match)
     finder = LandmarkFinder(common, side, subject.sex, model.planar, in_space=model.sided)
+    model = as_marked(model, trial.match, finder)
+    chosen, left_out = candidates(model, trial.match, side)
+    locks, bare, locked = find_locks(model, trial.match, chosen)
+    messages += left_out + locked
+
     if model.sided:
         entries = [r for r in (static, recording) if r is not None]
         height_m, how_high = find_height(subject, entries, source, finder)
@@ -107,9 +116,11 @@ def measure(
     messages.append(f"Lengths and marker places: {which}.")
     standing = source.median(frames)
     if model.sided:
-        found = completed(
-            model, table, locks, finder.find_in_space(standing), standing, finder.height_m or np.nan, trial.match.where
-        )
+        landmarks = finder.find_in_space(standing)
+        if functional:
+            landmarks, how_found = functional_landmarks(functional, landmarks, finder, source, frames)
+            messages += how_found
+        found = completed(model, table, locks, landmarks, standing, finder.height_m or np.nan, trial.match.where)
         landmarks, added = found.landmarks, set(found.added)
     else:
         landmarks, added = finder.find(standing), set[str]()
@@ -118,7 +129,11 @@ def measure(
         subject,
         [(t.recording, t.ground) for t in ([source, trial] if static is not None else [trial])],
         source.match.foot_markers,
-        [name for key, name in source.match.names.items() if source.match.marker_set.marker(key[0]).segment == "pelvis"],
+        [
+            name
+            for key, name in source.match.names.items()
+            if source.match.marker_set.marker(key[0]).segment == "pelvis"
+        ],
         finder.height_m if model.sided else None,
     )
     messages.append(how)
@@ -192,16 +207,15 @@ def needed_markers(model: ModelFile, finder: LandmarkFinder, locks: dict[str, fl
 def flat_slopes(trial: Trial) -> dict[str, float]:
     """Side -> slope (rad) of the line from heel to toe while that foot stands flat; none for a foot that never does."""
     found: dict[str, float] = {}
-    pair = trial.match.marker_set.heel_toe
     for side in SIDES:
-        names = [trial.match.names.get((name, side)) for name in pair or ()]
-        own = {side: [name for name in names if name]} if all(names) else {}
+        names = trial.match.heel_toe(side)
+        own = {side: list(names)} if names else {}
         contact = foot_contacts(trial.recording, trial.ground, own).get(side)
         if contact is None or contact.touching.shape[1] != 2:
             continue
         flat = contact.touching.all(axis=1)
         if flat.any():
-            heel, toe = (trial.ground.points_to_ground(trial.recording.marker(str(n))) for n in names)
+            heel, toe = (trial.ground.points_to_ground(trial.recording.marker(n)) for n in own[side])
             found[side] = float(np.median(slope((toe - heel)[flat])))
     return found
 
