@@ -124,7 +124,7 @@ def test_configuration_as_used_can_be_read_again() -> None:
         (["run", "--estimate", "length"], "run: --estimate[0]: Input should be"),
         (["tune", "fit", "--side", "middle"], "tune fit: --side: Input should be"),
         (["compare", "--sex", "other"], "compare: --sex: Input should be"),
-        (["check", "--sex", "other"], "check: --sex: Input should be"),
+        (["check", "--sex", "other"], "run: --sex: Input should be"),
     ],
 )
 def test_a_wrong_value_is_named_by_its_option(

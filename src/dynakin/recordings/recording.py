@@ -13,6 +13,7 @@ import numpy.typing as npt
 
 from dynakin.errors import RecordingError
 from dynakin.recordings.limits import check_markers, check_wrench
+from dynakin.recordings.signals import AnalogChannel, Event
 
 Array = npt.NDArray[np.float64]
 
@@ -76,9 +77,12 @@ class Recording:
         plates: each force plate on its own.
         length_unit: unit of the file, in which its markers are written back.
         notes: what the reader found or changed, one sentence each.
-        subject: "mass_kg" and "height_m" where the file gives them.
+        subject: what the file says of the person: "mass_kg", "height_m", and of each leg "leg_length_m_r",
+            "knee_width_m_r", "ankle_width_m_r" ("_l").
         hints: what the file says of its axes (C3D: "X_SCREEN", "Y_SCREEN"); can be wrong, so it only votes.
         read_with: settings that it was read with (forces, plate_filter_hz, ...), by their keys in a configuration.
+        events: what is marked in the file (strikes and offs of feet, say), in the order of time.
+        analog: its analog channels, each at its own rate.
     """
 
     name: str
@@ -92,6 +96,8 @@ class Recording:
     subject: dict[str, float] = field(default_factory=dict)
     hints: dict[str, str] = field(default_factory=dict)
     read_with: dict[str, Any] = field(default_factory=dict)
+    events: tuple[Event, ...] = ()
+    analog: tuple[AnalogChannel, ...] = ()
 
     def __post_init__(self) -> None:
         expected = (len(self.time), len(self.marker_names), 3)
@@ -168,9 +174,13 @@ class Recording:
                 f"it runs from {self.time[0]:g} s to {self.time[-1]:g} s"
             )
         keep = slice(int(index[0]), int(index[-1]) + 1)
+        first, last = self.time[keep][[0, -1]]
+        step = 1.0 / self.rate if self.n_frames > 1 else np.inf
         return replace(
             self,
             time=self.time[keep],
             markers=self.markers[keep],
             plates=tuple(plate.frames(keep) for plate in self.plates),
+            events=tuple(event for event in self.events if first - 0.5 * step <= event.time_s <= last + 0.5 * step),
+            analog=tuple(channel.between(first, last + step) for channel in self.analog),
         )

@@ -30,11 +30,7 @@ _OPTIONS = {
 _PATHS = ("trial", "forces", "static", "parameters", "output")
 FunctionalJoint = Literal["hip_r", "hip_l", "knee_r", "knee_l"]
 """Joints whose centre or axis a trial of their own can show."""
-NEEDED = {
-    "trial": "TRIAL",
-    "model": "--model NAME (fullbody, sagittal7, squat7, a .toml or .osim file)",
-    "output": "-o OUT",
-}
+NEEDED = {"trial": "TRIAL", "output": "-o OUT"}
 
 
 class Settings(Strict, use_attribute_docstrings=True):
@@ -44,8 +40,8 @@ class Settings(Strict, use_attribute_docstrings=True):
     """Recording to estimate: .c3d, .trc or .csv.
 
     Paths are relative to this file."""
-    model: str = Field(examples=["squat7"])
-    """Model: fullbody, squat7, sagittal7, or a .toml or .osim file of your own."""
+    model: str = Field(default="fullbody", examples=["squat7"])
+    """Model: fullbody (where none is given), squat7, sagittal7, or a .toml or .osim file of your own."""
     output: Path = Field(default=Path(), examples=["out/squat"])
     """Folder for the results. It is replaced if it holds an earlier output, and refused if it holds anything else."""
 

@@ -16,7 +16,7 @@ from dynakin.model.calibration.functional import functional_landmarks
 from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder, slope
 from dynakin.model.calibration.lumping import PlacedPart, segment_bodies
 from dynakin.model.calibration.posture import Posture, find_geometry, find_posture, frame_landmarks
-from dynakin.model.calibration.sites import Candidate, candidates, find_locks, place_sites
+from dynakin.model.calibration.sites import Candidate, as_marked, candidates, find_locks, place_sites
 from dynakin.model.markers.marker_set import MarkerKey, MarkerMatch, choose_marker_set, match_markers
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.model.plan import Geometry, ModelPlan
@@ -83,16 +83,17 @@ def measure(
         messages.append(how)
     else:
         side = "both"
-    chosen, left_out = candidates(model, trial.match, side)
-    locks, bare, locked = find_locks(model, trial.match, chosen)
-    messages += left_out + locked
-
     source = trial
     if static is not None:
         source = matched(static, None).facing() if model.floating else matched(static, None)
     # A planar model starts from the trial's own landmarks; in space it starts from markers (pose_start).
     common = source.match if model.sided else _common(trial.match, source.match)
     finder = LandmarkFinder(common, side, subject.sex, model.planar, in_space=model.sided)
+    model = as_marked(model, trial.match, finder)
+    chosen, left_out = candidates(model, trial.match, side)
+    locks, bare, locked = find_locks(model, trial.match, chosen)
+    messages += left_out + locked
+
     if model.sided:
         entries = [r for r in (static, recording) if r is not None]
         finder.height_m, _ = find_height(subject, entries, source)

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import re
+import tempfile
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, TypeVar
 
 import ezc3d
 import numpy as np
@@ -12,38 +13,57 @@ import numpy as np
 from dynakin.errors import RecordingError
 from dynakin.recordings.formats.c3d_parameters import Parameters
 from dynakin.recordings.formats.c3d_plates import read_plates
-from dynakin.recordings.formats.c3d_records import check_c3d_file
+from dynakin.recordings.formats.c3d_points import Points, sort_points
+from dynakin.recordings.formats.c3d_records import Correction, check_c3d_file
+from dynakin.recordings.formats.c3d_signals import first_frame, read_analog, read_events
+from dynakin.recordings.formats.c3d_subject import read_subject
 from dynakin.recordings.formats.textfile import check_unique, trial_name
-from dynakin.recordings.formats.trajectories import clean_markers
+from dynakin.recordings.formats.trajectories import clean_markers, length_unit, told_apart
 from dynakin.recordings.limits import FASTEST_HZ, SLOWEST_HZ
-from dynakin.recordings.recording import Recording
+from dynakin.recordings.recording import Array, Recording
 from dynakin.recordings.resampling import ReadOptions
-from dynakin.units import length_factor
 
-_UNLABELLED = re.compile(r"^\*\d+$|^(unlabell?ed|uname)\W*\d*$", re.IGNORECASE)
-# POINT parameters that list what a model computed
-_COMPUTED = ("ANGLES", "FORCES", "MOMENTS", "POWERS", "SCALARS", "REACTIONS")
+_Read = TypeVar("_Read")
 
 
 def read_c3d(path: Path, options: ReadOptions | None = None) -> Recording:
-    """Read markers and force plates (types 1 to 4) of a C3D file.
+    """Read markers, force plates (types 1 to 7), events, analog channels and what is said of the person.
 
-    Time begins at 0 at the first frame of the file; a note gives that frame's number in the capture. Points
-    that no camera saw (negative residual, or exactly 0, 0, 0) are NaN; unlabelled points (``*12``) and what a
-    model computed (angles, moments, ...) are left out, and the notes say so.
+    Time begins at 0 at the first frame of the file; a note gives that frame's number in the capture. Points that no
+    camera saw (negative residual, or exactly 0, 0, 0) are NaN; unlabelled points (``*12``) and what a model computed
+    (angles, moments, axes, ...) are left out, and so is a plate that cannot be read; the notes say so.
 
     Raises:
-        RecordingError: no such file, not a C3D, truncated or damaged, no or unknown length unit, no points, a plate
-            type other than 1 to 4.
+        RecordingError: no such file, not a C3D, truncated or damaged, no points.
     """
-    path = Path(path)
-    layout_notes = check_c3d_file(path)
+    return _opened(Path(path), lambda data, notes: _recording(data, Path(path), options or ReadOptions(), notes))
+
+
+def read_c3d_results(path: Path) -> dict[str, Array]:
+    """What the file's own model computed (angles, moments, powers, ...): label -> (T, 3) in the file's units, NaN where
+    there is no result; at the times of the recording.
+
+    Raises:
+        RecordingError: as `read_c3d`.
+    """
+
+    def results(data: Any, _: list[str]) -> dict[str, Array]:
+        points, sorted_points = _points(data, Parameters(data["parameters"]))
+        values = points.transpose(1, 2, 0)  # (N, T, 3)
+        values = np.where((values == 0.0).all(axis=2, keepdims=True), np.nan, values)
+        return {sorted_points.labels[k]: values[k] for k in sorted_points.outputs}
+
+    return _opened(Path(path), results)
+
+
+def _opened(path: Path, use: Callable[[Any, list[str]], _Read]) -> _Read:
+    layout_notes, corrections = check_c3d_file(path)
     try:
-        data: Any = ezc3d.c3d(str(path))
+        data: Any = _corrected(path, corrections) if corrections else ezc3d.c3d(str(path))
     except Exception as error:  # ezc3d raises anything its C++ throws
         raise RecordingError(f"{path}: cannot be read as C3D ({' '.join(str(error).split())})") from error
     try:
-        return _recording(data, path, options or ReadOptions(), layout_notes)
+        return use(data, layout_notes)
     except RecordingError:
         raise
     except (ArithmeticError, LookupError, MemoryError, TypeError, ValueError) as error:
@@ -52,28 +72,41 @@ def read_c3d(path: Path, options: ReadOptions | None = None) -> Recording:
         raise RecordingError(f"{path}: the C3D's parameters contradict each other ({found})") from error
 
 
+def _corrected(path: Path, corrections: list[Correction]) -> Any:
+    """What ezc3d reads from a copy in which these bytes are put right."""
+    content = bytearray(path.read_bytes())
+    for at, new in corrections:
+        content[at : at + len(new)] = new
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / "corrected.c3d"
+        copy.write_bytes(content)
+        return ezc3d.c3d(str(copy))
+
+
 def _recording(data: Any, path: Path, options: ReadOptions, notes: list[str]) -> Recording:
     parameters = Parameters(data["parameters"])
     rate = parameters.number("POINT", "RATE") or float(data["header"]["points"]["frame_rate"])
     if not SLOWEST_HZ <= rate <= FASTEST_HZ:
         raise RecordingError(f"{path}: found point rate {rate:g} Hz, expected {SLOWEST_HZ:g} to {FASTEST_HZ:g} Hz")
-    factor, unit = _unit(parameters, path)
-
-    points = np.asarray(data["data"]["points"], dtype=float)[:3]  # (3, N, T)
-    residual = np.asarray(data["data"]["meta_points"]["residuals"], dtype=float)[0]  # (N, T)
-    points[:, residual < 0] = np.nan
-    keep, names, point_notes = _markers(parameters, points.shape[1], path)
+    points, found = _points(data, parameters)
     frames = points.shape[2]
-    if frames == 0 or not names:
-        raise RecordingError(f"{path}: found {frames} frames of {len(names)} labelled markers, expected some")
-    markers, marker_notes = clean_markers(names, np.moveaxis(points[:, keep], 0, -1).swapaxes(0, 1) * factor)
-    first = int(data["header"]["points"]["first_frame"])
+    if frames == 0 or not found.names:
+        raise RecordingError(f"{path}: found {frames} frames of {len(found.names)} labelled markers, expected some")
+    raw = points[:, found.markers].transpose(2, 1, 0)  # (T, M, 3)
+    factor, unit, unit_notes = length_unit(parameters.text("POINT", "UNITS"), raw)
+    names, markers, doubled_notes = told_apart(found.names, raw * factor)
+    check_unique(names, "marker", path)
+    markers, missing_notes = clean_markers(names, markers)
+    first = first_frame(parameters, int(data["header"]["points"]["first_frame"]))
+    start_notes = []
     if first:
-        point_notes.append(f"Time 0 is frame {first + 1} of the capture ({first / rate:.4g} s after its start).")
+        start_notes.append(f"Time 0 is frame {first + 1} of the capture ({first / rate:.4g} s after its start).")
 
-    analog = np.asarray(data["data"]["analogs"], dtype=float)[0]  # (channels, samples)
     time = np.arange(frames) / rate
-    plates, plate_notes = read_plates(parameters, analog, time, markers, unit, path, options)
+    analog = np.asarray(data["data"]["analogs"], dtype=float)[0]  # (channels, samples)
+    plates, plate_notes = read_plates(parameters, analog, time, markers, factor, options)
+    events, event_notes = read_events(parameters, first / rate, time)
+    said = [*notes, *found.notes, *start_notes, *unit_notes, *doubled_notes, *missing_notes, *plate_notes, *event_notes]
     return Recording(
         name=trial_name(path),
         path=path,
@@ -82,49 +115,17 @@ def _recording(data: Any, path: Path, options: ReadOptions, notes: list[str]) ->
         markers=markers,
         plates=plates,
         length_unit=unit,
-        notes=tuple(notes + point_notes + marker_notes + plate_notes),
-        subject=_subject(parameters),
+        notes=tuple(said),
+        subject=read_subject(parameters),
         hints={key: word for key in ("X_SCREEN", "Y_SCREEN") if (word := parameters.text("POINT", key))},
+        events=events,
+        analog=read_analog(parameters, analog, time),
     )
 
 
-def _unit(parameters: Parameters, path: Path) -> tuple[float, Literal["mm", "m"]]:
-    word = parameters.text("POINT", "UNITS")
-    factor = length_factor(word)
-    if factor not in (1.0, 1e-3):
-        raise RecordingError(f"{path}: found length unit {word!r} in POINT:UNITS, expected mm or m")
-    return factor, ("mm" if factor == 1e-3 else "m")
-
-
-def _markers(parameters: Parameters, n_points: int, path: Path) -> tuple[list[int], tuple[str, ...], list[str]]:
-    """Indices and names of the points that are markers, and notes on those that are not."""
-    labels = parameters.texts("POINT", "LABELS")[:n_points]
-    labels += [""] * (n_points - len(labels))
-    computed = {text for key in _COMPUTED for text in parameters.texts("POINT", key) if text}
-    dropped = [k for k, label in enumerate(labels) if not label or _UNLABELLED.match(label)]
-    outputs = [k for k, label in enumerate(labels) if label in computed and k not in dropped]
-    notes = []
-    if dropped:
-        notes.append(f"{len(dropped)} unlabelled points left out.")
-    if outputs:
-        notes.append(f"{len(outputs)} computed points left out: {', '.join(labels[k] for k in outputs)}.")
-    keep = [k for k in range(n_points) if k not in set(dropped) | set(outputs)]
-    names = tuple(labels[k] for k in keep)
-    check_unique(names, "marker", path)
-    return keep, names, notes
-
-
-def _subject(parameters: Parameters) -> dict[str, float]:
-    """Mass and height where the file gives them (Vicon's PROCESSING group, or a SUBJECT(S) group)."""
-    subject: dict[str, float] = {}
-    for group in ("PROCESSING", "SUBJECTS", "SUBJECT"):
-        for key in ("BODYMASS", "MASS", "WEIGHT"):
-            mass = parameters.number(group, key)
-            if mass and 1 < mass < 500:
-                subject.setdefault("mass_kg", mass)
-        height = parameters.number(group, "HEIGHT")
-        if height and height > 0:
-            metres = next((height * f for f in (1.0, 1e-2, 1e-3) if 0.3 < height * f < 3.0), None)
-            if metres:
-                subject.setdefault("height_m", metres)
-    return subject
+def _points(data: Any, parameters: Parameters) -> tuple[Array, Points]:
+    """All points (3, N, T) in the file's unit, NaN where no camera saw them, and which are markers."""
+    points = np.asarray(data["data"]["points"], dtype=float)[:3].copy()
+    residual = np.asarray(data["data"]["meta_points"]["residuals"], dtype=float)[0]  # (N, T)
+    points[:, residual < 0] = np.nan
+    return points, sort_points(parameters, points)

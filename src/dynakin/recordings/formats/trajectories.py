@@ -2,9 +2,111 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from typing import Literal
+
 import numpy as np
 
 from dynakin.recordings.recording import Array, rate_of
+from dynakin.units import length_factor
+
+_METRES_BELOW, _CENTIMETRES_BELOW = 5.0, 300.0
+"""Extent of the markers in a frame up to which it is one in m, and in cm: of a person 0.3 to 2.6 m, of a foot alone
+0.3 m. Only a foot in mm (300) and a person with arms raised in cm (260) come near each other."""
+_SAME_M = 1e-6
+_MOSTLY = 2.0
+"""How many times as often as any other of its name a marker is seen to be the one that is meant."""
+
+
+def length_unit(word: str, raw: Array) -> tuple[float, Literal["mm", "m"], list[str]]:
+    """Metres per unit, the unit to write back in, and notes.
+
+    Args:
+        word: the file's; where it is none that is known, the size of a person decides.
+        raw: (T, M, 3) in that unit, NaN where missing.
+    """
+    factor = length_factor(word)
+    notes = []
+    if factor is None:
+        points = np.where((raw == 0.0).all(axis=2, keepdims=True), np.nan, raw)
+        low = np.where(np.isnan(points), np.inf, points).min(axis=1, initial=np.inf)
+        high = np.where(np.isnan(points), -np.inf, points).max(axis=1, initial=-np.inf)
+        with np.errstate(invalid="ignore", over="ignore"):
+            extent = (high - low).max(axis=1, initial=-np.inf)
+        span = float(np.median(extent[np.isfinite(extent)])) if np.isfinite(extent).any() else 0.0
+        factor = 1.0 if span < _METRES_BELOW else 1e-2 if span < _CENTIMETRES_BELOW else 1e-3
+        name = {1.0: "m", 1e-2: "cm", 1e-3: "mm"}[factor]
+        found = f"The length unit {word!r} is not known" if word else "The file names no length unit"
+        notes.append(f"{found}: {name} taken, as the markers span {span:.4g} of them.")
+    if factor == 1e-2:
+        notes.append("The file is in centimetres; markers are written back in metres.")
+    return factor, ("mm" if factor == 1e-3 else "m"), notes
+
+
+def told_apart(names: tuple[str, ...], markers: Array) -> tuple[tuple[str, ...], Array, list[str]]:
+    """Names that are each used once, their markers (T, K, 3) m, and notes on those that were used more often.
+
+    Of markers of one name, those that are never seen, or where the other is, go; those that are never seen together
+    are one. Two that are left are two markers, and only one is what the name says: the one that is seen most of the
+    time if the others are not seen half as often, else none. Who is not meant is called ``NAME (2)``, which no marker
+    set knows, so that nothing is matched to the wrong one.
+    """
+    counts = Counter(names)
+    spots: dict[str, list[int]] = {name: [k for k, n in enumerate(names) if n == name] for name in counts}
+    new_names, columns, notes = [], [], []
+    for name, doubled in spots.items():
+        if len(doubled) == 1:
+            new_names.append(name)
+            columns.append(markers[:, doubled[0]])
+            continue
+        places = markers[:, doubled]
+        places = np.where(
+            (places == 0.0).all(axis=2, keepdims=True) | np.isnan(places).any(2, keepdims=True), np.nan, places
+        )
+        kept = _distinct(list(places.transpose(1, 0, 2)))
+        if len(kept) == 1:
+            labels = [name]
+            notes.append(
+                f"Marker {name!r} is in the file {len(doubled)} times, never at different places: taken as one."
+            )
+        else:
+            labels = _labels(name, kept, set(counts))
+            who = " and ".join(repr(label) for label in sorted(labels))
+            notes.append(f"Warning: marker {name!r} is in the file {len(doubled)} times, at different places: {who}.")
+        new_names += labels
+        columns += kept
+    return tuple(new_names), np.stack(columns, axis=1) if columns else markers, notes
+
+
+def _distinct(places: list[Array]) -> list[Array]:
+    """Of trajectories (T, 3) of one name: those at different places at one time, fragments joined."""
+    kept: list[Array] = []
+    for place in places:
+        for k, other in enumerate(kept):
+            both = np.isfinite(place[:, 0]) & np.isfinite(other[:, 0])
+            if (np.abs(place[both] - other[both]) <= _SAME_M).all():
+                kept[k] = np.where(np.isnan(other), place, other)
+                break
+        else:
+            kept.append(place)
+    return kept
+
+
+def _labels(name: str, places: list[Array], taken: set[str]) -> list[str]:
+    seen = [int(np.isfinite(place[:, 0]).sum()) for place in places]
+    most = int(np.argmax(seen))
+    sure = all(seen[most] >= _MOSTLY * n for k, n in enumerate(seen) if k != most)
+    labels, number = [], 1
+    for k in range(len(places)):
+        if sure and k == most:
+            labels.append(name)
+            continue
+        number += sure
+        while f"{name} ({number})" in taken:
+            number += 1
+        labels.append(f"{name} ({number})")
+        number += not sure
+    return labels
 
 
 def clean_markers(names: tuple[str, ...], markers: Array) -> tuple[Array, list[str]]:

@@ -1,0 +1,106 @@
+"""The types of force plate of the C3D standard: what their channels hold, and how a wrench comes of them.
+
+| type | channels | calibration matrix |
+|---|---|---|
+| 1 | F_x, F_y, F_z, centre of pressure x, y, free moment z | |
+| 2 | F_x, F_y, F_z, M_x, M_y, M_z | |
+| 3 | f_x12, f_x34, f_y14, f_y23, f_z1, f_z2, f_z3, f_z4 (Kistler) | |
+| 4 | as 2 | 6 by 6 |
+| 5 | eight signals of any kind | 6 by 8, gives the channels of type 2 |
+| 6 | F_x, F_y, F_z of sensor 1, 2, 3, 4 | 12 by 12 |
+| 7 | as 3 | 8 by 8 |
+
+Source of types 5 to 7, which no recording at hand has and ezc3d does not read: the tables of BTK's
+``btkForcePlatform`` and of Visual3D's documentation (FP_Type). Types 11, 12 (split belts) and 21 (stairs) are makers'
+own and published nowhere.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from dynakin.recordings.recording import Array
+
+Signal = Literal["force", "moment", "point"]
+_WRENCH: tuple[Signal, ...] = ("force",) * 3 + ("moment",) * 3
+
+
+@dataclass(frozen=True)
+class PlateType:
+    """One type.
+
+    Attributes:
+        channels: how many the file lists.
+        outputs: what they hold, after the calibration where there is one.
+        calibrated: the matrix (outputs, channels) comes from the file.
+        uncalibrated: the type that it is where the file has no matrix, as its channels are calibrated already; None
+            where that cannot be.
+    """
+
+    channels: int
+    outputs: tuple[Signal, ...]
+    calibrated: bool = False
+    uncalibrated: int | None = None
+
+
+TYPES: dict[int, PlateType] = {
+    1: PlateType(6, ("force",) * 3 + ("point",) * 2 + ("moment",)),
+    2: PlateType(6, _WRENCH),
+    3: PlateType(8, ("force",) * 8),
+    4: PlateType(6, _WRENCH, calibrated=True, uncalibrated=2),
+    5: PlateType(8, _WRENCH, calibrated=True),
+    6: PlateType(12, ("force",) * 12, calibrated=True, uncalibrated=6),
+    7: PlateType(8, ("force",) * 8, calibrated=True, uncalibrated=3),
+}
+
+
+def plate_wrench(
+    kind: int, channels: Array, *, origin: Array, calibration: Array | None, units: Array
+) -> tuple[Array, Array]:
+    """Force (N, 3) N and moment (N, 3) N m about the centre of the surface, in the plate's frame (z into the
+    floor).
+
+    Args:
+        kind: a key of `TYPES`.
+        channels: (C, N) as the file scales them.
+        origin: (3,) m. Where the channels are a wrench: between the transducers' origin and the surface's centre;
+            types 3, 6, 7: distances a, b of the sensors from the axes, and their depth. Files differ in the sign of
+            its depth: the transducers lie below the surface, that is settled here.
+        calibration: (outputs, C), None where the channels are calibrated.
+        units: (outputs,) factor to N, N m or m.
+    """
+    if calibration is not None:
+        channels = calibration @ channels
+    values = channels * units[:, None]
+    if kind == 1:
+        force = values[:3].T
+        arm = np.column_stack([values[3], values[4], np.zeros(values.shape[1])])
+        return force, np.cross(arm, force) + np.outer(values[5], [0.0, 0.0, 1.0])
+    if kind == 6:
+        x, y, z = values[0::3], values[1::3], values[2::3]  # (4, N) each
+        values = np.stack([x[0] + x[1], x[2] + x[3], y[0] + y[3], y[1] + y[2], *z])
+    if kind in (3, 6, 7):
+        return _eight_forces(values, a=abs(origin[0]), b=abs(origin[1]), depth=abs(origin[2]))
+    # From the transducers' origin T to the surface's centre S, which lies above it, at negative z: a file
+    # with a positive depth holds the opposite vector. M_S = M_T + F x (S - T).
+    to_surface = -origin if origin[2] > 0 else origin
+    force = values[:3].T
+    return force, values[3:].T + np.cross(force, to_surface)
+
+
+def _eight_forces(values: Array, a: float, b: float, depth: float) -> tuple[Array, Array]:
+    """Kistler: f_x12, f_x34, f_y14, f_y23, f_z1 to f_z4; sensors at (+-a, +-b), ``depth`` below the
+    surface."""
+    x12, x34, y14, y23, z1, z2, z3, z4 = values
+    force = np.column_stack([x12 + x34, y14 + y23, z1 + z2 + z3 + z4])
+    moment = np.column_stack(
+        [
+            b * (z1 + z2 - z3 - z4),
+            a * (z2 + z3 - z1 - z4),
+            b * (x34 - x12) + a * (y14 - y23),
+        ]
+    )
+    return force, moment + np.cross(force, [0.0, 0.0, -depth])
