@@ -12,7 +12,8 @@ from dynakin.errors import ModelError
 from dynakin.model.calibration.body import find_height
 from dynakin.model.calibration.frames import Trial
 from dynakin.model.definition import load_model
-from dynakin.model.markers.marker_set import load_marker_set, match_markers
+from dynakin.model.markers.marker_set import load_marker_set
+from dynakin.model.markers.match import match_markers
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.recording import Recording
 from dynakin.settings.model import Bounds, Priors

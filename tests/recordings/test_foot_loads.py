@@ -10,7 +10,7 @@ import pytest
 
 from dynakin import read
 from dynakin.errors import ConfigError
-from dynakin.model.markers.marker_set import foot_markers_of
+from dynakin.model.markers.recognise import foot_markers_of
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.loads import MEASURED, OFF_PLATE, REASONS, SHARED, SWING
 from dynakin.recordings.frame import GroundFrame, find_ground_frame

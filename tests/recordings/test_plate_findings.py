@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dynakin import read
-from dynakin.model.markers.marker_set import foot_markers_of
+from dynakin.model.markers.recognise import foot_markers_of
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.loads import SWING, UNKNOWN
 from dynakin.recordings.frame import find_ground_frame

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from dynakin.errors import RecordingError
-from dynakin.model.markers.marker_set import foot_markers_of
+from dynakin.model.markers.recognise import foot_markers_of
 from dynakin.recordings.checks import check_plates
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.read import read

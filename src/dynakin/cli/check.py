@@ -14,16 +14,15 @@ from dynakin.cli.options import OF_A_MODEL, OF_THE_LABORATORY, OF_THE_PLATES, Gi
 from dynakin.cli.prepared import GROUND, MARKERS, SUBJECT, Rows, assumed, contacts, print_rows, short, starting
 from dynakin.errors import DynakinError, ModelError, RecordingError
 from dynakin.filter.prepared import Prepared
-from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
+from dynakin.model.markers.recognise import fits, seen_names
 from dynakin.pipeline.stages import configure, prepare_case
 from dynakin.recordings.beside import forces_beside, static_beside
-from dynakin.recordings.landmarks import plain_name
 from dynakin.recordings.recording import Recording
 from dynakin.results.naming import sentence, words
 from dynakin.settings.settings import Settings
 from dynakin.validation.case import Case, case_of
 
-_LISTED = 6
+_LISTED, _SETS = 6, 3
 _SOME_KG = 70.0
 """To see what else there is where a mass is all that is missing; nothing that depends on it is said then."""
 _DETAILS = ("Lengths", "Masses", "Length of", "Start", "Marker places")
@@ -52,7 +51,7 @@ def check(
     if ready is not None:
         print_rows(console, _model(ready, settings, refusal))
     else:
-        print_rows(console, [("Markers", text) for text in [_nearest_sets(case.recording)]])
+        print_rows(console, [("Markers", text) for text in _nearest_sets(case.recording)])
     print_rows(console, [("Add", text) for text in _to_add(case, ready, refusal)])
     if refusal is not None:
         raise _refused(refusal)
@@ -130,7 +129,6 @@ def _model(ready: Prepared, settings: Settings, refusal: DynakinError | None) ->
         "Model": _held(ready),
         "Markers": [
             f"{len(calibrated.spec.markers)} of {len(ready.recording.marker_names)} are used.",
-            _nearest_sets(ready.recording),
             *(short(text) for text in sentences if text not in told),
         ],
         "Ground": starting(sentences, GROUND),
@@ -161,21 +159,13 @@ def _held(ready: Prepared) -> list[str]:
     return [f"Held: {', '.join(told.values())}."] if told else []
 
 
-def _nearest_sets(recording: Recording) -> str:
-    """The two marker sets that the recording's names fit best."""
-    present = np.asarray(np.isfinite(recording.markers).all(axis=2).any(axis=0))
-    names = {plain_name(name) for name, seen in zip(recording.marker_names, present, strict=True) if seen}
-    fits = []
-    for name in available_marker_sets():
-        chosen = load_marker_set(name)
-        sites = [marker.aliases(side) for marker in chosen.usual for side in ("right", "left", "centre")]
-        sites = [aliases for aliases in sites if aliases]
-        missing = [aliases[0] for aliases in sites if not any(plain_name(alias) in names for alias in aliases)]
-        fits.append((len(missing) / len(sites), name, len(sites), missing))
-    (_, best, size, missing), (_, second, other, lacks) = sorted(fits)[:2]
-    more = f" and {len(missing) - _LISTED} more" if len(missing) > _LISTED else ""
-    without = f" (without {', '.join(missing[:_LISTED])}{more})" if 0 < len(missing) < size else ""
-    return f"By names {best} {size - len(missing)} of {size}{without}, next {second} {other - len(lacks)} of {other}."
+def _nearest_sets(recording: Recording) -> list[str]:
+    """The marker sets that the recording's names fit best, and what each lacks at least."""
+    told = []
+    for fit in fits(seen_names(recording))[:_SETS]:
+        lacks = f"; lacks markers {', '.join(fit.lacking)}" if fit.lacking else ""
+        told.append(f"{fit.marker_set.name}: {fit.explained_n} of its {fit.expected_n} markers by name{lacks}.")
+    return told
 
 
 def _to_add(case: Case, ready: Prepared | None, refusal: DynakinError | None) -> list[str]:

@@ -55,6 +55,8 @@ def assemble(
         feet,
         np.zeros(len(recording.time), dtype=bool) if undeclared is None else undeclared,
         initial.feet.values(),
+        initial.held,
+        initial.unmarked_feet.values(),
     )
     if feet is not None:
         data = data.isel(foot=[name != RESIDUAL for name in feet.names])
@@ -69,6 +71,7 @@ def assemble(
         "mass_kg": initial.mass_kg,
         "height_m": initial.height_m,
         "side": initial.side,
+        "held": dict(initial.held),
         "ground": {
             "vertical": initial.ground.vertical,
             "forward": initial.ground.forward.tolist(),

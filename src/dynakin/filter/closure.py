@@ -33,6 +33,9 @@ SMOOTH_S = 0.05
 LASTING, LASTING_S = 0.05, 1.0
 """Less is enough where its mean over a second is: a hand on a rail. Well measured recordings stay below 0.025, a run at
 5 m/s below 0.04, simulated ones below 0.01; a rail that bears a tenth makes 0.06 to 0.09."""
+UNSEEN = np.array([0.5, 0.3, 0.1])
+"""What a body whose parts are not all marked may do more, of `EXCESS`, `EDGE` and `LASTING`, by the part of its mass that
+is not: without the upper body's markers (0.38) a walk makes 0.20, for longer than a second 0.03, squats 0.11."""
 _MASS_WITHIN, _OFTEN = 0.15, 0.2
 _UNSEEN_S = 0.2
 """Where too few markers are seen for longer than this, the plates' mean has to be near the weight."""
@@ -92,8 +95,9 @@ def closure(initial: CalibratedModel, time: Array, markers: Array, wrench: Array
     zmp = centre - centre[:, [1]] * acceleration / (acceleration[:, [1]] + GRAVITY_M_S2).clip(1.0)
     about = np.stack([-need[:, 1] * zmp[:, 2] - wrench[:, 3], need[:, 1] * zmp[:, 0] - wrench[:, 5]], axis=1)
     size = np.abs(np.nan_to_num(excess)).max(axis=1) / weight
-    undeclared = _with_edges(judged & (size > EXCESS), size, judged, claimed, rate)
-    undeclared |= _small_but_lasting(excess / weight, judged & ~undeclared, round(LASTING_S * rate))
+    large, edge, lasting = np.array([EXCESS, EDGE, LASTING]) + UNSEEN * initial.unseen_kg / initial.weighed_kg
+    undeclared = _with_edges(judged & (size > large), size > edge, judged, claimed, rate)
+    undeclared |= _small_but_lasting(excess / weight, judged & ~undeclared, round(LASTING_S * rate), lasting)
     for first, end in runs(claimed & ~judged):
         load = float(np.median(wrench[first:end, 1]))
         if end - first > _UNSEEN_S * rate and abs(load - weight) > EXCESS * weight:
@@ -137,26 +141,26 @@ def _window_means(values: Array, window: int) -> Array:
     return np.asarray(ndimage.uniform_filter1d(values, max(window, 1), axis=0, mode="constant"))
 
 
-def _small_but_lasting(excess: Array, judged: Flags, window: int) -> Flags:
+def _small_but_lasting(excess: Array, judged: Flags, window: int, least: float) -> Flags:
     """Frames (T,) within a window that is judged throughout over which a component's mean, parts of the weight (T, 3),
-    is large, and in which it has at least half of that."""
+    is larger than ``least``, and in which it has at least half of that."""
     filled = np.where(judged[:, None], excess, 0.0)
     means = _window_means(filled, window)
     whole = _window_means(judged.astype(float), window) > 1.0 - 1e-9
     found = np.zeros(len(judged), dtype=bool)
     for axis in range(3):
         for sign in (1.0, -1.0):
-            large = whole & (sign * means[:, axis] > LASTING)
+            large = whole & (sign * means[:, axis] > least)
             near = ndimage.binary_dilation(large, structure=np.ones(2 * (window // 2) + 1, dtype=bool))
-            found |= near & (sign * filled[:, axis] > 0.5 * LASTING)
+            found |= near & (sign * filled[:, axis] > 0.5 * least)
     return found
 
 
-def _with_edges(core: Flags, size: Array, judged: Flags, claimed: Flags, rate: float) -> Flags:
+def _with_edges(core: Flags, some: Flags, judged: Flags, claimed: Flags, rate: float) -> Flags:
     """Frames in which the excess is large, with those before and after in which it comes and goes."""
     reach = 2 * round(SPREAD_S * rate) + 1
     near = ndimage.binary_dilation(core, structure=np.ones(reach, dtype=bool))
-    found: Flags = claimed & np.asarray(ndimage.binary_propagation(core, mask=near & (~judged | (size > EDGE))))
+    found: Flags = claimed & np.asarray(ndimage.binary_propagation(core, mask=near & (~judged | some)))
     for first, end in runs(~judged & claimed):  # not judged: as its neighbours are
         sides = [bool(found[k]) for k in (first - 1, end) if 0 <= k < len(found)]
         found[first:end] |= bool(sides) and all(sides)

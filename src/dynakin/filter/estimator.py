@@ -227,7 +227,7 @@ class Estimator:
             raise RecordingError(f"{recording.path or recording.name}: {problem}")
         calibrated = self.calibrate(recording, static=static)
         markers, wrench, ground = self._measured(recording, calibrated)
-        tracker = Tracker(calibrated, self._noise_for(ground), self.estimate, self.lag)
+        tracker = Tracker(calibrated, self._noise_for(ground, calibrated), self.estimate, self.lag)
         calibrated = tracker.calibrated
         contacts = None
         if feet is not None:
@@ -235,7 +235,7 @@ class Estimator:
         elif ground.loads is not None:
             paths = ContactPaths.of(calibrated).at(markers)
             contacts = expected_loads(ground.loads, calibrated, self.noise, paths, ground.undeclared, ground.bears)
-        doubt = doubtful_mass(wrench, calibrated.weighed_kg, ground.load_ratio)
+        doubt = doubtful_mass(wrench, calibrated.weighed_kg, ground.load_ratio, calibrated.unseen_kg)
         return Prepared(recording, tracker, markers, wrench, ground, contacts, smooth, doubt, tuple(unsmoothed))
 
     def follow(self, ready: Prepared, progress: Progress | None = None) -> Tracked:
@@ -269,9 +269,11 @@ class Estimator:
         )  # fmt: skip
         return Tracked(without_lost(estimate), tracker)
 
-    def _noise_for(self, ground: Ground) -> Noise:
-        """Without a delay of the plates where these measure the whole too seldom: priors follow the markers' clock."""
-        if ground.loads is None or ground.loads.total_known.mean() >= CLOCK_SHARE:
+    def _noise_for(self, ground: Ground, calibrated: CalibratedModel) -> Noise:
+        """Without a delay of the plates where these measure the whole too seldom, because priors follow the markers'
+        clock, and where much of the body is not marked, because what it does late looks like one."""
+        often = ground.loads is None or ground.loads.total_known.mean() >= CLOCK_SHARE
+        if often and not calibrated.unseen_kg:
             return self.noise
         return self.noise.changed(plate_delay_sd_s=0.0)
 

@@ -51,6 +51,9 @@ BELOW_PELVIS_M = 0.2
 """How far below the middle of the pelvis' markers it acts: those are a hand's breadth above the hips."""
 HAND_SD, HAND_MOMENT_M = np.full(3, 0.2), np.full(3, 0.02)
 """The same of anything else, at its segment's markers: a decimetre of a fifth of the weight."""
+UNMARKED_M_S2, UNMARKED_M2_S2 = 0.5, 0.5
+"""Residual force and moment for each further kilogram: a trunk that leans and turns on the pelvis, and arms that swing
+(squats and a walk without the upper body's markers; `benchmarks`)."""
 _WHITE_N, _WHITE_NM = 5.0, 2.0  # of a wrench that is a state
 _LEAST_HEIGHT_M = 0.3  # of the pelvis over the sole, for the direction
 
@@ -113,7 +116,7 @@ def expected_loads(
         errors[off, k, :, k] = _about(root[off], np.array([_WHITE_N] * 3 + [_WHITE_NM] * 3))
     for t in np.flatnonzero((contact == SHARED_PLATE).any(axis=1)):
         _divide(int(t), np.flatnonzero(contact[t] == SHARED_PLATE), priors, wrench, errors)
-    size = [noise.residual_force_sd_n] * 3 + [noise.residual_moment_sd_nm] * 3
+    size = residual_sd(noise, initial)
     errors[:, K, :, K] = _about(root, np.where(undeclared[:, None], UNDECLARED_SD * weight, size))
     residual = np.where(undeclared, UNMEASURED, ON_PLATE if all(size) else NO_CONTACT)
     pelvis = next(s.name for s in initial.spec.segments if s.parent == "ground")
@@ -126,6 +129,14 @@ def expected_loads(
         contact=np.column_stack([contact, residual]).astype(np.uint8),
         known=~undeclared & ((contact != NO_CONTACT).any(axis=1) | (residual != NO_CONTACT)),
     )
+
+
+def residual_sd(noise: Noise, initial: CalibratedModel) -> Array:
+    """(6,) N and N m: the declared residual, with what the parts of the body do that no marker shows; zeros where none
+    is declared."""
+    size = np.array([noise.residual_force_sd_n] * 3 + [noise.residual_moment_sd_nm] * 3)
+    more = initial.unseen_kg * np.array([UNMARKED_M_S2] * 3 + [UNMARKED_M2_S2] * 3)
+    return np.where(size.all(), np.hypot(size, more), size)
 
 
 def plate_errors(wrench: Array) -> Array:

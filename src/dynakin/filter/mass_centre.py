@@ -27,8 +27,12 @@ _BRIDGED_S = 0.2
 _REACH_S = 0.3
 """How far a stretch without some marker is led into its neighbours, so that its derivatives are known at its ends."""
 _POSTURES, _SPREAD_RAD = 200, 0.4
-_WORST_M = 0.015
-"""Remainder, RMS, from which a set of markers does not give the centre of mass."""
+_UNSEEN_RAD = 0.1
+"""The same of the root's turns where a trunk that is not marked is held to it: a mean of the pelvis' markers, which lie in
+one plane, cannot follow what stands on them, nor would the trunk lean as far as the pelvis does."""
+_WORST_M, _WORST_UNSEEN_M = 0.015, 0.025
+"""Remainder, RMS, from which a set of markers does not give the centre of mass; of a trunk without markers, whose own
+motion is more than that: Plug-in Gait's 16 of the lower body leave 16 mm."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,11 +125,16 @@ class CentreWeights:
         states = np.tile(initial.x0, (_POSTURES, 1))
         turned = {axis.coordinate for s in initial.spec.segments for axis in s.axes if axis.kind == "rotation"}
         turns = np.array([c.name in turned for c in initial.spec.coordinates if not c.locked])
-        spread = np.random.default_rng(0).normal(0.0, _SPREAD_RAD, (_POSTURES, size))
-        states[:, offset : offset + size] += spread * turns
+        spread = np.random.default_rng(0).normal(0.0, _SPREAD_RAD, (_POSTURES, size)) * turns
+        if initial.unseen_kg:
+            root = {a.coordinate for s in initial.spec.segments if s.parent == "ground" for a in s.axes}
+            free = [c.name for c in initial.spec.coordinates if not c.locked]
+            spread *= np.where(np.isin(free, list(root)), _UNSEEN_RAD / _SPREAD_RAD, 1.0)
+        states[:, offset : offset + size] += spread
         axes = np.array(initial.spec.markers[0].measured)
         self._places = np.stack([_core.marker_positions(model, x) for x in states])[..., axes]
         self._centre = _core.whole_body(model, states)["mass_centre"][:, axes]
+        self._worst_m = _WORST_UNSEEN_M if initial.unseen_kg else _WORST_M
         self._found: dict[bytes, Array | None] = {}
 
     def of(self, use: npt.NDArray[np.intp]) -> Array | None:
@@ -146,4 +155,4 @@ class CentreWeights:
         weights = np.linalg.solve(A.T @ A + ridge, A.T @ b)
         weights = weights - weights.mean() + 1.0 / len(use)
         left = np.einsum("m,sma->sa", weights, places) - self._centre
-        return np.asarray(weights) if np.sqrt(np.mean(left**2)) < _WORST_M else None
+        return np.asarray(weights) if np.sqrt(np.mean(left**2)) < self._worst_m else None

@@ -10,6 +10,7 @@ import xarray as xr
 
 from dynakin.bindings import _core
 from dynakin.filter.contacts import ContactLoads
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, contact_sources
 
 Flags = npt.NDArray[np.bool_]
@@ -17,7 +18,12 @@ Codes = npt.NDArray[np.uint8]
 
 
 def with_sources(
-    data: xr.Dataset, feet: ContactLoads | None, undeclared: Flags, soles: Collection[str] = ()
+    data: xr.Dataset,
+    feet: ContactLoads | None,
+    undeclared: Flags,
+    soles: Collection[str] = (),
+    held: Collection[str] = (),
+    unmarked: Collection[str] = (),
 ) -> xr.Dataset:
     """The dataset of an estimate with ``foot_source``, ``moment_source`` and ``joint_source``, and NaN where absent.
 
@@ -30,7 +36,8 @@ def with_sources(
         data: with the joints' tree and, of floating models, the core's ``moment_source``.
         feet: contacts (T, F) and the segments on which they act; None of a model that stands on its root.
         undeclared: (T,) frames in which something bears the person that no plate measures.
-        soles: segments on which the ground acts.
+        soles: segments on which the ground acts. held: coordinates that no marker shows, of which nothing is known.
+        unmarked: those of ``soles`` that no marker shows: what they carry is absent, with all that lies before it.
     """
     segments = [str(name) for name in data["joint_segment"].values]
     parents = data["joint_parent"].values
@@ -41,7 +48,7 @@ def with_sources(
         moments = np.tile(np.where(blind, DERIVED, MEASURED)[:, None], (1, len(moved)))
         legs = np.zeros(len(segments), dtype=bool)
     else:
-        contacts = contact_sources(feet.contact, undeclared)
+        contacts = _contacts(feet, undeclared, unmarked)
         data = data.assign(foot_source=(("time", "foot"), contacts))
         for name in ("foot_wrench", "foot_wrench_sd"):
             if name in data:
@@ -50,37 +57,58 @@ def with_sources(
         legs = _below_the_thighs([segments.index(name) for name in soles], parents)
         moments = data["moment_source"].transpose("time", "coordinate").values.copy()
     joints[np.ix_(undeclared, ~legs)] = ABSENT
-    moments[undeclared[:, None] & (joints[:, moved] == ABSENT)] = ABSENT
-    known, held = moments != ABSENT, joints != ABSENT
+    moments[joints[:, moved] == ABSENT] = ABSENT
+    moments[:, np.isin(data["coordinate"].values, list(held))] = ABSENT
+    known, carried = moments != ABSENT, joints != ABSENT
     found = data.assign(
         moment_source=(("time", "coordinate"), moments.astype(np.uint8)),
         joint_source=(("time", "joint"), joints.astype(np.uint8)),
     )
     for name in ("moments", "moments_sd"):
         found[name] = found[name].where(xr.DataArray(known, dims=("time", "coordinate")))
-    found["joint_loads"] = found["joint_loads"].where(xr.DataArray(held, dims=("time", "joint")))
+    found["joint_loads"] = found["joint_loads"].where(xr.DataArray(carried, dims=("time", "joint")))
     return found
 
 
 class ContactSources:
     """The same of a model's moments by its contacts alone: what a live step says, and `Prepared` of a recording."""
 
-    def __init__(self, spec: _core.ModelSpec, soles: Collection[str]) -> None:
+    def __init__(
+        self,
+        spec: _core.ModelSpec,
+        soles: Collection[str],
+        held: Collection[str] = (),
+        unmarked: Collection[str] = (),
+    ) -> None:
+        self._unmarked = unmarked
+        self._held = np.array([c.name in held for c in spec.coordinates], dtype=bool)
         self._segments = [segment.name for segment in spec.segments]
         self._parents = np.array([_place(self._segments, segment.parent) for segment in spec.segments])
         self._moved = [self._segments.index(name) for name in moved_segments(spec)]
         self._legs = _below_the_thighs([self._segments.index(name) for name in soles], self._parents)
 
+    @classmethod
+    def of(cls, initial: CalibratedModel) -> ContactSources:
+        """Those of a calibrated model."""
+        return cls(initial.spec, initial.feet.values(), initial.held, initial.unmarked_feet.values())
+
     def moments(self, feet: ContactLoads | None) -> Codes:
         """(T, C) codes of the moments by the contacts; of a model without any one row: measured, as far as anybody
         knows."""
         if feet is None:
-            return np.full((1, len(self._moved)), MEASURED, dtype=np.uint8)
+            return np.where(self._held, ABSENT, MEASURED).astype(np.uint8)[None]
         undeclared = feet.undeclared
         at = [self._segments.index(name) for name in feet.segments]
-        joints = _behind(contact_sources(feet.contact, undeclared), at, self._parents)
+        joints = _behind(_contacts(feet, undeclared, self._unmarked), at, self._parents)
         joints[np.ix_(undeclared, ~self._legs)] = ABSENT
-        return np.asarray(joints[:, self._moved])
+        return np.where(self._held, ABSENT, joints[:, self._moved]).astype(np.uint8)
+
+
+def _contacts(feet: ContactLoads, undeclared: Flags, unmarked: Collection[str]) -> Codes:
+    """(T, C) codes of the contacts; absent of a foot that no marker shows."""
+    return np.where(np.isin(feet.segments, list(unmarked)), ABSENT, contact_sources(feet.contact, undeclared)).astype(
+        np.uint8
+    )
 
 
 def moved_segments(spec: _core.ModelSpec) -> list[str]:

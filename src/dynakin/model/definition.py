@@ -16,7 +16,9 @@ from dynakin.files import is_file
 from dynakin.model.calibration.calibrated import CalibratedModel, first_centre_of_pressure
 from dynakin.model.calibration.in_space import started
 from dynakin.model.calibration.measure import measure
-from dynakin.model.markers.marker_set import choose_marker_set, load_marker_set, match_markers
+from dynakin.model.markers.marker_set import load_marker_set
+from dynakin.model.markers.match import match_markers
+from dynakin.model.markers.recognise import choose_marker_set
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.model.opensim.definition import OpenSimDefinition, load_opensim
 from dynakin.model.schema import ModelFile
@@ -168,11 +170,12 @@ class ModelDefinition:
             self.model, self.subject, self.table, self.marker_set, recording, ground,
             static=static, side=side, vertical=vertical, forward=forward,
         )  # fmt: skip
-        messages, speeds = list(rest.messages), dict[str, float]()
+        messages, speeds, held = list(rest.messages), dict[str, float](), rest.held
         if plan.model.sided:
             begun = started(plan, rest.trial, rest.unplaced, rest.still)
             plan, speeds = begun.plan, begun.speeds
             messages += begun.messages
+            held = held | begun.held
         spec = to_core(plan)
         core = _core.Model(spec)
         names = list(core.layout.names)
@@ -210,6 +213,8 @@ class ModelDefinition:
             plan=plan,
             foot_markers=rest.trial.match.foot_markers,
             feet={s.side: s.name for s in plan.model.segments if s.side is not None and "foot" in s.parts},
+            unmarked_kg=sum(body.mass for name, body in plan.bodies.items() if name not in plan.marked()),
+            held=held,
         )
 
 

@@ -67,6 +67,14 @@ class ModelPlan:
         wanted = entry.inertia_estimated and self.bodies[segment].mass > 0.0
         return tuple(wanted and (not self.model.planar or name in PLANAR_INERTIA) for name in INERTIA_NAMES)
 
+    def marked(self) -> set[str]:
+        """Segments that have markers, or between two that do."""
+        found = {site.segment for site in self.sites}
+        for segment in reversed(self.model.segments):  # children stand after their parents
+            if segment.name in found and segment.parent != "ground":
+                found.add(segment.parent)
+        return found
+
     def _kinds(self) -> dict[str, str]:
         return {axis.coordinate: axis.kind for segment in self.model.segments for axis in segment.axes}
 

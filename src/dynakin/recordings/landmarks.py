@@ -17,10 +17,15 @@ class FacingPairs:
     Attributes:
         heel_toe: (back, front) of each foot.
         pelvis: (back, front), posterior and anterior iliac spine of each side.
+        across: (right, left) of places that lie beside each other on the body, such as both hips.
+        above, below: markers of pelvis and trunk, and of the feet; where none are given, those of the pairs.
     """
 
     heel_toe: tuple[tuple[str, str], ...]
     pelvis: tuple[tuple[str, str], ...]
+    across: tuple[tuple[str, str], ...] = ()
+    above: tuple[str, ...] = ()
+    below: tuple[str, ...] = ()
 
 
 DEFAULT_PAIRS = FacingPairs(

@@ -24,26 +24,28 @@ def find_forward(recording: Recording, up: Array, pairs: FacingPairs) -> tuple[A
 
     From heel to toe, mean direction of each foot over the first standing second (the first second where
     nobody stands), both feet with equal weight so that turned-out feet cancel; else from the back of the
-    pelvis to its front; else the walking direction. The others are compared, and a difference beyond 30 deg
-    is said.
+    pelvis to its front; else square to the line from right to left; else the walking direction. The others
+    are compared, and a difference beyond 30 deg is said.
 
     Raises:
-        RecordingError: no foot or pelvis pair, and the person does not walk.
+        RecordingError: no foot or pelvis pair, no pair of sides, and the person does not walk.
     """
     frames = _window(recording)
     feet, n_feet = _mean_direction(recording, pairs.heel_toe, up, frames)
     pelvis, _ = _mean_direction(recording, pairs.pelvis, up, frames)
+    leftward, _ = _mean_direction(recording, pairs.across, up, frames)
     walk, way = _walking(recording, up)
     found = [
         (f"from heel to toe ({'both feet' if n_feet > 1 else 'one foot only'})", feet),
         ("from the back of the pelvis to its front", pelvis),
+        ("square to the line from right to left", None if leftward is None else np.cross(leftward, up)),
         (f"the walking direction ({way:.2g} m)", walk),
     ]
     known = [(why, direction) for why, direction in found if direction is not None]
     if not known:
         raise RecordingError(
             f"{recording.path or recording.name}: facing direction not found "
-            "(no heel and toe, no pelvis markers, the "
+            "(no heel and toe, no pelvis markers, no right and left of one place, the "
             f"person walks {way:.2g} m only), expected it to be given"
         )
     why, forward = known[0]
@@ -131,7 +133,7 @@ def find_vertical(recording: Recording, pairs: FacingPairs) -> tuple[str, list[s
         RecordingError: no witness.
     """
     witnesses: list[tuple[str, Callable[[], str | None]]] = [
-        ("the pelvis above the feet", lambda: _from_body(recording, pairs)),
+        ("the body above the feet", lambda: _from_body(recording, pairs)),
         ("the plates' force", lambda: _from_plates(recording)),
         ("the longer side of the markers' box", lambda: _from_spread(recording)),
         ("the file's Y_SCREEN", lambda: _from_screen(recording)),
@@ -162,9 +164,9 @@ def _name(direction: Array) -> str | None:
 
 def _from_body(recording: Recording, pairs: FacingPairs) -> str | None:
     everything = slice(None)
-    feet = [name for pair in present_pairs(recording, pairs.heel_toe) for name in pair]
-    pelvis = [name for pair in present_pairs(recording, pairs.pelvis) for name in pair]
-    low, high = (mean_position(recording, names, everything) for names in (feet, pelvis))
+    feet = list(pairs.below) or [name for pair in present_pairs(recording, pairs.heel_toe) for name in pair]
+    body = list(pairs.above) or [name for pair in present_pairs(recording, pairs.pelvis) for name in pair]
+    low, high = (mean_position(recording, names, everything) for names in (feet, body))
     return None if low is None or high is None else _name(high - low)
 
 

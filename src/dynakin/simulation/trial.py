@@ -73,7 +73,8 @@ def simulate(
         noise: of the sensors; None: `SensorNoise()`, ``SensorNoise.none()`` for perfect ones.
         spread: of the subject around the anthropometric table; None: `Spread()`.
         motion_cutoff_hz: of the low-pass on a coordinates file.
-        markers: set that "fullbody" carries, "opencap" (where None) or "plug-in-gait"; the others have one each.
+        markers: set that "fullbody" wears, "opencap" where None, any built-in one or a .toml file; the others have one
+            each.
         plates: of "fullbody", what has one: "feet" (each its own), "all" (the seat too), "shared" (one below both
             feet), "right" or "left" (one foot only) or "none". Belts of "belt" are plates: one a foot, or "shared".
         rail: of "fullbody", how hard hands push on a rail that no plate measures, over body weight, 0 to 0.3.

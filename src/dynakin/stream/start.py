@@ -16,8 +16,9 @@ from dynakin.filter.tracker import Tracker
 from dynakin.model.calibration.body import steady_load
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition
-from dynakin.model.markers.marker_set import foot_markers_of
+from dynakin.model.markers.recognise import foot_markers_of
 from dynakin.recordings.checks import check_plates
+from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.landmarks import DEFAULT_PAIRS
 from dynakin.recordings.orientation import axis_vector, find_vertical
@@ -121,7 +122,7 @@ def _weighed(present: Recording, whole: Recording) -> tuple[Recording, str]:
     if not whole.plates or "mass_kg" in present.subject:
         return present, ""
     try:
-        mass, why = steady_load(whole, find_ground_frame(whole), foot_markers_of(whole))
+        mass, why = steady_load(whole, foot_loads(whole, find_ground_frame(whole), foot_markers_of(whole)))
     except RecordingError as error:
         mass, why = None, error.message
     if mass is None:

@@ -14,7 +14,8 @@ from pydantic import BaseModel
 from dynakin.errors import DynakinError
 from dynakin.model.definition import load_model
 from dynakin.model.identified import read_identified
-from dynakin.model.markers.marker_set import foot_markers_of, load_marker_set
+from dynakin.model.markers.marker_set import load_marker_set
+from dynakin.model.markers.recognise import foot_markers_of
 from dynakin.model.opensim.export import read_values
 from dynakin.model.table import load_table
 from dynakin.recordings.checks import check_plates

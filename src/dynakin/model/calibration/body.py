@@ -7,10 +7,16 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import numpy.typing as npt
 
+from scipy import ndimage
+
+from dynakin.arrays import runs
 from dynakin.errors import ModelError
+from dynakin.model.calibration.completion import Proportions
 from dynakin.model.calibration.frames import Trial
+from dynakin.model.calibration.landmarks import LandmarkFinder
 from dynakin.recordings.checks import check_plates
 from dynakin.recordings.feet.assignment import foot_loads
+from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Recording
 from dynakin.settings.subject import Subject
@@ -24,20 +30,37 @@ over 5 s are 4 %."""
 _STEADY = 0.3
 """Part of its mean by which the load may vary: squats do by a quarter. Running, a seat that bears part of the weight,
 a step off the plates or onto a box does by more."""
+_STRETCH_S, _SPEED_S = 0.15, 0.02
+"""Shortest stretch whose impulse counts: 0.05 m/s that the centre of mass gains beside the pelvis are 3 % of it; and the
+smoothing before the pelvis' path is differentiated."""
+_APART = 0.15
+"""Part of the weight, RMS, by which the load may differ from what the pelvis' motion needs: walks and stairs differ by 0.03 to 0.08."""
 _BODY_MASS_INDEX = (10.0, 60.0)
 """kg/m2; what lies beyond is no weight of a person of that height who stood on the plates."""
 _OTHER_LEVEL_M = 0.08  # a heel that has left the floor, or a toe that dips, is nearer
 _STANDS_M_S = 0.1
 """Speed of the lowest marker below which a foot stands: in the air it points down, which adds 0.2 m to a height."""
 
+_HEIGHT_BY = ("asis", "hip", "knee_lateral", "knee")
+"""Landmarks that give a height by the proportions, the best first."""
+MEAN_HEIGHT_M, MEAN_BODY_MASS_INDEX = 1.70, 23.0
+
 
 def find_mass(
     subject: Subject,
     trials: Sequence[tuple[Recording, GroundFrame]],
     foot_markers: Mapping[str, Sequence[str]],
+    pelvis: Sequence[str] = (),
+    height_m: float | None = None,
 ) -> tuple[float, str]:
     """Mass (kg) and where it comes from: given, from the plates while standing still, from the file, or, with a
-    warning, from the plates' mean over a movement that is long and steady enough.
+    warning, from the plates' mean over a movement that is long and steady enough, or from their impulse while they
+    bear all of the person.
+
+    Args:
+        pelvis: the recordings' names of the markers on it; its vertical speed stands for that of the centre of mass.
+        height_m: for a mean adult's mass, with a warning, where no trial has plates, and nothing is weighed; None: such
+            trials are refused.
 
     Raises:
         ModelError: none of these; the message says why the plates do not show it.
@@ -53,10 +76,15 @@ def find_mass(
         if check.refusal is not None:
             reasons.append(f"{recording.name}: {check.refusal}")
         elif check.mass_kg_from_plates is None:
-            mean, why = steady_load(recording, ground, foot_markers)
+            loads = foot_loads(recording, ground, foot_markers)
+            mean, why = steady_load(recording, loads)
             reasons.append(f"nobody stands still on the plates of {recording.name}, and {why}")
             if mean is not None:
-                means.append((mean, recording.name))
+                means.append((mean, f"the mean vertical force of {recording.name}, in which nobody stands still"))
+            elif (found := impulse_load(recording, ground, loads, pelvis)) is not None:
+                mean, seconds = found
+                text = f"the plates' impulse over the {seconds:.1f} s of {recording.name} in which they bear all of the "
+                means.append((mean, f"{text}person, and the speed that the pelvis gains"))
         else:
             mass = float(check.mass_kg_from_plates)
             return mass, f"Mass {mass:.2f} kg: from the plates of {recording.name} while standing still."
@@ -66,20 +94,60 @@ def find_mass(
             return mass_kg, f"Mass {mass_kg:.2f} kg: from the file {recording.name}."
     for mass, name in means:
         return mass, (
-            f"Warning: mass {mass:.2f} kg from the mean vertical force of {name}, in which nobody stands still; wrong "
-            "where anything but the plates bears the person. Give the mass if it is known."
+            f"Warning: mass {mass:.2f} kg from {name}; wrong where anything but the plates bears the person. Give the "
+            "mass if it is known."
+        )
+    if height_m is not None and not any(recording.plates for recording, _ in trials):
+        mass = MEAN_BODY_MASS_INDEX * height_m**2
+        return mass, (
+            f"Warning: mass {mass:.1f} kg assumed, of a mean adult of {height_m:.2f} m: it is not given, and there are no "
+            "plates. Forces and moments grow with it. Give the mass if it is known."
         )
     raise ModelError(
         f"mass_kg is not given and cannot be found ({'; '.join(reasons)}); expected mass_kg of the subject (--mass)"
     )
 
 
-def steady_load(
-    recording: Recording, ground: GroundFrame, foot_markers: Mapping[str, Sequence[str]]
-) -> tuple[float | None, str]:
+def impulse_load(
+    recording: Recording, ground: GroundFrame, loads: FootLoads, pelvis: Sequence[str]
+) -> tuple[float, float] | None:
+    """Mass (kg) that the plates' impulse says over the stretches in which every foot that stands is on a plate, and
+    their seconds: of force it takes m (g T + gained speed). None where these are too few or the pelvis is not seen."""
+    push = loads.wrench[..., 1].sum(axis=1)
+    names = [name for name in pelvis if name in recording.marker_names]
+    if not names or recording.n_frames < 2 or not loads.aloft.any(axis=0).all():
+        return None  # who does not step may pull at something all the time
+    height = ground.points_to_ground(np.stack([recording.marker(name) for name in names], axis=1))[..., 1].mean(axis=1)
+    seen = np.isfinite(height)
+    if np.count_nonzero(seen) < 2:
+        return None
+    path = np.interp(recording.time, recording.time[seen], height[seen])
+    speed = np.gradient(ndimage.gaussian_filter1d(path, _SPEED_S * recording.rate), recording.time)
+    known = loads.total_known & np.isfinite(push) & seen & (loads.on.any(axis=(1, 2)))
+    impulse, need, seconds = 0.0, 0.0, 0.0
+    pushes, accelerations = list[Array](), list[Array]()
+    acceleration = np.gradient(speed, recording.time)
+    for first, end in runs(known):
+        lasts = float(recording.time[end - 1] - recording.time[first])
+        if lasts < _STRETCH_S:
+            continue
+        impulse += float(np.trapezoid(push[first:end], recording.time[first:end]))
+        need += GRAVITY_M_S2 * lasts + float(speed[end - 1] - speed[first])
+        seconds += lasts
+        pushes.append(push[first:end])
+        accelerations.append(acceleration[first:end])
+    if not (seconds > 0.0 and impulse > 0.0 and need > 0.0):
+        return None
+    mass = impulse / need
+    apart = np.concatenate(pushes) - mass * (GRAVITY_M_S2 + np.concatenate(accelerations))
+    if np.sqrt(np.mean(apart**2)) > _APART * mass * GRAVITY_M_S2:
+        return None
+    return mass, seconds
+
+
+def steady_load(recording: Recording, loads: FootLoads) -> tuple[float | None, str]:
     """Mean load (kg) of the frames in which every foot that stands is on a plate, and why it is no weight; None where
     these are few, or it varies too much."""
-    loads = foot_loads(recording, ground, foot_markers)
     push = loads.wrench[..., 1].sum(axis=1)[loads.total_known]
     push = push[np.isfinite(push)]
     seconds = len(push) / recording.rate
@@ -112,8 +180,14 @@ def check_body_mass(subject: Subject, mass_kg: float, height_m: float | None) ->
         )
 
 
-def find_height(subject: Subject, recordings: list[Recording], trial: Trial) -> tuple[float | None, str]:
+def find_height(
+    subject: Subject, recordings: list[Recording], trial: Trial, finder: LandmarkFinder | None = None
+) -> tuple[float | None, str]:
     """Height (m) and where it comes from; None with the reason where nothing gives it.
+
+    Args:
+        finder: of a model in space, which needs a height: where that marker does not give one, the highest landmark of
+            the proportions that is seen over a foot does, and without any it is a mean adult's, with a warning.
 
     Estimated from the marker set's ``height_marker`` (the acromion) where it is highest over the lowest marker of the
     recording, divided by its fraction of the body height: a person who never stands upright comes out too small, and
@@ -134,17 +208,47 @@ def find_height(subject: Subject, recordings: list[Recording], trial: Trial) -> 
     ]
     over = _over_the_foot(trial, tops) if tops else np.empty(0)
     if not len(over) or marker_set.height_fraction is None:
+        if finder is not None:
+            return _by_proportions(trial, finder)
         return None, f"height_m is not given and {marker_set.height_marker or 'no marker'} does not show it."
-    top, lowest = np.mean([np.nanpercentile(path[:, 1], 99.0) for path in tops]), "lowest marker"
-    reach = float(top - np.nanmin([np.nanpercentile(path[:, 1], 1.0) for path in _seen(trial)]))
-    if reach - np.percentile(over, 99.0) > _OTHER_LEVEL_M:
-        reach, lowest = float(np.percentile(over, 99.0)), "lowest marker of the same frame"
-    height = reach / marker_set.height_fraction
+    height, lowest = _over_lowest(trial, tops, over)
+    height /= marker_set.height_fraction
     return height, (
         f"Height {height:.2f} m: not given, estimated from {marker_set.height_marker} (where it is highest) "
         f"over the {lowest}, divided by {marker_set.height_fraction:g} "
         f"({marker_set.height_source})."
     )
+
+
+def _by_proportions(trial: Trial, finder: LandmarkFinder) -> tuple[float, str]:
+    """Height (m) from the highest landmark that needs no height itself, over a foot that stands."""
+    feet = [name for names in trial.match.foot_markers.values() for name in names]
+    for name in _HEIGHT_BY if feet else ():
+        keys = [key for key in finder.markers_of(name) if np.isfinite(trial.paths[key]).all(axis=1).any()]
+        tops = [trial.paths[key] for key in keys]
+        over = _over_the_foot(trial, tops) if tops else np.empty(0)
+        if not len(over):
+            continue
+        reach, lowest = _over_lowest(trial, tops, over)
+        template = Proportions.load().landmarks
+        fraction = float(template[f"{name}_r"][1] - template["heel_r"][1])
+        return reach / fraction, (
+            f"Height {reach / fraction:.2f} m: not given, estimated from {name} (where it is highest) over the "
+            f"{lowest}, divided by {fraction:g} (proportions of an adult)."
+        )
+    return MEAN_HEIGHT_M, (
+        f"Warning: height {MEAN_HEIGHT_M:.2f} m assumed, of a mean adult: it is not given and no markers show it. What "
+        "no markers measure is of this size. Give the height if it is known."
+    )
+
+
+def _over_lowest(trial: Trial, tops: list[Array], over: Array) -> tuple[float, str]:
+    """Height (m) of markers over the lowest one, where they are highest, and which one that is."""
+    top, lowest = np.mean([np.nanpercentile(path[:, 1], 99.0) for path in tops]), "lowest marker"
+    reach = float(top - np.nanmin([np.nanpercentile(path[:, 1], 1.0) for path in _seen(trial)]))
+    if reach - np.percentile(over, 99.0) > _OTHER_LEVEL_M:
+        reach, lowest = float(np.percentile(over, 99.0)), "lowest marker of the same frame"
+    return reach, lowest
 
 
 def _seen(trial: Trial) -> list[Array]:

@@ -18,6 +18,9 @@ from dynakin.recordings.recording import Recording
 
 Array = npt.NDArray[np.float64]
 
+UNMARKED_SHARE = 0.09
+"""Part of the mass that may be unmarked before it counts: head and hands, of which recordings often have no markers."""
+
 
 @dataclass(frozen=True, eq=False)
 class JointPrior:
@@ -56,6 +59,8 @@ class CalibratedModel:
             added to the noise of the cameras.
         dimensionless: geometry parameters that are factors, not lengths.
         carried_kg: mass of the known loads (`model.calibration.loads`), not in ``mass_kg``.
+        unmarked_kg: mass of the segments that no marker shows, and that hang still on their neighbours.
+        held: coordinate -> why nothing shows it, where it is held at an angle for lack of markers: results have none.
         joint_prior: prior covariance of elements that were identified before; the others are independent.
     """
 
@@ -82,6 +87,8 @@ class CalibratedModel:
     unmodelled_m: Array | float = 0.0
     dimensionless: frozenset[str] = frozenset()
     carried_kg: float = 0.0
+    unmarked_kg: float = 0.0
+    held: dict[str, str] = field(default_factory=dict)
     joint_prior: JointPrior | None = None
     contacts: dict[str, str] = field(default_factory=dict)
 
@@ -89,6 +96,21 @@ class CalibratedModel:
     def weighed_kg(self) -> float:
         """What the plates carry: the person and the known loads, kg."""
         return self.mass_kg + self.carried_kg
+
+    @property
+    def unseen_kg(self) -> float:
+        """Mass whose motion no marker shows, beyond that of head and hands."""
+        return max(0.0, self.unmarked_kg - UNMARKED_SHARE * self.mass_kg)
+
+    @property
+    def unmarked_feet(self) -> dict[str, str]:
+        """Those of ``feet`` that no marker shows, nor what hangs on them."""
+        parents = {segment.name: segment.parent for segment in self.spec.segments}
+        marked = {marker.segment for marker in self.spec.markers}
+        for name in reversed(list(parents)):  # children stand after their parents
+            if name in marked and parents[name] in self.feet.values():
+                marked.add(parents[name])
+        return {side: name for side, name in self.feet.items() if name not in marked}
 
     def measured_plan(self) -> ModelPlan:
         """The plan.

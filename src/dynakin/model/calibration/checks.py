@@ -89,10 +89,25 @@ def report(model: ModelFile, plan: ModelPlan, mass_kg: float, messages: list[str
         )
 
 
-def fixed_lengths(model: ModelFile, bare: set[str]) -> frozenset[str]:
-    """Lengths that are not estimated: by the file, or because nothing on their segment is measured."""
+def fixed_lengths(model: ModelFile, bare: set[str], added: set[str]) -> frozenset[str]:
+    """Lengths that are not estimated: by the file, or because nothing on their segment is measured.
+
+    Args:
+        bare: segments without markers. added: landmarks that no marker gives; what lies between one of them and a
+            segment without markers has its length from proportions.
+    """
     fixed = {length.name for length in model.lengths if not length.estimated}
+    ends = {length.name: {name for pair in length.pairs() for name in pair} for length in model.lengths}
+    shown: set[str] = set()
     for segment in model.segments:
-        if segment.parent in bare:
-            fixed |= {term.length for term in segment.placement}
-    return frozenset(fixed)
+        for length in {term.length for term in segment.placement}:
+            by_proportion = segment.name in bare and bool(ends[length] & added or segment.without_markers is None)
+            if segment.parent in bare or by_proportion:
+                fixed.add(length)
+            else:
+                shown.add(length)
+    return frozenset(name for name in fixed if name not in shown or not _estimated(model, name))
+
+
+def _estimated(model: ModelFile, name: str) -> bool:
+    return next(length.estimated for length in model.lengths if length.name == name)

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from dynakin.errors import ModelError
 from dynakin.model.calibration.landmarks import SIDES, Positions
-from dynakin.model.markers.marker_set import MarkerKey, MarkerMatch
+from dynakin.model.markers.match import MarkerKey, MarkerMatch
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.standing import standing_window

@@ -10,6 +10,7 @@ import numpy.typing as npt
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.model.calibration.frames import Trial
+from dynakin.model.calibration.observed import hold_unseen
 from dynakin.model.calibration.pose_start import PoseFit, near, start_posture
 from dynakin.model.calibration.sites import Candidate, site_of
 from dynakin.model.plan import ModelPlan, Site
@@ -27,7 +28,7 @@ _AVERAGED, _TURNS = 20, 3
 _FAIR_M = 0.03
 """Skin moves so far in a deep squat: a fit as good as that has not gone astray."""
 _FRAMES = 5
-"""Frames on which a marker is placed that the calibration does not show."""
+"""Frames on which a marker is placed that the calibration does not show, and on which it is judged what markers show."""
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,7 @@ class Started:
     plan: ModelPlan
     speeds: dict[str, float]
     messages: list[str]
+    held: dict[str, str]  # coordinates that are locked because the markers do not show them, and why
 
 
 def started(plan: ModelPlan, trial: Trial, unplaced: tuple[Candidate, ...], still: bool) -> Started:
@@ -72,6 +74,11 @@ def started(plan: ModelPlan, trial: Trial, unplaced: tuple[Candidate, ...], stil
     if extra:
         plan = replace(plan, sites=(*plan.sites, *extra))
         model, paths = _core.Model(to_core(plan)), _paths(trial, plan.sites)
+    plan, held = hold_unseen(plan, _postures(model, paths, limits))
+    if held:
+        names = ", ".join(held)
+        messages.append(f"Held where they stand, because the markers do not show them: {names}.")
+        model = _core.Model(to_core(plan))
     if not still:
         plan, how = _averaged(plan, paths, limits)
         model = _core.Model(to_core(plan))
@@ -85,7 +92,17 @@ def started(plan: ModelPlan, trial: Trial, unplaced: tuple[Candidate, ...], stil
     fit = start_posture(model, paths[first], limits=limits, where=trial.match.where)
     messages.append(f"Start: all coordinates fitted to the markers, {1000.0 * fit.rms_m:.1f} mm (root mean square).")
     speeds = _speeds(model, paths, trial, first, fit, limits)
-    return Started(replace(plan, start=fit.coordinates), speeds, messages)
+    return Started(replace(plan, start=fit.coordinates), speeds, messages, held)
+
+
+def _postures(model: _core.Model, paths: Array, limits: dict[str, Interval]) -> list[tuple[Array, Array]]:
+    """States fitted to some frames that show enough markers, and these markers."""
+    usable = np.flatnonzero(_enough(paths))
+    frames = usable[np.unique(np.linspace(0, len(usable) - 1, _FRAMES).astype(int))] if len(usable) else usable
+    return [
+        (start_posture(model, paths[k], limits=limits, good_m=_FAIR_M, bad_m=np.inf, where="").x, paths[k])
+        for k in frames.tolist()
+    ]
 
 
 def _averaged(plan: ModelPlan, paths: Array, limits: dict[str, Interval]) -> tuple[ModelPlan, list[str]]:

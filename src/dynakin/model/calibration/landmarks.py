@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ModelError
-from dynakin.model.markers.marker_set import MarkerKey, MarkerMatch
+from dynakin.model.markers.match import MarkerKey, MarkerMatch
 from dynakin.model.markers.schema import Offset, PelvisRegression, PolarRegression, Recipe, by_sex
 from dynakin.model.mirroring import SUFFIXES
 from dynakin.settings.subject import Sex
@@ -63,10 +63,8 @@ class LandmarkFinder:
         if recipe.pelvis is not None:
             both = all(self._key(recipe.pelvis.asis, s) for s in SIDES)
             return both and any(self._key(recipe.pelvis.psis, s) for s in SIDES)
-        if recipe.offset is not None:
-            across = [name for name in (recipe.offset.asis, recipe.offset.scale) if name]
-            if not all(self._key(name, s) for name in across for s in SIDES):
-                return False
+        if not all(self._key(name, s) for name in recipe.across for s in SIDES):
+            return False
         return all(self._available(source, _sides(recipe, side)) for source in recipe.inputs)
 
     def recipe(self, name: str, side: str) -> Recipe | None:
@@ -104,7 +102,7 @@ class LandmarkFinder:
             if source in self._recipes:
                 if self.recipe(source, side) is None:
                     return self._first_absent(source, side)
-            elif any(self._key(source, s) is None for s in (SIDES if recipe.pelvis else (side,))):
+            elif any(self._key(source, s) is None for s in (SIDES if source in recipe.across else (side,))):
                 return self.match.absent(source)
         raise AssertionError(f"landmark {name} is there")  # callers ask only for what is lacking
 
@@ -124,8 +122,7 @@ class LandmarkFinder:
                 for s in _sides(recipe, side):
                     keys |= self._markers_of(source, s)
             else:
-                across = recipe.offset is not None and source in (recipe.offset.asis, recipe.offset.scale)
-                sides = SIDES if recipe.pelvis is not None or across else _sides(recipe, side)
+                sides = SIDES if source in recipe.across else _sides(recipe, side)
                 keys |= {key for s in sides if (key := self._key(source, s)) is not None}
         return keys
 
@@ -186,6 +183,8 @@ class LandmarkFinder:
             return self._polar(recipe.polar, [point(source) for source in recipe.inputs])
         if recipe.offset is not None:
             return self._offset(recipe.offset, side, point, positions)
+        if recipe.corner is not None:
+            return corner([point(name) for name in recipe.corner.arms], self._apart(recipe.corner.asis, side, positions))
         assert recipe.fraction is not None
         start, end = (point(source) for source in recipe.fraction.between)
         return start + by_sex(recipe.fraction.male, recipe.fraction.female, self.sex) * (end - start)
@@ -224,15 +223,17 @@ class LandmarkFinder:
         coefficient = by_sex(regression.male.coefficient, regression.female.coefficient, self.sex)
         return np.asarray(origin + coefficient * np.linalg.norm(scale_to - scale_from) * turned)
 
-    def _offset(self, offset: Offset, side: str, point: Callable[[str], Array], positions: Positions) -> Array:
-        def apart(marker: str) -> Array:
-            """From the other side's to one's own."""
-            other = SIDES[1 - SIDES.index(side)]
-            return positions.get((marker, side), _NOWHERE) - positions.get((marker, other), _NOWHERE)
+    @staticmethod
+    def _apart(marker: str, side: str, positions: Positions) -> Array:
+        """From the other side's to one's own (3,) m."""
+        other = SIDES[1 - SIDES.index(side)]
+        return np.asarray(positions.get((marker, side), _NOWHERE) - positions.get((marker, other), _NOWHERE))
 
+    def _offset(self, offset: Offset, side: str, point: Callable[[str], Array], positions: Positions) -> Array:
         foot = [point(name) for name in offset.foot] if offset.foot else None
-        across = lateral(apart(offset.asis), foot, side) if offset.inward else None
-        size = self.height_m if offset.scale is None else float(np.linalg.norm(apart(offset.scale)))
+        across = lateral(self._apart(offset.asis, side, positions), foot, side) if offset.inward else None
+        scale = offset.scale
+        size = self.height_m if scale is None else float(np.linalg.norm(self._apart(scale, side, positions)))
         if size is None:
             raise ModelError(f"{self.match.where}: height_m is needed: the joint under {offset.origin} has one marker")
         return offset_point(offset, point, across, side, size)
@@ -241,6 +242,19 @@ class LandmarkFinder:
 def slope(heel_to_toe: Array) -> Array:
     """Elevation (rad) of lines (..., 3) over the horizontal."""
     return np.asarray(np.arctan2(heel_to_toe[..., 1], np.hypot(heel_to_toe[..., 0], heel_to_toe[..., 2])))
+
+
+def corner(ends: Sequence[Array], outward: Array) -> Array:
+    """Where three arms of one length at right angles meet (3,) m, on the far side of the plane through their ends.
+
+    Args:
+        ends: (3,) m each. outward: (3,), roughly the direction in which the arms point away from the body.
+    """
+    a, b, c = ends
+    edge = np.mean([np.linalg.norm(b - a), np.linalg.norm(c - b), np.linalg.norm(a - c)])
+    normal = np.cross(b - a, c - a)
+    normal *= np.sign(normal @ outward) / np.linalg.norm(normal)
+    return np.asarray(np.mean(ends, axis=0) - edge / np.sqrt(6.0) * normal)
 
 
 def off_sole(heel_to_toe: Array, flat: float | None) -> Array:

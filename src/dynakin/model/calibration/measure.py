@@ -9,13 +9,15 @@ import numpy.typing as npt
 
 from dynakin.errors import ModelError
 from dynakin.model.calibration.body import check_body_mass, find_height, find_mass
+from dynakin.model.calibration.completion import completed, free
 from dynakin.model.calibration.checks import check_masses, fixed_lengths, reach, refuse_moving_origin, report
 from dynakin.model.calibration.frames import Trial, choose_side
 from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder, slope
 from dynakin.model.calibration.lumping import PlacedPart, segment_bodies
 from dynakin.model.calibration.posture import Posture, find_geometry, find_posture, frame_landmarks
 from dynakin.model.calibration.sites import Candidate, candidates, find_locks, place_sites
-from dynakin.model.markers.marker_set import MarkerKey, MarkerMatch, choose_marker_set, match_markers
+from dynakin.model.markers.match import MarkerKey, MarkerMatch
+from dynakin.model.markers.recognise import recognise
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.model.plan import Geometry, ModelPlan
 from dynakin.model.schema import ModelFile
@@ -41,6 +43,7 @@ class Measured:
     messages: tuple[str, ...]
     trial: Trial
     unplaced: tuple[Candidate, ...]  # markers of a model in space that the calibration frames do not show
+    held: dict[str, str]  # coordinate -> why nothing shows it
     still: bool  # the person stands still in the calibration frames
 
 
@@ -59,13 +62,15 @@ def measure(
 ) -> tuple[ModelPlan, Measured]:
     """The model filled with what the recording shows; arguments and errors as of ``Definition.calibrate``."""
     messages: list[str] = []
-    marker_set = asked_markers or choose_marker_set(recording.marker_names)
-    if asked_markers is None:
-        messages.append(f"Marker set {marker_set.name}: chosen by the recording's marker names.")
+    recognised = recognise(recording, asked_markers)
+    messages += recognised.messages
 
     def matched(entry: Recording, frame: GroundFrame | None) -> Trial:
-        seen = [bool(np.isfinite(entry.marker(name)).all(axis=1).any()) for name in entry.marker_names]
-        match = match_markers(marker_set, entry.marker_names, seen, str(entry.path or entry.name))
+        match = recognised.match
+        if entry is not recording:
+            own = recognise(entry, match.marker_set)
+            messages.extend(f"{said} ({entry.name})" for said in own.messages)
+            match = own.match
         find = find_laboratory_frame if model.floating else find_ground_frame
         found = frame or find(entry, vertical=vertical, forward=forward, pairs=match.facing_pairs)
         return Trial.of(entry, match, found)
@@ -90,7 +95,8 @@ def measure(
     finder = LandmarkFinder(common, side, subject.sex, model.planar, in_space=model.sided)
     if model.sided:
         entries = [r for r in (static, recording) if r is not None]
-        finder.height_m, _ = find_height(subject, entries, source)
+        height_m, how_high = find_height(subject, entries, source, finder)
+        finder.height_m = height_m
         finder.sole = flat_slopes(source)
     needed = needed_markers(model, finder, locks)
     refuse_moving_origin(model, trial, finder)
@@ -103,16 +109,26 @@ def measure(
     source = trial if static is None else _at_origin(model, source, finder, frames)
     messages.append(f"Lengths and marker places: {which}.")
     standing = source.median(frames)
-    landmarks = finder.find_in_space(standing) if model.sided else finder.find(standing)
+    if model.sided:
+        found = completed(
+            model, table, locks, finder.find_in_space(standing), standing, finder.height_m or np.nan, trial.match.where
+        )
+        landmarks, added = found.landmarks, set(found.added)
+    else:
+        landmarks, added = finder.find(standing), set[str]()
 
     mass_kg, how = find_mass(
         subject,
         [(t.recording, t.ground) for t in ([source, trial] if static is not None else [trial])],
         source.match.foot_markers,
+        [name for key, name in source.match.names.items() if source.match.marker_set.marker(key[0]).segment == "pelvis"],
+        finder.height_m if model.sided else None,
     )
     messages.append(how)
-    height_m, how = find_height(subject, [r for r in (static, recording) if r is not None], source)
-    messages.append(how)
+    if not model.sided:
+        height_m, how_high = find_height(subject, [r for r in (static, recording) if r is not None], source)
+    messages.append(how_high)
+    messages += found.messages if model.sided else []
     check_body_mass(subject, mass_kg, height_m)
     if subject.sex is None:
         messages.append(
@@ -129,7 +145,7 @@ def measure(
     check_masses(model, bodies, parts, mass_kg, height_m, messages)
     start = posture if model.sided else _first_posture(model, geometry, finder, trial, needed, posture, messages)
     plan = ModelPlan(
-        model, geometry, start.coordinates, fixed_lengths(model, bare), bodies,
+        model, geometry, start.coordinates, fixed_lengths(model, set(bare), added), bodies,
         {s.name: reach(model, s.name, geometry, parts[s.name]) for s in model.segments}, tuple(sites),
     )  # fmt: skip
     report(model, plan, mass_kg, messages)
@@ -137,8 +153,9 @@ def measure(
     window = standing_window(source.recording)
     still = window is not None and window.start <= frames[0] < window.stop
     left = tuple(c for c in chosen if c.recorded not in placed_names)
+    held = {name: f"segment {segment} has no markers" for segment, names in bare.items() for name in names}
     trial = as_asked if model.floating else trial
-    return plan, Measured(trial.ground, side, mass_kg, height_m, parts, tuple(messages), trial, left, still)
+    return plan, Measured(trial.ground, side, mass_kg, height_m, parts, tuple(messages), trial, left, held, still)
 
 
 def _common(match: MarkerMatch, other: MarkerMatch) -> MarkerMatch:
@@ -151,10 +168,11 @@ def _common(match: MarkerMatch, other: MarkerMatch) -> MarkerMatch:
 
 
 def needed_markers(model: ModelFile, finder: LandmarkFinder, locks: dict[str, float | None]) -> set[MarkerKey]:
-    """Markers of every landmark that the lengths and frames need; refuses a recording without one of them."""
+    """Markers of every landmark that the lengths and frames need. In the plane a recording without one of them is
+    refused; in space the others are completed (`completion`)."""
     wanted: dict[str, str] = {}
     for segment in model.segments:
-        if segment.axes and all(locks.get(axis.coordinate) is not None for axis in segment.axes):
+        if not free(segment, locks):
             continue  # its pose follows from its parent's
         for name in frame_landmarks(segment):
             wanted.setdefault(name, f"segment {segment.name!r} of model {model.name}")
@@ -163,7 +181,10 @@ def needed_markers(model: ModelFile, finder: LandmarkFinder, locks: dict[str, fl
     keys: set[MarkerKey] = set()
     for name, why in wanted.items():
         own, plain = finder.of_side(name)
-        own.require(plain, why)
+        if not model.sided:
+            own.require(plain, why)
+        elif not own.known(plain):
+            continue
         keys |= own.markers_of(plain)
     for length in model.lengths:
         if length.between is not None and all(finder.known(name) for name in length.between):
@@ -174,16 +195,15 @@ def needed_markers(model: ModelFile, finder: LandmarkFinder, locks: dict[str, fl
 def flat_slopes(trial: Trial) -> dict[str, float]:
     """Side -> slope (rad) of the line from heel to toe while that foot stands flat; none for a foot that never does."""
     found: dict[str, float] = {}
-    pair = trial.match.marker_set.heel_toe
     for side in SIDES:
-        names = [trial.match.names.get((name, side)) for name in pair or ()]
-        own = {side: [name for name in names if name]} if all(names) else {}
+        names = trial.match.heel_toe(side)
+        own = {side: list(names)} if names else {}
         contact = foot_contacts(trial.recording, trial.ground, own).get(side)
         if contact is None or contact.touching.shape[1] != 2:
             continue
         flat = contact.touching.all(axis=1)
         if flat.any():
-            heel, toe = (trial.ground.points_to_ground(trial.recording.marker(str(n))) for n in names)
+            heel, toe = (trial.ground.points_to_ground(trial.recording.marker(n)) for n in own[side])
             found[side] = float(np.median(slope((toe - heel)[flat])))
     return found
 

@@ -10,11 +10,11 @@ from dynakin.errors import ModelError
 from dynakin.model.calibration.frames import FIRST_FRAMES, Trial
 from dynakin.model.calibration.landmarks import LandmarkFinder
 from dynakin.model.calibration.posture import Posture, find_posture
-from dynakin.model.markers.marker_set import MarkerKey, MarkerMatch
+from dynakin.model.markers.match import MarkerKey, MarkerMatch
 from dynakin.model.markers.schema import Marker
 from dynakin.model.mirroring import SUFFIXES
 from dynakin.model.plan import Geometry, Site
-from dynakin.model.schema import ModelFile
+from dynakin.model.schema import ModelFile, WithoutMarkers
 
 
 @dataclass(frozen=True)
@@ -58,8 +58,9 @@ def _home(model: ModelFile, name: str, side: str) -> str | None:
 
 def find_locks(
     model: ModelFile, match: MarkerMatch, chosen: list[Candidate]
-) -> tuple[dict[str, float | None], set[str], list[str]]:
-    """Coordinates to lock because a segment has no markers, these segments, and sentences on it.
+) -> tuple[dict[str, float | None], dict[str, tuple[str, ...]], list[str]]:
+    """Coordinates to lock, segments without markers with the coordinates that are locked because of that, and sentences
+    on them.
 
     Raises:
         ModelError: a segment without markers whose model file does not say what to do then.
@@ -71,8 +72,12 @@ def find_locks(
     locks: dict[str, float | None] = {
         c.name: None if c.as_measured else c.value or 0.0 for c in model.coordinates if c.locked
     }
-    bare: set[str] = set()
+    bare: dict[str, tuple[str, ...]] = {}
     messages: list[str] = []
+    marked = {name for name, count in counts.items() if count}
+    for segment in reversed(model.segments):  # children stand after their parents
+        if segment.name in marked:
+            marked.add(segment.parent)
     for name, count in counts.items():
         segment = by_name[name]
         if count == 1:
@@ -81,6 +86,10 @@ def find_locks(
         if count or all(locks.get(axis.coordinate) is not None for axis in segment.axes):
             continue
         rule = segment.without_markers
+        if model.sided and rule is None:
+            if segment.parent == "ground" or name in marked:
+                continue  # what hangs on it shows how it moves, as far as it does (`observed`)
+            rule = WithoutMarkers(lock_to=segment.parent)
         if rule is None:
             parts = {name, *segment.parts}
             fitting = [m for m in match.marker_set.markers if m.segment in parts and m.measures(not model.sided)]
@@ -90,9 +99,9 @@ def find_locks(
                 f"{tried or 'none, the set has none on it'}) "
                 f"and its model file has no without_markers rule; it has {', '.join(match.recorded)}"
             )
-        bare.add(name)
         joint = segment if rule.lock_to == segment.parent else by_name[rule.lock_to]
         value = None if rule.value_deg is None else float(np.deg2rad(rule.value_deg))
+        bare[name] = tuple(axis.coordinate for axis in joint.axes if axis.coordinate not in locks)
         for axis in joint.axes:
             locks.setdefault(axis.coordinate, value)
         names = ", ".join(axis.coordinate for axis in joint.axes)

@@ -11,14 +11,14 @@ from typing import Any
 
 from dynakin.settings.strict import nearest, read_toml
 
-_FILE = resources.files("dynakin.model") / "markers" / "anatomy.toml"
+_FOLDER = resources.files("dynakin.model") / "markers"
 _SIDED = re.compile(r"\{([^{},]*),([^{},]*)\}")
 
 
 @cache
 def anatomy() -> dict[str, Any]:
     """The contents of anatomy.toml: ``places``, ``clusters``, ``landmarks``, ``in_space`` and keys of a whole set."""
-    return read_toml(Path(str(_FILE)))
+    return read_toml(Path(str(_FOLDER / "anatomy.toml")))
 
 
 def sided(pattern: str) -> dict[str, str]:
@@ -38,12 +38,17 @@ def sided(pattern: str) -> dict[str, str]:
 def expanded(data: Mapping[str, Any]) -> dict[str, Any]:
     """A marker set's file with its places and clusters written out as markers, and the landmarks that follow.
 
-    What the file gives itself stands: its own numbers and markers, its own recipes for a landmark instead.
+    What the file gives itself stands: its own numbers and markers, its own recipes for a landmark instead. With
+    ``extends`` the places and clusters of a built-in set come first; a place that is given here stands instead, one
+    without names is left out.
 
     Raises:
-        ValueError: a place or segment that anatomy.toml does not have (the nearest is named), or a wrong name pattern.
+        ValueError: a place or segment that anatomy.toml does not have, or a set to extend that there is not (the nearest
+            is named), or a wrong name pattern.
     """
     shared = anatomy()
+    if "extends" in data:
+        data = _extended(data)
     rest = {key: value for key, value in data.items() if key not in ("places", "clusters")}
     if "places" not in data:
         return rest  # a set that gives all of itself
@@ -65,7 +70,9 @@ def expanded(data: Mapping[str, Any]) -> dict[str, Any]:
             )
         for entry in names:
             given = _entry(entry)
-            name = _SIDED.sub("", entry["names"] if isinstance(entry, dict) else entry).strip("._- ")
+            if not _patterns(entry):
+                raise ValueError(f"clusters: {segment}: a marker without names")
+            name = _SIDED.sub("", _patterns(entry)[0]).strip("._- ")
             markers.append({"name": name, "segment": segment, **shared["clusters"][segment], **given})
     rest["markers"] = [*markers, *rest.get("markers", ())]
     there = {marker["name"] for marker in rest["markers"] if isinstance(marker, dict) and "name" in marker}
@@ -83,17 +90,35 @@ def expanded(data: Mapping[str, Any]) -> dict[str, Any]:
     return rest
 
 
+def _extended(data: Mapping[str, Any]) -> dict[str, Any]:
+    """A set's contents on top of those of the built-in one that it extends."""
+    folder, base = _FOLDER / "sets", data["extends"]
+    known = sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
+    if base not in known:
+        raise ValueError(f"extends: {base!r} is no built-in set{nearest(str(base), known)}; expected {', '.join(known)}")
+    below = read_toml(Path(str(folder / f"{base}.toml")))
+    if "extends" in below:
+        raise ValueError(f"extends: {base!r} extends another set itself; expected one that stands alone")
+    own = {key: value for key, value in data.items() if key != "extends"}
+    for key in ("places", "clusters"):
+        merged = {**below.get(key, {}), **own.get(key, {})}
+        own[key] = {name: names for name, names in merged.items() if names}
+    return {**{key: value for key, value in below.items() if key not in ("description", "source")}, **own}
+
+
 def _entry(given: str | Iterable[str] | Mapping[str, Any]) -> dict[str, Any]:
     """Keys of a marker from its names, or from ``names`` and other numbers than the shared ones."""
-    found: dict[str, Any] = {}
-    names = given
-    if isinstance(given, Mapping):
-        found = {key: value for key, value in given.items() if key != "names"}
-        names = given.get("names", ())
-    for pattern in (names,) if isinstance(names, str) else names:
+    found = {key: value for key, value in given.items() if key != "names"} if isinstance(given, Mapping) else {}
+    for pattern in _patterns(given):
         for side, name in sided(pattern).items():
             found.setdefault(side, []).append(name)
     return found
+
+
+def _patterns(given: str | Iterable[str] | Mapping[str, Any]) -> tuple[str, ...]:
+    """The name patterns of a place or of a cluster's marker."""
+    names = given.get("names", ()) if isinstance(given, Mapping) else given
+    return (names,) if isinstance(names, str) else tuple(names)
 
 
 def _possible(landmarks: Mapping[str, Any], markers: set[str], own: Mapping[str, Any]) -> dict[str, Any]:
@@ -121,6 +146,7 @@ def _needs(recipe: Any) -> set[str]:
         ("polar", ("origin", "along", "scale")),
         ("fraction", ("between",)),
         ("offset", ("origin", "along", "asis", "foot", "square_to", "bend", "scale")),
+        ("corner", ("arms", "asis")),
     ):
         given = recipe.get(way, {})
         for key in keys if isinstance(given, dict) else ():

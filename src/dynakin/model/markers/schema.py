@@ -138,8 +138,19 @@ class Offset(Strict):
         return tuple(dict.fromkeys([*found, *(name for name in (self.asis, self.scale) if name)]))
 
 
+class Corner(Strict):
+    """The point in which three arms of one length meet at right angles, from the markers at their ends.
+
+    Of the two such points the one on the inner side: the arms point away from the body's middle, along ``asis``.
+    """
+
+    arms: tuple[str, str, str]
+    asis: str
+
+
 class Recipe(Strict):
-    """One way to find a landmark: mean of markers or landmarks, a regression, or a proportion of a line."""
+    """One way to find a landmark: mean of markers or landmarks, a regression, a proportion of a line, an offset or a
+    corner."""
 
     mean: tuple[str, ...] | None = None
     sides: Literal["own", "both", "right", "left"] = "own"  # "right", "left": that side for either side
@@ -147,13 +158,15 @@ class Recipe(Strict):
     polar: PolarRegression | None = None
     fraction: Fraction | None = None
     offset: Offset | None = None
+    corner: Corner | None = None
     source: str = ""
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:
-        given = [key for key in ("mean", "pelvis", "polar", "fraction", "offset") if getattr(self, key) is not None]
+        ways = ("mean", "pelvis", "polar", "fraction", "offset", "corner")
+        given = [key for key in ways if getattr(self, key) is not None]
         if len(given) != 1:
-            raise ValueError(f"exactly one of mean, pelvis, polar, fraction, offset expected, found {given or 'none'}")
+            raise ValueError(f"exactly one of {', '.join(ways)} expected, found {given or 'none'}")
         if given[0] != "mean" and self.sides == "both":
             raise ValueError("sides = 'both' is possible with mean only")
         if given[0] != "mean" and not self.source:
@@ -171,8 +184,19 @@ class Recipe(Strict):
             return (self.polar.origin, *self.polar.along, *self.polar.scale)
         if self.offset is not None:
             return self.offset.inputs
+        if self.corner is not None:
+            return (*self.corner.arms, self.corner.asis)
         assert self.fraction is not None
         return self.fraction.between
+
+    @property
+    def across(self) -> tuple[str, ...]:
+        """Those of the markers it starts from that it takes on both sides."""
+        if self.pelvis is not None:
+            return (self.pelvis.asis, self.pelvis.psis)
+        if self.offset is not None:
+            return tuple(name for name in (self.offset.asis, self.offset.scale) if name)
+        return (self.corner.asis,) if self.corner is not None else ()
 
 
 class MarkerSetFile(Strict):

@@ -84,8 +84,8 @@ PLUG_IN_GAIT = MarkerList(
     ),
 )
 
-_PAIRED = ("thigh", "shank", "foot", "upper_arm", "forearm")
-_ON_KNEE, _ON_ANKLE, _ON_ELBOW = 0.0320, 0.0236, 0.0230  # sideways of the joint centre, over the height
+PAIRED = ("thigh", "shank", "foot", "upper_arm", "forearm", "hand")
+ON_KNEE, ON_ANKLE, ON_ELBOW = 0.0320, 0.0236, 0.0230  # sideways of the joint centre, over the height
 # The length along which a segment's markers are spread, and its part of the height on which the rows rest.
 _SPREAD = {"shank": 0.246, "thigh": 0.245, "torso": 0.260, "upper_arm": 0.186, "forearm": 0.146}
 # Coordinate that moves a region's skin; those of limbs on the marker's own side.
@@ -107,13 +107,13 @@ SETS: Mapping[str, MarkerList] = {
         OPENCAP.name,
         (
             *(Row(stem, *rest) for stem, rest in zip(("toe", "5meta", "calc"), _FEET, strict=True)),
-            Row("ankle", "shank", "ankle", 0.000, -0.246, _ON_ANKLE, True),
-            Row("mankle", "shank", "ankle", 0.000, -0.246, -_ON_ANKLE, True),
+            Row("ankle", "shank", "ankle", 0.000, -0.246, ON_ANKLE, True),
+            Row("mankle", "shank", "ankle", 0.000, -0.246, -ON_ANKLE, True),
             Row("sh2", "shank", "shank", -0.020, -0.056, 0.020),
             Row("sh3", "shank", "shank", -0.012, -0.136, 0.022),
             Row("shank_antsup", "shank", "shank", 0.026, -0.046, 0.004),
-            Row("knee", "thigh", "knee", 0.000, -0.245, _ON_KNEE, True),
-            Row("mknee", "thigh", "knee", 0.000, -0.245, -_ON_KNEE, True),
+            Row("knee", "thigh", "knee", 0.000, -0.245, ON_KNEE, True),
+            Row("mknee", "thigh", "knee", 0.000, -0.245, -ON_KNEE, True),
             Row("thigh1", "thigh", "thigh", 0.045, -0.080, 0.020),
             Row("thigh2", "thigh", "thigh", 0.042, -0.160, 0.020),
             Row("thigh3", "thigh", "thigh", -0.025, -0.090, 0.060),
@@ -123,8 +123,8 @@ SETS: Mapping[str, MarkerList] = {
             Row("Sternum", "torso", "trunk", 0.055, 0.215, 0.014),
             Row("Shoulder", "torso", "shoulder", 0.000, 0.249, 0.110),
             Row("humerus", "upper_arm", "arm", 0.012, -0.080, 0.028),
-            Row("elbow_lat", "upper_arm", "arm", 0.000, -0.186, _ON_ELBOW, True),
-            Row("elbow_med", "upper_arm", "arm", 0.000, -0.186, -_ON_ELBOW, True),
+            Row("elbow_lat", "upper_arm", "arm", 0.000, -0.186, ON_ELBOW, True),
+            Row("elbow_med", "upper_arm", "arm", 0.000, -0.186, -ON_ELBOW, True),
             Row("forearm", "forearm", "forearm", 0.014, -0.045, 0.010),
             Row("wrist_radius", "forearm", "forearm", 0.000, -0.146, 0.017, True),
             Row("wrist_ulna", "forearm", "forearm", 0.000, -0.146, -0.017, True),
@@ -135,15 +135,15 @@ SETS: Mapping[str, MarkerList] = {
         PLUG_IN_GAIT.name,
         (
             *(Row(stem, *rest) for stem, rest in zip(("TOE", "MT5", "HEE"), _FEET, strict=True)),
-            Row("ANK", "shank", "ankle", 0.000, -0.246, _ON_ANKLE, True),
+            Row("ANK", "shank", "ankle", 0.000, -0.246, ON_ANKLE, True),
             Row("TIB", "shank", "shank", -0.008, -0.116, 0.024),
-            Row("KNE", "thigh", "knee", 0.000, -0.245, _ON_KNEE, True),
+            Row("KNE", "thigh", "knee", 0.000, -0.245, ON_KNEE, True),
             Row("THI", "thigh", "thigh", 0.005, -0.130, 0.060),
             Row("ASI", "pelvis", "pelvis", 0.000, 0.000, 0.076, True),
             Row("PSI", "pelvis", "pelvis", -0.122, 0.000, 0.028, True),
             Row("SHO", "torso", "shoulder", 0.000, 0.249, 0.110),
             Row("UPA", "upper_arm", "arm", 0.012, -0.080, 0.028),
-            Row("ELB", "upper_arm", "arm", 0.000, -0.186, _ON_ELBOW, True),
+            Row("ELB", "upper_arm", "arm", 0.000, -0.186, ON_ELBOW, True),
             Row("WRA", "forearm", "forearm", 0.000, -0.146, 0.017, True),
             Row("WRB", "forearm", "forearm", 0.000, -0.146, -0.017, True),
             Row("FHD", "head", "head", 0.055, 0.100, 0.040),
@@ -169,14 +169,14 @@ def draw_sites(
         if row.part in _SPREAD:  # along the segment, so that a marker at its end stays at its end
             y = y / _SPREAD[row.part] * subject.lengths[row.part] / subject.height_m
         place = subject.height_m * np.array([row.x, y, row.lateral])
-        if row.lateral == 0.0 and row.part not in _PAIRED:
+        if row.lateral == 0.0 and row.part not in PAIRED:
             off = scatter_m * rng.standard_normal(3)
             sites.append(Site(row.stem, row.part, row.region, place + off, row.landmark, _driver(row, "")))
             continue
         for side, sign in (("right", 1.0), ("left", -1.0)):
             off = np.zeros(3) if row.landmark else scatter_m * rng.standard_normal(3)
             name, suffix = markers.name(row, side), f"_{side[0]}"
-            segment = row.part + suffix if row.part in _PAIRED else row.part
+            segment = row.part + suffix if row.part in PAIRED else row.part
             place_of = place * [1.0, 1.0, sign] + off
             sites.append(Site(name, segment, row.region, place_of, row.landmark, _driver(row, suffix)))
     return tuple(sites)

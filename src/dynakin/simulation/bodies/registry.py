@@ -10,7 +10,6 @@ import numpy as np
 from dynakin.errors import ConfigError
 from dynakin.simulation.bodies import sagittal, squat_chain, whole_body
 from dynakin.simulation.bodies.body import SimulatedBody
-from dynakin.simulation.bodies.marker_rows import SETS
 from dynakin.simulation.bodies.subject import SimulatedSubject, Spread, draw_subject
 from dynakin.simulation.streams import Streams
 
@@ -36,12 +35,14 @@ def choose_body(
     own is checked and taken as it is.
 
     Raises:
-        ConfigError: no such body or marker set, a subject that cannot be, or a tree that does not hang together.
+        ConfigError: no such body, a marker set for another than fullbody, a subject that cannot be, or a tree that does
+            not hang together.
+        ModelError: no such marker set.
     """
-    if markers is not None and (model != "fullbody" or markers not in SETS):
+    if markers is not None and model != "fullbody":
         raise ConfigError(
             f"simulation: markers is {markers!r} for {model if isinstance(model, str) else model.name!r}, expected "
-            f"{' or '.join(SETS)} for fullbody, nothing for the others, which have one set each"
+            "a marker set for fullbody only, nothing for the others, which have one set each"
         )
     if isinstance(model, SimulatedBody):
         _check(model)

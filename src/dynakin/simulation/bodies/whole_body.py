@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dynakin.model.markers.marker_set import load_marker_set
 from dynakin.simulation.bodies.body import Contact, SimulatedBody
 from dynakin.simulation.bodies.marker_rows import SETS, draw_sites
 from dynakin.simulation.bodies.markers import HipCentres
@@ -24,6 +25,7 @@ from dynakin.simulation.bodies.subject import (
     mass_com_inertia,
     symmetric,
 )
+from dynakin.simulation.bodies.worn import worn_sites
 from dynakin.simulation.mechanics import Axis, Segment
 
 Array = NDArray[np.float64]
@@ -84,6 +86,11 @@ def _lumbar_in_pelvis(subject: SimulatedSubject) -> Array:
 def _shoulder_in_torso(subject: SimulatedSubject, sign: float) -> Array:
     L = subject.lengths
     return np.array([0.0, _SHOULDER_ON_TRUNK * L["trunk"], sign * 0.5 * L["shoulder_width"]])
+
+
+def _joints(subject: SimulatedSubject) -> dict[str, Array]:
+    """Joint centres (3,) m of the right side on the segments of the middle."""
+    return {"hip": hip_in_pelvis(subject, 1.0), "shoulder": _shoulder_in_torso(subject, 1.0)}
 
 
 def _lengths(subject: SimulatedSubject) -> dict[str, float]:
@@ -156,7 +163,15 @@ def _sided(subject: SimulatedSubject, sign: float) -> Mapping[str, Array]:
 
 
 def build_body(subject: SimulatedSubject, rng: np.random.Generator, markers: str = "opencap") -> SimulatedBody:
-    """The whole body with the markers of a set, "opencap" or "plug-in-gait"; ``rng`` draws where they are put on."""
+    """The whole body with the markers of a set; ``rng`` draws where they are put on.
+
+    Args:
+        markers: "opencap" or "plug-in-gait": the lists of `marker_rows`, on which the validation's tables rest; any other
+            built-in set or file: all that it names.
+
+    Raises:
+        ModelError: no such set, or a wrong file.
+    """
     tree, L = build_tree(subject), subject.lengths
     joints = {
         "thigh": "hip", "shank": "knee", "foot": "ankle", "torso": "lumbar", "head": "cervical",
@@ -179,7 +194,9 @@ def build_body(subject: SimulatedSubject, rng: np.random.Generator, markers: str
         name="fullbody",
         subject=subject,
         tree=tree,
-        sites=draw_sites(rng, subject, SETS[markers]),
+        sites=draw_sites(rng, subject, SETS[markers])
+        if markers in SETS
+        else worn_sites(rng, subject, load_marker_set(markers), _joints(subject)),
         feet=(
             Contact("right foot", "plate 1", "foot_r", np.array([0.0, 0.0, _FOOT_LATERAL * subject.height_m])),
             Contact("left foot", "plate 2", "foot_l", np.array([0.0, 0.0, -_FOOT_LATERAL * subject.height_m])),

@@ -17,7 +17,7 @@ from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.frames import Trial
 from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder
 from dynakin.model.definition import ModelDefinition
-from dynakin.model.markers.marker_set import choose_marker_set, match_markers
+from dynakin.model.markers.recognise import recognise
 from dynakin.model.plan import ModelPlan
 from dynakin.model.schema import Frame
 from dynakin.model.schema import Segment as SegmentEntry
@@ -131,9 +131,7 @@ def landmark_paths(recording: Recording, initial: CalibratedModel, definition: M
     Raises:
         ModelError: the recording's markers fit no marker set.
     """
-    marker_set = definition.marker_set or choose_marker_set(recording.marker_names)
-    seen = [bool(np.isfinite(recording.marker(name)).all(axis=1).any()) for name in recording.marker_names]
-    match = match_markers(marker_set, recording.marker_names, seen, str(recording.path or recording.name))
+    match = recognise(recording, definition.marker_set).match
     trial = Trial.of(recording, match, initial.ground)
     sides = SIDES if initial.side == "both" else (initial.side,)
     finders = [

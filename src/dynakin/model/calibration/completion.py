@@ -1,0 +1,247 @@
+"""Landmarks that no marker gives, from the proportions of a standing adult laid on those that are measured.
+
+Segment by segment, from the root on, the template is turned and shifted so that it meets the landmarks of the segment
+that are known; weak points far out hold its direction to that of its parent, so that nothing, one, two and more known
+landmarks are one formula (Kabsch 1976, Acta Cryst A32:922-923). A side that is not marked takes the other's shape.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from importlib import resources
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.errors import ModelError
+from dynakin.model.calibration.landmarks import Positions
+from dynakin.model.calibration.posture import frame_landmarks
+from dynakin.model.mirroring import SUFFIXES
+from dynakin.model.schema import ModelFile, Segment
+from dynakin.model.table import BodyTable
+
+Array = npt.NDArray[np.float64]
+
+_MARKER_WEIGHT = 0.01
+"""Of a marker on the skin next to a landmark: people differ there, but it shows where the segment faces."""
+_HOLD_WEIGHT = 1e-4
+"""Of each of six points a tenth of the height away that hold the segment's direction to its parent's."""
+_HOLD = 0.1
+_FLIP = np.array([1.0, 1.0, -1.0])
+_LEAST = 2
+"""Landmarks of the root that must be measured."""
+
+
+@dataclass(frozen=True, eq=False)
+class Proportions:
+    """Places in parts of the height, of landmarks by their names with side, and of markers by set name with segment."""
+
+    landmarks: dict[str, Array]
+    markers: dict[str, tuple[str, Array]]
+
+    @classmethod
+    @cache
+    def load(cls) -> Proportions:
+        """Those of the file ``proportions.toml``."""
+        text = (resources.files("dynakin.model.calibration") / "proportions.toml").read_text(encoding="utf-8")
+        content = tomllib.loads(text)
+        landmarks: dict[str, Array] = {}
+        for name, place in content["landmarks"].items():
+            landmarks[name] = np.array(place)
+            if name.endswith("_r"):
+                landmarks[f"{name.removesuffix('_r')}_l"] = np.array(place) * _FLIP
+        markers = {name: (entry["segment"], np.array(entry["at"])) for name, entry in content["markers"].items()}
+        return cls(landmarks, markers)
+
+
+@dataclass
+class Completed:
+    """All landmarks that the model needs, those that were completed, and a sentence on them."""
+
+    landmarks: dict[str, Array]
+    added: dict[str, str] = field(default_factory=dict)  # landmark -> segment
+    messages: list[str] = field(default_factory=list)
+
+
+def wanted_landmarks(model: ModelFile, table: BodyTable, locks: Mapping[str, float | None], segment: Segment) -> list[str]:
+    """Names, with side, of what a segment's frame, its lengths, its children's origins and its table parts need."""
+    names = frame_landmarks(segment) if free(segment, locks) else []
+    names += [child.origin for child in model.segments if child.parent == segment.name and child.origin]
+    placed = {term.length for term in segment.placement}
+    for length in model.lengths:
+        if length.name in placed:
+            names += [name for pair in length.pairs() for name in pair]
+    suffix = SUFFIXES.get(segment.side or "", "")
+    for part in (table.part(name) for name in segment.parts):
+        for point in (part.origin, part.length_from, part.length_to, part.axis_from, part.axis_to):
+            names += [f"{end}{suffix}" for end in (point.start, point.end)]
+    plain = [each for name in names for each in _sided(name)]
+    others = tuple(other for side, other in SUFFIXES.items() if segment.side not in (None, side))
+    return [name for name in dict.fromkeys(plain) if not (others and name.endswith(others))]
+
+
+def free(segment: Segment, locks: Mapping[str, float | None]) -> bool:
+    """Whether landmarks say how a segment stands; else that follows from its parent."""
+    return not segment.axes or any(locks.get(axis.coordinate) is None for axis in segment.axes)
+
+
+def _sided(name: str) -> list[str]:
+    """A landmark that the template has on each side, where it is asked for as the middle of both."""
+    known = Proportions.load().landmarks
+    for suffix in SUFFIXES.values():
+        if name not in known and name.removesuffix(suffix) in known:
+            return [name.removesuffix(suffix)]  # lumbar_r is the lumbar joint
+    if name not in known and f"{name}_r" in known:
+        return [f"{name}{suffix}" for suffix in SUFFIXES.values()]
+    return [name]
+
+
+def completed(
+    model: ModelFile,
+    table: BodyTable,
+    locks: Mapping[str, float | None],
+    landmarks: Mapping[str, Array],
+    positions: Positions,
+    height_m: float,
+    where: str,
+) -> Completed:
+    """Every landmark that the model needs, (3,) m, ground frame (X forward), measured or from proportions.
+
+    Args:
+        locks: coordinates that are locked, None: at the angle found. landmarks: as `LandmarkFinder.find_in_space` gives them. positions: of the markers.
+        height_m: of the body.
+
+    Raises:
+        ModelError: too little of the root is measured to say where the body is, or a landmark of a model of one's own
+            that neither markers nor proportions give.
+    """
+    template = Proportions.load()
+    known = {name: place for name, place in landmarks.items() if np.isfinite(place).all()}
+    found = Completed(dict(known))
+    turns: dict[str, Array] = {}
+    shape = {name: height_m * place for name, place in template.landmarks.items()}
+    lacking: dict[str, str] = {}
+    for segment in _better_side_first(model, table, locks, known):
+        wanted = wanted_landmarks(model, table, locks, segment)
+        own = [name for name in wanted if name in shape]
+        lacking |= {name: segment.name for name in _needed(segment, locks, wanted) if name not in shape | known}
+        have = [name for name in own if name in found.landmarks]
+        missing = [name for name in own if name not in found.landmarks]
+        if segment.parent == "ground" and len(set(own) & set(known)) < _LEAST:
+            raise ModelError(
+                f"{where}: segment {segment.name!r} of model {model.name} has {len(set(own) & set(known))} of the "
+                f"landmarks {', '.join(own)}, expected {_LEAST} or more: markers on it, or joint centres"
+            )
+        hold = _held(segment, turns, have, shape, found.landmarks)
+        source = [shape[name] for name in have]
+        target = [found.landmarks[name] for name in have]
+        weights = [1.0] * len(have)
+        for name, (home, place) in template.markers.items():
+            seen = positions.get((name, "centre"))
+            if home == segment.name and seen is not None and np.isfinite(seen).all():
+                source.append(height_m * place)
+                target.append(seen)
+                weights.append(_MARKER_WEIGHT)
+        turn, shift = _laid(np.array(source), np.array(target), np.array(weights), hold, _HOLD * height_m)
+        turns[segment.name] = turn
+        for name in missing:
+            found.landmarks[name] = turn @ shape[name] + shift
+            found.added[name] = segment.name
+        if segment.side is not None:
+            _mirrored_shape(shape, own, found.landmarks, turn, shift, segment)
+    if lacking:
+        raise ModelError(
+            f"{where}: neither markers nor proportions give "
+            + ", ".join(f"landmark {name!r} (segment {segment})" for name, segment in lacking.items())
+        )
+    _middles(found.landmarks, set(template.landmarks))
+    if found.added:
+        found.messages.append(
+            f"From the proportions of an adult of {height_m:.2f} m, or of the other side, because no markers give them: "
+            + ", ".join(sorted(found.added))
+            + "."
+        )
+    return found
+
+
+def _needed(segment: Segment, locks: Mapping[str, float | None], wanted: list[str]) -> list[str]:
+    """Of these the ones without which the segment has no frame."""
+    if not free(segment, locks):
+        return []
+    frame = [name for name in frame_landmarks(segment) if not name.startswith(("floor", "over_floor"))]
+    return [each for name in frame for each in _sided(name) if each in wanted]
+
+
+def _better_side_first(
+    model: ModelFile, table: BodyTable, locks: Mapping[str, float | None], known: Mapping[str, Array]
+) -> list[Segment]:
+    """The model's segments, parents first, and of two sides the one first of which more is measured."""
+    count = {s.name: sum(name in known for name in wanted_landmarks(model, table, locks, s)) for s in model.segments}
+    sides = {
+        side: sum(count[s.name] for s in model.segments if s.side == side) for side in SUFFIXES
+    }
+    order = sorted(SUFFIXES, key=lambda side: -sides[side])
+    centre = [s for s in model.segments if s.side is None]
+    rest = [s for side in order for s in model.segments if s.side == side]
+    ordered: list[Segment] = []
+    waiting = [*centre, *rest]
+    while waiting:  # a middle segment may hang on a limb in a model of one's own
+        done = {"ground", *(s.name for s in ordered)}
+        nearest = next(s for s in waiting if s.parent in done)
+        ordered.append(nearest)
+        waiting.remove(nearest)
+    return ordered
+
+
+def _held(
+    segment: Segment, turns: Mapping[str, Array], have: list[str], shape: Mapping[str, Array], found: Mapping[str, Array]
+) -> Array:
+    """Rotation (3, 3) of the template to which a segment is held: upright, as the root faces, of what hangs on the
+    root; else that of the parent."""
+    if segment.parent == "ground":
+        return np.eye(3)
+    parent = turns[segment.parent]
+    if segment.parent != next(iter(turns)):
+        return parent
+    ahead = parent[:, 0] * np.array([1.0, 0.0, 1.0])
+    if np.linalg.norm(ahead) < 0.1:
+        return parent
+    ahead /= np.linalg.norm(ahead)
+    up = np.array([0.0, 1.0, 0.0])
+    return np.column_stack([ahead, up, np.cross(ahead, up)])
+
+
+def _laid(source: Array, target: Array, weights: Array, hold: Array, reach: float) -> tuple[Array, Array]:
+    """Rotation (3, 3) and shift (3,) that lay points (K, 3) best on targets, directions held to a rotation weakly."""
+    weights = weights / weights.sum()
+    a, b = weights @ source, weights @ target
+    covariance = (target - b).T @ (weights[:, None] * (source - a))
+    covariance += _HOLD_WEIGHT * 2.0 * reach**2 * hold
+    u, _, vt = np.linalg.svd(covariance)
+    turn = u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))]) @ vt
+    return turn, b - turn @ a
+
+
+def _mirrored_shape(
+    shape: dict[str, Array], own: list[str], found: Mapping[str, Array], turn: Array, shift: Array, segment: Segment
+) -> None:
+    """Gives the other side the shape of this one, in place."""
+    mine, other = SUFFIXES[str(segment.side)], next(s for k, s in SUFFIXES.items() if k != segment.side)
+    for name in own:
+        if name.endswith(mine) and f"{name.removesuffix(mine)}{other}" in shape:
+            shape[f"{name.removesuffix(mine)}{other}"] = (turn.T @ (found[name] - shift)) * _FLIP
+
+
+def _middles(landmarks: dict[str, Array], template: set[str]) -> None:
+    """Middle of both sides under the plain name, and middle landmarks under both sides' names, in place."""
+    for name in sorted(template):
+        plain = next((name.removesuffix(s) for s in SUFFIXES.values() if name.endswith(s)), name)
+        sides = [f"{plain}{suffix}" for suffix in SUFFIXES.values()]
+        if plain not in landmarks and all(side in landmarks for side in sides):
+            landmarks[plain] = np.mean([landmarks[side] for side in sides], axis=0)
+        if plain in template and plain in landmarks:
+            for side in sides:
+                landmarks.setdefault(side, landmarks[plain])

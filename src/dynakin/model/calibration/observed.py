@@ -1,0 +1,80 @@
+"""Which coordinates the markers show at all, by how far each would be known from one frame; the others are held."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.bindings import _core
+from dynakin.model.plan import Geometry, ModelPlan
+from dynakin.model.spec import to_core
+
+Array = npt.NDArray[np.float64]
+
+MARKER_SD_M = 0.005
+"""Skin beside noise."""
+PRIOR_SD_RAD, PRIOR_SD_M = np.deg2rad(60.0), 1.0
+"""Of each coordinate, before any marker."""
+HELD_SD_RAD = float(np.deg2rad(20.0))
+"""From this deviation on, of the median frame, a coordinate is held: a lever of 14 mm. The least of sets with two or more
+markers a segment have 30 mm (an elbow's marker about the upper arm)."""
+_ALIKE_RAD = np.deg2rad(5.0)
+
+
+def hold_unseen(plan: ModelPlan, postures: list[tuple[Array, Array]]) -> tuple[ModelPlan, dict[str, str]]:
+    """The plan with the coordinates locked where they stand that its markers do not show, and why, by coordinate.
+
+    Of several that can stand for each other the one furthest from the root is held first. Coordinates of the root
+    never are: something moves the body.
+
+    Args:
+        postures: states (n,) of the plan's model at some frames, and the markers (M, 3) seen there, NaN where not.
+    """
+    held: dict[str, str] = {}
+    depth = _depths(plan)
+    kinds = {axis.coordinate: axis.kind for s in plan.model.segments for axis in s.axes}
+    model = _core.Model(to_core(plan))
+    free = [c.name for c in model.spec.coordinates if not c.locked]
+    jacobians = [
+        _core.marker_jacobian(model, x)[np.isfinite(markers).ravel()][:, : len(free)] / MARKER_SD_M
+        for x, markers in postures
+    ]
+    prior = np.array([PRIOR_SD_RAD if kinds[name] == "rotation" else PRIOR_SD_M for name in free])
+    kept = np.ones(len(free), dtype=bool)
+    while True:
+        sd = np.median([_deviations(J[:, kept], prior[kept]) for J in jacobians], axis=0)
+        names = [name for name, keep in zip(free, kept, strict=True) if keep]
+        worst = [
+            (round(value / _ALIKE_RAD), depth[name], name)
+            for value, name in zip(sd, names, strict=True)
+            if value > HELD_SD_RAD and depth[name] > 0 and kinds[name] == "rotation"
+        ]
+        if not worst:
+            break
+        name = max(worst)[2]
+        kept[free.index(name)] = False
+        held[name] = "the markers do not show it"
+    if not held:
+        return plan, held
+    geometry = plan.geometry
+    locked = {**geometry.locked, **{name: plan.start[name] for name in held}}
+    return replace(plan, geometry=Geometry(geometry.lengths, geometry.directions, locked)), held
+
+
+def _deviations(J: Array, prior: Array) -> Array:
+    """Standard deviations (n,) of each coordinate with the others free, from rows that are in units of theirs."""
+    information = J.T @ J + np.diag(prior**-2.0)
+    return np.asarray(np.sqrt(np.diag(np.linalg.inv(information))))
+
+
+def _depths(plan: ModelPlan) -> dict[str, int]:
+    """How many joints each coordinate's first one is away from the root's."""
+    deep = {"ground": -1}
+    found: dict[str, int] = {}
+    for segment in plan.model.segments:
+        deep[segment.name] = deep[segment.parent] + 1
+        for axis in segment.axes:
+            found.setdefault(axis.coordinate, deep[segment.name])
+    return found

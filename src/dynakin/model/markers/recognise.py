@@ -1,0 +1,282 @@
+"""Which marker set a recording has: the one whose names explain most of its markers, checked on the body."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from dynakin.errors import ModelError
+from dynakin.model.markers.geometry import Expected, Found, body_height_m, deviations, places_of
+from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
+from dynakin.model.markers.match import (
+    SIDES,
+    MarkerKey,
+    MarkerMatch,
+    Spellings,
+    found_markers,
+    match_markers,
+)
+from dynakin.model.markers.schema import MarkerSetFile
+from dynakin.model.markers.swaps import Swap, distance_words, swaps_for_a_while, swaps_throughout
+from dynakin.recordings.recording import Recording
+
+_LISTED = 8  # names in a sentence
+_LEG = ("thigh", "shank", "foot")
+_ON_LEG_AT_LEAST = 2  # segments of one leg
+_ROOT = "pelvis"
+_ABOUT_AS_MANY = 0.9  # of the markers that the first set explains
+_IMPOSSIBLE = 4.5  # deviations of a distance beyond which it is none of a body (2.9 at most in shared/data)
+_FEW_WRONG, _MANY_WRONG = 2, 0.25
+_SHORT = 0.05  # of a trial: exchanged labels that the filter's own outlier rules are for
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A built-in set beside a recording's names.
+
+    Attributes:
+        names: of the markers that are there. doubled: aliases that several names fit.
+        expected_n: markers that the whole set has, each side counted.
+    """
+
+    marker_set: MarkerSetFile
+    names: dict[MarkerKey, str]
+    doubled: dict[str, list[str]]
+    expected_n: int
+
+    @property
+    def explained_n(self) -> int:
+        """How many of the recording's markers the set knows."""
+        return len(self.names)
+
+    @property
+    def lacking(self) -> list[str]:
+        """What a model needs at least and the recording lacks: the pelvis, and two segments of a leg; with the set's
+        names for them."""
+        return _lacking(self.marker_set, self.names)
+
+
+def _lacking(marker_set: MarkerSetFile, names: dict[MarkerKey, str]) -> list[str]:
+    parts = {
+        side: {_segment(marker_set, name) for name, own in names if own in (side, "centre")}
+        for side in ("right", "left")
+    }
+    best = max(("right", "left"), key=lambda side: len(parts[side] & set(_LEG)))
+    lacks = [] if any(_ROOT in found for found in parts.values()) else [_names_on(marker_set, _ROOT, best)]
+    here = parts[best] & set(_LEG)
+    if len(here) < _ON_LEG_AT_LEAST:
+        lacks += [_names_on(marker_set, segment, best) for segment in _LEG if segment not in here]
+    return lacks
+
+
+def _names_on(marker_set: MarkerSetFile, segment: str, side: str) -> str:
+    markers = [m for m in marker_set.markers if _segment(marker_set, m.name) == segment]
+    names = [m.aliases(own)[0] for m in markers for own in (side, "centre") if m.aliases(own)]
+    return f"on the {segment} ({', '.join(names[:3]) or 'none in the set'})"
+
+
+_CENTRES = {"HJC": "pelvis", "KJC": "thigh", "AJC": "shank"}
+
+
+def _segment(marker_set: MarkerSetFile, name: str) -> str:
+    return marker_set.marker(name).segment or _CENTRES.get(name, "")
+
+
+def fits(recorded: Iterable[str]) -> list[Fit]:
+    """The built-in sets beside names, the one that explains most of them first, of equals the one with fewest markers
+    that are not there; ``-all`` variants, which are for who asks for them, are left away."""
+    spelt = Spellings.of(recorded)
+    found = []
+    for name in available_marker_sets():
+        if name.endswith("-all"):
+            continue
+        set_ = load_marker_set(name)
+        names, doubled = found_markers(set_, spelt)
+        found.append(Fit(set_, names, doubled, sum(len(m.aliases(s)) > 0 for m in set_.markers for s in SIDES)))
+    return sorted(found, key=lambda fit: (-fit.explained_n, fit.expected_n - fit.explained_n, fit.marker_set.name))
+
+
+def choose_marker_set(recorded: Iterable[str], where: str = "the recording") -> MarkerSetFile:
+    """The built-in set that explains most of the names.
+
+    Raises:
+        ModelError: none of them has the pelvis and two segments of a leg there; says what lacks.
+    """
+    names = tuple(recorded)
+    return _usable(fits(names), where)[0].marker_set
+
+
+def _usable(ranked: Sequence[Fit], where: str) -> list[Fit]:
+    found = [fit for fit in ranked if not fit.lacking]
+    if not found:
+        best = ranked[0]
+        raise ModelError(
+            f"{where}: no marker set fits (best: {best.marker_set.name} with {best.explained_n} markers; it lacks "
+            f"{'; '.join(best.lacking)}), expected names of a set that `dynakin check` lists, or a set of your own: "
+            "dynakin markers new TRIAL -o my.toml"
+        )
+    return found
+
+
+@dataclass(frozen=True)
+class Recognised:
+    """A recording's markers by a set.
+
+    Attributes:
+        match: without the markers that are not where their names say.
+        messages: the choice, and a Warning for each of these.
+        wrong_n: markers whose places contradict a body, apart from exchanged ones.
+    """
+
+    match: MarkerMatch
+    messages: tuple[str, ...]
+    wrong_n: int = 0
+
+
+def recognise(recording: Recording, asked: MarkerSetFile | None = None) -> Recognised:
+    """The markers of a recording by the set that is asked for, or by the built-in one that explains most of its names.
+
+    Names decide, then the body is asked: markers that lie elsewhere than their names say, or bear each other's names,
+    are left out and said. Of sets that explain about as many names one that the body contradicts gives way.
+
+    Raises:
+        ModelError: no set fits, two persons in one file, or what is left out leaves no pelvis or no leg.
+    """
+    where = str(recording.path or recording.name)
+    seen = _seen(recording)
+    if asked is not None:
+        found = checked(recording, match_markers(asked, recording.marker_names, seen, where))
+        _refuse_wrong_set(found, where)
+        return found
+    ranked = fits(seen_names(recording))
+    usable = _usable(ranked, where)
+    best: Recognised | None = None
+    for fit in usable:
+        if best is not None and (not best.wrong_n or fit.explained_n < _ABOUT_AS_MANY * usable[0].explained_n):
+            break
+        own = checked(recording, match_markers(fit.marker_set, recording.marker_names, seen, where))
+        if best is None or own.wrong_n < best.wrong_n:
+            best = own
+    assert best is not None
+    _refuse_wrong_set(best, where)
+    return Recognised(best.match, (choice_words(best.match, ranked), *best.messages), best.wrong_n)
+
+
+def choice_words(match: MarkerMatch, ranked: Sequence[Fit]) -> str:
+    """Which set was chosen and how well it fits, with its runner-up and the names that it does not know."""
+    own = next(fit for fit in ranked if fit.marker_set.name == match.marker_set.name)
+    said = f"Marker set {own.marker_set.name}: {own.explained_n} of its {own.expected_n} markers by name"
+    other = next((fit for fit in ranked if fit is not own and fit.explained_n), None)
+    if other is not None:
+        said += f"; next best {other.marker_set.name} with {other.explained_n} of {other.expected_n}"
+    left = match.unexplained
+    if left:
+        more = f" and {len(left) - _LISTED} more" if len(left) > _LISTED else ""
+        said += f"; not known to it and left out: {', '.join(left[:_LISTED])}{more}"
+    return said + "."
+
+
+def checked(recording: Recording, match: MarkerMatch) -> Recognised:
+    """A match without the markers that lie elsewhere than their names say, each with a Warning.
+
+    Raises:
+        ModelError: exchanged labels without which there is no pelvis or no leg.
+    """
+    keys = list(match.names)
+    if not keys or not recording.n_frames:
+        return Recognised(match, ())
+    places = places_of(recording, match, keys)
+    expected = Expected.of(match, keys)
+    found = Found.of(places, expected)
+    height_m = body_height_m(found, expected)
+    swaps, order = swaps_throughout(match, keys, found, expected, height_m)
+    wrong = _misplaced(match, keys, found, expected, height_m, order)
+    gone = {keys[k] for k in wrong} | {key for swap in swaps for key in swap.keys}
+    if not swaps:
+        swaps = [
+            swap for swap in swaps_for_a_while(recording, match, keys, places, found, expected) if not swap.keys & gone
+        ]
+    messages = []
+    for swap in swaps:
+        match, said = _without_swap(match, swap)
+        messages.append(said)
+    for k, why in wrong.items():
+        if keys[k] in match.names:
+            match = match.without([keys[k]], f"{why}: it is not where its name says")
+            messages.append(f"Warning: {why}; {recording_name(match, keys[k])} is left out: check its label.")
+    return Recognised(match, tuple(messages), len(wrong))
+
+
+def recording_name(match: MarkerMatch, key: MarkerKey) -> str:
+    """The name of a marker by its set, for messages."""
+    return match.marker_set.marker(key[0]).aliases(key[1])[0]
+
+
+def _without_swap(match: MarkerMatch, swap: Swap) -> tuple[MarkerMatch, str]:
+    when = ""
+    if swap.span_s is not None:
+        when = f" from {swap.span_s[0]:.2f} to {swap.span_s[1]:.2f} s"
+    looks = f"{swap.what} look swapped{when} ({swap.evidence})"
+    if swap.share < _SHORT:
+        return match, f"Warning: {looks}: correct the labels; so short a time they are used as they are."
+    left = match.without(swap.keys, looks + ": correct the labels")
+    if not _lacking(match.marker_set, match.names) and (lacks := _lacking(left.marker_set, left.names)):
+        raise ModelError(
+            f"{match.where}: {looks}, and without them there is nothing {'; '.join(lacks)}; expected the labels "
+            "corrected"
+        )
+    both = "both are" if len(swap.keys) == 2 else "they are"
+    return left, f"Warning: {looks}; {both} left out: correct the labels in the recording."
+
+
+def _misplaced(
+    match: MarkerMatch, keys: Sequence[MarkerKey], found: Found, expected: Expected, height_m: float, order: np.ndarray
+) -> dict[int, str]:
+    """Markers at distances that no body has, and what shows it; one by one, the worst first."""
+    far = np.abs(deviations(found.ordered(order), expected, height_m).distance)
+    known = np.isfinite(expected.distance) & np.isfinite(found.distance[np.ix_(order, order)])
+    wrong: dict[int, str] = {}
+    while True:
+        beyond = (far > _IMPOSSIBLE) & known
+        n = beyond.sum(axis=1)
+        if not n.any():
+            return wrong
+        k = int(np.argmax(n + far.sum(axis=1) / (1.0 + far.sum())))
+        j = int(np.argmax(np.where(beyond[k], far[k], 0.0)))
+        wrong[k] = distance_words(
+            match.names[keys[k]], match.names[keys[j]], float(found.distance[order[k], order[j]]),
+            float(expected.distance[k, j]) * height_m,
+        )  # fmt: skip
+        known[k], known[:, k] = False, False
+        if n[k] == 1 and not known[j].any():  # two alone: either may be the wrong one
+            wrong[j] = wrong[k]
+
+
+def _refuse_wrong_set(found: Recognised, where: str) -> None:
+    total = len(found.match.names) + len(found.match.left_out)
+    if found.wrong_n > max(_FEW_WRONG, _MANY_WRONG * total):
+        example = next(said for said in found.messages if said.startswith("Warning"))
+        raise ModelError(
+            f"{where}: the names fit marker set {found.match.marker_set.name}, but {found.wrong_n} of {total} markers "
+            f"are not where it says ({example.removeprefix('Warning: ').split(';')[0]}); expected the set that was used, "
+            "or one of your own: dynakin markers new TRIAL -o my.toml"
+        )
+
+
+def foot_markers_of(recording: Recording) -> dict[str, list[str]]:
+    """Side -> markers on its foot by the built-in set that fits a recording best; none where none fits."""
+    try:
+        return recognise(recording).match.foot_markers
+    except ModelError:
+        return {"right": [], "left": []}
+
+
+def seen_names(recording: Recording) -> list[str]:
+    """Names of the markers that are seen at all."""
+    return [name for name, there in zip(recording.marker_names, _seen(recording), strict=True) if there]
+
+
+def _seen(recording: Recording) -> list[bool]:
+    return [bool(np.isfinite(recording.marker(name)).all(axis=1).any()) for name in recording.marker_names]
