@@ -70,10 +70,11 @@ class Completed:
 
 
 def wanted_landmarks(model: ModelFile, table: BodyTable, locks: Mapping[str, float | None], segment: Segment) -> list[str]:
-    """Names, with side, of what a segment's frame, its lengths, its children's origins and its table parts need."""
+    """Names, with side, of what a segment's frame, its children's places and its table parts need."""
     names = frame_landmarks(segment) if free(segment, locks) else []
-    names += [child.origin for child in model.segments if child.parent == segment.name and child.origin]
-    placed = {term.length for term in segment.placement}
+    children = [child for child in model.segments if child.parent == segment.name]
+    names += [child.origin for child in children if child.origin]
+    placed = {term.length for child in children for term in child.placement}
     for length in model.lengths:
         if length.name in placed:
             names += [name for pair in length.pairs() for name in pair]
@@ -156,6 +157,10 @@ def completed(
             found.landmarks[name] = turn @ shape[name] + shift
             found.added[name] = segment.name
             _beside_hinge(name, segment.side, known, found.landmarks)
+        laid = set(missing) & set(frame_landmarks(segment))
+        for floor in (name for name in frame_landmarks(segment) if laid and name.startswith("floor")):
+            up = next(name for name in frame_landmarks(segment) if name.startswith("over_floor"))
+            found.landmarks[up] = found.landmarks[floor] + turn @ np.array([0.0, 1.0, 0.0])  # flat in the proportions
         if segment.side is not None:
             mine, other = SUFFIXES[segment.side], next(s for side, s in SUFFIXES.items() if side != segment.side)
             shapes[f"{segment.name.removesuffix(mine)}{other}"] = {
