@@ -85,10 +85,11 @@ class MarkerMatch:
         return [(marker, key, self.names[key]) for marker, key in keys if key in self.names]
 
     def absent(self, name: str) -> str:
-        """Sentence for a marker that the recording lacks: aliases tried and what there is."""
+        """Words for a marker that the recording lacks, with the aliases tried."""
         marker = self.marker_set.marker(name)
-        tried = ", ".join((*marker.right, *marker.left, *marker.centre))
-        return f"marker {name} is not in the recording (tried {tried}); it has {', '.join(self.recorded)}"
+        return (
+            f"marker {name} is not in the recording (tried {', '.join((*marker.right, *marker.left, *marker.centre))})"
+        )
 
 
 def match_markers(
