@@ -119,11 +119,7 @@ def measure(
         subject,
         [(t.recording, t.ground) for t in ([source, trial] if static is not None else [trial])],
         source.match.foot_markers,
-        [
-            name
-            for key, name in source.match.names.items()
-            if source.match.marker_set.marker(key[0]).segment == "pelvis"
-        ],
+        [name for (marker, _), name in names.items() if set_.marker(marker).segment == "pelvis"],
         finder.height_m if model.sided else None,
     )
     messages.append(how)
