@@ -19,7 +19,8 @@ from dynakin.model.definition import available_models, load_built_in_or_toml
 from dynakin.model.markers.anatomy import anatomy, expanded
 from dynakin.model.markers.draft.by_name import places, said
 from dynakin.model.markers.draft.draft import Guess, guess_markers, toml_text
-from dynakin.model.markers.marker_set import load_marker_set, match_markers
+from dynakin.model.markers.marker_set import load_marker_set
+from dynakin.model.markers.match import match_markers
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
 from dynakin.simulation.output import save_trial
