@@ -66,7 +66,6 @@ def guess_markers(recording: Recording) -> list[Guess]:
     by_name = {k: found for k, name in enumerate(names) if (found := said(name)) is not None}
     named = {k: (f.place, f.side) for k, f in by_name.items() if f.place in places() and f.side is not None}
     person = _person(recording, at, {k: (str(place), str(side)) for k, (place, side) in named.items()})
-    firm = stands and person is not None and person.cost <= _FIRM_FIT * len(names)
     guesses = []
     for k, name in enumerate(names):
         told = by_name.get(k)
@@ -75,7 +74,7 @@ def guess_markers(recording: Recording) -> list[Guess]:
             guesses.append(replace(lies, why=f"{told.why}, and {lies.why}"))  # a head needs places, not only markers
         elif told is not None:
             guess = Guess(name, told.place, told.segment, told.side or "", told.sure, told.why)
-            guesses.append(_checked(guess, person, k, firm))
+            guesses.append(_checked(guess, person, k, stands))
         else:
             guesses.append(lies)
     return _one_each(guesses)
@@ -116,7 +115,7 @@ def _person(recording: Recording, at: Array, named: dict[int, tuple[str, str]]) 
     return person
 
 
-def _checked(guess: Guess, person: Stature | None, marker: int, firm: bool) -> Guess:
+def _checked(guess: Guess, person: Stature | None, marker: int, stands: bool) -> Guess:
     """What a name says, held against where the marker lies."""
     if person is None:
         if guess.side:
@@ -127,9 +126,9 @@ def _checked(guess: Guess, person: Stature | None, marker: int, firm: bool) -> G
         return replace(guess, place=None, side=side, sure="unsure", why=f"{guess.why}, but in the middle: computed?")
     if not guess.side:
         return replace(guess, side=side, sure="unsure", why=f"{guess.why}; the side is where it lies")
-    if not firm:
+    if not stands:
         return guess
-    if not fits and not places().get(guess.place or "", {}).get("loose"):
+    if not fits:
         return replace(guess, sure="unsure", why=f"{guess.why}, BUT IT LIES ELSEWHERE")
     if "centre" not in (side, guess.side) and side != guess.side and abs(person.scaled[marker][2]) > 0.03:
         return replace(guess, sure="unsure", why=f"{guess.why}, BUT IT LIES ON THE {side.upper()}")
