@@ -34,8 +34,8 @@ _BONES = re.compile(r"^(PEL|[LR](?:FE|TI|FO|TO|CL|HU|RA|HN)|HED|TRX)[OALP]$")
 _COMPUTED = re.compile(r"cent(er|re)ofmass|ground$|virtual")
 _LIKELY_MARGIN, _LEAST_MARGIN = 3.0, 1.0
 """By how much the next best place must fit worse (standard deviations squared). On 14 recordings of seven laboratories
-with their names hidden 112 of 113 likely places were right, and 88 of 119 unsure ones; limits were set with them in view. On six simulated
-persons that were not 129 of 133 likely ones were right."""
+with their names hidden 112 of 113 likely places were right, and 88 of 119 unsure ones; limits were set with them in
+view. On six simulated persons that were not 129 of 133 likely ones were right."""
 _FIRM_FIT, _FIT = 8.0, 9.0
 """Mean cost of a marker up to which the person stands as the list of places has it, and beyond which nobody does."""
 _RANK: dict[Sure, int] = {"sure": 0, "likely": 1, "unsure": 2}
