@@ -1,7 +1,7 @@
 """Drafts of marker sets: names in several languages, hidden names, what is written, what a model lacks.
 
 The places were measured on five real recordings; the simulated persons and the other laboratories here were not among
-them.
+them; these laboratories were in view when limits were set, the persons were not.
 """
 
 from __future__ import annotations

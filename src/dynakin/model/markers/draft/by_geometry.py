@@ -22,7 +22,7 @@ _NO_PLACE = 14.0
 """Squared distance, in standard deviations, beyond which a marker has no place of the list."""
 _TURNS = 4
 _MIRRORED = 0.05  # of the height: how far from the mirror image of the other side's a marker may lie
-_NAMED_ODD = 0.12  # of the height: how far from its place a marker may lie that its name says
+_NAMED_ODD, _ARM = 0.12, 0.28  # of the height: how far from its place a marker may lie that its name says; on an arm
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +94,8 @@ def lies_at(stature: Stature, marker: int, place: str) -> tuple[bool, str]:
     if about is None or "at" not in about:
         return True, side
     apart = np.array([x, y, abs(z)]) - about["at"]
-    return float(np.linalg.norm(apart)) < max(_NAMED_ODD, 2.5 * float(np.linalg.norm(about["sd"]))), side
+    limit = _ARM if about.get("loose") else max(_NAMED_ODD, 2.5 * float(np.linalg.norm(about["sd"])))
+    return float(np.linalg.norm(apart)) < limit, side
 
 
 def alike_on_both_sides(stature: Stature, marker: int) -> bool:

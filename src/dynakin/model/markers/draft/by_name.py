@@ -27,10 +27,11 @@ _SEGMENTS = {
     "thigh": ("oberschenkel", "upperleg", "thigh", "femur", "cuisse", "muslo", "coscia", "uleg", "tgh", "thi", "th"),
     "shank": ("unterschenkel", "lowerleg", "shank", "tibia", "jambe", "calf", "shin", "lleg", "leg", "tib", "sha",
               "shk", "sk", "sh"),
-    "foot": ("foot", "fuss", "pied"),
+    "foot": ("midfoot", "foot", "fuss", "pied"),
     "pelvis": ("pelvis", "becken", "bassin", "pelv", "pel"),
-    "upper_arm": ("upperarm", "oberarm", "humerus", "deltoid", "triceps", "biceps", "uparm", "uarm", "upa", "arm"),
-    "forearm": ("lowerarm", "unterarm", "forearm", "farm", "larm", "frm", "fra"),
+    "upper_arm": ("upperarm", "oberarm", "humerus", "deltoid", "triceps", "biceps", "bicep", "uparm", "uarm",
+                  "upa", "arm"),
+    "forearm": ("handgelenk", "poignet", "wrist", "lowerarm", "unterarm", "forearm", "farm", "larm", "frm", "fra"),
     "hand": ("finger", "thumb", "hand", "fin", "mcp", "hnd"),
     "thorax": ("thorax", "trunk", "torso", "chest", "rib", "trnk"),
     "head": ("head", "kopf", "tete"),
@@ -47,7 +48,7 @@ _CENTRES = {
 }
 _CENTRE = re.compile(r"^(hip|knee|ankle|shoulder|[hkas])(jc|jointcent(?:er|re)|cent(?:er|re)|joint)(?:reg)?$")
 _QUALIFIED = (
-    r"(?:\d+|[a-d]|front|back|top|bottom|upper|lower|up|low|lat|med|ant|post|sup|inf|prox|dist"
+    r"(?:\d+|[a-d]|front|rear|back|top|bottom|upper|lower|up|low|lat|med|ant|post|sup|inf|prox|dist"
     r"|cluster|tracking|marker)*"
 )
 
@@ -96,8 +97,9 @@ def said(name: str) -> Said | None:
         place = _place(rest)
         if place is not None:
             centre = places().get(place, {}).get("at", (0.0, 0.0, 1.0))[2] == 0.0
-            if centre and own_side is not None:
-                continue  # the side's letter belongs to the word
+            if centre and own_side is not None:  # beside the middle: a clavicle's own marker
+                segment = anatomy()["places"][place].get("segment")
+                return Said(None, segment, own_side, "likely", f"its name: {rest}, on one side")
             return Said(place, None, "centre" if centre else own_side, "likely", f"its name: {rest}")
         segment = _segment(rest)
         if segment is not None:
