@@ -243,11 +243,15 @@ class _Body:
             if k >= 0:
                 start[np.flatnonzero(angles)[k // 3]] += 0.5 * np.pi * (k % 3 + 1)
             found = least_squares(gap, start)
-            end = np.where(angles, (found.x + np.pi) % (2.0 * np.pi) - np.pi, found.x)
             # Three angles have two readings of every pose; the one with the smaller turns is meant.
-            rank = (round(float(found.cost), 9), float(np.abs(end - self.rest[self.base])[angles].sum()))
-            if rank < least:
-                least, best[self.base] = rank, end
+            for end in (found.x, _other_reading(found.x, angles)):
+                end = np.where(angles, (end + np.pi) % (2.0 * np.pi) - np.pi, end)
+                cost = 0.5 * float((gap(end) ** 2).sum())
+                rank = (round(cost, 9), float(np.abs(end - self.rest[self.base])[angles].sum()))
+                if rank < least:
+                    least, best[self.base] = rank, end
+            if least[0] == 0.0:
+                break
         return np.asarray(best)
 
     def mended(self, fit: _Fit) -> _Fit:
@@ -268,6 +272,16 @@ class _Body:
             found = self.solve(start)
             fit = found if found.rms < fit.rms else fit
         return fit
+
+
+def _other_reading(values: Array, angles: npt.NDArray[np.bool_]) -> Array:
+    """The same pose by three turns about axes at right angles to each other: half a turn more, the middle one's
+    supplement, half a turn more."""
+    found = values.copy()
+    turns = np.flatnonzero(angles)
+    if len(turns) == 3:
+        found[turns] = [values[turns[0]] + np.pi, np.pi - values[turns[1]], values[turns[2]] + np.pi]
+    return found
 
 
 def laid(points: Array, targets: Array) -> tuple[Array, Array] | None:

@@ -21,6 +21,10 @@ Array = npt.NDArray[np.float64]
 _LEAST_M, _LEAST_SINE = 1e-3, 1e-3
 
 
+_EXACT = 1e-20
+"""Cost of a joint's fit that meets its target: rotations to 1e-10."""
+
+
 def axes_from(main: str, direction: Array, second: str = "", second_direction: Array | None = None) -> Array:
     """Rotation matrix whose columns are x, y, z: ``main`` along ``direction``, ``second`` as near as
     possible to its own.
@@ -106,7 +110,11 @@ def solve_joint(
     for k, name in enumerate(free):  # from a third of a turn either way too: half a turn off is a saddle
         if kinds[name] == "rotation":
             starts += [np.eye(len(free))[k] * angle for angle in (2.1, -2.1)]
-    fits = [least_squares(residual, start, xtol=1e-14, ftol=1e-14, gtol=1e-14) for start in starts]
+    fits = []
+    for start in starts:
+        fits.append(least_squares(residual, start, xtol=1e-14, ftol=1e-14, gtol=1e-14))
+        if fits[0].cost < _EXACT and np.abs(fits[0].x).max() < 0.5 * np.pi:
+            break  # no other reading has smaller turns
     best = min(fits, key=lambda fit: (round(float(fit.cost), 12), float(np.abs(fit.x).sum())))
     wrapped = [
         (v + np.pi) % (2 * np.pi) - np.pi if kinds[n] == "rotation" else v for n, v in zip(free, best.x, strict=True)
