@@ -98,23 +98,17 @@ def started(plan: ModelPlan, trial: Trial, unplaced: tuple[Candidate, ...], stil
 def _postures(model: _core.Model, paths: Array, limits: dict[str, Interval]) -> list[tuple[Array, Array]]:
     """States fitted to some frames that show enough markers, and these markers."""
     usable = np.flatnonzero(_enough(paths))
-    frames = usable[np.unique(np.linspace(0, len(usable) - 1, _FRAMES).astype(int))] if len(usable) else usable
-    return [
-        (start_posture(model, paths[k], limits=limits, good_m=_FAIR_M, bad_m=np.inf, where="").x, paths[k])
-        for k in frames.tolist()
-    ]
-
-
-def _averaged(plan: ModelPlan, paths: Array, limits: dict[str, Interval]) -> tuple[ModelPlan, list[str]]:
-    """Marker places as their mean over frames of the trial, postures fitted and places averaged by turns."""
-    usable = np.flatnonzero(_enough(paths))
     frames = usable[np.unique(np.linspace(0, len(usable) - 1, _AVERAGED).astype(int))] if len(usable) else usable
     rms: list[float] = []
+    states: dict[int, Array] = {}
     for _ in range(_TURNS):
         model = _core.Model(to_core(plan))
-        fits, found = [], []
+        fits, found, before = [], [], None
         for frame in frames:
-            fit = start_posture(model, paths[frame], limits=limits, good_m=_FAIR_M, where=f"frame {frame + 1}")
+            # each from the one before, or from itself in the turn before: people move little between them
+            guess = states.get(int(frame), before)
+            fit = start_posture(model, paths[frame], guess=guess, limits=limits, good_m=_FAIR_M, where=f"frame {frame + 1}")
+            states[int(frame)] = before = fit.x
             R, p = _core.segment_poses(model, fit.x)
             on = [model.segment_names.index(site.segment) for site in plan.sites]
             found.append([R[s].T @ (paths[frame, k] - p[s]) for k, s in enumerate(on)])

@@ -53,6 +53,7 @@ def start_posture(
     model: _core.Model,
     markers: Array,
     *,
+    guess: Array | None = None,
     limits: Mapping[str, Interval] | None = None,
     good_m: float = GOOD_M,
     bad_m: float = BAD_M,
@@ -65,6 +66,7 @@ def start_posture(
             are the first guess of the joints. A root with three translations and three rotations may be anywhere and
             head anywhere.
         markers: (M, 3) or (T, M, 3) m, ground frame, in the order of the model's markers; NaN: not seen.
+        guess: (n,) state of this or a like model to begin with; other starts are tried where that ends badly.
         limits: name -> (lower, upper) rad or m of coordinates that have any.
         good_m: root mean square distance from which on nothing else is tried.
         bad_m: root mean square distance from which the fit is refused.
@@ -78,7 +80,7 @@ def start_posture(
     if measured.ndim == 3:
         measured = _median(measured)
     body = _Body(model, measured, dict(limits or {}), where, good_m)
-    best = body.fit()
+    best = body.fit(None if guess is None else guess[: body.n_free])
     _refuse(body, best, bad_m, where)
     x = np.array(model.initial_state(), dtype=float)
     x[: body.n_free] = best.q
@@ -195,9 +197,13 @@ class _Body:
         end[endless] = (end[endless] + np.pi) % (2.0 * np.pi) - np.pi
         return _Fit(end, float(np.sqrt(np.nanmean(self.distances(end) ** 2))))
 
-    def fit(self) -> _Fit:
+    def fit(self, guess: Array | None = None) -> _Fit:
         """The best of several starts; the first good one where there is one."""
         best: _Fit | None = None
+        if guess is not None:
+            best = self.solve(guess)
+            if best.rms < self.good_m:
+                return best
         for start in self.starts():
             found = self.mended(self.solve(start))
             best = found if best is None or found.rms < best.rms else best
