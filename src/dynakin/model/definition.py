@@ -13,7 +13,7 @@ import numpy as np
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.files import is_file
-from dynakin.model.calibration.calibrated import CalibratedModel, first_centre_of_pressure
+from dynakin.model.calibration.calibrated import UNMARKED_SHARE, CalibratedModel, first_centre_of_pressure
 from dynakin.model.calibration.in_space import started
 from dynakin.model.calibration.measure import measure
 from dynakin.model.markers.marker_set import load_marker_set
@@ -180,6 +180,9 @@ class ModelDefinition:
             plan, speeds = begun.plan, begun.speeds
             messages += begun.messages
             held = held | begun.held
+        unmarked_kg = sum(body.mass for name, body in plan.bodies.items() if name not in plan.marked())
+        if unmarked_kg <= UNMARKED_SHARE * rest.mass_kg:  # a head that is held moves little: its neck has a moment
+            held = {name: why for name, why in held.items() if name not in rest.held}
         spec = to_core(plan)
         core = _core.Model(spec)
         names = list(core.layout.names)
@@ -217,7 +220,7 @@ class ModelDefinition:
             plan=plan,
             foot_markers=rest.trial.match.foot_markers,
             feet={s.side: s.name for s in plan.model.segments if s.side is not None and "foot" in s.parts},
-            unmarked_kg=sum(body.mass for name, body in plan.bodies.items() if name not in plan.marked()),
+            unmarked_kg=unmarked_kg,
             held=held,
         )
 
