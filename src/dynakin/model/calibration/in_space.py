@@ -98,17 +98,32 @@ def started(plan: ModelPlan, trial: Trial, unplaced: tuple[Candidate, ...], stil
 def _postures(model: _core.Model, paths: Array, limits: dict[str, Interval]) -> list[tuple[Array, Array]]:
     """States fitted to some frames that show enough markers, and these markers."""
     usable = np.flatnonzero(_enough(paths))
+    frames = usable[np.unique(np.linspace(0, len(usable) - 1, _FRAMES).astype(int))] if len(usable) else usable
+    found: list[tuple[Array, Array]] = []
+    for frame in frames:
+        guess = found[-1][0] if found else None
+        fit = start_posture(model, paths[frame], guess=guess, limits=limits, good_m=_FAIR_M, bad_m=np.inf, where="")
+        found.append((fit.x, paths[frame]))
+    return found
+
+
+def _averaged(plan: ModelPlan, paths: Array, limits: dict[str, Interval]) -> tuple[ModelPlan, list[str]]:
+    """Marker places as their mean over frames of the trial, postures fitted and places averaged by turns."""
+    usable = np.flatnonzero(_enough(paths))
     frames = usable[np.unique(np.linspace(0, len(usable) - 1, _AVERAGED).astype(int))] if len(usable) else usable
     rms: list[float] = []
     states: dict[int, Array] = {}
     for _ in range(_TURNS):
         model = _core.Model(to_core(plan))
-        fits, found, before = [], [], None
-        for frame in frames:
-            # each from the one before, or from itself in the turn before: people move little between them
-            guess = states.get(int(frame), before)
-            fit = start_posture(model, paths[frame], guess=guess, limits=limits, good_m=_FAIR_M, where=f"frame {frame + 1}")
-            states[int(frame)] = before = fit.x
+        fits, found, last = [], [], None
+        for frame in frames.tolist():
+            if frame in states:  # places move by millimetres from turn to turn
+                fit = near(model, states[frame], paths[frame], limits)
+            else:
+                fit = start_posture(
+                    model, paths[frame], guess=last, limits=limits, good_m=_FAIR_M, where=f"frame {frame + 1}"
+                )
+            states[frame] = last = fit.x
             R, p = _core.segment_poses(model, fit.x)
             on = [model.segment_names.index(site.segment) for site in plan.sites]
             found.append([R[s].T @ (paths[frame, k] - p[s]) for k, s in enumerate(on)])
@@ -139,10 +154,10 @@ def _speeds(
     frames = [k for k in frames if time[k] - time[first] <= _SPEED_S]
     if len(frames) < 4:
         return {}
-    start, values = fit.x, [fit.coordinates]
+    values = [fit.coordinates]
     for frame in frames[1:]:
-        start, found = near(model, start, paths[frame], limits)
-        values.append(found)
+        fit = near(model, fit.x, paths[frame], limits)
+        values.append(fit.coordinates)
     t = time[frames] - time[first]
     powers = np.stack([np.ones_like(t), t, t**2], axis=1)
     table = np.array([[value[name] for name in fit.coordinates] for value in values])

@@ -82,27 +82,24 @@ def start_posture(
     body = _Body(model, measured, dict(limits or {}), where, good_m)
     best = body.fit(None if guess is None else guess[: body.n_free])
     _refuse(body, best, bad_m, where)
-    x = np.array(model.initial_state(), dtype=float)
-    x[: body.n_free] = best.q
-    q, _, _ = _core.coordinates(model, x)
-    names = model.coordinate_names
-    return PoseFit(dict(zip(names, map(float, q), strict=True)), x, body.distances(best.q), best.rms)
+    return _pose(model, body, best)
 
 
-def near(
-    model: _core.Model, x: Array, markers: Array, limits: Mapping[str, Interval]
-) -> tuple[Array, dict[str, float]]:
-    """State (n,) and coordinates of the fit that is reached from a state x (n,), one frame (M, 3) later, say.
+def near(model: _core.Model, x: Array, markers: Array, limits: Mapping[str, Interval]) -> PoseFit:
+    """The fit that is reached from a state x (n,): one frame (M, 3) later, say.
 
     Raises:
         ModelError: fewer than three markers.
     """
     body = _Body(model, np.asarray(markers, dtype=float), dict(limits), "next frame")
-    q = body.solve(x[: body.n_free], wrap=False).q
-    state = np.array(x, dtype=float)
-    state[: body.n_free] = q
-    values, _, _ = _core.coordinates(model, state)
-    return state, dict(zip(model.coordinate_names, map(float, values), strict=True))
+    return _pose(model, body, body.solve(x[: body.n_free], wrap=False))
+
+
+def _pose(model: _core.Model, body: _Body, fit: _Fit) -> PoseFit:
+    x = np.array(model.initial_state(), dtype=float)
+    x[: body.n_free] = fit.q
+    q, _, _ = _core.coordinates(model, x)
+    return PoseFit(dict(zip(model.coordinate_names, map(float, q), strict=True)), x, body.distances(fit.q), fit.rms)
 
 
 def _median(frames: Array) -> Array:
