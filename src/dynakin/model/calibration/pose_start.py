@@ -69,7 +69,7 @@ def start_posture(
         guess: (n,) state of this or a like model to begin with; other starts are tried where that ends badly.
         limits: name -> (lower, upper) rad or m of coordinates that have any.
         good_m: root mean square distance from which on nothing else is tried.
-        bad_m: root mean square distance from which the fit is refused.
+        bad_m: root mean square distance from which the fit is refused; infinite: any is taken.
         where: opens the messages (a file's name).
 
     Raises:
@@ -81,7 +81,8 @@ def start_posture(
         measured = _median(measured)
     body = _Body(model, measured, dict(limits or {}), where, good_m)
     best = body.fit(None if guess is None else guess[: body.n_free])
-    _refuse(body, best, bad_m, where)
+    if np.isfinite(bad_m):
+        _refuse(body, best, bad_m, where)
     return _pose(model, body, best)
 
 
