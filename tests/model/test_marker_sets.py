@@ -198,15 +198,18 @@ def test_joint_widths_of_the_recording_come_before_those_of_the_height(person: S
 
 @pytest.mark.parametrize("name", ["rajagopal-run", "qualisys-gait", "halpe26"])
 def test_a_squat_is_followed(name: str) -> None:
-    """Default sensors; changes of the angles (less their mean) as with plug-in-gait; limits by seeds 1 and 3."""
-    trial = simulate("fullbody", "squat", SEED, 5.0, 25.0, markers=name)
+    """Default sensors; changes of the angles, less their mean; limit by seeds 1 and 3 (worst 1.0).
+
+    Three points on the line of the hips do not show the pelvis' tilt: of keypoints the thigh in space is judged.
+    """
+    trial = simulate("fullbody", "squat", SEED, 5.0, 12.5, markers=name)
     estimate = Estimator(load_model("fullbody", WHO, markers=name)).run(trial.recording)
     names = list(estimate.coordinate_names)
-    limit = 3.0 if name in KEYPOINTS else 2.0
-    for coordinate in ("hip_flexion_r", "knee_angle_l", "ankle_angle_r"):
-        found = estimate.data["coordinates"].values[:, names.index(coordinate)]
-        error = np.rad2deg(found - trial.truth.data["coordinates"].sel(coordinate=coordinate).values)[5:]
-        assert np.std(error) < limit, coordinate
+    found, true = estimate.data["coordinates"].values, trial.truth.data["coordinates"]
+    thigh = ("hip_flexion_r", "pelvis_tilt") if name in KEYPOINTS else ("hip_flexion_r",)
+    for summed in (thigh, ("knee_angle_l",), ("ankle_angle_r",)):
+        error = sum(found[:, names.index(c)] - true.sel(coordinate=c).values for c in summed)
+        assert np.rad2deg(np.std(np.asarray(error)[5:])) < 2.0, summed
 
 
 def test_places_have_numbers_and_reasons() -> None:

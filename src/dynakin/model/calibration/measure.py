@@ -248,7 +248,7 @@ def _at_origin(model: ModelFile, trial: Trial, finder: LandmarkFinder, frames: n
 
 
 def _joint_widths(entries: list[Recording], finder: LandmarkFinder) -> tuple[dict[str, float], list[str]]:
-    """Widths (m) of knee and ankle by joint and side ("knee_r") as the recordings say them, and a sentence where used."""
+    """Widths (m) of knee and ankle by joint and side ("knee_r") as recordings say them, and a sentence where used."""
     keys = {f"{joint}_{side[0]}": side for joint in ("knee", "ankle") for side in SIDES}
     found: dict[str, float] = {}
     for key in keys:
