@@ -51,10 +51,12 @@ class Row:
         return str(self.path.relative_to(DATA)) if self.path.is_relative_to(DATA) else str(self.path)
 
     @property
+    def pairs(self) -> list[tuple[str, str]]:
+        return list(zip(self.extra[::2], self.extra[1::2], strict=True))
+
+    @property
     def given(self) -> str:
-        return " ".join(
-            f"{option} {Path(value).name}" for option, value in zip(self.extra[::2], self.extra[1::2], strict=True)
-        )
+        return " ".join(f"{option} {Path(value).name}" for option, value in self.pairs)
 
 
 def rows_of(path: Path, source: str) -> list[Row]:
@@ -139,11 +141,19 @@ def compared(rows: list[Row]) -> Iterator[str]:
         config = tomllib.loads((row.folder / "config.toml").read_text(encoding="utf-8"))
         with xr.open_dataset(file) as opened:
             data = opened.load()
-        for theirs in _references(row, config["mass_kg"]):
+        mass_kg = _their_mass(row) or config["mass_kg"]
+        for theirs in _references(row, mass_kg):
             ground = find_laboratory_frame(row.recording, vertical=config["ground"]["vertical"], forward="auto")
-            found = differences(data, ground, config["mass_kg"], theirs)
+            found = differences(data, ground, mass_kg, theirs)
             for joint in dict.fromkeys(joint for _, joint in found):
                 yield f"| `{row.name}` | {row.given or '–'} | {theirs.what} | {' | '.join(_cells(found, joint))} |"
+
+
+def _their_mass(row: Row) -> float | None:
+    """By which the file's own moments are divided: its person's, or that of the standing trial's file."""
+    assert row.recording is not None
+    files = [row.recording, *(read(Path(value)) for name, value in row.pairs if name == "--static")]
+    return next((file.subject["mass_kg"] for file in files if "mass_kg" in file.subject), None)
 
 
 def _references(row: Row, mass_kg: float) -> list[Theirs]:

@@ -12,6 +12,8 @@ _LENGTH = {
     1.0: ("m", "meter", "meters", "metre", "metres"),
     1e-2: ("cm", "centimeter", "centimeters", "centimetre", "centimetres"),
     1e-3: ("mm", "millimeter", "millimeters", "millimetre", "millimetres"),
+    0.0254: ("in", "inch", "inches"),
+    0.3048: ("ft", "foot", "feet"),
 }
 _FORCE = {1.0: ("n", "newton", "newtons"), 1e3: ("kn", "kilonewton", "kilonewtons")}
 

@@ -76,6 +76,7 @@ def person() -> Any:
         weighed_kg=MASS_KG,
         feet={"right": "foot_r", "left": "foot_l"},
         contacts={},
+        unseen_kg=0.0,
         spec=SimpleNamespace(segments=segments),
     )
 

@@ -18,7 +18,6 @@ from dynakin.model.definition import load_model
 from dynakin.model.markers.anatomy import anatomy
 from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
 from dynakin.model.markers.match import match_markers
-from dynakin.model.markers.recognise import recognise
 from dynakin.recordings.landmarks import plain_name
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording

@@ -120,8 +120,16 @@ def test_an_absent_marker_is_named_with_its_aliases() -> None:
     finder = LandmarkFinder(matched(("RTOE", "C7")), "right", None, planar=True)
     assert not finder.known("ankle")
     with pytest.raises(ModelError) as error:
-        finder.require("ankle", "segment 'shank'")
-    for word in ("trial", "segment 'shank'", "marker ANK", "tried RANK, LANK", "it has RTOE, C7"):
+        finder.require({"ankle": "segment 'shank'", "toe": "segment 'foot'", "knee": "segment 'thigh'"})
+    assert "'toe'" not in error.value.message
+    for word in (
+        "trial",
+        "'ankle' (segment 'shank')",
+        "marker ANK",
+        "tried RANK, LANK",
+        "marker KNE",
+        "it has RTOE, C7",
+    ):
         assert word in error.value.message
 
 

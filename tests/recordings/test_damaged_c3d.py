@@ -234,6 +234,8 @@ def test_names_that_are_not_utf8_can_be_printed(tmp_path: Path, whole: bytes) ->
     path = tmp_path / "a.c3d"
     path.write_bytes(changed(whole, spot(whole, "POINT", "LABELS", "values"), "KNÖC".encode("latin-1")))
     assert read_c3d(path).marker_names == ("KNÖC",)
+    path.write_bytes(changed(whole, spot(whole, "POINT", "LABELS", "values"), b"K\nE\x01"))
+    assert read_c3d(path).marker_names == ("K E",)
 
 
 def test_stray_exception_names_the_file(tmp_path: Path, whole: bytes, monkeypatch: pytest.MonkeyPatch) -> None:

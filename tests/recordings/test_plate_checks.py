@@ -83,6 +83,31 @@ def test_empty_plates_beside_the_feet_are_no_fault_and_below_a_foot_are(shift_m:
     assert refused or found.messages[-1].startswith("Nobody steps on the plates")
 
 
+@pytest.mark.parametrize(("shift_m", "weighs"), [(0.0, True), (-0.25, False)])
+def test_who_stands_over_a_plates_edge_is_not_weighed(shift_m: float, weighs: bool) -> None:
+    made = standing(70.0)
+    x, z = 0.3, 0.15
+    corners = np.array([[x, 0.0, z], [-x, 0.0, z], [-x, 0.0, -z], [x, 0.0, -z]])
+    places = {
+        "plate 1": (made.marker("LHEE"), made.marker("LTOE")),
+        "plate 2": (made.marker("RHEE"), made.marker("RTOE")),
+    }
+    plates = tuple(
+        replace(
+            plate,
+            corners=corners
+            + 0.5 * (places[plate.name][0][0] + places[plate.name][1][0]) * [1.0, 0.0, 1.0]
+            + [shift_m * (plate.name == "plate 1"), 0.0, 0.0],
+        )
+        for plate in made.plates
+    )
+    found = check(made.with_plates(plates))
+    assert found.refusal is None
+    assert found.mass_kg_from_plates == (pytest.approx(70.0) if weighs else None)
+    said = [text for text in found.messages if "over the edge of plate 1" in text]
+    assert bool(said) != weighs
+
+
 def test_pressure_somewhat_off_the_foot_is_a_warning() -> None:
     found = check(standing(70.0, cop_shift_m=0.3))
     assert found.refusal is None

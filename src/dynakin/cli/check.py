@@ -14,6 +14,7 @@ from dynakin.cli.options import OF_A_MODEL, OF_THE_LABORATORY, OF_THE_PLATES, Gi
 from dynakin.cli.prepared import GROUND, MARKERS, SUBJECT, Rows, assumed, contacts, print_rows, short, starting
 from dynakin.errors import DynakinError, ModelError, RecordingError
 from dynakin.filter.prepared import Prepared
+from dynakin.model.markers.recognise import fits, seen_names
 from dynakin.pipeline.stages import configure, prepare_case
 from dynakin.recordings.beside import forces_beside, static_beside
 from dynakin.recordings.recording import Recording
@@ -21,7 +22,7 @@ from dynakin.results.naming import sentence, words
 from dynakin.settings.settings import Settings
 from dynakin.validation.case import Case, case_of
 
-_LISTED = 6
+_LISTED, _SETS = 6, 3
 _SOME_KG = 70.0
 """To see what else there is where a mass is all that is missing; nothing that depends on it is said then."""
 _DETAILS = ("Lengths", "Masses", "Length of", "Start", "Marker places")
@@ -49,6 +50,8 @@ def check(
     ready, refusal = _rehearsed(case)
     if ready is not None:
         print_rows(console, _model(ready, settings, refusal))
+    else:
+        print_rows(console, [("Markers", text) for text in _nearest_sets(case.recording)])
     print_rows(console, [("Add", text) for text in _to_add(case, ready, refusal)])
     if refusal is not None:
         raise _refused(refusal)
@@ -154,6 +157,15 @@ def _held(ready: Prepared) -> list[str]:
         for stem, name in zip(stems, locked, strict=True)
     }
     return [f"Held: {', '.join(told.values())}."] if told else []
+
+
+def _nearest_sets(recording: Recording) -> list[str]:
+    """The marker sets that the recording's names fit best, and what each lacks at least."""
+    told = []
+    for fit in fits(seen_names(recording))[:_SETS]:
+        lacks = f"; lacks markers {', '.join(fit.lacking)}" if fit.lacking else ""
+        told.append(f"{fit.marker_set.name}: {fit.explained_n} of its {fit.expected_n} markers by name{lacks}.")
+    return told
 
 
 def _to_add(case: Case, ready: Prepared | None, refusal: DynakinError | None) -> list[str]:

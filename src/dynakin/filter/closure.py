@@ -34,8 +34,8 @@ LASTING, LASTING_S = 0.05, 1.0
 """Less is enough where its mean over a second is: a hand on a rail. Well measured recordings stay below 0.025, a run at
 5 m/s below 0.04, simulated ones below 0.01; a rail that bears a tenth makes 0.06 to 0.09."""
 UNSEEN = np.array([0.5, 0.3, 0.1])
-"""What a body whose parts are not all marked may do more, of `EXCESS`, `EDGE` and `LASTING`, by the part of its mass that
-is not: without the upper body's markers (0.38) a walk makes 0.20, for longer than a second 0.03, squats 0.11."""
+"""What a body whose parts are not all marked may do more, of `EXCESS`, `EDGE` and `LASTING`, by the part of its mass
+that is not: without the upper body's markers (0.38) a walk makes 0.20, for longer than a second 0.03, squats 0.11."""
 _MASS_WITHIN, _OFTEN = 0.15, 0.2
 _UNSEEN_S = 0.2
 """Where too few markers are seen for longer than this, the plates' mean has to be near the weight."""

@@ -28,8 +28,8 @@ _REACH_S = 0.3
 """How far a stretch without some marker is led into its neighbours, so that its derivatives are known at its ends."""
 _POSTURES, _SPREAD_RAD = 200, 0.4
 _UNSEEN_RAD = 0.1
-"""The same of the root's turns where a trunk that is not marked is held to it: a mean of the pelvis' markers, which lie in
-one plane, cannot follow what stands on them, nor would the trunk lean as far as the pelvis does."""
+"""The same of the root's turns where a trunk that is not marked is held to it: a mean of the pelvis' markers, which lie
+in one plane, cannot follow what stands on them, nor would the trunk lean as far as the pelvis does."""
 _WORST_M, _WORST_UNSEEN_M = 0.015, 0.025
 """Remainder, RMS, from which a set of markers does not give the centre of mass; of a trunk without markers, whose own
 motion is more than that: Plug-in Gait's 16 of the lower body leave 16 mm."""

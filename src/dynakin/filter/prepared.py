@@ -68,11 +68,11 @@ class Prepared:
         """Which moments will be measured, derived, a prior and absent, and why, as `moment_figures` of an estimate;
         frames in which the filter will lose the person are not known yet."""
         calibrated = self.calibrated
-        sources = ContactSources(calibrated.spec, calibrated.feet.values()).moments(self.contacts)
+        sources = ContactSources.of(calibrated).moments(self.contacts)
         if self.contacts is None:
             blind = np.isnan(self.wrench).all(axis=1)
             codes = np.where(self.ground.undeclared, ABSENT, np.where(blind, DERIVED, MEASURED))
-            sources = np.repeat(codes[:, None], sources.shape[1], axis=1).astype(np.uint8)
+            sources = np.maximum(sources, codes[:, None]).astype(np.uint8)
         data = xr.Dataset(coords=labels(self.tracker.core_model, calibrated, self.recording.time, self.contacts))
         if self.contacts is not None:
             data = data.isel(foot=[name != RESIDUAL for name in self.contacts.names])

@@ -10,6 +10,7 @@ import xarray as xr
 
 from dynakin.bindings import _core
 from dynakin.filter.contacts import ContactLoads
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.contact import NO_CONTACT
 from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, contact_sources
 
@@ -89,6 +90,11 @@ class ContactSources:
         self._moved = [self._segments.index(name) for name in moved_segments(spec)]
         self._soles = tuple(soles)
         self._legs = _below_the_thighs([self._segments.index(name) for name in soles], self._parents)
+
+    @classmethod
+    def of(cls, initial: CalibratedModel) -> ContactSources:
+        """Those of a calibrated model."""
+        return cls(initial.spec, initial.feet.values(), initial.held, initial.unmarked_feet.values())
 
     def moments(self, feet: ContactLoads | None) -> Codes:
         """(T, C) codes of the moments by the contacts; of a model without any one row: measured, as far as anybody

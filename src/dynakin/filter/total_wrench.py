@@ -107,8 +107,8 @@ def known_ground(
             loads = loads.without(np.tile(np.isin(loads.feet, list(initial.unmarked_feet)), (n, 1)))
             sides = " and the ".join(initial.unmarked_feet)
             text = (
-                f"No markers of the {sides} foot: what it carries is not known. Moments are those of a leg whose own foot is "
-                "on a plate, or in the air."
+                f"No markers of the {sides} foot: what it carries is not known. Moments are those of a leg whose own "
+                "foot is on a plate, or in the air."
             )
             loads = replace(loads, reasons=(*loads.reasons, text))
     names = list(initial.contacts)

@@ -51,8 +51,7 @@ class Tracker:
         self._lag = _core.FixedLag(self._filter, lag) if lag else None
         self._filter.report_sensors(True)
         self._labels = Labels.of(self.core_model)
-        known = self.calibrated
-        self._sources = ContactSources(known.spec, known.feet.values(), known.held, known.unmarked_feet.values())
+        self._sources = ContactSources.of(self.calibrated)
         self._time: float | None = None
         self._latest: StepEstimate | None = None
         self._stepped: deque[tuple[float, _core.ContactLoads | None, Codes]] = deque(maxlen=lag + 1)

@@ -30,10 +30,11 @@ _STEADY = 0.3
 """Part of its mean by which the load may vary: squats do by a quarter. Running, a seat that bears part of the weight,
 a step off the plates or onto a box does by more."""
 _STRETCH_S, _SPEED_S = 0.15, 0.02
-"""Shortest stretch whose impulse counts: 0.05 m/s that the centre of mass gains beside the pelvis are 3 % of it; and the
-smoothing before the pelvis' path is differentiated."""
+"""Shortest stretch whose impulse counts: 0.05 m/s that the centre of mass gains beside the pelvis are 3 % of it; and
+the smoothing before the pelvis' path is differentiated."""
 _APART = 0.15
-"""Part of the weight, RMS, by which the load may differ from what the pelvis' motion needs: walks and stairs differ by 0.03 to 0.08."""
+"""Part of the weight, RMS, by which the load may differ from what the pelvis' motion needs: walks and stairs differ by
+0.03 to 0.08."""
 _BODY_MASS_INDEX = (10.0, 60.0)
 """kg/m2; what lies beyond is no weight of a person of that height who stood on the plates."""
 _OTHER_LEVEL_M = 0.08  # a heel that has left the floor, or a toe that dips, is nearer
@@ -101,8 +102,8 @@ def find_mass(
     if height_m is not None and not any(recording.plates for recording, _ in trials):
         mass = MEAN_BODY_MASS_INDEX * height_m**2
         return mass, (
-            f"Warning: mass {mass:.1f} kg assumed, of a mean adult of {height_m:.2f} m: it is not given, and there are no "
-            "plates. Forces and moments grow with it. Give the mass if it is known."
+            f"Warning: mass {mass:.1f} kg assumed, of a mean adult of {height_m:.2f} m: it is not given, and there are "
+            "no plates. Forces and moments grow with it. Give the mass if it is known."
         )
     raise ModelError(
         f"mass_kg is not given and cannot be found ({'; '.join(reasons)}); expected mass_kg of the subject (--mass)"

@@ -20,7 +20,7 @@ from dynakin.errors import ModelError
 from dynakin.model.calibration.landmarks import BENT, Positions
 from dynakin.model.calibration.posture import frame_landmarks
 from dynakin.model.mirroring import SUFFIXES
-from dynakin.model.schema import ModelFile, Segment
+from dynakin.model.schema import Frame, ModelFile, Segment
 from dynakin.model.table import BodyTable
 
 Array = npt.NDArray[np.float64]
@@ -31,14 +31,15 @@ _HOLD_WEIGHT = 1e-4
 """Of each of six points a tenth of the height away that hold the segment's direction to its parent's."""
 _HOLD = 0.1
 _FLIP = np.array([1.0, 1.0, -1.0])
+_ONE_PLACE_M = 1e-3
 _LEAST = 2
 """Landmarks of the root that must be measured."""
 
 
 @dataclass(frozen=True, eq=False)
 class Proportions:
-    """Places in parts of the height, of landmarks by their names with side, and of markers by set name with segment; and
-    landmarks beside a hinge, with the limb's and which way it bends."""
+    """Places in parts of the height, of landmarks by their names with side, and of markers by set name with segment;
+    and landmarks beside a hinge, with the limb's and which way it bends."""
 
     landmarks: dict[str, Array]
     markers: dict[str, tuple[str, Array]]
@@ -72,10 +73,11 @@ class Completed:
 def wanted_landmarks(
     model: ModelFile, table: BodyTable, locks: Mapping[str, float | None], segment: Segment
 ) -> list[str]:
-    """Names, with side, of what a segment's frame, its lengths, its children's origins and its table parts need."""
+    """Names, with side, of what a segment's frame, its children's places and its table parts need."""
     names = frame_landmarks(segment) if free(segment, locks) else []
-    names += [child.origin for child in model.segments if child.parent == segment.name and child.origin]
-    placed = {term.length for term in segment.placement}
+    children = [child for child in model.segments if child.parent == segment.name]
+    names += [child.origin for child in children if child.origin]
+    placed = {term.length for child in children for term in child.placement}
     for length in model.lengths:
         if length.name in placed:
             names += [name for pair in length.pairs() for name in pair]
@@ -116,7 +118,8 @@ def completed(
     """Every landmark that the model needs, (3,) m, ground frame (X forward), measured or from proportions.
 
     Args:
-        locks: coordinates that are locked, None: at the angle found. landmarks: as `LandmarkFinder.find_in_space` gives them. positions: of the markers.
+        locks: coordinates that are locked, None: at the angle found.
+        landmarks: as `LandmarkFinder.find_in_space` gives them. positions: of the markers.
         height_m: of the body.
 
     Raises:
@@ -125,6 +128,8 @@ def completed(
     """
     template = Proportions.load()
     known = {name: place for name, place in landmarks.items() if np.isfinite(place).all()}
+    for name in _on_the_skin(model, known):
+        del known[name]
     found = Completed(dict(known))
     turns: dict[str, Array] = {}
     shapes: dict[str, dict[str, Array]] = {}  # of the second side, as the first one has it
@@ -158,6 +163,10 @@ def completed(
             found.landmarks[name] = turn @ shape[name] + shift
             found.added[name] = segment.name
             _beside_hinge(name, segment.side, known, found.landmarks)
+        laid = set(missing) & set(frame_landmarks(segment))
+        for floor in (name for name in frame_landmarks(segment) if laid and name.startswith("floor")):
+            up = next(name for name in frame_landmarks(segment) if name.startswith("over_floor"))
+            found.landmarks[up] = found.landmarks[floor] + turn @ np.array([0.0, 1.0, 0.0])  # flat in the proportions
         if segment.side is not None:
             mine, other = SUFFIXES[segment.side], next(s for side, s in SUFFIXES.items() if side != segment.side)
             shapes[f"{segment.name.removesuffix(mine)}{other}"] = {
@@ -173,10 +182,21 @@ def completed(
     _middles(found.landmarks, set(template.landmarks))
     if found.added:
         found.messages.append(
-            f"From the proportions of an adult of {height_m:.2f} m, or of the other side, because no markers give them: "
+            f"From the proportions of an adult of {height_m:.2f} m, or the other side, because no markers give them: "
             + ", ".join(sorted(found.added))
             + "."
         )
+    return found
+
+
+def _on_the_skin(model: ModelFile, known: Mapping[str, Array]) -> set[str]:
+    """Joint centres that for want of anything better are taken to be where a marker beside them is."""
+    found = set()
+    for segment in model.segments:
+        for axis in ("x", "y", "z") if isinstance(segment.frame, Frame) else ():
+            start, end = getattr(segment.frame, axis) or ("", "")
+            if start in known and end in known and np.linalg.norm(known[end] - known[start]) < _ONE_PLACE_M:
+                found.add(start)
     return found
 
 

@@ -28,7 +28,7 @@ _AVERAGED, _TURNS = 20, 3
 _FAIR_M = 0.03
 """Skin moves so far in a deep squat: a fit as good as that has not gone astray."""
 _FRAMES = 5
-"""Frames on which a marker is placed that the calibration does not show, and on which it is judged what markers show."""
+"""Frames on which a marker is placed that the calibration does not show, and by which it is judged what they show."""
 
 
 @dataclass(frozen=True)

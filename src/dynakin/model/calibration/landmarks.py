@@ -83,19 +83,28 @@ class LandmarkFinder:
         """Whether the recording has the markers for this landmark."""
         return name.startswith(_FLOOR) or bool(self._sides_of(name))
 
-    def require(self, name: str, why: str) -> None:
-        """Refuse, in one line, a recording without the markers for this landmark.
+    def require(self, wanted: Mapping[str, str]) -> None:
+        """Refuse, in one line, a recording without the markers for these landmarks.
+
+        Args:
+            wanted: landmark -> what needs it.
 
         Raises:
-            ModelError: names the landmark, the marker, the aliases tried and what the recording has.
+            ModelError: names each landmark that lacks, its marker, the aliases tried, and what the recording has.
         """
-        if self.known(name):
-            return
         marker_set = self.match.marker_set
-        if name not in self._recipes:
-            raise ModelError(f"marker set {marker_set.name}: no landmark {name!r}, which {why} needs")
         side = SIDES[0] if self.side == "both" else self.side
-        raise ModelError(f"{self.match.where}: {why} needs landmark {name!r}: {self._first_absent(name, side)}")
+        lacking: dict[str, list[str]] = {}
+        for name, why in wanted.items():
+            if not self.known(name):
+                how = "no recipe for it" if name not in self._recipes else self._first_absent(name, side)
+                lacking.setdefault(how, []).append(f"landmark {name!r} ({why})")
+        if lacking:
+            raise ModelError(
+                f"{self.match.where}, marker set {marker_set.name}: "
+                + "; ".join(f"{how}, expected for {', '.join(names)}" for how, names in lacking.items())
+                + f"; it has {', '.join(self.match.recorded)}"
+            )
 
     def _first_absent(self, name: str, side: str) -> str:
         recipe = self._recipes[name][0]

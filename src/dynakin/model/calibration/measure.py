@@ -127,15 +127,12 @@ def measure(
     else:
         landmarks, added = finder.find(standing), set[str]()
 
+    set_, names = source.match.marker_set, source.match.names
     mass_kg, how = find_mass(
         subject,
         [(t.recording, t.ground) for t in ([source, trial] if static is not None else [trial])],
         source.match.foot_markers,
-        [
-            name
-            for key, name in source.match.names.items()
-            if source.match.marker_set.marker(key[0]).segment == "pelvis"
-        ],
+        [name for (marker, _), name in names.items() if set_.marker(marker).segment == "pelvis"],
         finder.height_m if model.sided else None,
     )
     messages.append(how)
@@ -192,14 +189,13 @@ def needed_markers(model: ModelFile, finder: LandmarkFinder, locks: dict[str, fl
             wanted.setdefault(name, f"segment {segment.name!r} of model {model.name}")
     if model.ground.origin:
         wanted.setdefault(model.ground.origin, f"the ground origin of model {model.name}")
+    if not model.sided:
+        finder.require(wanted)
     keys: set[MarkerKey] = set()
-    for name, why in wanted.items():
+    for name in wanted:
         own, plain = finder.of_side(name)
-        if not model.sided:
-            own.require(plain, why)
-        elif not own.known(plain):
-            continue
-        keys |= own.markers_of(plain)
+        if own.known(plain):
+            keys |= own.markers_of(plain)
     for length in model.lengths:
         if length.between is not None and all(finder.known(name) for name in length.between):
             keys |= finder.markers_of(length.between[0]) | finder.markers_of(length.between[1])

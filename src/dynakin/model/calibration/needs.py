@@ -13,7 +13,7 @@ from dynakin.model.markers.schema import Recipe
 from dynakin.model.mirroring import SUFFIXES
 from dynakin.model.schema import ModelFile
 
-_MOST_WAYS = 12
+_MOST_WAYS = 300  # of one landmark: of those that others start from the first are enough
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ def needs(model: ModelFile) -> list[Need]:
             if plain not in recipes:
                 continue  # the floor
             owner = segment.name.removesuffix(SUFFIXES.get(segment.side or "", ""))
-            optional = segment.without_markers is not None
+            optional = segment.without_markers is not None or segment.when_marked
             segments, was_optional, sided = found.get(plain, ([], True, False))
             found[plain] = (
                 list(dict.fromkeys([*segments, owner])), optional and was_optional, sided or bool(suffix)

@@ -18,6 +18,9 @@ from dynakin.model.schema import Axis, Frame, ModelFile, Segment
 Array = npt.NDArray[np.float64]
 
 
+_LEAST_M, _LEAST_SINE = 1e-3, 1e-3
+
+
 def axes_from(main: str, direction: Array, second: str = "", second_direction: Array | None = None) -> Array:
     """Rotation matrix whose columns are x, y, z: ``main`` along ``direction``, ``second`` as near as
     possible to its own.
@@ -35,12 +38,29 @@ def axes_from(main: str, direction: Array, second: str = "", second_direction: A
     return np.column_stack([columns[axis] for axis in "xyz"])
 
 
-def frame_rotation(frame: Frame, landmarks: Mapping[str, Array]) -> Array:
-    """R_GS (3, 3) of a segment from landmarks in the ground frame."""
+def frame_rotation(frame: Frame, landmarks: Mapping[str, Array], segment: str = "") -> Array:
+    """R_GS (3, 3) of a segment from landmarks in the ground frame.
+
+    Raises:
+        ModelError: the landmarks of an axis lie at one place, or those of both axes along one line.
+    """
     given = {axis: getattr(frame, axis) for axis in "xyz" if getattr(frame, axis) is not None}
     directions: dict[str, Array] = {a: landmarks[pair[1]] - landmarks[pair[0]] for a, pair in given.items()}
     main: str = frame.main or next(iter(directions))
     other = next((axis for axis in directions if axis != main), "")
+    for axis, (start, end) in given.items():
+        if not np.linalg.norm(directions[axis]) > _LEAST_M:
+            raise ModelError(
+                f"segment {segment!r}: landmarks {start} and {end} lie at one place ({landmarks[start].round(3)} m), "
+                f"expected them apart: they are its axis {axis}"
+            )
+    if other and np.linalg.norm(np.cross(directions[main], directions[other])) < _LEAST_SINE * np.linalg.norm(
+        directions[main]
+    ) * np.linalg.norm(directions[other]):
+        raise ModelError(
+            f"segment {segment!r}: landmarks {', '.join(dict.fromkeys([*given[main], *given[other]]))} lie along one "
+            f"line, expected its axes {main} and {other} to differ"
+        )
     return axes_from(main, directions[main], other, directions.get(other))
 
 
@@ -142,7 +162,7 @@ def _target_rotation(
     model: ModelFile, segment: Segment, landmarks: Mapping[str, Array], standing: Posture | None
 ) -> Array:
     if isinstance(segment.frame, Frame):
-        return frame_rotation(segment.frame, landmarks)
+        return frame_rotation(segment.frame, landmarks, segment.name)
     if standing is None:
         return np.eye(3)
     R_standing, p_standing = standing.rotations[segment.name], standing.origins[segment.name]

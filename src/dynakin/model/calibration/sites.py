@@ -87,7 +87,7 @@ def find_locks(
         c.name: None if c.as_measured else c.value or 0.0 for c in model.coordinates if c.locked
     }
     bare: dict[str, tuple[str, ...]] = {}
-    messages: list[str] = []
+    messages, lacking = list[str](), list[str]()
     marked = {name for name, count in counts.items() if count}
     for segment in reversed(model.segments):  # children stand after their parents
         if segment.name in marked:
@@ -108,11 +108,8 @@ def find_locks(
             parts = {name, *segment.parts}
             fitting = [m for m in match.marker_set.markers if m.segment in parts and m.measures(not model.sided)]
             tried = ", ".join(alias for m in fitting for alias in (*m.right, *m.left, *m.centre))
-            raise ModelError(
-                f"{match.where}: segment {name!r} has no marker (tried "
-                f"{tried or 'none, the set has none on it'}) "
-                f"and its model file has no without_markers rule; it has {', '.join(match.recorded)}"
-            )
+            lacking.append(f"segment {name!r} has no marker (tried {tried or 'none, the set has none on it'})")
+            continue
         joint = segment if rule.lock_to == segment.parent else by_name[rule.lock_to]
         value = None if rule.value_deg is None else float(np.deg2rad(rule.value_deg))
         bare[name] = tuple(axis.coordinate for axis in joint.axes if axis.coordinate not in locks)
@@ -121,6 +118,11 @@ def find_locks(
         names = ", ".join(axis.coordinate for axis in joint.axes)
         at = "the angle found while standing" if rule.value_deg is None else f"{rule.value_deg:g} deg"
         messages.append(f"Segment {name} has no markers: locked to {rule.lock_to} (coordinate {names} at {at}).")
+    if lacking:
+        raise ModelError(
+            f"{match.where}: {'; '.join(lacking)}, and the model file has no without_markers rule for "
+            f"{'it' if len(lacking) == 1 else 'them'}; it has {', '.join(match.recorded)}"
+        )
     return locks, bare, messages
 
 

@@ -93,13 +93,14 @@ class MarkerMatch:
         return [(marker, key, self.names[key]) for marker, key in keys if key in self.names]
 
     def absent(self, name: str) -> str:
-        """Sentence for a marker that the recording lacks: why it is left out, or aliases tried and what there is."""
+        """Words for a marker that the recording lacks: why it is left out, or the aliases tried."""
         for (left_out, _), why in self.left_out.items():
             if left_out == name:
                 return f"marker {name} cannot be used: {why}"
         marker = self.marker_set.marker(name)
-        tried = ", ".join((*marker.right, *marker.left, *marker.centre))
-        return f"marker {name} is not in the recording (tried {tried}); it has {', '.join(self.recorded)}"
+        return (
+            f"marker {name} is not in the recording (tried {', '.join((*marker.right, *marker.left, *marker.centre))})"
+        )
 
     def without(self, keys: Iterable[MarkerKey], why: str) -> MarkerMatch:
         """The same without some markers."""

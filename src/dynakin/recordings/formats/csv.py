@@ -58,7 +58,9 @@ def read_csv_table(path: Path) -> Table:
     while len(names) > 1 and not names[-1]:
         del names[-1]
     if not _TIME.match(names[0]):
-        raise RecordingError(f"{path}, line {first}: found column {names[0]!r} first, expected 'time'")
+        raise RecordingError(
+            f"{path}, line {first}: found column {names[0]!r} first, expected 'time', then NAME_x, NAME_y, NAME_z"
+        )
     check_unique(names, "column", path)
     values, numbers, notes = parse_rows(((n, split_cells(line, separator)) for n, line in filled[1:]), names, path)
     if not len(values):

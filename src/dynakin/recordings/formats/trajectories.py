@@ -13,7 +13,8 @@ from dynakin.units import length_factor
 _METRES_BELOW, _CENTIMETRES_BELOW = 5.0, 300.0
 """Extent of the markers in a frame up to which it is one in m, and in cm: of a person 0.3 to 2.6 m, of a foot alone
 0.3 m. Only a foot in mm (300) and a person with arms raised in cm (260) come near each other."""
-_SAME_M = 1e-6
+_SAME_M = 3e-3
+"""Distance up to which two trajectories are one marker's, rounded or filtered otherwise: balls of 6 mm touch there."""
 _MOSTLY = 2.0
 """How many times as often as any other of its name a marker is seen to be the one that is meant."""
 
@@ -35,11 +36,11 @@ def length_unit(word: str, raw: Array) -> tuple[float, Literal["mm", "m"], list[
             extent = (high - low).max(axis=1, initial=-np.inf)
         span = float(np.median(extent[np.isfinite(extent)])) if np.isfinite(extent).any() else 0.0
         factor = 1.0 if span < _METRES_BELOW else 1e-2 if span < _CENTIMETRES_BELOW else 1e-3
-        name = {1.0: "m", 1e-2: "cm", 1e-3: "mm"}[factor]
         found = f"The length unit {word!r} is not known" if word else "The file names no length unit"
-        notes.append(f"{found}: {name} taken, as the markers span {span:.4g} of them.")
-    if factor == 1e-2:
-        notes.append("The file is in centimetres; markers are written back in metres.")
+        word = {1.0: "m", 1e-2: "cm", 1e-3: "mm"}[factor]
+        notes.append(f"{found}: {word} taken, as the markers span {span:.4g} of them.")
+    if factor not in (1.0, 1e-3):
+        notes.append(f"The file is in {word}; markers are written back in metres.")
     return factor, ("mm" if factor == 1e-3 else "m"), notes
 
 
@@ -84,7 +85,7 @@ def _distinct(places: list[Array]) -> list[Array]:
     for place in places:
         for k, other in enumerate(kept):
             both = np.isfinite(place[:, 0]) & np.isfinite(other[:, 0])
-            if (np.abs(place[both] - other[both]) <= _SAME_M).all():
+            if (np.linalg.norm(place[both] - other[both], axis=1) <= _SAME_M).all():
                 kept[k] = np.where(np.isnan(other), place, other)
                 break
         else:

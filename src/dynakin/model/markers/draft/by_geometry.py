@@ -109,6 +109,18 @@ def alike_on_both_sides(stature: Stature, marker: int) -> bool:
     return bool(np.linalg.norm(apart) < _MIRRORED)
 
 
+def mirrored_node(stature: Stature, marker: int, margin: float) -> Node | None:
+    """The place of the other side's marker that lies where this one's mirror image does, if it fits better than the
+    next by ``margin`` and this side's is not taken."""
+    firm = {node: k for k, node in enumerate(stature.nodes) if node is not None and stature.margins[k] >= margin}
+    image = stature.scaled[marker] * [1.0, 1.0, -1.0]
+    for (place, side), other in firm.items():
+        own = (place, "left" if side == "right" else "right")
+        if side != "centre" and own not in firm and np.linalg.norm(stature.scaled[other] - image) < 0.5 * _MIRRORED:
+            return own
+    return None
+
+
 def segment_at(stature: Stature, marker: int) -> str | None:
     """The segment on which a marker lies, by its height and how far out it is."""
     _, y, z = stature.scaled[marker]

@@ -111,7 +111,7 @@ def _readings(name: str) -> list[tuple[str | None, str]]:
     tokens = [t.casefold() for t in re.findall(r"[^\W\d_]?[a-zß-ÿ]+|[A-Z]+(?![a-z])|\d+", last)]
     found: list[tuple[str | None, str]] = []
     for side, words in _WORDS.items():
-        for k in (0, len(tokens) - 1):
+        for k in (0, len(tokens) - 1, *range(1, len(tokens) - 1)):
             if len(tokens) > 1 and tokens[k] in words:
                 found.append((side, "".join(tokens[:k] + tokens[k + 1 :])))
     whole = "".join(tokens)

@@ -1,0 +1,194 @@
+"""Drafts of marker sets: names in several languages, hidden names, what is written, what a model lacks.
+
+The places were measured on five real recordings; the simulated persons and the other laboratories here were not among
+them.
+"""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dynakin.cli.app import main
+from dynakin.model.calibration.needs import lacking, needs
+from dynakin.model.definition import available_models, load_built_in_or_toml
+from dynakin.model.markers.anatomy import anatomy, expanded
+from dynakin.model.markers.draft.by_name import places, said
+from dynakin.model.markers.draft.draft import Guess, guess_markers, toml_text
+from dynakin.model.markers.marker_set import load_marker_set
+from dynakin.model.markers.match import match_markers
+from dynakin.recordings.read import read
+from dynakin.recordings.recording import Recording
+from dynakin.simulation.output import save_trial
+from dynakin.simulation.trial import simulate
+
+DATA = Path("/work/shared/data")
+OTHERS = (  # marker set, and recordings of laboratories that the list of places was not measured on
+    ("plug-in-gait", "c3d_parser/MH/MH_Cal 01.c3d"),
+    ("plug-in-gait", "c3d_parser/RBWH/Max Cal 01.c3d"),
+    ("plug-in-gait", "c3d_parser/FMC/MH0222_BP08.c3d"),
+)
+
+
+def hidden(recording: Recording, marker_set: str) -> tuple[Recording, dict[str, tuple[str | None, str, str]]]:
+    """The markers of a set only, in another order as M1, M2, ...; their place, segment and side by the new name."""
+    known = load_marker_set(marker_set)
+    seen = [bool(np.isfinite(recording.marker(name)).all(axis=1).any()) for name in recording.marker_names]
+    matched = match_markers(known, recording.marker_names, seen, recording.name).names
+    kept = [(key, name) for key, name in matched.items() if not known.marker(key[0]).landmark_only]
+    order = np.random.default_rng(0).permutation(len(kept))
+    truth: dict[str, tuple[str | None, str, str]] = {}
+    columns = []
+    for k, at in enumerate(order):
+        (place, side), name = kept[at]
+        truth[f"M{k + 1}"] = (place if place in anatomy()["places"] else None, known.marker(place).segment, side)
+        columns.append(recording.marker_names.index(name))
+    return replace(recording, marker_names=tuple(truth), markers=recording.markers[:, columns]), truth
+
+
+def judged(guesses: list[Guess], truth: dict[str, tuple[str | None, str, str]]) -> dict[tuple[str, bool], int]:
+    """(how sure, right) -> number of guessed places."""
+    found: dict[tuple[str, bool], int] = {}
+    for guess in guesses:
+        if guess.place:
+            place, _, side = truth[guess.recorded]
+            key = (guess.sure, (guess.place, guess.side) == (place, side))
+            found[key] = found.get(key, 0) + 1
+    return found
+
+
+@pytest.mark.parametrize(("name", "place", "side"), [
+    ("Subject:LASI", "ASI", "left"), ("Right Knee Lateral", "KNE", "right"), ("LeftKneeMedial", "KNM", "left"),
+    ("Knie_lateral_rechts", "KNE", "right"), ("Ferse_links", "HEE", "left"), ("talon_droit", "HEE", "right"),
+    ("rodilla_derecha", "KNE", "right"), ("R_FAL", "ANK", "right"), ("L_TAM", "ANM", "left"),
+    ("RElbowIn", "ELM", "right"), ("WaistRFront", "ASI", "right"), ("V.Sacral", "SACR", "centre"),
+    ("GTRO_R", "GTR", "right"), ("LHJC", "HJC", "left"), ("R1stMet", "MT1", "right"), ("CV7", "C7", "centre"),
+])  # fmt: skip
+def test_names_in_several_languages(name: str, place: str, side: str) -> None:
+    found = said(name)
+    assert found is not None and (found.place, found.side) == (place, side)
+
+
+def test_a_name_that_says_nothing() -> None:
+    for name in ("M1", "M12", "A3", "marker7", "P05", "Unlabeled 3", "*17", ""):
+        assert said(name) is None
+
+
+def test_every_place_of_the_list_is_one_of_the_anatomy() -> None:
+    assert set(places()) <= set(anatomy()["places"])
+    for place, about in places().items():
+        assert {"names", "words", "at", "sd"} <= set(about), place
+
+
+@pytest.mark.parametrize("markers", ["opencap", "plug-in-gait"])
+@pytest.mark.parametrize("seed", [31, 32, 33])
+def test_hidden_names_of_simulated_persons(markers: str, seed: int) -> None:
+    """Most places are found by where the markers lie; what is wrong is said to be unsure."""
+    trial = simulate("fullbody", "squat", seed=seed, duration_s=6.0, height_m=1.55 + 0.1 * (seed % 3), markers=markers)
+    recording, truth = hidden(trial.recording, markers)
+    standing = recording.time < 1.4
+    recording = replace(
+        recording, time=recording.time[standing], markers=recording.markers[standing], plates=()
+    )  # fmt: skip
+    counts = judged(guess_markers(recording), truth)
+    firm_right, firm_wrong = counts.get(("likely", True), 0), counts.get(("likely", False), 0)
+    right = sum(count for (_, is_right), count in counts.items() if is_right)
+    print(counts)
+    assert firm_wrong <= 1 and firm_right >= 12
+    assert right >= 0.8 * sum(counts.values())
+
+
+@pytest.mark.skipif(not DATA.is_dir(), reason=f"no recordings in {DATA}")
+def test_hidden_names_of_other_laboratories() -> None:
+    total: dict[tuple[str, bool], int] = {}
+    for marker_set, file in OTHERS:
+        recording, truth = hidden(read(DATA / file), marker_set)
+        for key, count in judged(guess_markers(recording), truth).items():
+            total[key] = total.get(key, 0) + count
+    print(total)
+    assert total.get(("likely", False), 0) <= 1
+    assert total[("likely", True)] >= 20
+
+
+def test_a_name_at_the_wrong_place_is_said_to_be_unsure() -> None:
+    """Left and right of the ankles change names, and so do a knee and an elbow."""
+    recording = simulate("fullbody", "squat", seed=34, duration_s=5.0, markers="plug-in-gait").recording
+    swaps = {"LANK": "RANK", "RANK": "LANK", "RKNE": "RELB", "RELB": "RKNE"}
+    swapped = replace(recording, marker_names=tuple(swaps.get(name, name) for name in recording.marker_names))
+    found = {guess.recorded: guess for guess in guess_markers(swapped)}
+    for name in swaps:
+        assert found[name].sure == "unsure" and "BUT IT LIES" in found[name].why
+    assert sum(guess.sure != "unsure" for guess in found.values()) == len(found) - len(swaps)
+
+
+def test_what_is_written_loads_and_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """From names that no set knows to results, in two commands; a file that exists is left alone."""
+    trial = simulate("fullbody", "squat", seed=35, duration_s=5.0, markers="plug-in-gait")
+    sides = {"R": "rechts", "L": "links"}
+    german = {"ASI": "SIAS", "PSI": "SIPS", "KNE": "Knie lateral", "ANK": "Knoechel", "HEE": "Ferse", "TOE": "Zehe",
+              "MT5": "Meta5", "SHO": "Schulter", "ELB": "Ellbogen", "WRA": "radialwrist", "WRB": "ulnarwrist",
+              "THI": "Oberschenkel 1", "TIB": "Unterschenkel 1", "UPA": "Oberarm 1", "FHD": "Kopf A",
+              "BHD": "Kopf B"}  # fmt: skip
+    names = [
+        f"{german[name[1:]]} {sides[name[0]]}" if name[1:] in german and name[0] in sides else name
+        for name in trial.recording.marker_names
+    ]
+    save_trial(replace(trial, recording=replace(trial.recording, marker_names=tuple(names))), tmp_path / "trial")
+    file = next((tmp_path / "trial").glob("*.trc"))
+    draft = tmp_path / "mine.toml"
+    assert main(["markers", "new", str(file), "-o", str(draft)]) == 0
+    said_first = capsys.readouterr().out
+    assert "Model fullbody" in said_first and "unsure" in said_first
+    found = load_marker_set(draft)
+    assert found.marker("KNE").right == ("Knie lateral rechts",) and found.marker("HEE").left == ("Ferse links",)
+    assert main(["markers", "new", str(file), "-o", str(draft)]) == 2
+    assert "exists already" in capsys.readouterr().err
+    forces = str(next((tmp_path / "trial").glob("forces.mot")))
+    words = ["--model", "fullbody", "--markers", str(draft), "--forces", forces, "-o", str(tmp_path / "out")]
+    assert main(["run", str(file), *words]) == 0
+    assert (tmp_path / "out" / "coordinates.mot").exists()
+
+
+def test_names_that_toml_and_patterns_know_otherwise() -> None:
+    guesses = [
+        Guess("R{1},a", "KNE", None, "right", "sure", "x"),
+        Guess('L"2\\', "KNE", None, "left", "sure", "x"),
+        Guess("only right", None, "thigh", "right", "unsure", "y\nz"),
+        Guess("?", None, None, "centre", "unsure", "nothing"),
+    ]
+    text = toml_text(guesses, "odd", "a.trc")
+    assert "\n#   ?: nothing" in text
+    markers = {m["name"]: m for m in expanded(tomllib.loads(text))["markers"]}
+    assert markers["KNE"]["right"] == ["R{1},a"] and markers["KNE"]["left"] == ['L"2\\']
+    assert markers["thigh1"]["right"] == ["only right"] and "left" not in markers["thigh1"]
+
+
+def test_what_models_need_is_what_calibrating_asks_for() -> None:
+    """All places of Plug-in Gait do; without the knees the knee is lacking, on the side that lacks it."""
+    found = load_marker_set("plug-in-gait")
+    there = {side: {m.name for m in found.markers if m.aliases(side)} for side in ("right", "left", "centre")}
+    for name in available_models():
+        model = load_built_in_or_toml(name).model
+        assert needs(model) and all(need.optional for need, _ in lacking(model, there))
+        without = there | {"left": there["left"] - {"KNE"}}
+        lacks = {(need.landmark, side) for need, side in lacking(model, without) if not need.optional}
+        assert lacks <= {("knee", "left"), ("knee_lateral", "left"), ("ankle", "left")}
+        assert bool(lacks) == model.sided  # a model of one side takes the other
+    fullbody = load_built_in_or_toml("fullbody").model
+    knee = next(need for need in needs(fullbody) if need.landmark == "knee")
+    assert knee.sided and not knee.optional and frozenset({"KNE", "KNM"}) in knee.ways
+
+
+def test_commands_that_list(capsys: pytest.CaptureFixture[str]) -> None:
+    for words, said_in in (
+        (["list"], "plug-in-gait"),
+        (["show", "plug-in-gait"], "RKNE"),
+        (["places"], "epicondyle"),
+        (["needs", "fullbody"], "KNE"),
+    ):
+        assert main(["markers", *words]) == 0
+        assert said_in in capsys.readouterr().out

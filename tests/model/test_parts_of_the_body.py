@@ -1,0 +1,141 @@
+"""fullbody on people who are marked in part: what is completed, what is held, and what is refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dynakin.errors import ModelError
+from dynakin.model.calibration.completion import Proportions
+from dynakin.model.definition import load_model
+from dynakin.recordings.recording import Recording
+from dynakin.settings.subject import Subject
+from support.joint_centres import marker_set, seen
+from support.made_in_space import CENTRE, RATE, SIDES, WHO, definition, measured, standing, states
+
+UPPER = [*CENTRE, *(side + name for name in ("SHO", "UPA", "ELB", "WRA", "WRB", "FHD", "BHD") for side in "RL")]
+LEFT_LEG = [f"L{name}" for name in ("THI", "KNE", "TIB", "ANK", "HEE", "TOE", "MT5")]
+LEG = ("hip_flexion", "hip_adduction", "hip_rotation", "knee_angle", "ankle_angle", "subtalar_angle")
+
+
+def without(recording: Recording, names: list[str]) -> Recording:
+    markers = recording.markers.copy()
+    markers[:, [recording.marker_names.index(name) for name in names]] = np.nan
+    return replace(recording, markers=markers)
+
+
+def test_proportions_are_those_of_a_person() -> None:
+    places = Proportions.load().landmarks
+    for name, place in places.items():
+        other = name[:-2] + ("_l" if name.endswith("_r") else "_r")
+        if name.endswith(("_r", "_l")):
+            np.testing.assert_allclose(places[other], place * [1.0, 1.0, -1.0])
+        else:
+            assert place[2] == 0.0
+        assert 0.0 <= place[1] <= 1.0
+    for upper, lower, length in (
+        ("hip_r", "knee_r", 0.235),
+        ("knee_r", "ankle_r", 0.246),
+        ("shoulder_r", "elbow_r", 0.160),
+        ("elbow_r", "wrist_r", 0.157),
+        ("cervical", "lumbar", 0.268),
+    ):
+        assert np.linalg.norm(places[upper] - places[lower]) == pytest.approx(length, abs=0.004), upper
+
+
+def test_without_the_upper_body_the_legs_are_the_same_and_the_mass_is_all_there() -> None:
+    full, found = measured(), definition().calibrate(without(standing(), UPPER))
+    assert found.plan is not None and full.plan is not None
+    for name in LEG:
+        for side in "rl":
+            assert found.plan.start[f"{name}_{side}"] == pytest.approx(full.plan.start[f"{name}_{side}"], abs=2e-3)
+    for name in ("thigh", "shank", "pelvis"):
+        assert found.plan.geometry.lengths[name] == pytest.approx(full.plan.geometry.lengths[name], abs=1e-6)
+    assert sum(body.mass for body in found.plan.bodies.values()) == pytest.approx(70.0)
+    upper = {"torso", "head", *(f"{part}_{side}" for part in ("upper_arm", "forearm", "hand") for side in "rl")}
+    assert found.unmarked_kg == pytest.approx(sum(found.plan.bodies[name].mass for name in upper))
+    assert full.unseen_kg == 0.0 < found.unseen_kg < found.unmarked_kg
+    held = {"lumbar_extension", "arm_flex_l", "elbow_flex_r", "neck_bending"}
+    assert held <= set(found.held) and not {f"{name}_r" for name in LEG} & set(found.held)
+    assert {"lumbar", "torso", "shoulder", "upper_arm", "forearm"} <= found.plan.fixed_lengths
+    assert not {"pelvis", "thigh", "shank"} & found.plan.fixed_lengths
+    said = next(text for text in found.messages if text.startswith("From the proportions"))
+    assert "1.75 m" in said and "cervical" in said and "knee_r" not in said
+
+
+def test_the_trunk_stands_where_the_marked_one_does() -> None:
+    full, found = measured(), definition().calibrate(without(standing(), UPPER))
+    assert found.plan is not None and full.plan is not None
+    apart = found.plan.geometry.lengths["torso"] - full.plan.geometry.lengths["torso"]
+    assert abs(apart) < 0.04
+    assert found.plan.start["lumbar_bending"] == pytest.approx(0.0, abs=1e-6)
+    leans = found.plan.start["lumbar_extension"] - full.plan.start["lumbar_extension"]
+    assert abs(np.rad2deg(leans)) < 8.0
+
+
+def test_a_leg_without_markers_takes_the_other_ones_lengths_and_hangs_as_it_does() -> None:
+    full, found = measured(), definition().calibrate(without(standing(), LEFT_LEG))
+    assert found.plan is not None and full.plan is not None
+    for name in ("thigh", "shank"):
+        assert found.plan.geometry.lengths[name] == pytest.approx(full.plan.geometry.lengths[name], abs=2e-3)
+        assert name not in found.plan.fixed_lengths  # the right leg shows it
+    for name in LEG:
+        assert f"{name}_l" in found.held and f"{name}_r" not in found.held
+        apart = found.plan.start[f"{name}_l"] - full.plan.start[f"{name}_l"]
+        assert abs(np.rad2deg(apart)) < 3.0, name
+    assert found.unmarked_feet == {"left": "foot_l"}
+    np.testing.assert_allclose(found.plan.bodies["thigh_l"].mass, found.plan.bodies["thigh_r"].mass)
+
+
+@pytest.mark.parametrize("gone", [["RWRA", "RWRB"], ["RSHO", "LSHO"], ["LPSI", "RPSI"], ["RHEE"], ["RKNE"], ["LASI"]])
+def test_a_few_markers_less_change_what_they_show_and_little_else(gone: list[str]) -> None:
+    full, found = measured(), definition().calibrate(without(standing(), gone))
+    assert found.plan is not None and full.plan is not None
+    for name in ("hip_flexion_l", "knee_angle_l", "ankle_angle_l", "pelvis_tilt"):
+        apart = found.plan.start[name] - full.plan.start[name]
+        assert abs(np.rad2deg(apart)) < (10.0 if "PSI" in gone[0] or "ASI" in gone[0] else 1.0), name
+    for name, length in found.plan.geometry.lengths.items():
+        trunk = name in ("lumbar", "torso", "shoulder", "pelvis")
+        assert length == pytest.approx(full.plan.geometry.lengths[name], abs=0.06 if trunk else 0.03), name
+
+
+def test_a_person_without_height_or_mass_is_measured_by_the_markers() -> None:
+    nobody = load_model("fullbody", Subject(), markers="plug-in-gait")
+    found = nobody.calibrate(without(standing(), UPPER))
+    assert found.height_m == pytest.approx(1.75, abs=0.12)
+    assert found.mass_kg == pytest.approx(23.0 * found.height_m**2)
+    assert any(text.startswith("Warning: mass") and "mean adult" in text for text in found.messages)
+
+
+def test_too_little_of_the_pelvis_is_refused_in_words() -> None:
+    pelvis = ["LASI", "RASI", "LPSI", "RPSI"]
+    with pytest.raises(ModelError, match=r"segment 'pelvis' .* has 0 of the landmarks .*hip_r.*expected 2 or more"):
+        definition().calibrate(without(standing(), pelvis))
+
+
+@pytest.mark.parametrize("turn_rad", [0.0, 1.0])
+def test_joint_centres_alone_hold_what_they_do_not_show(tmp_path: Path, turn_rad: float) -> None:
+    initial, time = measured(), np.arange(100) / RATE
+    wave = np.sin(2.0 * np.pi * time)
+    motion = {f"hip_flexion_{side}": sign * 0.4 * wave for side, sign in (("r", 1.0), ("l", -1.0))}
+    motion |= {f"knee_angle_{side}": 0.4 + 0.3 * wave for side in "rl"}
+    motion |= {f"elbow_flex_{side}": np.full_like(wave, 0.4) for side in "rl"}
+    x = states(initial, motion, turn_rad, np.array([0.3, 0.0, 0.4]), time)
+    recording = seen(initial, x, time, foot=True)
+    model = load_model("fullbody", WHO, markers=marker_set(tmp_path, foot=True))
+    found = model.calibrate(recording)
+    shown = {"neck_extension", "neck_bending", "neck_rotation"}  # no markers on the head
+    assert set(found.held) - shown == {"pro_sup_r", "pro_sup_l", "lumbar_extension"}
+    assert any(text.startswith("Held where they stand") and "pro_sup_r" in text for text in found.messages)
+    assert found.plan is not None and initial.plan is not None
+    for name in ("thigh", "shank", "upper_arm", "forearm"):
+        assert found.plan.geometry.lengths[name] == pytest.approx(initial.plan.geometry.lengths[name], abs=2e-3)
+
+
+def test_nothing_of_whole_marker_sets_is_held_or_completed() -> None:
+    found = measured()
+    assert not found.held and not any("proportions" in text for text in found.messages)
+    assert len(SIDES) * 2 + len(CENTRE) == len(found.recorded_markers)
