@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 import pytest
 
+from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.filter.estimator import Estimator
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -16,6 +18,7 @@ from dynakin.model.definition import load_model
 from dynakin.model.markers.anatomy import anatomy
 from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
 from dynakin.model.markers.match import match_markers
+from dynakin.model.markers.recognise import recognise
 from dynakin.recordings.landmarks import plain_name
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
@@ -84,16 +87,24 @@ def test_a_person_who_wears_it_is_found_and_measured(person: SimulatedTrial, nam
     recording = wearing(person, name)
     marker_set = load_marker_set(name)
     match = match_markers(marker_set, recording.marker_names, [True] * len(recording.marker_names), "worn")
-    assert set(match.names.values()) == set(recording.marker_names) - {"R_forearm", "L_forearm"}
+    unknown = set(recording.marker_names) - set(match.names.values())
+    assert unknown == ({"R_forearm", "L_forearm"} if name == "opencap" else set())
     initial = measured(recording, name)
-    if name == "rizzoli-trunk":  # no legs
+    if name == "rizzoli-trunk":  # no legs: by name only
         return
+    assert recognise(recording).match.marker_set.name == name.removesuffix("-all")
     limit = 15.0 if name in NO_BACK_OF_PELVIS else 4.0
     for joint in ("hip_flexion", "knee_angle", "ankle_angle"):
         if name == "coco17" and joint == "ankle_angle":  # no feet
             continue
         for side in "rl":
             assert abs(difference_deg(person, initial, f"{joint}_{side}")) < limit, (joint, side)
+
+
+@pytest.mark.parametrize("name", SETS)
+def test_the_manual_lists_it(name: str) -> None:
+    manual = (Path(__file__).parents[2] / "docs" / "models.md").read_text(encoding="utf-8")
+    assert f"| `{name}` | {load_marker_set(name).description} |" in manual
 
 
 def test_extends_takes_a_set_and_changes_it(tmp_path: Path) -> None:
@@ -168,17 +179,38 @@ def test_the_device_without_a_knee_marker_sets_the_knees_axis(person: SimulatedT
         assert abs(abs(difference_deg(person, initial, f"hip_rotation_{side}")) - turned_deg) < 3.0
 
 
+def test_joint_widths_of_the_recording_come_before_those_of_the_height(person: SimulatedTrial) -> None:
+    plain = wearing(person, "plug-in-gait")
+    told = {"knee_width_m_r": 0.120, "knee_width_m_l": 0.120, "ankle_width_m_r": 0.080}
+    initial = measured(replace(plain, subject=told), "plug-in-gait")
+    assert any("right knee 120 mm" in said and "right ankle 80 mm" in said for said in initial.messages)
+    core = _core.Model(initial.spec)
+    _, origins = _core.segment_poses(core, core.initial_state())
+    places = dict(zip(initial.recorded_markers, _core.marker_positions(core, core.initial_state()), strict=True))
+    for segment, marker, expected in (
+        ("shank_r", "RKNE", 0.067),
+        ("shank_l", "LKNE", 0.067),
+        ("foot_r", "RANK", 0.047),
+        ("foot_l", "LANK", 0.01963 * 1.75 + 0.007),
+    ):
+        away = np.linalg.norm(origins[core.segment_names.index(segment)] - places[marker])
+        assert away == pytest.approx(expected, abs=2e-3), segment
+
+
 @pytest.mark.parametrize("name", ["rajagopal-run", "qualisys-gait", "halpe26"])
 def test_a_squat_is_followed(name: str) -> None:
-    """Default sensors; changes of the angles (less their mean) as with plug-in-gait; limits by seeds 1 and 3."""
-    trial = simulate("fullbody", "squat", SEED, 5.0, 25.0, markers=name)
+    """Default sensors; changes of the angles, less their mean; limit by seeds 1 and 3 (worst 1.0).
+
+    Three points on the line of the hips do not show the pelvis' tilt: of keypoints the thigh in space is judged.
+    """
+    trial = simulate("fullbody", "squat", SEED, 5.0, 12.5, markers=name)
     estimate = Estimator(load_model("fullbody", WHO, markers=name)).run(trial.recording)
     names = list(estimate.coordinate_names)
-    limit = 3.0 if name in KEYPOINTS else 2.0
-    for coordinate in ("hip_flexion_r", "knee_angle_l", "ankle_angle_r"):
-        found = estimate.data["coordinates"].values[:, names.index(coordinate)]
-        error = np.rad2deg(found - trial.truth.data["coordinates"].sel(coordinate=coordinate).values)[5:]
-        assert np.std(error) < limit, coordinate
+    found, true = estimate.data["coordinates"].values, trial.truth.data["coordinates"]
+    thigh = ("hip_flexion_r", "pelvis_tilt") if name in KEYPOINTS else ("hip_flexion_r",)
+    for summed in (thigh, ("knee_angle_l",), ("ankle_angle_r",)):
+        error = sum(found[:, names.index(c)] - true.sel(coordinate=c).values for c in summed)
+        assert np.rad2deg(np.std(np.asarray(error)[5:])) < 2.0, summed
 
 
 def test_places_have_numbers_and_reasons() -> None:

@@ -44,6 +44,7 @@ class LandmarkFinder:
     planar: bool
     in_space: bool = False  # the recipes of models in space, each side apart
     height_m: float | None = None  # for joint widths
+    widths_m: Mapping[str, float] = field(default_factory=dict)  # of joints as somebody measured them: "knee_r"
     sole: Mapping[str, float] = field(default_factory=dict)  # side -> slope (rad) of heel to toe on a flat foot
     _chosen: dict[tuple[str, str], Recipe | None] = field(default_factory=dict)
 
@@ -244,10 +245,15 @@ class LandmarkFinder:
         foot = [point(name) for name in offset.foot] if offset.foot else None
         across = lateral(self._apart(offset.asis, side, positions), foot, side) if offset.inward else None
         scale = offset.scale
+        width_m = self.widths_m.get(f"{offset.width}{SUFFIXES[side]}")
+        if width_m is not None:
+            return offset_point(offset, point, across, side, 0.5 * width_m)
         size = self.height_m if scale is None else float(np.linalg.norm(self._apart(scale, side, positions)))
         if size is None:
             raise ModelError(f"{self.match.where}: height_m is needed: the joint under {offset.origin} has one marker")
-        return offset_point(offset, point, across, side, size)
+        fraction = offset.per_height if offset.per_height is not None else offset.per_scale
+        assert fraction is not None
+        return offset_point(offset, point, across, side, fraction * size)
 
 
 def slope(heel_to_toe: Array) -> Array:
@@ -301,17 +307,16 @@ def lateral(asis: Array, foot: Sequence[Array] | None, side: str) -> Array:
 
 
 def offset_point(
-    offset: Offset, point: Callable[[str], Array], across: Array | None, side: str, size_m: float
+    offset: Offset, point: Callable[[str], Array], across: Array | None, side: str, half_width_m: float
 ) -> Array:
     """The point (3,) m that an `Offset` describes.
 
     Args:
-        point: a marker's or landmark's place. across: `lateral`, for one that goes inward. size_m: height or scale.
+        point: a marker's or landmark's place. across: `lateral`, for one that goes inward. half_width_m: the
+            distance without ``add_m``.
     """
     origin = point(offset.origin)
-    fraction = offset.per_height if offset.per_height is not None else offset.per_scale
-    assert fraction is not None
-    distance = fraction * size_m + offset.add_m
+    distance = half_width_m + offset.add_m
     if offset.along is not None:
         start, end = (point(name) for name in offset.along)
         direction = end - start

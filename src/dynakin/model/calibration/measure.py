@@ -103,6 +103,8 @@ def measure(
         entries = [r for r in (static, recording) if r is not None]
         height_m, how_high = find_height(subject, entries, source, finder)
         finder.height_m = height_m
+        finder.widths_m, said = _joint_widths(entries, finder)
+        messages += said
         finder.sole = flat_slopes(source)
     needed = needed_markers(model, finder, locks)
     refuse_moving_origin(model, trial, finder)
@@ -239,6 +241,22 @@ def _at_origin(model: ModelFile, trial: Trial, finder: LandmarkFinder, frames: n
     origin_G = spatial.find(trial.median(frames))[model.ground.origin]
     assert keys and np.isfinite(origin_G).all()
     return trial.about(trial.ground.points_to_laboratory(origin_G))
+
+
+def _joint_widths(entries: list[Recording], finder: LandmarkFinder) -> tuple[dict[str, float], list[str]]:
+    """Widths (m) of knee and ankle by joint and side ("knee_r") as recordings say them, and a sentence where used."""
+    keys = {f"{joint}_{side[0]}": side for joint in ("knee", "ankle") for side in SIDES}
+    found: dict[str, float] = {}
+    for key in keys:
+        joint, side = key.split("_")
+        given = [e.subject[f"{joint}_width_m_{side}"] for e in entries if f"{joint}_width_m_{side}" in e.subject]
+        recipe = finder.recipe(joint, keys[key])
+        if given and recipe is not None and recipe.offset is not None and recipe.offset.width == joint:
+            found[key] = given[0]
+    if not found:
+        return {}, []
+    words = ", ".join(f"{keys[key]} {key.split('_')[0]} {1000.0 * width:.0f} mm" for key, width in found.items())
+    return found, [f"Joint widths: the recording's own ({words})."]
 
 
 def _unmeasured_lengths(
