@@ -95,7 +95,9 @@ def _extended(data: Mapping[str, Any]) -> dict[str, Any]:
     folder, base = _FOLDER / "sets", data["extends"]
     known = sorted(entry.name.removesuffix(".toml") for entry in folder.iterdir() if entry.name.endswith(".toml"))
     if base not in known:
-        raise ValueError(f"extends: {base!r} is no built-in set{nearest(str(base), known)}; expected {', '.join(known)}")
+        raise ValueError(
+            f"extends: {base!r} is no built-in set{nearest(str(base), known)}; expected {', '.join(known)}"
+        )
     below = read_toml(Path(str(folder / f"{base}.toml")))
     if "extends" in below:
         raise ValueError(f"extends: {base!r} extends another set itself; expected one that stands alone")
