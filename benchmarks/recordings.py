@@ -203,14 +203,25 @@ def run(trial: Trial, wanted: str, source: str) -> Run:
     for option, value in (("--forces", trial.forces), ("--static", trial.static)):
         options += [option, str(DATA / value)] if value else []
     options += ["--mass", str(trial.mass_kg)] if trial.mass_kg else []
-    digest = hashlib.sha256(json.dumps([source, trial.path, options]).encode())
-    for path in trial.inputs():
-        digest.update(path.read_bytes() if path.exists() else b"")
-    made = KEPT / f"{trial.name.replace('/', '_').replace(' ', '_')}-{digest.hexdigest()[:12]}"
+    code, said, seconds, folder = kept(DATA / trial.path, options, trial.inputs(), source)
+    return Run(trial, Path(model).name, code, said, seconds, folder)
+
+
+def kept(path: Path, options: list[str], inputs: list[Path], source: str) -> tuple[int, str, float, Path]:
+    """Exit code, first line of what went wrong, seconds and output folder of ``dynakin run``, run or kept before.
+
+    Args:
+        inputs: files on which the results depend. source: digest of the package.
+    """
+    name = path.relative_to(DATA).with_suffix("") if path.is_relative_to(DATA) else Path(path.parent.name, path.stem)
+    digest = hashlib.sha256(json.dumps([source, str(name) + path.suffix, options]).encode())
+    for each in inputs:
+        digest.update(each.read_bytes() if each.exists() else b"")
+    made = KEPT / f"{str(name).replace('/', '_').replace(' ', '_')}-{digest.hexdigest()[:12]}"
     told = made / "run.json"
     if not told.exists():
         made.mkdir(parents=True, exist_ok=True)
-        command = [str(Path(sys.executable).with_name("dynakin")), "run", str(DATA / trial.path), *options]
+        command = [str(Path(sys.executable).with_name("dynakin")), "run", str(path), *options]
         start = time.perf_counter()
         try:
             done = subprocess.run(
@@ -229,8 +240,7 @@ def run(trial: Trial, wanted: str, source: str) -> Run:
         content = {"code": code, "said": _first_line(err, out), "seconds": time.perf_counter() - start}
         told.write_text(json.dumps(content), encoding="utf-8")
     content = json.loads(told.read_text(encoding="utf-8"))
-    name = Path(model).name
-    return Run(trial, name, content["code"], content["said"], content["seconds"], made / "out")
+    return content["code"], content["said"], content["seconds"], made / "out"
 
 
 def _first_line(err: str, out: str) -> str:

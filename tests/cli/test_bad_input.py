@@ -138,8 +138,9 @@ def test_a_number_in_another_unit_names_the_option(trial: Path, refused: Refused
     assert "expected metres (--height), 1.70?" in refused("run", trial, *_options(tmp_path, height="170"))
 
 
-def test_without_a_model_the_models_are_listed(trial: Path, refused: Refused, tmp_path: Path) -> None:
-    assert "--model NAME (fullbody, sagittal7, squat7, " in refused("run", trial, *_options(tmp_path, model=""))
+def test_of_an_unknown_model_the_models_are_listed(trial: Path, refused: Refused, tmp_path: Path) -> None:
+    said = refused("run", trial, *_options(tmp_path, model="fulbody"))
+    assert "did you mean 'fullbody'" in said and "expected fullbody, sagittal7, squat7, or a .toml or .osim" in said
 
 
 def test_an_option_is_no_value_of_another(trial: Path, refused: Refused, tmp_path: Path) -> None:
@@ -181,8 +182,8 @@ def test_an_unknown_option_and_command(refused: Refused, trial: Path, tmp_path: 
 
 
 def test_what_is_missing_is_named(refused: Refused, trial: Path, tmp_path: Path) -> None:
-    assert "--model" in refused("run", trial, "-o", tmp_path / "out")
-    assert "-o OUT" in refused("run", trial, "--model", "squat7")
+    assert "-o OUT" in refused("run", trial)
+    assert "TRIAL..." in refused("compare", "--model", "squat7")
 
 
 def test_walking_is_refused_by_a_model_with_a_fixed_toe(refused: Refused, data_dir: Path, tmp_path: Path) -> None:

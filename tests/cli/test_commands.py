@@ -97,26 +97,6 @@ def test_demo_compares_with_the_truth_and_says_where_the_report_lies(tmp_path: P
     assert 'id="methods"' in page and "classical (6 Hz)" in page and "against AT" in page
 
 
-def test_check_tells_what_is_there_and_what_run_would_do(data_dir: Path, capsys: Said) -> None:
-    assert (
-        main(["check", str(data_dir / "plugin_gait" / "S1_FlywheelSquat.c3d"), "--model", "squat7", "--mass", "78.6"])
-        == 0
-    )
-    told = " ".join(capsys.readouterr().out.split())
-    for words in ("317 frames at 100 Hz", "2 force plates", "Vertical +Z", "RSHO 78.5 %", "23 of 30", "abdomen"):
-        assert words in told
-
-
-def test_check_says_what_run_would_refuse(data_dir: Path, capsys: Said) -> None:
-    trial = str(data_dir / "plugin_gait" / "GaitNormal_1.c3d")
-    assert main(["check", trial]) == 0
-    assert "nobody stands still on the plates of GaitNormal_1, and" in " ".join(capsys.readouterr().out.split())
-    assert main(["check", trial, "--mass", "66"]) == 0
-    told = " ".join(capsys.readouterr().out.split())
-    assert told.count("Refuse it:") == 2
-    assert "RTOE moves" in told
-
-
 @pytest.mark.nightly
 def test_run_on_real_data_and_again_from_its_own_configuration(data_dir: Path, tmp_path: Path, capsys: Said) -> None:
     folder = data_dir / "opencap_subject4"

@@ -98,7 +98,7 @@ def test_a_configuration_may_stand_for_a_trial(trial: list[str], tmp_path: Path)
     ("arguments", "expected"),
     [
         (["compare"], "no trial was given"),
-        (["compare", "{trial}"], "model is missing"),
+        (["compare", "{trial}", "--model", "fulbody"], "did you mean 'fullbody'"),
         (["compare", "{trial}", "--model", "sagittal7"], "no force plates"),
         (["compare", "{trial}", "{trial}", "--forces", "{forces}", "--model", "sagittal7"], "given once for 2 trials"),
         (["compare", "--identify-on", "{trial}", "--model", "sagittal7"], "--test-on is missing"),

@@ -124,7 +124,7 @@ def test_configuration_as_used_can_be_read_again() -> None:
         (["run", "--estimate", "length"], "run: --estimate[0]: Input should be"),
         (["tune", "fit", "--side", "middle"], "tune fit: --side: Input should be"),
         (["compare", "--sex", "other"], "compare: --sex: Input should be"),
-        (["check", "--sex", "other"], "check: --sex: Input should be"),
+        (["check", "--sex", "other"], "run: --sex: Input should be"),
     ],
 )
 def test_a_wrong_value_is_named_by_its_option(
@@ -150,3 +150,21 @@ def test_options_are_the_settings_themselves(capsys: pytest.CaptureFixture[str])
     for command in (["run"], ["compare"], ["tune", "grid"], ["tune", "fit"]):
         assert main([*command, "--help"]) == 0
         assert meaning in " ".join(capsys.readouterr().out.split())
+
+
+def test_functional_trials_in_file_and_option(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Their paths are relative to the configuration, absolute in an output's; a joint that there is not is named."""
+    path = tmp_path / "run.toml"
+    path.write_text('trial = "a.c3d"\nmodel = "fullbody"\noutput = "out"\n[functional]\nhip_r = "hip.c3d"\n')
+    config = Settings.of(read_keys(path), str(path))
+    assert config.functional == {"hip_r": tmp_path / "hip.c3d"}
+    assert Settings.of(config.as_used(), "again").functional == config.functional
+    words = ["run", "a.c3d", "-o", str(tmp_path / "out")]
+    for given, said in (
+        ("hip_right=hip.c3d", "hip_r"),
+        ("hip_r", "JOINT=FILE"),
+        ("hip_r=nowhere.c3d", "nowhere.c3d"),
+    ):
+        assert main([*words, "--model", "fullbody", "--functional", given]) == 2
+        error = capsys.readouterr().err.strip()
+        assert said in error and error.count("\n") == 0

@@ -174,14 +174,13 @@ def test_an_output_that_no_folder_can_be_called(tmp_path: Path, name: str) -> No
 # --- recordings
 
 
-@pytest.mark.parametrize(("rows", "expected"), [("9" * 5000, "truncated"), ("²", ""), ("9" * 30, "truncated")])
-def test_counts_of_rows_that_are_no_numbers(whole: Path, tmp_path: Path, rows: str, expected: str) -> None:
+@pytest.mark.parametrize(("rows", "said"), [("9" * 5000, "cut off"), ("²", ""), ("9" * 30, "cut off")])
+def test_counts_of_rows_that_are_no_numbers(whole: Path, tmp_path: Path, rows: str, said: str) -> None:
     path = tmp_path / "a.mot"
     path.write_text((whole / "forces_squat.mot").read_text().replace("nRows=24", f"nRows={rows}"))
-    if expected:
-        refused(lambda: read_table(path), RecordingError, expected)
-    else:
-        assert len(read_table(path).time) == 24
+    table = read_table(path)
+    assert len(table.time) == 24
+    assert len(" ".join(table.notes)) < 200 and said in " ".join(table.notes)
 
 
 def timed(whole: Path, folder: Path, name: str, factor: float) -> Path:

@@ -25,7 +25,7 @@ def changed(tmp_path: Path, folder: str, name: str, old: str, new: str) -> Path:
 
 def test_every_built_in_model_loads() -> None:
     assert available_models() == ["fullbody", "sagittal7", "squat7"]
-    assert len(load_model("fullbody").model.segments) == 15
+    assert len(load_model("fullbody").model.segments) == 17
     for name in ("sagittal7", "squat7"):
         definition = load_model(name)
         assert definition.name == name

@@ -67,6 +67,22 @@ def test_refusals_give_the_number(recording: Recording, mass: float | None, word
         assert word in found.refusal
 
 
+@pytest.mark.parametrize(("shift_m", "refused"), [(1.5, False), (0.0, True)])
+def test_empty_plates_beside_the_feet_are_no_fault_and_below_a_foot_are(shift_m: float, refused: bool) -> None:
+    made = standing(1.0)
+    x, z = 0.3, 0.25
+    corners = np.array([[x, 0.0, z], [-x, 0.0, z], [-x, 0.0, -z], [x, 0.0, -z]])
+    heels = {"plate 1": made.marker("LHEE")[0], "plate 2": made.marker("RHEE")[0]}
+    plates = tuple(
+        replace(plate, corners=corners + heels[plate.name] * [1.0, 0.0, 1.0] + [shift_m, 0.0, 0.0])
+        for plate in made.plates
+    )
+    found = check(made.with_plates(plates))
+    assert (found.refusal is not None) == refused
+    assert found.mass_kg_from_plates is None or refused
+    assert refused or found.messages[-1].startswith("Nobody steps on the plates")
+
+
 def test_pressure_somewhat_off_the_foot_is_a_warning() -> None:
     found = check(standing(70.0, cop_shift_m=0.3))
     assert found.refusal is None

@@ -1,4 +1,4 @@
-"""C3D files written by hand: markers, the four types of plate, turned plates, damaged files."""
+"""C3D files written by hand: markers, the seven types of plate, turned plates, damaged files."""
 
 from __future__ import annotations
 
@@ -38,12 +38,34 @@ def body(turn: np.ndarray = R_LP, above: float = 1.0) -> dict[str, np.ndarray]:
     return {"LASI": np.tile(1e3 * (CENTRE - above * turn[:, 2]), (T, 1))}
 
 
+def calibration_of(kind: int) -> np.ndarray | None:
+    """Some matrix (outputs, channels) that no other can be taken for."""
+    rows, columns = {4: (6, 6), 5: (6, 8), 6: (12, 12), 7: (8, 8)}.get(kind, (0, 0))
+    if not rows:
+        return None
+    mixed = np.random.default_rng(kind).normal(size=(rows, columns))
+    return 100.0 * (3.0 * np.eye(rows, columns) + 0.3 * mixed)
+
+
 def channels_of(kind: int, sign: float = 1.0) -> np.ndarray:
-    """Channels of a plate under FORCE_P and MOMENT (N, N mm, mm), constant in time."""
+    """Channels of a plate under FORCE_P and MOMENT (N, N mm, mm; behind a calibration whatever gives these), constant
+    in time."""
+    if (calibration := calibration_of(kind)) is not None:
+        return np.linalg.lstsq(calibration, outputs_of(kind, sign), rcond=None)[0]
+    return outputs_of(kind, sign)
+
+
+def outputs_of(kind: int, sign: float) -> np.ndarray:
+    """What the channels hold after the calibration: of types 6 and 7 the forces of four sensors."""
     f, m = sign * FORCE_P, sign * MOMENT_TRANSDUCER_P * 1e3
+    if kind == 6:  # shear forces spread evenly over the pairs
+        x12, x34, y14, y23, *z = outputs_of(3, sign)[:, 0]
+        sensors = [(x12, y14, z[0]), (x12, y23, z[1]), (x34, y23, z[2]), (x34, y14, z[3])]
+        forces = np.array([(0.5 * x, 0.5 * y, z) for x, y, z in sensors])
+        return np.repeat(forces.reshape(-1, 1), T * PER_FRAME, axis=1)
     if kind == 1:
         values = [*f, *(POINT_P[:2] * 1e3), sign * 4e3]
-    elif kind == 3:
+    elif kind in (3, 7):
         a, b = 0.12, 0.2
         # Vertical forces at (+-a, +-b) with sum F_z and moments M_x = b(z1+z2-z3-z4), M_y = a(-z1+z2+z3-z4).
         mx, my, mz = sign * MOMENT_TRANSDUCER_P
@@ -58,7 +80,7 @@ def channels_of(kind: int, sign: float = 1.0) -> np.ndarray:
 
 
 def origin_of(kind: int, depth_sign: float = -1.0) -> list[float]:
-    return [120.0, 200.0, depth_sign * 40.0] if kind == 3 else [0.0, 0.0, depth_sign * 40.0]
+    return [120.0, 200.0, depth_sign * 40.0] if kind in (3, 6, 7) else [0.0, 0.0, depth_sign * 40.0]
 
 
 def turned(turn: np.ndarray) -> np.ndarray:
@@ -76,11 +98,11 @@ def test_moment_by_hand() -> None:
     np.testing.assert_allclose(expected_wrench(R_LP), [10, 20, 800, 1678, -839, -4])
 
 
-@pytest.mark.parametrize("kind", [1, 2, 3, 4])
+@pytest.mark.parametrize("kind", [1, 2, 3, 4, 5, 6, 7])
 @pytest.mark.parametrize("sign", [1.0, -1.0], ids=["reaction", "action"])
 @pytest.mark.parametrize("depth_sign", [1.0, -1.0])
 @pytest.mark.parametrize("turn_deg", [0.0, 26.0])
-def test_all_four_types(tmp_path: Path, kind: int, sign: float, depth_sign: float, turn_deg: float) -> None:
+def test_all_types(tmp_path: Path, kind: int, sign: float, depth_sign: float, turn_deg: float) -> None:
     c, s = np.cos(np.radians(turn_deg)), np.sin(np.radians(turn_deg))
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ R_LP
     path = write_c3d(
@@ -90,7 +112,7 @@ def test_all_four_types(tmp_path: Path, kind: int, sign: float, depth_sign: floa
         channels=channels_of(kind, sign),
         corners=[turned(turn)],
         origins=[origin_of(kind, depth_sign)],
-        calibration=np.eye(6),
+        calibration=calibration_of(kind),
     )
     recording = read(path)
     (plate,) = recording.plates
@@ -110,13 +132,43 @@ def test_type_4_calibration_mixes_channels(tmp_path: Path) -> None:
         tmp_path / "a.c3d",
         body(),
         kinds=[4],
-        channels=np.linalg.solve(calibration, channels_of(4)),
+        channels=np.linalg.solve(calibration, outputs_of(2, 1.0)),
         corners=[turned(R_LP)],
         origins=[origin_of(4)],
         calibration=calibration,
         analog_units=["V"] * 6,
     )
     np.testing.assert_allclose(read(path).total_wrench()[5], expected_wrench(R_LP), rtol=1e-5, atol=1e-2)
+
+
+@pytest.mark.parametrize("kind", [4, 5, 7])
+@pytest.mark.parametrize("layout", ["by column", "by row", "in a larger one", "channels first"])
+def test_layouts_of_the_calibration(tmp_path: Path, kind: int, layout: str) -> None:
+    """A file gives its matrices by column, or says ByRow; those of plates of several types have one size."""
+    matrix = calibration_of(kind)
+    assert matrix is not None
+    rows, columns = matrix.shape
+    stored = matrix
+    if layout == "by row":
+        stored = matrix.ravel().reshape((rows, columns), order="F")
+    elif layout == "in a larger one":
+        stored = np.full((12, 12), np.nan)
+        stored[:rows, :columns] = matrix
+    elif layout == "channels first":
+        if rows == columns:
+            pytest.skip("a square matrix does not show which is first")
+        stored = matrix.T
+    path = write_c3d(
+        tmp_path / "a.c3d",
+        body(),
+        kinds=[kind],
+        channels=channels_of(kind),
+        corners=[turned(R_LP)],
+        origins=[origin_of(kind)],
+        calibration=stored,
+        by_row=layout == "by row",
+    )
+    np.testing.assert_allclose(read(path).total_wrench()[5], expected_wrench(R_LP), rtol=1e-4, atol=2e-2)
 
 
 def test_units_of_channels_and_metres(tmp_path: Path) -> None:
@@ -238,18 +290,45 @@ def test_truncated_file_is_one_clear_error(tmp_path: Path, share: float) -> None
 
 def test_plates_that_cannot_be_understood(tmp_path: Path) -> None:
     common = {"channels": channels_of(2), "corners": [turned(R_LP)], "origins": [origin_of(2)]}
-    with pytest.raises(RecordingError, match=r"plate 1 has type 7, expected a force plate of type 1 to 4"):
-        read(write_c3d(tmp_path / "a.c3d", body(), kinds=[7], **common))  # type: ignore[arg-type]
-    with pytest.raises(RecordingError, match="CAL_MATRIX has 0 numbers, plate 1 needs 36"):
-        read(write_c3d(tmp_path / "b.c3d", body(), kinds=[4], **common))  # type: ignore[arg-type]
-    with pytest.raises(
-        RecordingError, match=r"plate 1 lists channels \[1, 2, 3, 4, 5, 6, 7, 8\], expected 8 of 1 to 6"
-    ):
-        read(write_c3d(tmp_path / "c.c3d", body(), kinds=[3], **common))  # type: ignore[arg-type]
-    common["corners"] = [np.zeros((4, 3))]
-    recording = read(write_c3d(tmp_path / "d.c3d", body(), kinds=[2], **common))  # type: ignore[arg-type]
-    assert recording.plates == ()
-    assert any("plate 1 left out" in note for note in recording.notes)
+
+    def said(**other: object) -> str:
+        recording = read(write_c3d(tmp_path / "a.c3d", body(), **(common | other)))  # type: ignore[arg-type]
+        assert recording.plates == () and recording.marker_names == ("LASI",)
+        return " ".join(recording.notes)
+
+    assert "Warning: plate 1 left out: found type 21, expected a force plate of type 1 to 7." in said(kinds=[21])
+    assert "plate 1 left out: it has type 5 and no calibration in FORCE_PLATFORM:CAL_MATRIX" in said(
+        kinds=[5], channels=channels_of(3)
+    )
+    assert "plate 1 left out: it has type 4 and no calibration" in said(kinds=[4], analog_units=["V"] * 6)
+    assert "plate 1 left out: FORCE_PLATFORM:CAL_MATRIX is 6 by 6, type 7 needs 8 by 8" in said(
+        kinds=[7], channels=channels_of(3), calibration=np.eye(6)
+    )
+    assert "plate 1 left out: lists channels [1, 2, 3, 4, 5, 6, 7, 8], expected 8 of 1 to 6" in said(kinds=[3])
+    assert "plate 1 left out: its corners in the file do not span" in said(kinds=[2], corners=[np.zeros((4, 3))])
+
+
+def test_a_plate_that_cannot_be_read_does_not_take_the_others_along(tmp_path: Path) -> None:
+    path = write_c3d(
+        tmp_path / "a.c3d",
+        body(),
+        kinds=[21, 2],
+        channels=np.vstack([np.zeros_like(channels_of(2)), channels_of(2)]),
+        corners=[turned(R_LP) + np.array([0, 700.0, 0]), turned(R_LP)],
+        origins=[origin_of(2), origin_of(2)],
+    )
+    recording = read(path)
+    assert [plate.name for plate in recording.plates] == ["plate 2"]
+    np.testing.assert_allclose(recording.total_wrench()[3], expected_wrench(R_LP), rtol=1e-5, atol=2e-2)
+
+
+def test_channels_without_a_calibration_are_taken_as_calibrated(tmp_path: Path) -> None:
+    """Motion Analysis' files have type 4 and an empty matrix."""
+    common = {"corners": [turned(R_LP)], "analog_units": ["N"] * 3 + ["Nmm"] * 3}
+    path = write_c3d(tmp_path / "a.c3d", body(), kinds=[4], channels=channels_of(2), origins=[origin_of(2)], **common)  # type: ignore[arg-type]
+    recording = read(path)
+    np.testing.assert_allclose(recording.total_wrench()[3], expected_wrench(R_LP), rtol=1e-5, atol=2e-2)
+    assert "plate 1 has no calibration in the file: its channels are taken as calibrated." in recording.notes
 
 
 def test_causal_reading_says_its_delay(tmp_path: Path) -> None:

@@ -62,7 +62,6 @@ def test_degrees_become_radians_but_translations_stay(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        (NEW.replace("nRows=2", "nRows=9"), ["found 2 rows", "expected the 9"]),
         (NEW.replace("0.01\t180\t2", "0.01\t180"), ["line 11", "found 2 columns", "expected 3"]),
         (NEW.replace("\ttx", "\tknee"), ["'knee'", "more than once"]),
         (NEW.replace("0.01\t180", "0\t180"), ["line 11", "increasing"]),

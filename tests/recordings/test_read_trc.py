@@ -9,7 +9,7 @@ import pytest
 
 from dynakin.errors import RecordingError
 from dynakin.recordings.read import read
-from support.made_recordings import TRC, TRC_TOP, write
+from support.made_recordings import TRC, TRC_TOP, write, write_c3d
 
 
 def test_plain_file_in_millimetres(tmp_path: Path) -> None:
@@ -90,12 +90,10 @@ def test_header_counts_that_are_wrong_are_said(tmp_path: Path) -> None:
     [
         (TRC.replace("2.5\t3.5\t", "2.5\t"), ["line 8", "found 7 columns", "expected 8"]),
         (TRC.replace("6.5\n", "6.5\t7.5\n"), ["line 8", "found 9 columns", "expected 8"]),
-        (TRC.replace("RANK", "RKNE"), ["'RKNE'", "more than once"]),
         (TRC.replace("2\t0.01", "2\t0.00"), ["line 8", "time 0 s", "increasing"]),
         (TRC.replace("2\t0.01", "2\t"), ["line 8", "no time"]),
         (TRC.replace("2.5", "inf"), ["line 8", "'inf'", "RKNE y"]),
         (TRC.replace("2.5", "2,5"), ["line 8", "'2,5'", "RKNE y", "point"]),
-        (TRC.replace("\tmm\t", "\tfurlong\t"), ["furlong", "expected mm"]),
         (TRC_TOP, ["no frames"]),
         ("hello\nworld\n", ["not a TRC"]),
         ("", ["not a TRC"]),
@@ -118,8 +116,27 @@ def test_no_such_file_folder_and_unknown_kind(tmp_path: Path) -> None:
         read(tmp_path / "none.trc")
     with pytest.raises(RecordingError, match="is a folder"):
         read(tmp_path)
-    with pytest.raises(RecordingError, match=r"found extension '\.xyz', expected one of .*\.c3d"):
+    with pytest.raises(
+        RecordingError, match=r"found extension '\.xyz', expected a recording as \.c3d, \.csv or \.trc$"
+    ):
         read(write(tmp_path, "a.xyz", TRC))
+    with pytest.raises(RecordingError, match=r"'\.MOT', expected .* \.trc; a table of ground forces goes beside"):
+        read(write(tmp_path, "a.MOT", TRC))
+    with pytest.raises(
+        RecordingError, match=r"found extension '\.trc', expected ground forces as \.csv, \.mot or \.sto"
+    ):
+        read(write(tmp_path, "a.trc", TRC), tmp_path / "a.trc")
+
+
+def test_a_file_of_another_kind_than_its_extension_says(tmp_path: Path) -> None:
+    c3d = write_c3d(tmp_path / "a.c3d", {"LASI": np.ones((5, 3))}).read_bytes()
+    (tmp_path / "b.trc").write_bytes(c3d)
+    with pytest.raises(RecordingError, match=r"b\.trc: is not a text file$"):
+        read(tmp_path / "b.trc")
+    with pytest.raises(RecordingError, match=r"d\.C3D: is not a C3D file"):
+        read(write(tmp_path, "d.C3D", TRC))
+    (tmp_path / "e.C3D").write_bytes(c3d)
+    assert read(tmp_path / "e.C3D").marker_names == ("LASI",)
 
 
 @pytest.mark.parametrize(("wrong", "words"), [("mm", r"span 0\.00[0-9]+ m"), ("m", r"span [0-9.e+]+ m")])

@@ -114,6 +114,7 @@ def write_c3d(
     unit: str = "mm",
     per_frame: int = 10,
     residuals: np.ndarray | None = None,
+    by_row: bool = False,
 ) -> Path:
     """A C3D at 100 Hz: points name -> (T, 3) in ``unit``, analog channels (C, T * per_frame), corners (4, 3)
     in ``unit``."""
@@ -133,11 +134,10 @@ def write_c3d(
         c3d["data"]["analogs"] = channels[None]
         if analog_units:
             c3d.add_parameter("ANALOG", "UNITS", list(analog_units))
-        width = 8 if 3 in kinds else 6
-        listed = np.zeros((width, len(kinds)))
+        sizes = [{3: 8, 5: 8, 6: 12, 7: 8}.get(kind, 6) for kind in kinds]
+        listed = np.zeros((max(sizes, default=6), len(kinds)))
         at = 1
-        for k, kind in enumerate(kinds):
-            size = 8 if kind == 3 else 6
+        for k, size in enumerate(sizes):
             listed[:size, k] = np.arange(at, at + size)
             at += size
         c3d.add_parameter("FORCE_PLATFORM", "USED", [len(kinds)])
@@ -146,6 +146,8 @@ def write_c3d(
         c3d.add_parameter("FORCE_PLATFORM", "CORNERS", np.stack([c.T for c in corners], axis=2))
         c3d.add_parameter("FORCE_PLATFORM", "ORIGIN", np.array(origins, dtype=float).T)
         c3d.add_parameter("FORCE_PLATFORM", "ZERO", [1, 0])
+        if by_row:
+            c3d.add_parameter("FORCE_PLATFORM", "MATRIX_STORE", ["ByRow"])
         if calibration is not None:
             c3d.add_parameter("FORCE_PLATFORM", "CAL_MATRIX", np.repeat(calibration[:, :, None], len(kinds), axis=2))
     c3d.write(str(path))

@@ -18,6 +18,7 @@ from dynakin.cli.console import print_error
 from dynakin.cli.demo import demo
 from dynakin.cli.identify import identify
 from dynakin.cli.live import live
+from dynakin.cli.markers import markers
 from dynakin.cli.model import model
 from dynakin.cli.options import print_config
 from dynakin.cli.run import run
@@ -40,6 +41,7 @@ for command in (run, live, demo, compare, batch, identify, simulate, check, mode
     app.command()(command)
 app.command("print-config")(print_config)
 app.add_typer(tune, name="tune")
+app.add_typer(markers, name="markers")
 
 
 def _version(asked: bool) -> None:

@@ -1,168 +1,190 @@
-"""`dynakin check`: what is in a recording, what is missing, and what `run` would do with it."""
+"""`dynakin check`: a rehearsal of `dynakin run`, without the estimate."""
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 import typer
-from rich.console import Console
-from rich.padding import Padding
-from rich.table import Table
-from rich.text import Text
 
-from dynakin.cli.console import out, table
-from dynakin.cli.options import OF_A_MODEL, OF_THE_LABORATORY, Given, with_settings
-from dynakin.errors import DynakinError
-from dynakin.filter.build import definition_of
-from dynakin.model.definition import available_models
-from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
-from dynakin.model.markers.recognise import foot_markers_of
-from dynakin.model.markers.schema import MarkerSetFile
-from dynakin.recordings.checks import check_plates
-from dynakin.recordings.frame import GroundFrame, find_ground_frame
-from dynakin.recordings.landmarks import plain_name
-from dynakin.recordings.read import read
+from dynakin.cli.console import out, print_error
+from dynakin.cli.options import OF_A_MODEL, OF_THE_LABORATORY, OF_THE_PLATES, Given, with_settings
+from dynakin.cli.prepared import GROUND, MARKERS, SUBJECT, Rows, assumed, contacts, print_rows, short, starting
+from dynakin.errors import DynakinError, ModelError, RecordingError
+from dynakin.filter.prepared import Prepared
+from dynakin.pipeline.stages import configure, prepare_case
+from dynakin.recordings.beside import forces_beside, static_beside
 from dynakin.recordings.recording import Recording
-from dynakin.recordings.standing import standing_window
+from dynakin.results.naming import sentence, words
 from dynakin.settings.settings import Settings
+from dynakin.validation.case import Case, case_of
+
+_LISTED = 6
+_SOME_KG = 70.0
+"""To see what else there is where a mass is all that is missing; nothing that depends on it is said then."""
+_DETAILS = ("Lengths", "Masses", "Length of", "Start", "Marker places")
+"""Sentences of a calibration that a run's report has, and a rehearsal leaves out."""
 
 
-@with_settings("forces", *OF_A_MODEL, *OF_THE_LABORATORY, model="Model that is to be used; else all built-in ones.")
+@with_settings("forces", *OF_A_MODEL, "parameters", *OF_THE_LABORATORY, *OF_THE_PLATES, "preset")
 def check(
-    trial: Annotated[Path, typer.Argument(help="Recording: .c3d, .trc or .csv.")],
+    trial: Annotated[Path, typer.Argument(help="Recording (.c3d, .trc, .csv), or a configuration (.toml).")],
     *,
     given: Given,
 ) -> None:
-    """Say what is in a recording, what is missing, and what `run` would do with it."""
+    """Say what `run` would make of a recording, what would be absent and why, and what to add for more.
+
+    Exit code 0 where `run` would run; 1 where it would refuse, with the line that it would refuse with.
+    """
     console = out()
-    names = [given["model"]] if "model" in given else available_models()
-    settings = Settings.of({"trial": trial, "model": names[0]}, "check", given=given, needed=())
-    recording = read(trial, settings.forces)
-    still = None if settings.static is None else read(settings.static)
-    _print_recording(console, recording)
-    console.print(_marker_table(recording))
-    _print_plates(console, recording)
-    ground = _print_ground(console, recording, settings.vertical, settings.forward)
-    if ground is not None:
-        _print_plate_check(console, recording, ground, settings.mass_kg)
-    console.print(_marker_set_table(recording))
-    for name in names:
-        definition = definition_of(settings.changed(model=name))
-        console.print(f"What `run --model {name}` would do", style="bold")
+    settings = configure(trial, given, {"output": Path()}, options=True)
+    try:
+        case = case_of(settings)
+    except (RecordingError, ModelError) as error:
+        raise _refused(error) from None
+    console.print(f"{case.recording.path or case.recording.name}", style="bold", soft_wrap=True)
+    print_rows(console, _recording(case.recording))
+    ready, refusal = _rehearsed(case)
+    if ready is not None:
+        print_rows(console, _model(ready, settings, refusal))
+    print_rows(console, [("Add", text) for text in _to_add(case, ready, refusal)])
+    if refusal is not None:
+        raise _refused(refusal)
+    console.print("`dynakin run` would run it.", style="dim")
+
+
+def _refused(error: DynakinError) -> Exception:
+    """What ends the command with the line of a refusal; DYNAKIN_DEBUG=1 lets the error through."""
+    if os.environ.get("DYNAKIN_DEBUG") == "1":
+        return error
+    print_error(error.message)
+    return typer.Exit(1)
+
+
+def _rehearsed(case: Case) -> tuple[Prepared | None, DynakinError | None]:
+    """The trial as a run prepares it, or what it would refuse it with; both where only the mass is missing."""
+    try:
+        return next(iter(prepare_case(case).values())), None
+    except DynakinError as error:
+        refusal = error
+    if case.config.mass_kg is None and isinstance(refusal, ModelError) and refusal.message.startswith("mass_kg"):
+        heavy = case_of(case.config.changed(mass_kg=_SOME_KG), recording=case.recording, static=case.static)
         try:
-            if definition.planar and not recording.plates:
-                raise DynakinError("no force plates, expected at least one (give --forces)")
-            found = definition.calibrate(
-                recording,
-                static=still,
-                side=settings.side,
-                vertical=settings.vertical,
-                forward=settings.forward,
-            )
-            plates = check_plates(
-                recording, found.ground, found.mass_kg if definition.planar else None, found.foot_markers
-            )
-            if recording.plates and plates.refusal:
-                raise DynakinError(plates.refusal)
-        except DynakinError as error:
-            console.print(Padding(Text(f"Refuse it: {error.message}", style="red"), (0, 0, 0, 2)))
-        else:
-            # how the ground frame was found is said above
-            _sentences(console, [text for text in found.messages if text not in found.ground.how])
-        console.print()
+            return next(iter(prepare_case(heavy).values())), refusal
+        except DynakinError:
+            pass
+    return None, refusal
 
 
-def _print_recording(console: Console, recording: Recording) -> None:
+def _recording(recording: Recording) -> Rows:
     seconds = recording.time[-1] - recording.time[0]
-    console.print(f"{recording.path or recording.name}", style="bold", soft_wrap=True)
-    console.print(
-        f"  {recording.n_frames} frames at {recording.rate:.6g} Hz, {seconds:.4g} s from {recording.time[0]:g} s; "
-        f"{len(recording.marker_names)} markers in {recording.length_unit}; {len(recording.plates)} force plates"
-    )
-    subject = [f"{key.replace('_', ' in ')} {value:g}" for key, value in recording.subject.items()]
-    _sentences(console, ([f"Subject in the file: {', '.join(subject)}."] if subject else []) + list(recording.notes))
-    window = standing_window(recording)
-    if window is None:
-        console.print("  Standing still: nowhere for half a second.")
-    else:
-        start, end = recording.time[window.start], recording.time[window.stop - 1]
-        console.print(f"  Standing still: {start:.4g} to {end:.4g} s.")
-    console.print()
-
-
-def _marker_table(recording: Recording) -> Table:
-    """Markers with gaps one by one, complete ones in one row."""
-    seen = np.asarray(np.isfinite(recording.markers).all(axis=2))
-    share = np.asarray(seen.mean(axis=0))
-    rows = table("markers", "seen", "gaps", numbers=(1, 2), title="Markers")
-    complete = [name for name, part in zip(recording.marker_names, share, strict=True) if part == 1.0]
-    if complete:
-        rows.add_row(", ".join(complete), "100 %", "0")
-    for name, part, column in zip(recording.marker_names, share, seen.T, strict=True):
-        if part < 1.0:
-            gaps = int(np.sum(np.diff(np.concatenate([[1], column.astype(int)])) == -1))
-            rows.add_row(name, "never" if part == 0.0 else f"{np.floor(1000 * part) / 10:.1f} %", str(gaps))
-    return rows
-
-
-def _print_plates(console: Console, recording: Recording) -> None:
-    if not recording.plates:
-        console.print("Force plates: none (--forces GRF.mot). Models in the plane need them.\n")
-        return
-    rows = table("plate", "mean force, N", "greatest, N", "loaded", numbers=(1, 2, 3), title="Force plates")
+    plates = f"{len(recording.plates)} force plates" if len(recording.plates) != 1 else "1 force plate"
+    rows = [
+        (
+            "Recording",
+            f"{recording.n_frames} frames at {recording.rate:.6g} Hz, {seconds:.4g} s from {recording.time[0]:g} s; "
+            f"{len(recording.marker_names)} markers in {recording.length_unit}; {plates}.",
+        ),
+        ("Gaps", _gaps(recording)),
+    ]
+    subject = [_measure(key, value) for key, value in recording.subject.items()]
+    rows += [("In the file", f"{', '.join(subject)}.")] if subject else []
+    if recording.events:
+        kinds = list(dict.fromkeys(f"{event.side} {event.label}".strip().casefold() for event in recording.events))
+        rows.append(("In the file", f"{len(recording.events)} events ({', '.join(kinds)})."))
     for plate in recording.plates:
         size = np.linalg.norm(plate.force, axis=1)
-        loaded = f"{100 * np.mean(np.isfinite(plate.cop).all(axis=1)):.0f} %"
-        rows.add_row(plate.name, f"{np.nanmean(size):.1f}", f"{np.nanmax(size):.1f}", loaded)
-    console.print(rows)
+        if not np.isfinite(size).any():
+            rows.append(("Plates", f"{plate.name}: not measured."))
+            continue
+        loaded = 100.0 * float(np.mean(np.isfinite(plate.cop).all(axis=1)))
+        text = f"{plate.name}: up to {np.nanmax(size):.0f} N, mean {np.nanmean(size):.1f} N, loaded {loaded:.0f} %."
+        rows.append(("Plates", text))
+    return [*rows, *(("Note", short(text)) for text in recording.notes)]
 
 
-def _print_ground(
-    console: Console, recording: Recording, vertical: str, forward: str | tuple[float, ...]
-) -> GroundFrame | None:
-    console.print("Ground frame", style="bold")
-    try:
-        ground = find_ground_frame(recording, vertical=vertical, forward=forward)
-    except DynakinError as error:
-        console.print(f"  {error.message}\n  Give --vertical and --forward.\n", style="red")
-        return None
-    _sentences(console, list(ground.how))
-    console.print()
-    return ground
+def _gaps(recording: Recording) -> str:
+    """Markers with gaps, the worst first."""
+    seen = np.isfinite(recording.markers).all(axis=2)
+    share = {name: float(part) for name, part in zip(recording.marker_names, seen.mean(axis=0), strict=True)}
+    gappy = sorted((part, name) for name, part in share.items() if part < 1.0)
+    if not gappy:
+        return "none: every marker is seen in every frame."
+    told = [f"{name} {'never' if part == 0.0 else f'{np.floor(1000 * part) / 10:.1f} %'}" for part, name in gappy]
+    rest = f" and {len(told) - _LISTED} more" if len(told) > _LISTED else ""
+    return f"{len(gappy)} of {len(share)} markers are not always seen: {', '.join(told[:_LISTED])}{rest}."
 
 
-def _print_plate_check(console: Console, recording: Recording, ground: GroundFrame, mass: float | None) -> None:
-    if not recording.plates:
-        return
-    found = check_plates(recording, ground, mass, foot_markers_of(recording))
-    console.print("Plates' check", style="bold")
-    _sentences(console, list(found.messages))
-    if found.refusal:
-        console.print(f"  Refused: {found.refusal}", style="red")
-    console.print()
+def _model(ready: Prepared, settings: Settings, refusal: DynakinError | None) -> Rows:
+    """What `run` says first, with what it rests on, and what will come out."""
+    calibrated = ready.calibrated
+    sentences = calibrated.messages
+    told = {*starting(sentences, (*MARKERS, *GROUND, *SUBJECT, *_DETAILS))}
+    more = {
+        "Model": _held(ready),
+        "Markers": [
+            f"{len(calibrated.spec.markers)} of {len(ready.recording.marker_names)} are used.",
+            *(short(text) for text in sentences if text not in told),
+        ],
+        "Ground": starting(sentences, GROUND),
+    }
+    rows: Rows = []
+    for topic, text in assumed(ready, settings):
+        if topic == "Subject" and refusal is not None:
+            text = " ".join(["The mass is missing.", *starting(sentences, SUBJECT[2:])])
+        rows += [(topic, said) for said in (text, *more.get(topic, []))]
+    rows += contacts(ready)
+    if refusal is not None:
+        return rows
+    figures = ready.moment_figures()
+    rows += [("Results", text) for text in (figures["verdict"], *figures["reasons"])]
+    known = {*figures["reasons"], *told, *(sentence(text.removeprefix("Warning: ")) for text in sentences)}
+    warnings = [text for text in ready.messages if text.startswith("Warning: ")]
+    return rows + [("Doubts", text) for text in warnings if sentence(text.removeprefix("Warning: ")) not in known]
 
 
-def _marker_set_table(recording: Recording) -> Table:
-    rows = table("marker set", "found", "missing", title="Marker sets")
-    present = np.asarray(np.isfinite(recording.markers).all(axis=2).any(axis=0))
-    names = {plain_name(name) for name, seen in zip(recording.marker_names, present, strict=True) if seen}
-    for name in available_marker_sets():
-        found, missing = _fit(load_marker_set(name), names)
-        shown = ", ".join(missing[:8]) + (f" and {len(missing) - 8} more" if len(missing) > 8 else "")
-        rows.add_row(name, f"{found} of {found + len(missing)}", shown if found else "all")
-    return rows
+def _held(ready: Prepared) -> list[str]:
+    """A sentence on the coordinates that are not estimated; those of both sides once."""
+    locked = [coordinate.name for coordinate in ready.calibrated.spec.coordinates if coordinate.locked]
+    stems = [name.removesuffix("_r").removesuffix("_l") for name in locked]
+    told = {
+        stem: f"{words(stem)} (both sides)" if stems.count(stem) == 2 else words(name)
+        for stem, name in zip(stems, locked, strict=True)
+    }
+    return [f"Held: {', '.join(told.values())}."] if told else []
 
 
-def _fit(marker_set: MarkerSetFile, names: set[str]) -> tuple[int, list[str]]:
-    """How many of the set's markers (each side counts) are among plain names, and which are not."""
-    sites = [marker.aliases(side) for marker in marker_set.usual for side in ("right", "left", "centre")]
-    sites = [aliases for aliases in sites if aliases]
-    missing = [aliases[0] for aliases in sites if not any(plain_name(alias) in names for alias in aliases)]
-    return len(sites) - len(missing), missing
+def _to_add(case: Case, ready: Prepared | None, refusal: DynakinError | None) -> list[str]:
+    """What would give more, with what lies beside the recording."""
+    recording, settings = case.recording, case.config
+    path, found = recording.path, list[str]()
+    forces = None if path is None or settings.forces is not None else forces_beside(path)
+    if forces is not None:
+        found.append(f"--forces {forces.name} (found beside the recording): the plates' forces.")
+    elif not recording.plates:
+        found.append("--forces FILE.mot: nothing measures the ground's reaction.")
+    if settings.static is None and path is not None and (static := static_beside(path, recording)) is not None:
+        found.append(f"--static {static.name} (found beside the recording): lengths and marker places of standing.")
+    if refusal is not None and ready is not None and settings.mass_kg is None:
+        found.append("--mass KG: neither plates nor file show it.")
+    if ready is None:
+        return found
+    messages = ready.calibrated.messages
+    if refusal is None and starting(messages, ("Warning: mass",)):
+        found.append("--mass KG: it is only estimated (Subject, above).")
+    if any("estimated from" in text for text in starting(messages, ("Height",))):
+        found.append("--height M: estimated from the markers.")
+    if starting(messages, ("Sex not given",)):
+        found.append("--sex female or male: else the table's mean of both.")
+    if refusal is None and ready.ground.undeclared.any() and not settings.contacts:
+        found.append("--contact seat (hand_right, ...): if that is what bears the person where no plate does.")
+    return found
 
 
-def _sentences(console: Console, sentences: list[str]) -> None:
-    for text in sentences:
-        console.print(Padding(Text(text, style="yellow" if text.startswith("Warning") else ""), (0, 0, 0, 2)))
+def _measure(key: str, value: float) -> str:
+    """ "mass_kg" -> "mass 85 kg", "knee_width_m_r" -> "right knee width 0.139 m"."""
+    side = {"_r": "_r", "_l": "_l"}.get(key[-2:], "")
+    stem, _, unit = key.removesuffix(side).rpartition("_")
+    return f"{words(stem + side)} {value:g} {unit}"

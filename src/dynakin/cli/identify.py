@@ -16,7 +16,7 @@ from dynakin.identification.change import change_between, change_in_words
 from dynakin.identification.report import base_in_words, segment_rows
 from dynakin.identification.subject import Identification, identify_subject
 from dynakin.model.identified import read_identified
-from dynakin.recordings.read import read
+from dynakin.recordings.read import extensions, read
 from dynakin.recordings.recording import Recording
 from dynakin.settings.settings import Settings
 
@@ -24,7 +24,7 @@ from dynakin.settings.settings import Settings
 @with_settings(*OF_A_MODEL, *OF_THE_LABORATORY)
 def identify(
     trials: Annotated[
-        list[Path] | None, typer.Argument(help="Recordings of one subject with force plates (.c3d, .trc, .csv).")
+        list[Path] | None, typer.Argument(help=f"Recordings of one subject with force plates ({extensions()}).")
     ] = None,
     forces: Annotated[
         list[Path] | None,
@@ -42,11 +42,11 @@ def identify(
     if compare:
         _compare(paths)
         return
-    if not paths or "model" not in given or output is None:
-        raise ConfigError("identify: expected TRIAL..., --model NAME and -o subject.toml (or --compare A B)")
+    if not paths or output is None:
+        raise ConfigError("identify: expected TRIAL... and -o subject.toml (or --compare A B)")
     _check_trials(paths)
     _check_output(output)
-    settings = Settings.of({}, "identify", ("model",), given)
+    settings = Settings.of({}, "identify", (), given)
     recordings, standing = _read(paths, forces or [], settings.static)
     estimator = estimator_of(settings)
     with progress_bar("identifying") as progress:

@@ -41,7 +41,6 @@ _SHORT_S = 6.0
     *OF_THE_LABORATORY,
     "contacts",
     "table",
-    model="Model: fullbody (if not given), squat7, sagittal7, or a .toml or .osim file of your own.",
 )
 def live(
     source: Annotated[
@@ -95,7 +94,7 @@ def live(
     static = given.pop("static", None)
     if parameters is not None and parameters.suffix.casefold() == ".toml":
         given["parameters"], parameters = str(parameters.absolute()), None
-    settings = {"model": "fullbody"} | given
+    settings = {"model": Settings().model} | given  # which is to stand in what is recorded
     sources = _sources(source, forces)
     standing, wait = _LIVE_STANDING_S
     if isinstance(sources[0], Replay):
@@ -103,7 +102,7 @@ def live(
     sinks = _sinks(settings, record, publish, view, host, port)
     try:
         session = Live(
-            estimator_of(Settings.of({}, "live", ("model",), settings), lag),
+            estimator_of(Settings.of({}, "live", (), settings), lag),
             sources,
             sinks,
             delay_s=delay,

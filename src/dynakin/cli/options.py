@@ -25,7 +25,7 @@ Backend = Annotated[str, typer.Option(help="Who works: processes or threads of t
 Jobs = Annotated[int | None, typer.Option(help="Workers at a time on this machine; else one a core.")]
 Scheduler = Annotated[str | None, typer.Option(help="Address of the Dask cluster's scheduler, tcp://HOST:PORT.")]
 
-OF_A_MODEL = ("model", "markers", "static", "mass_kg", "height_m", "sex")
+OF_A_MODEL = ("model", "markers", "static", "functional", "mass_kg", "height_m", "sex")
 OF_THE_LABORATORY = ("side", "vertical", "forward")
 OF_THE_PLATES = ("contacts", "table", "plate_filter_hz", "force_threshold_n")
 
@@ -88,11 +88,25 @@ def _contacts(text: str) -> list[Any]:
     return [{"name": name, "segment": segment} if equals else name for name, equals, segment in parts]
 
 
+def _functional(text: str) -> dict[str, str]:
+    """`--functional hip_r=hip.c3d,knee_r=knee.c3d` as a table; the joints are checked with the settings."""
+    parts = [part.strip().partition("=") for part in text.split(",") if part.strip()]
+    wrong = next((joint for joint, _, file in parts if not file), None)
+    if wrong is not None or not parts:
+        raise typer.BadParameter(f"--functional is {text!r}, expected JOINT=FILE with commas (hip_r=right_hip.c3d)")
+    return {joint.strip(): file.strip() for joint, _, file in parts}
+
+
 def _same(value: Any) -> Any:
     return value
 
 
-_READ: dict[str, Callable[[Any], Any]] = {"forward": _forward, "estimate": _estimate, "contacts": _contacts}
+_READ: dict[str, Callable[[Any], Any]] = {
+    "forward": _forward,
+    "estimate": _estimate,
+    "contacts": _contacts,
+    "functional": _functional,
+}
 
 
 @with_settings("preset")

@@ -9,8 +9,10 @@ import typer
 
 from dynakin.cli.console import busy, out, progress_bar
 from dynakin.cli.options import OF_A_MODEL, OF_THE_LABORATORY, OF_THE_PLATES, Given, with_settings
+from dynakin.cli.prepared import assumed, print_rows
 from dynakin.cli.summary import end, print_summary
-from dynakin.pipeline.stages import configure, run_case
+from dynakin.pipeline.stages import configure, prepare_case, run_case
+from dynakin.recordings.read import extensions
 from dynakin.report.paper_figures.sensitivity import read_sensitivity
 from dynakin.results.files.folder import check_folder_writable, check_output_writable
 from dynakin.validation.case import case_of
@@ -30,7 +32,7 @@ from dynakin.validation.case import case_of
     "output",
 )
 def run(
-    trial: Annotated[Path, typer.Argument(help="Recording (.c3d, .trc, .csv), or a configuration (.toml).")],
+    trial: Annotated[Path, typer.Argument(help=f"Recording ({extensions()}), or a configuration (.toml).")],
     *,
     given: Given,
     figures: Annotated[
@@ -52,8 +54,11 @@ def run(
         check_folder_writable(figures)
     grid = None if sensitivity is None else read_sensitivity(sensitivity)
     case = case_of(config)
+    with busy("measuring the person"):
+        ready = prepare_case(case)
+    print_rows(out(), assumed(next(iter(ready.values())), config))
     with progress_bar("estimating") as progress:
-        result = run_case(case, keep_lost=keep_lost, keep="--keep-lost", progress=progress)
+        result = run_case(case, ready=ready, keep_lost=keep_lost, keep="--keep-lost", progress=progress)
     with busy("writing results and report"):
         folder = result.save(config.output, keep_lost=keep_lost, check=False)
     failures = result.failures

@@ -41,7 +41,9 @@ def simulate(
     motion_cutoff: Annotated[
         float, typer.Option("--motion-cutoff-hz", help="Low-pass on a coordinates file, Hz.")
     ] = CUTOFF_HZ,
-    markers: Annotated[str | None, typer.Option(help="Marker set that fullbody wears, built in or a .toml file.")] = None,
+    markers: Annotated[
+        str | None, typer.Option(help="Marker set that fullbody wears, built in or a .toml file.")
+    ] = None,
     plates: Annotated[str, typer.Option(help=f"What of fullbody has a plate: {', '.join(PLATES)}.")] = "feet",
     rail: Annotated[float, typer.Option(help="Push of fullbody's hands on a rail, of body weight, to 0.3.")] = 0.0,
 ) -> None:

@@ -13,12 +13,13 @@ from dynakin.arrays import finite
 from dynakin.bindings import _core
 from dynakin.filter.contacts import RESIDUAL, ContactLoads
 from dynakin.filter.events import events_of
+from dynakin.filter.labels import labels
 from dynakin.filter.parameters import parameters_of
-from dynakin.filter.sources import moved_segments, with_sources
+from dynakin.filter.sources import with_sources
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.contact import ON_PLATE
 from dynakin.recordings.recording import Recording
-from dynakin.results.estimate import AXES, COMPONENTS, Estimate
+from dynakin.results.estimate import Estimate
 from dynakin.results.measures.facing import nearly_singular
 from dynakin.results.records import Timing
 
@@ -143,32 +144,9 @@ def _dataset(
     if initial.feet or any(any(marker.soft_tissue) for marker in spec.markers):
         data["soft_tissue_amplitude"] = ("marker", initial.soft_tissue_m, {"units": "m"})
     data |= _body(arrays, model, axes, modelled, feet)
-    names, parents, segments = _joints(spec)
-    coords = {
-        "time": recording.time,
-        "coordinate": model.coordinate_names,
-        "coordinate_type": ("coordinate", _types(spec)),
-        "coordinate_segment": ("coordinate", moved_segments(spec)),
-        "marker": list(initial.recorded_markers),
-        "axis": list(AXES),
-        "axis_": list(AXES),
-        "sensor": [*initial.recorded_markers, "plates"],
-        "marker_axes_modelled": ("axis", axes),
-        "component": list(COMPONENTS),
-        "element": list(model.layout.names),
-        "element_": list(model.layout.names),
-        "joint": names,
-        "joint_parent": ("joint", parents),
-        "joint_segment": ("joint", segments),
-    }
     if feet is not None:
-        coords |= {
-            "foot": list(feet.names),
-            "foot_segment": ("foot", list(feet.segments)),
-            "foot_declared": ("foot", np.array([name in initial.contacts for name in feet.names], dtype=bool)),
-        }
         data |= _feet(arrays, feet)
-    return xr.Dataset(data, coords=coords)
+    return xr.Dataset(data, coords=labels(model, initial, recording.time, feet))
 
 
 def _sensors(arrays: Mapping[str, Array], unmeasured: npt.NDArray[np.bool_]) -> dict[str, Any]:
@@ -234,28 +212,6 @@ def _body(
         "mass_centre": (("time", "axis"), np.where(axes, found["mass_centre"], np.nan)),
         "mass_centre_velocity": (("time", "axis"), np.where(axes, found["mass_centre_velocity"], np.nan)),
     }
-
-
-def _joints(spec: _core.ModelSpec) -> tuple[list[str], list[int], list[str]]:
-    """Name, number of the parent joint (-1: ground) and segment of each joint; a hinge is named as its coordinate."""
-    segments = [segment.name for segment in spec.segments]
-    names = []
-    for segment in spec.segments:
-        coordinates = {axis.coordinate for axis in segment.axes}
-        names.append(coordinates.pop() if len(coordinates) == 1 else segment.name)
-    if len(set(names)) < len(names):
-        names = segments
-    parents = [segments.index(s.parent) if s.parent in segments else -1 for s in spec.segments]
-    return names, parents, segments
-
-
-def _types(spec: _core.ModelSpec) -> list[str]:
-    """A coordinate is a rotation unless every axis that it moves is a translation."""
-    kinds: dict[str, set[str]] = {}
-    for segment in spec.segments:
-        for axis in segment.axes:
-            kinds.setdefault(axis.coordinate, set()).add(axis.kind)
-    return ["translation" if kinds[c.name] == {"translation"} else "rotation" for c in spec.coordinates]
 
 
 def _timing(step_us: Array, recording: Recording) -> Timing:

@@ -15,7 +15,14 @@ def definition_of(settings: Settings) -> ModelDefinition | OpenSimDefinition:
     Raises:
         ModelError: as `load_model`.
     """
-    return load_model(settings.model, settings.subject(), settings.markers, settings.table, settings.opensim)
+    return load_model(
+        settings.model,
+        settings.subject(),
+        settings.markers,
+        settings.table,
+        settings.opensim,
+        settings.functional,
+    )
 
 
 def identified_of(settings: Settings) -> IdentifiedSubject | None:

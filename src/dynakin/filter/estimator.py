@@ -15,6 +15,7 @@ from dynakin.filter.assemble import assemble
 from dynakin.filter.augment import initial_covariance
 from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.expected import ContactPaths, expected_loads
+from dynakin.filter.prepared import Prepared
 from dynakin.filter.samples import in_step, recording_arrays
 from dynakin.filter.total_wrench import Ground, doubtful_mass, known_ground
 from dynakin.filter.tracker import Progress, Tracker, whether_to_smooth
@@ -206,40 +207,65 @@ class Estimator:
         progress: Progress | None = None,
     ) -> Tracked:
         """`run`, and the tracker that made it: the calibrated model, and the state after the last frame."""
+        return self.follow(self.prepare(recording, static=static, smooth=smooth, feet=feet), progress)
+
+    def prepare(
+        self,
+        recording: Recording,
+        *,
+        static: Recording | None = None,
+        smooth: bool | None = None,
+        feet: Feet | None = None,
+    ) -> Prepared:
+        """All of `run` but the estimate: what is known of the person, the plates and the contacts before it.
+
+        Raises:
+            ModelError, RecordingError, ConfigError: as in `run`.
+        """
         smooth, unsmoothed = whether_to_smooth(smooth, self.noise)
-        where = recording.path or recording.name
         if problem := rate_problem(recording.time):
-            raise RecordingError(f"{where}: {problem}")
+            raise RecordingError(f"{recording.path or recording.name}: {problem}")
         calibrated = self.calibrate(recording, static=static)
         markers, wrench, ground = self._measured(recording, calibrated)
         tracker = Tracker(calibrated, self._noise_for(ground, calibrated), self.estimate, self.lag)
         calibrated = tracker.calibrated
-        on_feet = None
+        contacts = None
         if feet is not None:
-            on_feet = feet(calibrated)
+            contacts = feet(calibrated)
         elif ground.loads is not None:
             paths = ContactPaths.of(calibrated).at(markers)
-            on_feet = expected_loads(ground.loads, calibrated, self.noise, paths, ground.undeclared, ground.bears)
+            contacts = expected_loads(ground.loads, calibrated, self.noise, paths, ground.undeclared, ground.bears)
+        doubt = doubtful_mass(wrench, calibrated.weighed_kg, ground.load_ratio, calibrated.unseen_kg)
+        return Prepared(recording, tracker, markers, wrench, ground, contacts, smooth, doubt, tuple(unsmoothed))
+
+    def follow(self, ready: Prepared, progress: Progress | None = None) -> Tracked:
+        """The estimate of a recording that is prepared, once or again: `ready` does not change.
+
+        Raises:
+            RecordingError, DivergenceError: as in `run`.
+        """
+        recording, calibrated, markers = ready.recording, ready.calibrated, ready.markers
+        smooth, ground, on_feet = ready.smooth, ready.ground, ready.contacts
         try:
-            doubt = doubtful_mass(wrench, calibrated.weighed_kg, ground.load_ratio, calibrated.unseen_kg)
-            passes = 0 if doubt else PASSES
             there, back = _shares(progress, recording.n_frames) if smooth else (progress, None)
+            passes = 0 if ready.doubt else PASSES
             tracker, arrays, shift, clock = run_in_step(
-                tracker, recording.time, markers, wrench, there, on_feet, passes
+                ready.tracker.fresh(), recording.time, markers, ready.wrench, there, on_feet, passes
             )
-            wrench = in_step(recording.time, wrench, shift) if shift else wrench
+            wrench = in_step(recording.time, ready.wrench, shift) if shift else ready.wrench
             on_feet = on_feet and on_feet.in_step(recording.time, shift)
             if smooth:
                 tracker = tracker.fresh()
                 arrays = tracker.run_smoothed_arrays(recording.time, markers, wrench, back, on_feet)
         except ValueError as error:  # a frame that the core refuses, named by it
-            raise RecordingError(f"{where}: {error}") from None
+            raise RecordingError(f"{recording.path or recording.name}: {error}") from None
         config = self.settings() | {"smooth": smooth, "ground_reasons": list(ground.reasons)}
-        notes = [*ground.notes, *([doubt] if doubt else clock if ground.usable else []), *unsmoothed]
+        doubt = [ready.doubt] if ready.doubt else clock if ground.usable else []
+        notes = [*ground.notes, *doubt, *ready.unsmoothed]
         covariances = (initial_covariance(calibrated, tracker.noise), tracker.covariance)
         estimate = assemble(
             arrays, tracker.core_model, calibrated, recording, (markers, wrench), config, notes, covariances, on_feet,
-            on_feet.undeclared if on_feet is not None and feet is None else ground.undeclared,
+            ready.undeclared(on_feet),
         )  # fmt: skip
         return Tracked(without_lost(estimate), tracker)
 

@@ -10,6 +10,7 @@ import xarray as xr
 
 from dynakin.bindings import _core
 from dynakin.filter.contacts import ContactLoads
+from dynakin.recordings.feet.contact import NO_CONTACT
 from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, contact_sources
 
 Flags = npt.NDArray[np.bool_]
@@ -56,6 +57,8 @@ def with_sources(
         legs = _below_the_thighs([segments.index(name) for name in soles], parents)
         moments = data["moment_source"].transpose("time", "coordinate").values.copy()
     joints[np.ix_(undeclared, ~legs)] = ABSENT
+    if feet is not None:
+        joints[_beyond(feet, soles, segments, parents)] = ABSENT
     moments[joints[:, moved] == ABSENT] = ABSENT
     moments[:, np.isin(data["coordinate"].values, list(held))] = ABSENT
     known, carried = moments != ABSENT, joints != ABSENT
@@ -69,8 +72,8 @@ def with_sources(
     return found
 
 
-class LiveSources:
-    """The same of a model's moments, frame by frame."""
+class ContactSources:
+    """The same of a model's moments by its contacts alone: what a live step says, and `Prepared` of a recording."""
 
     def __init__(
         self,
@@ -84,17 +87,20 @@ class LiveSources:
         self._segments = [segment.name for segment in spec.segments]
         self._parents = np.array([_place(self._segments, segment.parent) for segment in spec.segments])
         self._moved = [self._segments.index(name) for name in moved_segments(spec)]
+        self._soles = tuple(soles)
         self._legs = _below_the_thighs([self._segments.index(name) for name in soles], self._parents)
 
     def moments(self, feet: ContactLoads | None) -> Codes:
-        """(C,) codes of a frame's moments by its contacts (T = 1); measured, as far as anybody knows, without any."""
+        """(T, C) codes of the moments by the contacts; of a model without any one row: measured, as far as anybody
+        knows."""
         if feet is None:
-            return np.where(self._held, ABSENT, MEASURED).astype(np.uint8)
+            return np.where(self._held, ABSENT, MEASURED).astype(np.uint8)[None]
         undeclared = feet.undeclared
         at = [self._segments.index(name) for name in feet.segments]
         joints = _behind(_contacts(feet, undeclared, self._unmarked), at, self._parents)
         joints[np.ix_(undeclared, ~self._legs)] = ABSENT
-        return np.where(self._held, ABSENT, joints[0, self._moved]).astype(np.uint8)
+        joints[_beyond(feet, self._soles, self._segments, self._parents)] = ABSENT
+        return np.where(self._held, ABSENT, joints[:, self._moved]).astype(np.uint8)
 
 
 def _contacts(feet: ContactLoads, undeclared: Flags, unmarked: Collection[str]) -> Codes:
@@ -125,6 +131,18 @@ def _behind(contacts: Codes, at: list[int], parents: npt.NDArray[np.int_]) -> Co
             joints[:, segment] = np.maximum(joints[:, segment], contacts[:, k])
             segment = int(parents[segment])
     return joints
+
+
+def _beyond(feet: ContactLoads, soles: Collection[str], segments: list[str], parents: npt.NDArray[np.int_]) -> Flags:
+    """(T, J) joints that hang on a foot (toes) while it bears load: how much of it lies beyond them nobody measures."""
+    found = np.zeros((len(feet.contact), len(parents)), dtype=bool)
+    bears = {
+        segments.index(name): feet.contact[:, k] != NO_CONTACT for k, name in enumerate(feet.segments) if name in soles
+    }
+    for k, parent in enumerate(parents):  # parents stand before their children
+        if parent >= 0:
+            found[:, k] = bears.get(int(parent), found[:, parent])
+    return found
 
 
 def _below_the_thighs(at: list[int], parents: npt.NDArray[np.int_]) -> Flags:

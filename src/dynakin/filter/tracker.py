@@ -14,7 +14,7 @@ from dynakin.errors import ConfigError, DivergenceError, RecordingError
 from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.core_filter import core_filter
 from dynakin.filter.samples import Sample, sample_arrays
-from dynakin.filter.sources import LiveSources
+from dynakin.filter.sources import ContactSources
 from dynakin.filter.step import Codes, Labelled, Labels, StepEstimate, deviations_of, step_estimate
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.results.measures.sources import ABSENT
@@ -52,7 +52,7 @@ class Tracker:
         self._filter.report_sensors(True)
         self._labels = Labels.of(self.core_model)
         known = self.calibrated
-        self._sources = LiveSources(known.spec, known.feet.values(), known.held, known.unmarked_feet.values())
+        self._sources = ContactSources(known.spec, known.feet.values(), known.held, known.unmarked_feet.values())
         self._time: float | None = None
         self._latest: StepEstimate | None = None
         self._stepped: deque[tuple[float, _core.ContactLoads | None, Codes]] = deque(maxlen=lag + 1)
@@ -87,7 +87,7 @@ class Tracker:
         """What the last step gave; before the first one the start, whose time is NaN."""
         if self._latest is None:
             time = np.nan if self._time is None else self._time
-            sources = self._sources.moments(None)
+            sources = self._sources.moments(None)[0]
             self._latest = step_estimate(self.core_model, self._labels, time, self.state, None, sources)
         return self._latest
 
@@ -126,7 +126,7 @@ class Tracker:
         if report.diverged:
             raise DivergenceError(f"the filter diverged at {sample.time_s} s: {report.status}")
         self._time = sample.time_s
-        sources = self._sources.moments(feet)
+        sources = self._sources.moments(feet)[0]
         self._stepped.append((sample.time_s, loads, sources))
         self._latest = step_estimate(self.core_model, self._labels, sample.time_s, self.state, report, sources, loads)
         return self._latest

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
 from typing import Protocol
@@ -25,8 +25,10 @@ from dynakin.model.schema import ModelFile
 from dynakin.model.spec import in_layout, to_core
 from dynakin.model.table import BodyTable, load_table
 from dynakin.recordings.frame import GroundFrame
+from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
 from dynakin.settings.model import Bounds, OpenSimOptions, Priors
+from dynakin.settings.settings import FunctionalJoint
 from dynakin.settings.strict import nearest, read_toml, validate
 from dynakin.settings.subject import Subject
 
@@ -113,6 +115,7 @@ class ModelDefinition:
         subject: mass, height, sex, as far as they are given.
         marker_set: None: chosen by the recording's markers.
         table: inertial parameters for the subject's sex.
+        functional: recordings that show where a joint lies, by joint ("hip_r", "knee_l").
     """
 
     model: ModelFile
@@ -120,6 +123,7 @@ class ModelDefinition:
     subject: Subject
     marker_set: MarkerSetFile | None
     table: BodyTable
+    functional: Mapping[str, Recording] = field(default_factory=dict)
 
     @property
     def name(self) -> str:
@@ -168,7 +172,7 @@ class ModelDefinition:
         table, coordinates from landmarks and, in space, markers."""
         plan, rest = measure(
             self.model, self.subject, self.table, self.marker_set, recording, ground,
-            static=static, side=side, vertical=vertical, forward=forward,
+            static=static, side=side, vertical=vertical, forward=forward, functional=self.functional,
         )  # fmt: skip
         messages, speeds, held = list(rest.messages), dict[str, float](), rest.held
         if plan.model.sided:
@@ -224,6 +228,7 @@ def load_model(
     markers: str | Path = "auto",
     table: str | Path = "dumas",
     opensim: OpenSimOptions | None = None,
+    functional: Mapping[FunctionalJoint, Path] | None = None,
 ) -> ModelDefinition | OpenSimDefinition:
     """A built-in model ("sagittal7", "squat7"), a TOML file, or an OpenSim model (.osim, versions 3 and 4).
 
@@ -235,6 +240,7 @@ def load_model(
             file.
         table: "dumas", "deleva" or a CSV file of the same shape.
         opensim: what of an OpenSim model can be estimated; other models do not read it.
+        functional: functional trials by joint ("hip_r", "hip_l", "knee_r", "knee_l"), for models in space.
 
     Raises:
         ModelError: an unknown name (the nearest is suggested), or a wrong file (file and key are named).
@@ -243,8 +249,16 @@ def load_model(
     if Path(name_or_path).suffix.casefold() == ".osim":
         if str(markers) != "auto":
             raise ModelError(f"markers is {str(markers)!r}, expected auto: {name} has markers of its own")
+        if functional:
+            raise ModelError(
+                f"functional is given, but {name} has joints of its own; expected a model such as fullbody"
+            )
         return load_opensim(name, subject, opensim)
-    return load_built_in_or_toml(name, subject, markers, table)
+    definition = load_built_in_or_toml(name, subject, markers, table)
+    if not functional:
+        return definition
+    recordings = {path: read(path) for path in set(functional.values())}
+    return replace(definition, functional={joint: recordings[path] for joint, path in functional.items()})
 
 
 def load_built_in_or_toml(

@@ -7,6 +7,7 @@ examples.
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterable
 from typing import Annotated, Any, Literal, Self
 
 import numpy as np
@@ -91,6 +92,8 @@ class Segment(Strict):
     placement: tuple[Placement, ...] = ()
     axes: tuple[Axis, ...] = ()
     without_markers: WithoutMarkers | None = None
+    when_marked: bool = False  # part of the model only where a recording has markers and the origin of it
+    takes_markers_of: tuple[str, ...] = ()  # parts whose markers it carries where the model has no segment of theirs
     inertia: Annotated[tuple[float, ...], Field(min_length=10, max_length=10)] | None = None
     inertia_estimated: bool = True
 
@@ -202,6 +205,20 @@ class ModelFile(Strict):
         free = {c.name for c in self.coordinates if not c.locked and not np.isfinite(c.limits).any()}
         return self.sided and self.ground.origin is None and len(roots) == 1 and len(own & free) == len(own) == 6
 
+    def without(self, names: Collection[str]) -> ModelFile:
+        """The model without some segments that carry no others, and the coordinates and lengths that only they have."""
+        gone = [segment for segment in self.segments if segment.name in names]
+        kept = tuple(segment for segment in self.segments if segment.name not in names)
+        lost = _of_axes(gone) - _of_axes(kept)
+        lengths = _of_places(gone) - _of_places(kept)
+        return self.model_copy(
+            update={
+                "segments": kept,
+                "coordinates": tuple(c for c in self.coordinates if c.name not in lost),
+                "lengths": tuple(length for length in self.lengths if length.name not in lengths),
+            }
+        )
+
     @model_validator(mode="before")
     @classmethod
     def _both_sides(cls, data: Any) -> Any:
@@ -247,6 +264,15 @@ class ModelFile(Strict):
         if idle:
             raise ValueError(f"coordinates: no axis uses {sorted(idle)[0]!r}")
         return self
+
+
+def _of_axes(segments: Iterable[Segment]) -> set[str]:
+    return {axis.coordinate for segment in segments for axis in segment.axes}
+
+
+def _of_places(segments: Iterable[Segment]) -> set[str]:
+    scales = {axis.scale for segment in segments for axis in segment.axes if axis.scale}
+    return scales | {term.length for segment in segments for term in segment.placement}
 
 
 def _need(name: str, known: object, where: str, expected: str) -> None:

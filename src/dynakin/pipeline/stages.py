@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from dynakin.errors import ConfigError, DynakinError
+from dynakin.filter.prepared import Prepared
 from dynakin.filter.tracker import Tracker
 from dynakin.identification.observability.trial import Identifiability, identifiability
 from dynakin.pipeline.result import Result
@@ -107,9 +108,24 @@ def configure(
     return Settings.of(content, where, given=known) if options else Settings.of(content | known, where)
 
 
+def prepare_case(case: Case) -> dict[str, Prepared]:
+    """All of `run_case` but the estimate, by the title of each preset: what `dynakin check` tells of a trial, and what
+    `dynakin run` says first.
+
+    Raises:
+        DynakinError: as `run`, for all that can be known before the estimate.
+    """
+    setup = case.setup
+    return {
+        title: setup.estimator(title).prepare(case.recording, static=case.static, smooth=setup.smooth)
+        for title in setup.noise
+    }
+
+
 def run_case(
     case: Case,
     *,
+    ready: Mapping[str, Prepared] | None = None,
     keep_lost: bool = False,
     keep: str | None = "keep_lost=True",
     observability: bool = True,
@@ -118,6 +134,7 @@ def run_case(
     """`run` on a trial that is read.
 
     Args:
+        ready: what `prepare_case` gave, where that has been done.
         keep: what the caller is asked with to keep the good frames of a trial that was lost; None: cannot be asked.
 
     Raises:
@@ -125,7 +142,13 @@ def run_case(
     """
     failures = Failures()
     estimates, _, trackers = estimate_each(
-        case.recording, case.setup, static=case.static, progress=progress, keep_lost=True, failures=failures
+        case.recording,
+        case.setup,
+        static=case.static,
+        progress=progress,
+        keep_lost=True,
+        failures=failures,
+        ready=ready,
     )
     if not keep_lost:
         for estimate in estimates.values():

@@ -105,8 +105,13 @@ def check_plates(
     findings = _Findings()
     standing = _on_plates(standing_window(recording), recording, ground)
     frames = standing if standing is not None else slice(None)
-    mass = _check_vertical(recording, ground, mass_kg, standing, findings)
     feet = _feet(recording, ground, foot_markers or {}, findings)
+    if mass_kg is None and _nobody_on(recording, ground, feet):
+        findings.say("Nobody steps on the plates: they carry nothing, and no foot is on any.")
+        return PlateCheck(
+            not any("Warning:" in text for text in findings.messages), None, None, tuple(findings.messages), None
+        )
+    mass = _check_vertical(recording, ground, mass_kg, standing, findings)
     if loads is None:
         loads = foot_loads(recording, ground, foot_markers or {})
     under: dict[str, str] = {}
@@ -142,6 +147,24 @@ def _on_plates(standing: slice | None, recording: Recording, ground: GroundFrame
     total = ground.vectors_to_ground(np.sum([plate.force for plate in recording.plates], axis=0))
     loaded = np.abs(np.nan_to_num(total[:, 1])) > JUDGED_N
     return None if standing is not None and loaded.any() and not loaded[standing].any() else standing
+
+
+def _nobody_on(recording: Recording, ground: GroundFrame, feet: Mapping[str, Array]) -> bool:
+    """Whether the plates are empty because nobody steps on them, by their corners and the feet (T, K, 2);
+    in another unit of the forces they would be empty below a foot."""
+    pushes = [np.nan_to_num(ground.vectors_to_ground(plate.force)[:, 1]) for plate in recording.plates]
+    if len(feet) < 2 or max(np.abs(push).max() for push in pushes) > JUDGED_N:
+        return False
+    for plate in recording.plates:
+        if plate.corners is None:
+            return False
+        place = ground.points_to_ground(plate.corners)[:, [0, 2]]
+        for outline in feet.values():
+            points = outline.reshape(-1, 2)
+            away = distance_to_hull(points, np.broadcast_to(place, (len(points), *place.shape)))
+            if not np.isfinite(away).any() or np.nanmin(away) < NEAR_M:
+                return False
+    return True
 
 
 def _check_vertical(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 
@@ -29,6 +29,13 @@ READERS: dict[str, Reader] = {".trc": read_trc, ".c3d": read_c3d, ".csv": read_c
 FORCE_READERS: dict[str, ForceReader] = {".mot": read_table, ".sto": read_table, ".csv": read_csv_table}
 """Readers of ground-force tables by extension."""
 
+
+def extensions(readers: Iterable[str] = READERS) -> str:
+    """The extensions in words, for help and errors: ".c3d, .csv or .trc"."""
+    *most, last = sorted(readers)
+    return f"{', '.join(most)} or {last}" if most else last
+
+
 _ENOUGH = 5  # markers that show how large a person is
 _SPAN_M = (0.02, 50.0)
 
@@ -49,8 +56,8 @@ def read(
     """Read a trial: markers, and plates from the same file or from a ground-force table.
 
     Args:
-        path: .trc, .c3d or .csv.
-        forces: .mot, .sto or .csv with ground forces in the laboratory frame of the markers.
+        path: of one of `READERS`' kinds.
+        forces: of one of `FORCE_READERS`' kinds, ground forces in the laboratory frame of the markers.
         plate_filter_hz, force_threshold_n, causal: see ``ReadOptions``.
 
     Raises:
@@ -62,7 +69,10 @@ def read(
     reader = READERS.get(path.suffix.casefold())
     require_file(path)
     if reader is None:
-        raise RecordingError(f"{path}: found extension {path.suffix!r}, expected one of {', '.join(sorted(READERS))}")
+        hint = "; a table of ground forces goes beside a recording" if path.suffix.casefold() in FORCE_READERS else ""
+        raise RecordingError(
+            f"{path}: found extension {path.suffix!r}, expected a recording as {extensions(READERS)}{hint}"
+        )
     recording = reader(path, options)
     _check_unit(recording, path)
     if forces is not None:
@@ -103,8 +113,8 @@ def read_forces(path: Path) -> Table:
     require_file(path)
     force_reader = FORCE_READERS.get(path.suffix.casefold())
     if force_reader is None:
-        known = ", ".join(sorted(FORCE_READERS))
-        raise RecordingError(f"{path}: found extension {path.suffix!r}, expected forces as one of {known}")
+        known = extensions(FORCE_READERS)
+        raise RecordingError(f"{path}: found extension {path.suffix!r}, expected ground forces as {known}")
     table = force_reader(path)
     return _only_forces(table) if path.suffix.casefold() == ".csv" else table
 

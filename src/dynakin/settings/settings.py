@@ -28,11 +28,9 @@ _OPTIONS = {
 }
 # Keys that name files: relative to the configuration file that they stand in.
 _PATHS = ("trial", "forces", "static", "parameters", "output")
-NEEDED = {
-    "trial": "TRIAL",
-    "model": "--model NAME (fullbody, sagittal7, squat7, a .toml or .osim file)",
-    "output": "-o OUT",
-}
+FunctionalJoint = Literal["hip_r", "hip_l", "knee_r", "knee_l"]
+"""Joints whose centre or axis a trial of their own can show."""
+NEEDED = {"trial": "TRIAL", "output": "-o OUT"}
 
 
 class Settings(Strict, use_attribute_docstrings=True):
@@ -42,8 +40,8 @@ class Settings(Strict, use_attribute_docstrings=True):
     """Recording to estimate: .c3d, .trc or .csv.
 
     Paths are relative to this file."""
-    model: str = Field(examples=["squat7"])
-    """Model: fullbody, squat7, sagittal7, or a .toml or .osim file of your own."""
+    model: str = Field(default="fullbody", examples=["squat7"])
+    """Model: fullbody (where none is given), squat7, sagittal7, or a .toml or .osim file of your own."""
     output: Path = Field(default=Path(), examples=["out/squat"])
     """Folder for the results. It is replaced if it holds an earlier output, and refused if it holds anything else."""
 
@@ -51,6 +49,10 @@ class Settings(Strict, use_attribute_docstrings=True):
     """Ground forces, where the recording does not hold them: .mot, .sto or .csv."""
     static: Path | None = Field(default=None, examples=["standing.c3d"])
     """Recording of the same person and markers standing, from which lengths and marker places are taken."""
+    functional: dict[FunctionalJoint, Path] | None = Field(default=None, examples=[{"hip_r": "right_hip.c3d"}])
+    """Recordings of the same person and markers that show where joints lie, for models in space: hip_r, hip_l (the leg
+    swung forward, sideways and around) and knee_r, knee_l (the knee bent); as an option with commas,
+    hip_r=right_hip.c3d,knee_r=right_knee.c3d. One file may serve several joints."""
     parameters: Path | None = Field(default=None, examples=["subject.toml"])
     """Identified subject that `dynakin identify` wrote: the filter starts from its values and deviations."""
     markers: str = "auto"
@@ -180,6 +182,8 @@ class Settings(Strict, use_attribute_docstrings=True):
         for key in _PATHS:
             path = getattr(self, key)
             plain[key] = None if path in (None, Path()) else str(path.absolute())
+        if self.functional is not None:
+            plain["functional"] = {joint: str(path.absolute()) for joint, path in self.functional.items()}
         return plain
 
 
@@ -201,6 +205,11 @@ def read_keys(path: Path, paths: Sequence[str] = _PATHS) -> dict[str, Any]:
     for key in paths:
         if isinstance(content.get(key), str):
             content[key] = str(path.parent / content[key])
+    functional = content.get("functional")
+    if "functional" not in paths and isinstance(functional, dict):
+        content["functional"] = {
+            joint: str(path.parent / file) if isinstance(file, str) else file for joint, file in functional.items()
+        }
     for key in ("model", "markers", "table", "preset"):  # a name, or a file next to the configuration
         value = content.get(key)
         if isinstance(value, str) and is_file(path.parent / value):

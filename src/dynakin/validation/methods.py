@@ -11,6 +11,7 @@ import numpy.typing as npt
 import xarray as xr
 
 from dynakin.errors import DynakinError, LostError, ModelError
+from dynakin.filter.prepared import Prepared
 from dynakin.filter.tracker import Tracker
 from dynakin.filter.zero import asked_angles
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -138,12 +139,14 @@ def estimate_each(
     progress: Progress | None = None,
     keep_lost: bool = False,
     failures: Failures | None = None,
+    ready: Mapping[str, Prepared] | None = None,
 ) -> tuple[dict[str, Estimate], dict[str, str], dict[str, Tracker]]:
     """Run every preset.
 
     Args:
         keep_lost: those that lost the person are estimates like the others. failures: takes what fails once an
             estimate is there (the angles that were asked for); not given: it is raised.
+        ready: the trial as prepared for these presets (`Estimator.prepare`), where that has been done.
 
     Returns:
         By preset: the estimates, why others lost the person, and the trackers of all as they ended.
@@ -156,7 +159,8 @@ def estimate_each(
     trackers: dict[str, Tracker] = {}
     for preset in setup.noise:
         estimator = setup.estimator(preset)
-        estimate, trackers[preset] = estimator.track(recording, static=static, smooth=setup.smooth, progress=progress)
+        made = (ready or {}).get(preset) or estimator.prepare(recording, static=static, smooth=setup.smooth)
+        estimate, trackers[preset] = estimator.follow(made, progress)
         reason = None if keep_lost else why_lost(estimate)
         if reason is not None:
             lost[preset] = reason

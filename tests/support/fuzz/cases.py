@@ -19,6 +19,7 @@ from dynakin.model.markers.recognise import foot_markers_of
 from dynakin.model.opensim.export import read_values
 from dynakin.model.table import load_table
 from dynakin.recordings.checks import check_plates
+from dynakin.recordings.formats.c3d import read_c3d_results
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Plate, Recording
@@ -76,6 +77,14 @@ def _recording(path: Path, corpus: Path) -> Recording:
     return recording
 
 
+def _c3d(path: Path, corpus: Path) -> Recording:
+    recording = _recording(path, corpus)
+    for label, values in read_c3d_results(path).items():
+        if values.shape != (recording.n_frames, 3):
+            raise Unclean(f"{label} has shape {values.shape}")
+    return recording
+
+
 def _with_forces(path: Path, corpus: Path) -> Recording:
     return read(corpus / "markers_squat.trc", path)
 
@@ -90,7 +99,7 @@ def _study(path: Path, corpus: Path) -> Any:
 
 READERS: Mapping[str, Callable[[Path, Path], Any]] = {
     "markers": _recording,
-    "c3d": _recording,
+    "c3d": _c3d,
     "forces": _with_forces,
     "model": lambda path, _: load_model(path),
     "osim": lambda path, _: load_model(path),
@@ -122,6 +131,14 @@ def _check_result(found: Any, what: str) -> None:
         for array in (found.markers, *(a for plate in found.plates for a in _arrays(plate))):
             if np.isinf(array).any():
                 raise Unclean("an infinite number in a recording")
+        for channel in found.analog:
+            if np.isinf(channel.values).any() or not np.isfinite([channel.start_s, channel.rate_hz]).all():
+                raise Unclean(f"an infinite number in analog channel {channel.name}")
+        if not np.isfinite([*(event.time_s for event in found.events), *found.subject.values()]).all():
+            raise Unclean("an infinite number in events or measures of the person")
+        if not "".join(found.notes).isprintable():
+            raise Unclean("notes that cannot be printed")
+        found.window(float(found.time[0]), float(found.time[-1]))
     else:
         _check_numbers(found, what, 0)
 

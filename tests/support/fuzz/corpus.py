@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from importlib import resources
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from dynakin.recordings.recording import Recording
 from dynakin.results.files.markers import write_trc
 from dynakin.results.files.storage import write_storage
 from dynakin.simulation.trial import simulate_squat
+from support.made_c3d import made_c3d
 from support.made_recordings import write_c3d
 
 FRAMES, MARKERS = 24, 8
@@ -71,8 +73,10 @@ def make(folder: Path) -> None:
     heads = ["time", *(f"{name}_{axis}" for name in names for axis in "xyz"), *columns]
     lines = [",".join(heads), *(",".join(f"{value:.6g}" for value in row) for row in table)]
     (folder / "markers_squat.csv").write_text("# a squat\n" + "\n".join(lines) + "\n")
+    _as_they_come(folder)
     _c3d(folder / "c3d_plates.c3d", markers, values)
     _c3d(folder / "c3d_plain.c3d", markers, None)
+    _c3d_of_a_laboratory(folder, markers)
     package = resources.files("dynakin.model")
     for kind, inside in (("model", "builtin"), ("set", "markers"), ("table", "tables")):
         for entry in (package / inside).iterdir():
@@ -100,6 +104,48 @@ def make(folder: Path) -> None:
     )
     known = {"parameters": [{"name": "length/thigh", "value": 0.4, "sd": 0.01, "estimated": True}]}
     (folder / "known_run.json").write_text(json.dumps(known))
+
+
+def _as_they_come(folder: Path) -> None:
+    """The same text files as other programs write them: decimal commas, semicolons, doubled tabs, UTF-16, rounded
+    times, a doubled name."""
+    trc, csv = ((folder / name).read_text() for name in ("markers_squat.trc", "markers_squat.csv"))
+    (folder / "markers_commas.trc").write_text(re.sub(r"(?<=\d)\.(?=\d)", ",", trc))
+    (folder / "markers_tabs.trc").write_text(re.sub(r"(?m)^(\d.*)$", lambda m: m[1].replace("\t", "\t\t"), trc))
+    rounded = re.sub(r"(?m)^(\d+\t\d+\.\d)\d*", r"\1", trc)  # 50 Hz, to 0.1 s
+    names = [name for name in trc.splitlines()[3].split("\t")[2:] if name]
+    (folder / "markers_rounded.trc").write_text(rounded.replace(names[1], names[0]))
+    (folder / "markers_semicolons.csv").write_text(csv.replace(",", ";").replace(".", ","))
+    (folder / "markers_wide.csv").write_bytes(csv.encode("utf-16"))
+
+
+def _c3d_of_a_laboratory(folder: Path, markers: np.ndarray) -> None:
+    """Axes, outputs, events, analog channels, measures of the person, a doubled name; integer data, too."""
+    origin = 1e3 * markers[:, 0]
+    ends = zip("ALP", 100.0 * np.eye(3), strict=True)
+    points = [(f"M{k}", 1e3 * markers[:, k]) for k in range(markers.shape[1])]
+    points += [("PELO", origin), *((f"PEL{a}", origin + end) for a, end in ends)]
+    points += [("M1", 1e3 * markers[:, 2]), ("LHipAngles", origin), ("CentreOfMass", origin), ("*12", origin)]
+    groups = {
+        "POINT": {"ANGLES": ["LHipAngles"], "TYPE_GROUPS": ["ANGLES", "ANGLE"]},
+        "EVENT": {"USED": 2, "CONTEXTS": ["Left", "Right"], "LABELS": ["Foot Strike", "Foot Off"]}
+        | {"TIMES": np.array([[0.0, 0.0], [0.1, 0.2]])},
+        "PROCESSING": {"Bodymass": 70.0, "Height": 1750.0, "LLegLength": 900.0},
+        "SUBJECTS": {"NAMES": ["Ann"]},
+        "TRIAL": {"ACTUAL_START_FIELD": np.array([1, 0])},
+        "ANALOG": {"UNITS": ["V"] * 12},
+        "FORCE_PLATFORM": {
+            "USED": 1,
+            "TYPE": [6],
+            "CHANNEL": np.arange(1, 13)[:, None],
+            "ORIGIN": np.full((3, 1), 99.0),
+        }
+        | {"CORNERS": np.array([[200.0, 0, 300], [-200, 0, 300], [-200, 0, -300], [200, 0, -300]]).T[:, :, None]}
+        | {"CAL_MATRIX": 100.0 * np.eye(12)[:, :, None]},
+    }
+    analog = 1.0 + np.random.default_rng(1).normal(size=(12, 3 * len(origin)))
+    for name, scale in (("whole", -1.0), ("integer", 0.1)):
+        made_c3d(folder / f"c3d_{name}.c3d", points, groups, analog=analog, per_frame=3, scale=scale)
 
 
 def _forces(recording: Recording) -> tuple[list[str], np.ndarray]:

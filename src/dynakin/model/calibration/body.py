@@ -6,7 +6,6 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
-
 from scipy import ndimage
 
 from dynakin.arrays import runs
@@ -83,7 +82,9 @@ def find_mass(
                 means.append((mean, f"the mean vertical force of {recording.name}, in which nobody stands still"))
             elif (found := impulse_load(recording, ground, loads, pelvis)) is not None:
                 mean, seconds = found
-                text = f"the plates' impulse over the {seconds:.1f} s of {recording.name} in which they bear all of the "
+                text = (
+                    f"the plates' impulse over the {seconds:.1f} s of {recording.name} in which they bear all of the "
+                )
                 means.append((mean, f"{text}person, and the speed that the pelvis gains"))
         else:
             mass = float(check.mass_kg_from_plates)

@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ModelError
-from dynakin.model.calibration.landmarks import Positions
+from dynakin.model.calibration.landmarks import BENT, Positions
 from dynakin.model.calibration.posture import frame_landmarks
 from dynakin.model.mirroring import SUFFIXES
 from dynakin.model.schema import ModelFile, Segment
@@ -37,10 +37,12 @@ _LEAST = 2
 
 @dataclass(frozen=True, eq=False)
 class Proportions:
-    """Places in parts of the height, of landmarks by their names with side, and of markers by set name with segment."""
+    """Places in parts of the height, of landmarks by their names with side, and of markers by set name with segment; and
+    landmarks beside a hinge, with the limb's and which way it bends."""
 
     landmarks: dict[str, Array]
     markers: dict[str, tuple[str, Array]]
+    hinges: dict[str, tuple[tuple[str, str, str], float]]
 
     @classmethod
     @cache
@@ -54,7 +56,8 @@ class Proportions:
             if name.endswith("_r"):
                 landmarks[f"{name.removesuffix('_r')}_l"] = np.array(place) * _FLIP
         markers = {name: (entry["segment"], np.array(entry["at"])) for name, entry in content["markers"].items()}
-        return cls(landmarks, markers)
+        hinges = {name: (tuple(entry["limb"]), float(entry["forward"])) for name, entry in content["hinges"].items()}
+        return cls(landmarks, markers, hinges)
 
 
 @dataclass
@@ -66,7 +69,9 @@ class Completed:
     messages: list[str] = field(default_factory=list)
 
 
-def wanted_landmarks(model: ModelFile, table: BodyTable, locks: Mapping[str, float | None], segment: Segment) -> list[str]:
+def wanted_landmarks(
+    model: ModelFile, table: BodyTable, locks: Mapping[str, float | None], segment: Segment
+) -> list[str]:
     """Names, with side, of what a segment's frame, its lengths, its children's origins and its table parts need."""
     names = frame_landmarks(segment) if free(segment, locks) else []
     names += [child.origin for child in model.segments if child.parent == segment.name and child.origin]
@@ -122,10 +127,12 @@ def completed(
     known = {name: place for name, place in landmarks.items() if np.isfinite(place).all()}
     found = Completed(dict(known))
     turns: dict[str, Array] = {}
-    shape = {name: height_m * place for name, place in template.landmarks.items()}
+    shapes: dict[str, dict[str, Array]] = {}  # of the second side, as the first one has it
+    nominal = {name: height_m * place for name, place in template.landmarks.items()}
     lacking: dict[str, str] = {}
     for segment in _better_side_first(model, table, locks, known):
         wanted = wanted_landmarks(model, table, locks, segment)
+        shape = nominal | shapes.get(segment.name, {})
         own = [name for name in wanted if name in shape]
         lacking |= {name: segment.name for name in _needed(segment, locks, wanted) if name not in shape | known}
         have = [name for name in own if name in found.landmarks]
@@ -135,7 +142,7 @@ def completed(
                 f"{where}: segment {segment.name!r} of model {model.name} has {len(set(own) & set(known))} of the "
                 f"landmarks {', '.join(own)}, expected {_LEAST} or more: markers on it, or joint centres"
             )
-        hold = _held(segment, turns, have, shape, found.landmarks)
+        hold = _held(segment, turns)
         source = [shape[name] for name in have]
         target = [found.landmarks[name] for name in have]
         weights = [1.0] * len(have)
@@ -150,8 +157,14 @@ def completed(
         for name in missing:
             found.landmarks[name] = turn @ shape[name] + shift
             found.added[name] = segment.name
+            _beside_hinge(name, segment.side, known, found.landmarks)
         if segment.side is not None:
-            _mirrored_shape(shape, own, found.landmarks, turn, shift, segment)
+            mine, other = SUFFIXES[segment.side], next(s for side, s in SUFFIXES.items() if side != segment.side)
+            shapes[f"{segment.name.removesuffix(mine)}{other}"] = {
+                f"{name.removesuffix(mine)}{other}": (turn.T @ (found.landmarks[name] - shift)) * _FLIP
+                for name in own
+                if name.endswith(mine)
+            }
     if lacking:
         raise ModelError(
             f"{where}: neither markers nor proportions give "
@@ -180,9 +193,7 @@ def _better_side_first(
 ) -> list[Segment]:
     """The model's segments, parents first, and of two sides the one first of which more is measured."""
     count = {s.name: sum(name in known for name in wanted_landmarks(model, table, locks, s)) for s in model.segments}
-    sides = {
-        side: sum(count[s.name] for s in model.segments if s.side == side) for side in SUFFIXES
-    }
+    sides = {side: sum(count[s.name] for s in model.segments if s.side == side) for side in SUFFIXES}
     order = sorted(SUFFIXES, key=lambda side: -sides[side])
     centre = [s for s in model.segments if s.side is None]
     rest = [s for side in order for s in model.segments if s.side == side]
@@ -196,9 +207,7 @@ def _better_side_first(
     return ordered
 
 
-def _held(
-    segment: Segment, turns: Mapping[str, Array], have: list[str], shape: Mapping[str, Array], found: Mapping[str, Array]
-) -> Array:
+def _held(segment: Segment, turns: Mapping[str, Array]) -> Array:
     """Rotation (3, 3) of the template to which a segment is held: upright, as the root faces, of what hangs on the
     root; else that of the parent."""
     if segment.parent == "ground":
@@ -225,14 +234,22 @@ def _laid(source: Array, target: Array, weights: Array, hold: Array, reach: floa
     return turn, b - turn @ a
 
 
-def _mirrored_shape(
-    shape: dict[str, Array], own: list[str], found: Mapping[str, Array], turn: Array, shift: Array, segment: Segment
-) -> None:
-    """Gives the other side the shape of this one, in place."""
-    mine, other = SUFFIXES[str(segment.side)], next(s for k, s in SUFFIXES.items() if k != segment.side)
-    for name in own:
-        if name.endswith(mine) and f"{name.removesuffix(mine)}{other}" in shape:
-            shape[f"{name.removesuffix(mine)}{other}"] = (turn.T @ (found[name] - shift)) * _FLIP
+def _beside_hinge(name: str, side: str | None, known: Mapping[str, Array], found: dict[str, Array]) -> None:
+    """Turns a completed landmark beside a hinge, in place, to where the measured limb's plane has it."""
+    suffix = SUFFIXES.get(side or "", "")
+    limb, forward = Proportions.load().hinges.get(name.removesuffix(suffix), ((), 0.0))
+    ends = [f"{end}{suffix}" for end in limb]
+    if not ends or not all(end in known for end in ends):
+        return
+    upper, middle, lower = (known[end] for end in ends)
+    line, rest = upper - middle, lower - middle
+    plane = forward * np.cross(rest, line) / (np.linalg.norm(rest) * np.linalg.norm(line))  # to the right
+    beside = found[name] - middle
+    size = float(np.linalg.norm(beside))
+    across = beside / size + BENT * (plane if side == "right" else -plane)
+    line = line / np.linalg.norm(line)
+    across = across - line * float(across @ line)
+    found[name] = middle + size * across / np.linalg.norm(across)
 
 
 def _middles(landmarks: dict[str, Array], template: set[str]) -> None:

@@ -44,6 +44,7 @@ class LandmarkFinder:
     planar: bool
     in_space: bool = False  # the recipes of models in space, each side apart
     height_m: float | None = None  # for joint widths
+    widths_m: Mapping[str, float] = field(default_factory=dict)  # of joints as somebody measured them: "knee_r"
     sole: Mapping[str, float] = field(default_factory=dict)  # side -> slope (rad) of heel to toe on a flat foot
     _chosen: dict[tuple[str, str], Recipe | None] = field(default_factory=dict)
 
@@ -184,7 +185,9 @@ class LandmarkFinder:
         if recipe.offset is not None:
             return self._offset(recipe.offset, side, point, positions)
         if recipe.corner is not None:
-            return corner([point(name) for name in recipe.corner.arms], self._apart(recipe.corner.asis, side, positions))
+            return corner(
+                [point(name) for name in recipe.corner.arms], self._apart(recipe.corner.asis, side, positions)
+            )
         assert recipe.fraction is not None
         start, end = (point(source) for source in recipe.fraction.between)
         return start + by_sex(recipe.fraction.male, recipe.fraction.female, self.sex) * (end - start)
@@ -233,10 +236,15 @@ class LandmarkFinder:
         foot = [point(name) for name in offset.foot] if offset.foot else None
         across = lateral(self._apart(offset.asis, side, positions), foot, side) if offset.inward else None
         scale = offset.scale
+        width_m = self.widths_m.get(f"{offset.width}{SUFFIXES[side]}")
+        if width_m is not None:
+            return offset_point(offset, point, across, side, 0.5 * width_m)
         size = self.height_m if scale is None else float(np.linalg.norm(self._apart(scale, side, positions)))
         if size is None:
             raise ModelError(f"{self.match.where}: height_m is needed: the joint under {offset.origin} has one marker")
-        return offset_point(offset, point, across, side, size)
+        fraction = offset.per_height if offset.per_height is not None else offset.per_scale
+        assert fraction is not None
+        return offset_point(offset, point, across, side, fraction * size)
 
 
 def slope(heel_to_toe: Array) -> Array:
@@ -268,7 +276,7 @@ def off_sole(heel_to_toe: Array, flat: float | None) -> Array:
     return np.asarray(np.cos(pitch) * np.array([0.0, 1.0, 0.0]) - np.sin(pitch) * ahead)
 
 
-_BENT = 10.0
+BENT = 10.0
 """How much the plane of a bent limb counts against the body's middle plane: it takes over from 6 deg of bend."""
 
 
@@ -290,17 +298,16 @@ def lateral(asis: Array, foot: Sequence[Array] | None, side: str) -> Array:
 
 
 def offset_point(
-    offset: Offset, point: Callable[[str], Array], across: Array | None, side: str, size_m: float
+    offset: Offset, point: Callable[[str], Array], across: Array | None, side: str, half_width_m: float
 ) -> Array:
     """The point (3,) m that an `Offset` describes.
 
     Args:
-        point: a marker's or landmark's place. across: `lateral`, for one that goes inward. size_m: height or scale.
+        point: a marker's or landmark's place. across: `lateral`, for one that goes inward. half_width_m: the
+            distance without ``add_m``.
     """
     origin = point(offset.origin)
-    fraction = offset.per_height if offset.per_height is not None else offset.per_scale
-    assert fraction is not None
-    distance = fraction * size_m + offset.add_m
+    distance = half_width_m + offset.add_m
     if offset.along is not None:
         start, end = (point(name) for name in offset.along)
         direction = end - start
@@ -311,7 +318,7 @@ def offset_point(
             upper, middle, lower = (point(name) for name in offset.bend)
             a, b = lower - middle, upper - middle
             plane = np.cross(a, b) / (np.linalg.norm(a) * np.linalg.norm(b))  # to the right of a flexed arm
-            outward = across + _BENT * (plane if side == "right" else -plane)
+            outward = across + BENT * (plane if side == "right" else -plane)
         start, end = (point(name) for name in offset.square_to)
         line = (end - start) / np.linalg.norm(end - start)
         direction = -(outward - line * float(outward @ line))

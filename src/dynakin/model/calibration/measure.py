@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,13 +10,14 @@ import numpy.typing as npt
 
 from dynakin.errors import ModelError
 from dynakin.model.calibration.body import check_body_mass, find_height, find_mass
-from dynakin.model.calibration.completion import completed, free
 from dynakin.model.calibration.checks import check_masses, fixed_lengths, reach, refuse_moving_origin, report
+from dynakin.model.calibration.completion import completed, free
 from dynakin.model.calibration.frames import Trial, choose_side
+from dynakin.model.calibration.functional import functional_landmarks
 from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder, slope
 from dynakin.model.calibration.lumping import PlacedPart, segment_bodies
 from dynakin.model.calibration.posture import Posture, find_geometry, find_posture, frame_landmarks
-from dynakin.model.calibration.sites import Candidate, candidates, find_locks, place_sites
+from dynakin.model.calibration.sites import Candidate, as_marked, candidates, find_locks, place_sites
 from dynakin.model.markers.match import MarkerKey, MarkerMatch
 from dynakin.model.markers.recognise import recognise
 from dynakin.model.markers.schema import MarkerSetFile
@@ -59,8 +61,11 @@ def measure(
     side: str,
     vertical: str,
     forward: str | tuple[float, float, float],
+    functional: Mapping[str, Recording],
 ) -> tuple[ModelPlan, Measured]:
     """The model filled with what the recording shows; arguments and errors as of ``Definition.calibrate``."""
+    if functional and not model.sided:
+        raise ModelError(f"functional is given, but model {model.name} is planar; expected a model in space (fullbody)")
     messages: list[str] = []
     recognised = recognise(recording, asked_markers)
     messages += recognised.messages
@@ -83,20 +88,23 @@ def measure(
         messages.append(how)
     else:
         side = "both"
-    chosen, left_out = candidates(model, trial.match, side)
-    locks, bare, locked = find_locks(model, trial.match, chosen)
-    messages += left_out + locked
-
     source = trial
     if static is not None:
         source = matched(static, None).facing() if model.floating else matched(static, None)
     # A planar model starts from the trial's own landmarks; in space it starts from markers (pose_start).
     common = source.match if model.sided else _common(trial.match, source.match)
     finder = LandmarkFinder(common, side, subject.sex, model.planar, in_space=model.sided)
+    model = as_marked(model, trial.match, finder)
+    chosen, left_out = candidates(model, trial.match, side)
+    locks, bare, locked = find_locks(model, trial.match, chosen)
+    messages += left_out + locked
+
     if model.sided:
         entries = [r for r in (static, recording) if r is not None]
         height_m, how_high = find_height(subject, entries, source, finder)
         finder.height_m = height_m
+        finder.widths_m, said = _joint_widths(entries, finder)
+        messages += said
         finder.sole = flat_slopes(source)
     needed = needed_markers(model, finder, locks)
     refuse_moving_origin(model, trial, finder)
@@ -110,9 +118,11 @@ def measure(
     messages.append(f"Lengths and marker places: {which}.")
     standing = source.median(frames)
     if model.sided:
-        found = completed(
-            model, table, locks, finder.find_in_space(standing), standing, finder.height_m or np.nan, trial.match.where
-        )
+        landmarks = finder.find_in_space(standing)
+        if functional:
+            landmarks, how_found = functional_landmarks(functional, landmarks, finder, source, frames)
+            messages += how_found
+        found = completed(model, table, locks, landmarks, standing, finder.height_m or np.nan, trial.match.where)
         landmarks, added = found.landmarks, set(found.added)
     else:
         landmarks, added = finder.find(standing), set[str]()
@@ -121,7 +131,11 @@ def measure(
         subject,
         [(t.recording, t.ground) for t in ([source, trial] if static is not None else [trial])],
         source.match.foot_markers,
-        [name for key, name in source.match.names.items() if source.match.marker_set.marker(key[0]).segment == "pelvis"],
+        [
+            name
+            for key, name in source.match.names.items()
+            if source.match.marker_set.marker(key[0]).segment == "pelvis"
+        ],
         finder.height_m if model.sided else None,
     )
     messages.append(how)
@@ -231,6 +245,22 @@ def _at_origin(model: ModelFile, trial: Trial, finder: LandmarkFinder, frames: n
     origin_G = spatial.find(trial.median(frames))[model.ground.origin]
     assert keys and np.isfinite(origin_G).all()
     return trial.about(trial.ground.points_to_laboratory(origin_G))
+
+
+def _joint_widths(entries: list[Recording], finder: LandmarkFinder) -> tuple[dict[str, float], list[str]]:
+    """Widths (m) of knee and ankle by joint and side ("knee_r") as the recordings say them, and a sentence where used."""
+    keys = {f"{joint}_{side[0]}": side for joint in ("knee", "ankle") for side in SIDES}
+    found: dict[str, float] = {}
+    for key in keys:
+        joint, side = key.split("_")
+        given = [e.subject[f"{joint}_width_m_{side}"] for e in entries if f"{joint}_width_m_{side}" in e.subject]
+        recipe = finder.recipe(joint, keys[key])
+        if given and recipe is not None and recipe.offset is not None and recipe.offset.width == joint:
+            found[key] = given[0]
+    if not found:
+        return {}, []
+    words = ", ".join(f"{keys[key]} {key.split('_')[0]} {1000.0 * width:.0f} mm" for key, width in found.items())
+    return found, [f"Joint widths: the recording's own ({words})."]
 
 
 def _unmeasured_lengths(

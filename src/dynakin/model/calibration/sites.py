@@ -9,7 +9,7 @@ import numpy as np
 from dynakin.errors import ModelError
 from dynakin.model.calibration.frames import FIRST_FRAMES, Trial
 from dynakin.model.calibration.landmarks import LandmarkFinder
-from dynakin.model.calibration.posture import Posture, find_posture
+from dynakin.model.calibration.posture import Posture, find_posture, frame_landmarks
 from dynakin.model.markers.match import MarkerKey, MarkerMatch
 from dynakin.model.markers.schema import Marker
 from dynakin.model.mirroring import SUFFIXES
@@ -53,7 +53,21 @@ def _home(model: ModelFile, name: str, side: str) -> str | None:
     """The segment that has this part of the body, or this name, on this side."""
     own = [s for s in model.segments if s.side in (None, side)]
     plain = next((s.name for s in own if name in (s.name, s.name.removesuffix(SUFFIXES.get(side, "")))), None)
-    return plain or next((s.name for s in own if name in s.parts), None)
+    return plain or next((s.name for s in own if name in (*s.parts, *s.takes_markers_of)), None)
+
+
+def as_marked(model: ModelFile, match: MarkerMatch, finder: LandmarkFinder) -> ModelFile:
+    """The model without the segments that need markers or landmarks which a recording lacks (`Segment.when_marked`)."""
+    optional = [segment for segment in model.segments if segment.when_marked]
+    if not optional:
+        return model
+    homes = {_home(model, marker.segment, key[1]) for marker, key, _ in match.sites("both", not model.sided)}
+
+    def known(name: str) -> bool:
+        own, plain = finder.of_side(name)
+        return own.known(plain)
+
+    return model.without([s.name for s in optional if s.name not in homes or not all(map(known, frame_landmarks(s)))])
 
 
 def find_locks(

@@ -43,8 +43,8 @@ def expanded(data: Mapping[str, Any]) -> dict[str, Any]:
     without names is left out.
 
     Raises:
-        ValueError: a place or segment that anatomy.toml does not have, or a set to extend that there is not (the nearest
-            is named), or a wrong name pattern.
+        ValueError: a place or segment that anatomy.toml does not have, or no such set to extend (the nearest is named),
+            or a wrong name pattern.
     """
     shared = anatomy()
     if "extends" in data:

@@ -103,8 +103,8 @@ class Offset(Strict):
     The direction is that of ``along``, or, with ``inward``, towards the body's middle plane: the mean of the line
     between the two ASIS and of the right angle to the foot (heel to toe), made square to ``square_to``; with ``bend``
     (three landmarks of a limb, proximal to distal) it is the normal of the limb's plane as far as the limb is bent.
-    The distance is a fraction of the height, or of the distance between both sides of the marker ``scale``, and
-    ``add_m`` (a marker's radius).
+    The distance is half of the joint's ``width`` where the recording says it (`Recording.subject`), else a fraction of
+    the height or of the distance between both sides of the marker ``scale``; and ``add_m`` (a marker's radius).
     """
 
     origin: str
@@ -117,6 +117,7 @@ class Offset(Strict):
     per_height: float | None = None
     scale: str | None = None  # a marker: the distance between its two sides
     per_scale: float | None = None
+    width: Literal["knee", "ankle"] | None = None
     add_m: float = 0.0
 
     @model_validator(mode="after")

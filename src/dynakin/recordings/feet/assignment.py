@@ -323,7 +323,9 @@ class _Assignment:
             self.recording.time, self.feet, contacts, [self.plates[p] for p in own], soles, self.on[:, :, own]
         )
         if missing := [foot for foot in self.feet if foot not in self.contacts]:
-            said.append(f"No markers of the {' and '.join(missing)} foot: nobody sees whether it stands beside the plates.")
+            said.append(
+                f"No markers of the {' and '.join(missing)} foot: nobody sees whether it stands beside the plates."
+            )
         return replace(loads, messages=(*said, *reasons), reasons=tuple(reasons))
 
     def spans(self, flags: Flags) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
@@ -13,7 +14,7 @@ from dynakin.errors import RecordingError
 from dynakin.recordings.formats.c3d_parameters import Parameters
 from dynakin.recordings.formats.c3d_plates import read_plates
 from dynakin.recordings.formats.c3d_points import Points, sort_points
-from dynakin.recordings.formats.c3d_records import check_c3d_file
+from dynakin.recordings.formats.c3d_records import Correction, check_c3d_file
 from dynakin.recordings.formats.c3d_signals import first_frame, read_analog, read_events
 from dynakin.recordings.formats.c3d_subject import read_subject
 from dynakin.recordings.formats.textfile import check_unique, trial_name
@@ -56,9 +57,9 @@ def read_c3d_results(path: Path) -> dict[str, Array]:
 
 
 def _opened(path: Path, use: Callable[[Any, list[str]], _Read]) -> _Read:
-    layout_notes = check_c3d_file(path)
+    layout_notes, corrections = check_c3d_file(path)
     try:
-        data: Any = ezc3d.c3d(str(path))
+        data: Any = _corrected(path, corrections) if corrections else ezc3d.c3d(str(path))
     except Exception as error:  # ezc3d raises anything its C++ throws
         raise RecordingError(f"{path}: cannot be read as C3D ({' '.join(str(error).split())})") from error
     try:
@@ -69,6 +70,17 @@ def _opened(path: Path, use: Callable[[Any, list[str]], _Read]) -> _Read:
         # What the checks let through: numbers in the parameters that no calculation can use.
         found = " ".join(f"{type(error).__name__}: {error}".split())
         raise RecordingError(f"{path}: the C3D's parameters contradict each other ({found})") from error
+
+
+def _corrected(path: Path, corrections: list[Correction]) -> Any:
+    """What ezc3d reads from a copy in which these bytes are put right."""
+    content = bytearray(path.read_bytes())
+    for at, new in corrections:
+        content[at : at + len(new)] = new
+    with tempfile.TemporaryDirectory() as folder:
+        copy = Path(folder) / "corrected.c3d"
+        copy.write_bytes(content)
+        return ezc3d.c3d(str(copy))
 
 
 def _recording(data: Any, path: Path, options: ReadOptions, notes: list[str]) -> Recording:
@@ -115,8 +127,5 @@ def _points(data: Any, parameters: Parameters) -> tuple[Array, Points]:
     """All points (3, N, T) in the file's unit, NaN where no camera saw them, and which are markers."""
     points = np.asarray(data["data"]["points"], dtype=float)[:3].copy()
     residual = np.asarray(data["data"]["meta_points"]["residuals"], dtype=float)[0]  # (N, T)
-    hidden = residual < 0
-    if hidden.all() and points.any():  # a program that writes no residuals has -1 everywhere
-        hidden[:] = False
-    points[:, hidden] = np.nan
+    points[:, residual < 0] = np.nan
     return points, sort_points(parameters, points)

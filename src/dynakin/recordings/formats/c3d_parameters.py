@@ -61,11 +61,11 @@ class Parameters:
 
 
 def _printable(text: str) -> str:
-    """A text that is not UTF-8 comes with its bytes as lone surrogates, which nothing can print: Latin-1 then. Some
-    systems fill up with NUL."""
-    text = text.strip("\0")
+    """A text that is not UTF-8 comes with its bytes as lone surrogates, which nothing can print: Latin-1 then. NUL ends
+    it, as in C; what else cannot be printed (a line end, say) is a blank."""
+    text = text.split("\0")[0]
     try:
         text.encode()
     except UnicodeEncodeError:
-        return text.encode("utf-8", "surrogateescape").decode("latin-1")
-    return text
+        text = text.encode("utf-8", "surrogateescape").decode("latin-1")
+    return "".join(letter if letter.isprintable() else " " for letter in text)

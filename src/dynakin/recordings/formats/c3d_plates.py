@@ -128,7 +128,7 @@ def _raw(
     force, moment = plate_wrench(
         kind,
         analog[channels],
-        origin=_slice(parameters.array("FORCE_PLATFORM", "ORIGIN"), k, 3, "ORIGIN") * unit_m,
+        origin=_origin(parameters, k, kind) * unit_m,
         calibration=calibration,
         units=_factors(parameters, channels, unit_m, kind, calibration),
     )
@@ -161,6 +161,11 @@ def _slice(values: Array, k: int, size: int, key: str) -> Array:
     if len(flat) < size * (k + 1):
         raise RecordingError(f"FORCE_PLATFORM:{key} has {len(flat)} numbers, it needs {size * (k + 1)}")
     return flat[size * k : size * (k + 1)]
+
+
+def _origin(parameters: Parameters, k: int, kind: int) -> Array:
+    """Of plate k, in the file's unit; type 1 needs none."""
+    return np.zeros(3) if kind == 1 else _slice(parameters.array("FORCE_PLATFORM", "ORIGIN"), k, 3, "ORIGIN")
 
 
 def _calibration(parameters: Parameters, k: int, kind: int) -> Array | None:

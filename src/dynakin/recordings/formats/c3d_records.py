@@ -22,15 +22,18 @@ from dynakin.files import require_file
 _TYPES = {-1: 1, 1: 1, 2: 2, 4: 4}  # text, byte, integer, float: bytes per value
 _MAX_DIMENSIONS = 7
 _MAX_DESCRIPTION = 127  # ezc3d reads the length as a signed byte
+_MOST_PADDING = 3  # bytes: some programs begin their records at even or at fourth bytes
 
 
 @dataclass(frozen=True)
 class Record:
-    """Type and raw values of one parameter; ``dec`` where its floats are in DEC's order."""
+    """Type and raw values of one parameter; ``dec`` where its floats are in DEC's order; ``at``: where its values begin
+    in the file."""
 
     kind: int
     raw: bytes
     dec: bool
+    at: int
 
     @property
     def count(self) -> int:
@@ -47,12 +50,21 @@ class Record:
             return float(struct.unpack("<f", raw[2:] + raw[:2])[0]) / 4
         return float(struct.unpack({1: "<B", 2: "<H", 4: "<f"}[self.kind], raw)[0])
 
+    def replaced(self, value: float) -> Correction | None:
+        """What to write over the file so that the first value is another; None where it cannot be written."""
+        if self.dec or self.count < 1 or self.kind not in (2, 4):
+            return None
+        return self.at, struct.pack("<f", value) if self.kind == 4 else struct.pack("<H", math.ceil(value))
 
+
+Correction = tuple[int, bytes]
+"""Place in the file, and the bytes that belong there."""
 Groups = dict[str, dict[str, Record]]
 
 
-def read_records(section: bytes, start: int, path: Path, *, dec: bool) -> Groups:
-    """Parameters by group and name, upper case.
+def read_records(section: bytes, start: int, path: Path, *, dec: bool) -> tuple[Groups, list[Correction]]:
+    """Parameters by group and name, upper case, and the section written anew where ezc3d could not read it: records
+    with a few bytes of padding behind them, descriptions of 128 characters or more (these are cut).
 
     Args:
         section: bytes from the start of the parameter section to where the data begin.
@@ -64,6 +76,7 @@ def read_records(section: bytes, start: int, path: Path, *, dec: bool) -> Groups
     """
     names: dict[int, str] = {}
     found: dict[int, dict[str, Record]] = {}
+    anew = bytearray(section[:4])
     at = 4
     while True:
         length, group = struct.unpack("bb", _take(section, at, 2, start, path, "the next record"))
@@ -86,18 +99,16 @@ def read_records(section: bytes, start: int, path: Path, *, dec: bool) -> Groups
             names.setdefault(-group, name)
             end = here + 2
         else:
-            record, end = _parameter(inside, here + 2, start, path, what, dec)
+            record, end = _parameter(inside, here + 2, start + len(anew) - at, path, what, dec)
             found.setdefault(group, {})[name] = record
-        description = _take(inside, end, 1, start, path, what)[0]
-        if description > _MAX_DESCRIPTION:
-            raise RecordingError(
-                f"{path}: damaged C3D parameters, {what} has a description of {description} bytes, "
-                f"expected at most {_MAX_DESCRIPTION}"
-            )
-        end += 1 + len(_take(inside, end + 1, description, start, path, what))
+        length = _take(inside, end, 1, start, path, what)[0]
+        description = _take(inside, end + 1, length, start, path, what)[:_MAX_DESCRIPTION]
+        content = section[here + 2 : end] + bytes([len(description)]) + description
+        end += 1 + length
+        anew += section[at:here] + struct.pack("<H", (2 + len(content)) if offset else 0) + content
         if offset == 0:
             break
-        if end != following:  # ezc3d refuses that too, but does not say where
+        if not end <= following <= end + _MOST_PADDING:  # ezc3d refuses that too, but does not say where
             raise RecordingError(
                 f"{path}: damaged C3D parameters, {what} ends at byte {start + end}, "
                 f"expected byte {start + following}, where the next record begins"
@@ -106,7 +117,8 @@ def read_records(section: bytes, start: int, path: Path, *, dec: bool) -> Groups
     groups: Groups = {}
     for number, name in sorted(names.items()):
         groups.setdefault(name, found.get(number, {}))  # of two groups with one name ezc3d takes the first
-    return groups
+    same = section.startswith(anew)
+    return groups, [] if same else [(start, bytes(anew.ljust(len(section), b"\0")))]
 
 
 def _parameter(section: bytes, at: int, start: int, path: Path, what: str, dec: bool) -> tuple[Record, int]:
@@ -123,7 +135,7 @@ def _parameter(section: bytes, at: int, start: int, path: Path, what: str, dec: 
     dimensions = _take(section, at + 2, n_dimensions, start, path, what)
     values = at + 2 + n_dimensions
     raw = _take(section, values, math.prod(dimensions) * _TYPES[kind], start, path, what)
-    return Record(kind, raw, dec), values + len(raw)
+    return Record(kind, raw, dec, start + values), values + len(raw)
 
 
 def _take(section: bytes, at: int, size: int, start: int, path: Path, what: str) -> bytes:
@@ -144,8 +156,8 @@ _BLOCK = 512
 _INTEL, _DEC = 84, 85  # 86, MIPS, is unknown to ezc3d
 
 
-def check_c3d_file(path: Path) -> list[str]:
-    """Notes on what the file says twice and differently.
+def check_c3d_file(path: Path) -> tuple[list[str], list[Correction]]:
+    """Notes on what the file says twice and differently, and what has to be corrected so that ezc3d reads it right.
 
     Raises:
         RecordingError: in one clear sentence, the file is no C3D, is shorter than it promises, or its header
@@ -184,12 +196,15 @@ def check_c3d_file(path: Path) -> list[str]:
         )
     if header.data_start < _BLOCK:
         raise RecordingError(f"{path}: found data in block {header.data_start // _BLOCK + 1}, expected 2 or later")
-    return check_counts(header, read_records(section, start, path, dec=processor == _DEC), size, path)
+    groups, rewritten = read_records(section, start, path, dec=processor == _DEC)
+    notes, corrections = check_counts(header, groups, size, path)
+    return notes, rewritten + corrections
 
 
 def _header(head: bytes, *, dec: bool) -> Header:
     words = struct.unpack("<12H", head[:24])
-    n_points, n_analog, first, last, data_block = words[1], words[2], words[3], words[4], words[8]
+    scale = head[14:16] + head[12:14] if dec else head[12:16]
+    n_points, n_analog, first, last, data_block, samples = words[1], words[2], words[3], words[4], words[8], words[9]
     # A negative scale (words 7 and 8) means floating-point data. Its sign bit is in the last byte in Intel
     # order, in the second in DEC's.
     sign = head[13] if dec else head[15]
@@ -199,6 +214,8 @@ def _header(head: bytes, *, dec: bool) -> Header:
         frames=last - first + 1 if last >= first else 0,
         data_start=(data_block - 1) * _BLOCK,
         floating=bool(sign & 0x80),
+        samples=samples,
+        scale=float(struct.unpack("<f", scale)[0]),
     )
 
 
@@ -220,22 +237,29 @@ _BYTES_PER_ROTATION = 17 * 4  # a matrix of 16 and its reliability
 
 @dataclass(frozen=True)
 class Header:
-    """What the header block says; ``n_analog`` values a frame, ``data_start`` in bytes."""
+    """What the header block says; ``n_analog`` values a frame in ``samples`` samples of each channel, ``data_start`` in
+    bytes."""
 
     n_points: int
     n_analog: int
     frames: int
     data_start: int
     floating: bool
+    samples: int
+    scale: float
 
     @property
     def frame_bytes(self) -> int:
         """Bytes of one frame."""
         return (4 * self.n_points + self.n_analog) * (4 if self.floating else 2)
 
+    def fits(self, size: int) -> bool:
+        """Whether the data that it promises fill a file of ``size`` bytes, but for its last blocks."""
+        return 0 <= size - self.data_start - self.frames * self.frame_bytes <= 2 * _BLOCK
 
-def check_counts(header: Header, groups: Groups, size: int, path: Path) -> list[str]:
-    """Notes on harmless contradictions.
+
+def check_counts(header: Header, groups: Groups, size: int, path: Path) -> tuple[list[str], list[Correction]]:
+    """Notes on contradictions that are harmless, or that the size of the file settles, and corrections for the latter.
 
     Raises:
         RecordingError: contradictions that would put values out of place, or promises beyond the file's end.
@@ -245,30 +269,31 @@ def check_counts(header: Header, groups: Groups, size: int, path: Path) -> list[
             record = groups.get(group, {}).get(name)
             if record is not None and not math.isfinite(record.first()):
                 raise RecordingError(f"{path}: damaged C3D parameters, {group}:{name} holds no number, expected one")
+    settled = _Settled(groups, trusted=header.fits(size) and not _number(groups, "ROTATION", "USED", 0))
     points = _number(groups, "POINT", "USED", 0)
-    if points != header.n_points or points == 0:
+    if header.n_points == 0 or (points != header.n_points and not settled.by_header("POINT", "USED", header.n_points)):
         raise RecordingError(
             f"{path}: found {points:g} points in POINT:USED and {header.n_points} in the header, "
             "expected the same number, at least 1"
         )
     floating = _number(groups, "POINT", "SCALE", -1.0) < 0
-    if floating != header.floating:
+    if floating != header.floating and not settled.by_header("POINT", "SCALE", header.scale):
         kinds = {True: "floating-point", False: "integer"}
         raise RecordingError(
             f"{path}: found {kinds[floating]} data by POINT:SCALE and {kinds[header.floating]} data by the header, "
             "expected the same"
         )
     if "SHADOW" not in groups:  # that maker's files leave ANALOG out, and ezc3d knows
-        _check_analog(header, groups, path)
+        _check_analog(header, groups, settled, path)
     frames = _number(groups, "POINT", "FRAMES", 0)
     needed = header.data_start + frames * header.frame_bytes
-    if frames < 0 or needed > size:
+    if (frames < 0 or needed > size) and not settled.by_header("POINT", "FRAMES", header.frames):
         raise RecordingError(
             f"{path}: truncated C3D file, found {size} bytes, expected {needed:.0f} for POINT:FRAMES {frames:g}"
         )
     _check_rotations(groups, size, path)
-    notes = []
-    if frames and frames != header.frames:
+    notes = settled.notes
+    if frames and frames != header.frames and needed <= size:
         notes.append(f"The header says {header.frames} frames, POINT:FRAMES {frames:g}: the latter is used.")
     block = _number(groups, "POINT", "DATA_START", 0)
     used = header.data_start // 512 + 1
@@ -276,23 +301,55 @@ def check_counts(header: Header, groups: Groups, size: int, path: Path) -> list[
         notes.append(
             f"The header says that data begin in block {used}, POINT:DATA_START {block:g}: the former is used."
         )
-    return notes
+    return notes, settled.corrections
 
 
-def _check_analog(header: Header, groups: Groups, path: Path) -> None:
+class _Settled:
+    """Parameters that contradict a header which fits the file's size (``trusted``) are corrected."""
+
+    def __init__(self, groups: Groups, *, trusted: bool) -> None:
+        self._groups, self._trusted = groups, trusted
+        self.notes: list[str] = []
+        self.corrections: list[Correction] = []
+
+    def by_header(self, group: str, name: str, value: float) -> bool:
+        """Whether the header's value could be put in the parameter's place."""
+        record = self._groups.get(group, {}).get(name)
+        correction = record.replaced(value) if record is not None and self._trusted else None
+        if record is None or correction is None:
+            return False
+        self.corrections.append(correction)
+        here, there = f"{record.first():g}", f"{round(value, 2):g}"
+        self.notes.append(f"{group}:{name} says {here}, the header and the file's size {there}: the latter is used.")
+        return True
+
+
+def _check_analog(header: Header, groups: Groups, settled: _Settled, path: Path) -> None:
     """Channels times samples a frame as ezc3d counts them, and a scale and an offset for each channel."""
     channels = _number(groups, "ANALOG", "USED", 0)
     point_rate = _number(groups, "POINT", "RATE", 0)
     ratio = _number(groups, "ANALOG", "RATE", 0) / point_rate if point_rate >= 1 else 1.0
     most = 65535 if header.n_analog else _MOST_SAMPLES
-    if not 0 <= ratio <= most:
-        raise RecordingError(f"{path}: found {ratio:g} analog samples a frame, expected a number from 0 to {most}")
-    # A rate is a 4-byte float: 999.99 / 100 may be meant as 10.
-    if header.n_analog not in (channels * math.floor(ratio), channels * round(ratio)):
-        raise RecordingError(
-            f"{path}: found {channels:g} analog channels of {ratio:g} samples a frame in ANALOG:USED and the rates, "
-            f"expected the {header.n_analog} analog values a frame of the header"
-        )
+    in_header, odd = divmod(header.n_analog, max(header.samples, 1))
+    # ezc3d cuts the ratio to a whole number, and a rate is a 4-byte float: 999.99 / 100 may be meant as 10.
+    if not 0 <= ratio <= most or header.n_analog != channels * math.floor(ratio):
+        samples = max(header.samples, 1)
+        rate = (samples + 1e-5) * point_rate  # which ezc3d does not cut to one less
+        sensible = point_rate >= 1 and not odd and samples <= _MOST_SAMPLES
+        if not (
+            sensible
+            and (channels == in_header or settled.by_header("ANALOG", "USED", in_header))
+            and (header.n_analog == 0 or math.floor(ratio) == samples or settled.by_header("ANALOG", "RATE", rate))
+        ):
+            if not 0 <= ratio <= most:
+                raise RecordingError(
+                    f"{path}: found {ratio:g} analog samples a frame, expected a number from 0 to {most}"
+                )
+            raise RecordingError(
+                f"{path}: found {channels:g} analog channels of {ratio:g} samples a frame in ANALOG:USED and the "
+                f"rates, expected the {header.n_analog} analog values a frame of the header"
+            )
+        channels = in_header
     for name in ("SCALE", "OFFSET") if header.n_analog else ():
         parts = [groups.get("ANALOG", {}).get(name + suffix) for suffix in ("", *map(str, range(2, 100)))]
         count = sum(part.count for part in parts if part is not None)

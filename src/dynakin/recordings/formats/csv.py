@@ -1,4 +1,4 @@
-"""dynakin's own simple format: one row of names, then numbers, parted by commas.
+"""dynakin's own simple format: one row of names, then numbers, parted by commas, semicolons or tabs.
 
 ``time`` in s, ``NAME_x, NAME_y, NAME_z`` in m for each marker, and, where there are plates, force columns in
 any of OpenSim's spellings (``FP1_vx`` ... N, ``FP1_px`` ... m, ``FP1_mx`` ... N m, ground-on-person) in the
@@ -13,7 +13,9 @@ cell is a missing value, a line that begins with ``#`` a remark::
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
+from typing import Literal
 
 import numpy as np
 
@@ -21,35 +23,49 @@ from dynakin.errors import RecordingError
 from dynakin.recordings.formats.grf_columns import parse_column
 from dynakin.recordings.formats.ground_forces import attach_forces
 from dynakin.recordings.formats.mot import Table
-from dynakin.recordings.formats.textfile import check_time, check_unique, parse_row, read_lines, split_cells, trial_name
-from dynakin.recordings.formats.trajectories import clean_markers, timing_notes
-from dynakin.recordings.recording import Recording
+from dynakin.recordings.formats.textfile import (
+    check_time,
+    check_unique,
+    even_times,
+    parse_rows,
+    read_lines,
+    split_cells,
+    trial_name,
+)
+from dynakin.recordings.formats.trajectories import clean_markers, length_unit, timing_notes
+from dynakin.recordings.recording import Array, Recording
 from dynakin.recordings.resampling import ReadOptions
+
+_TIME = re.compile(r"^time\W*(s|sec|seconds)?\W*$", re.IGNORECASE)
+_COORDINATE = re.compile(r"^(.+?)[_.: -]([xyz])$", re.IGNORECASE)
+_EXPECTED = "expected NAME_x, NAME_y and NAME_z for each marker"
+_PERSON = 5  # markers that show how large a person is
 
 
 def read_csv_table(path: Path) -> Table:
     """All columns of such a file, without sorting them into markers and forces."""
     path = Path(path)
-    rows: list[list[float]] = []
-    numbers: list[int] = []
-    names: list[str] = []
-    for number, line in enumerate(read_lines(path), start=1):
-        if not line.strip() or line.lstrip().startswith("#"):
-            continue
-        cells = split_cells(line, ",")
-        if not names:
-            names = [cell.strip('"') for cell in cells]
-            if names[0].casefold() != "time":
-                raise RecordingError(f"{path}, line {number}: found column {names[0]!r} first, expected 'time'")
-            check_unique(names, "column", path)
-        else:
-            rows.append(parse_row(cells, names, path, number))
-            numbers.append(number)
-    if not rows:
+    filled = [
+        (number, line)
+        for number, line in enumerate(read_lines(path), start=1)
+        if line.strip(" \t,;") and not line.lstrip(' "').startswith("#")
+    ]
+    if not filled:
         raise RecordingError(f"{path}: has no rows of numbers")
-    values = np.array(rows)
-    check_time(values[:, 0], numbers, path)
-    return Table(tuple(names[1:]), values[:, 0], values[:, 1:], None, path)
+    first, head = filled[0]
+    separator = next((mark for mark in ";\t" if mark in head), ",")
+    names = split_cells(head, separator)
+    while len(names) > 1 and not names[-1]:
+        del names[-1]
+    if not _TIME.match(names[0]):
+        raise RecordingError(f"{path}, line {first}: found column {names[0]!r} first, expected 'time'")
+    check_unique(names, "column", path)
+    values, numbers, notes = parse_rows(((n, split_cells(line, separator)) for n, line in filled[1:]), names, path)
+    if not len(values):
+        raise RecordingError(f"{path}: has no rows of numbers")
+    time, time_notes = even_times(values[:, 0])
+    check_time(time, numbers, path)
+    return Table(tuple(names[1:]), time, values[:, 1:], None, path, tuple(notes + time_notes))
 
 
 def read_csv(path: Path, options: ReadOptions | None = None) -> Recording:
@@ -62,24 +78,45 @@ def read_csv(path: Path, options: ReadOptions | None = None) -> Recording:
     table = read_csv_table(path)
     forces = [name for name in table.names if parse_column(name)]
     rest = [name for name in table.names if name not in forces]
-    names = tuple(dict.fromkeys(name[:-2] for name in rest if name[-2:] in ("_x", "_y", "_z")))
-    expected = {f"{name}_{axis}" for name in names for axis in "xyz"}
-    for name in sorted(expected ^ set(rest)):
-        found = "found" if name in rest else "missing"
-        raise RecordingError(f"{path}: {found} column {name!r}, expected NAME_x, NAME_y and NAME_z for each marker")
-    raw = np.stack([table.column(f"{name}_{axis}") for name in names for axis in "xyz"], axis=1) if names else None
-    shape = (len(table.time), len(names), 3)
-    markers, notes = clean_markers(names, np.empty(shape) if raw is None else raw.reshape(shape))
+    names, raw = _markers(table, rest)
+    factor, unit, unit_notes = (1.0, "m", []) if forces else _unit(raw)
+    markers, notes = clean_markers(names, raw * factor)
     recording = Recording(
         name=trial_name(table.path),
         path=table.path,
         time=table.time,
         marker_names=names,
         markers=markers,
-        notes=tuple(timing_notes(table.time) + notes),
+        length_unit=unit,
+        notes=(*table.notes, *timing_notes(table.time), *unit_notes, *notes),
     )
     if not forces:
         return recording
     columns = np.column_stack([table.column(name) for name in forces])
     only = Table(tuple(forces), table.time, columns, None, table.path)
     return attach_forces(recording, only, options or ReadOptions())
+
+
+def _markers(table: Table, columns: list[str]) -> tuple[tuple[str, ...], Array]:
+    """Names, and places (T, M, 3) in the file's unit, of the markers whose coordinates these columns are."""
+    spots: dict[str, dict[str, str]] = {}
+    for column in columns:
+        parts = _COORDINATE.match(column)
+        if parts is None:
+            raise RecordingError(f"{table.path}: found column {column!r}, {_EXPECTED}")
+        axes = spots.setdefault(parts[1].strip(), {})
+        if parts[2].lower() in axes:
+            raise RecordingError(f"{table.path}: found columns {axes[parts[2].lower()]!r} and {column!r}, {_EXPECTED}")
+        axes[parts[2].lower()] = column
+    for name, axes in spots.items():
+        for axis in set("xyz") - set(axes):
+            raise RecordingError(f"{table.path}: missing column {f'{name}_{axis}'!r}, {_EXPECTED}")
+    raw = [table.column(axes[axis]) for axes in spots.values() for axis in "xyz"]
+    shape = (len(table.time), len(spots), 3)
+    return tuple(spots), np.stack(raw, axis=1).reshape(shape) if raw else np.empty(shape)
+
+
+def _unit(raw: Array) -> tuple[float, Literal["mm", "m"], list[str]]:
+    """The format is in m; what cannot be a person in m is in the unit in which it can."""
+    factor, unit, notes = length_unit("", raw)
+    return (factor, unit, notes) if raw.shape[1] >= _PERSON and factor != 1.0 else (1.0, "m", [])

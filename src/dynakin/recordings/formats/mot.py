@@ -16,7 +16,14 @@ from pathlib import Path
 import numpy as np
 
 from dynakin.errors import RecordingError
-from dynakin.recordings.formats.textfile import check_time, check_unique, parse_row, read_lines, split_cells
+from dynakin.recordings.formats.textfile import (
+    check_time,
+    check_unique,
+    even_times,
+    parse_rows,
+    read_lines,
+    split_cells,
+)
 from dynakin.recordings.recording import Array
 
 _ENTRY = re.compile(
@@ -68,9 +75,8 @@ def read_table(path: str | Path) -> Table:
     """Read a MOT or STO file.
 
     Raises:
-        RecordingError: no column line beginning with time, wrong column count (line, found, expected), fewer
-            rows than the header promises (a truncated file), a column given twice, time that does not
-            increase.
+        RecordingError: no column line beginning with time, wrong column count (line, found, expected), a column given
+            twice, time that does not increase.
     """
     path = Path(path)
     lines = read_lines(path)
@@ -80,21 +86,18 @@ def read_table(path: str | Path) -> Table:
         if entry := _ENTRY.match(line):
             key = entry[1].casefold()
             header.setdefault(_SYNONYMS.get(key, key), entry[2])
-    columns = split_cells(lines[top].rstrip())
+    columns = [name for name in split_cells(lines[top]) if name]
     check_unique(columns, "column", path)
 
-    rows, numbers = [], []
-    for k in range(top + 1, len(lines)):
-        if lines[k].strip():
-            cells = split_cells(lines[k])
-            rows.append(parse_row(cells, columns, path, k + 1))
-            numbers.append(k + 1)
-    if not rows:
+    body = ((k + 1, split_cells(lines[k])) for k in range(top + 1, len(lines)))
+    table, numbers, notes = parse_rows(body, columns, path)
+    if not len(table):
         raise RecordingError(f"{path}: has no rows of numbers after line {top + 1}")
-    table = np.array(rows)
-    check_time(table[:, 0], numbers, path)
-    notes = _count_notes(header, len(rows), len(columns), path)
-    return Table(tuple(columns[1:]), table[:, 0], table[:, 1:], _in_degrees(header, path), path, tuple(notes))
+    time, time_notes = even_times(table[:, 0])
+    check_time(time, numbers, path)
+    notes = [f"{path.name}: {note}" for note in notes + time_notes]
+    notes += _count_notes(header, len(table), len(columns), path)
+    return Table(tuple(columns[1:]), time, table[:, 1:], _in_degrees(header, path), path, tuple(notes))
 
 
 def _names_line(lines: list[str], path: Path) -> int:
@@ -112,12 +115,13 @@ def _count_notes(header: dict[str, str], rows: int, columns: int, path: Path) ->
     notes = []
     said_rows, said_columns = header.get("nrows", ""), header.get("ncolumns", "")
     if said_columns and _count(said_columns) not in (None, columns):
-        notes.append(f"{path.name}: the header says {said_columns} columns, the file names {columns}.")
+        notes.append(f"{path.name}: the header says {said_columns:.20} columns, the file names {columns}.")
     said = _count(said_rows)
-    if said is not None and said > rows:
-        raise RecordingError(f"{path}: found {rows} rows, expected the {said_rows} of its header (truncated?)")
-    if said is not None and said < rows:
-        notes.append(f"{path.name}: the header says {said_rows} rows, the file holds {rows}: all are used.")
+    if said is not None and said != rows:
+        cut = " (has it been cut off?)" if said > rows else ""
+        notes.append(
+            f"{path.name}: the header says {said:.6g} rows, the file holds {rows}{cut}: all of these are used."
+        )
     return notes
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import codecs
+import csv
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +17,10 @@ from dynakin.recordings.limits import LONGEST_GAP_S, rate_problem
 from dynakin.recordings.recording import Array
 
 _CONTROL = re.compile(r"[\x00-\x1f\x7f]+")
+# What programs write for a value that is missing
+_MISSING = ("", "nan", "-nan", "na", "n/a", "#n/a", "null", "none", "-", "-nan(ind)", "nan(ind)", "-1.#ind", "1.#qnan")
+_ROUGH = 0.1  # part of a step from which rounding of times is undone: `resampling.UNEVEN` would refuse it
+_ENOUGH = 10  # times that show a grid
 
 
 def trial_name(path: Path) -> str:
@@ -23,27 +29,58 @@ def trial_name(path: Path) -> str:
 
 
 def read_lines(path: Path) -> list[str]:
-    """All lines without their ends (LF, CRLF or CR), byte order mark removed; Latin-1 where it is not
-    UTF-8."""
+    """All lines without their ends (LF, CRLF or CR), byte order mark removed; UTF-16 where its mark says so, Latin-1
+    where it is not UTF-8."""
     raw = read_bytes(path)
-    if b"\0" in raw:
-        raise RecordingError(f"{path}: is not a text file")
+    encoding = "utf-16" if raw[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE) else "utf-8-sig"
     try:
-        text = raw.decode("utf-8-sig")
+        text = raw.decode(encoding)
     except UnicodeDecodeError:
         text = raw.decode("latin-1")
+    if "\0" in text:
+        raise RecordingError(f"{path}: is not a text file")
     return text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
 
 
 def split_cells(line: str, separator: str | None = None) -> list[str]:
-    """Cells of a line: between tabs where it has any (blank cells count), else between blanks."""
-    if separator is not None:
-        return [cell.strip() for cell in line.split(separator)]
-    return [cell.strip() for cell in line.split("\t")] if "\t" in line else line.split()
+    """Cells of a line without blanks and quotes round them: between tabs where it has any (blank cells count), else
+    between blanks."""
+    if separator is None:
+        separator = "\t" if "\t" in line else None
+    if separator is None:
+        return [cell.strip('"') for cell in line.split()]
+    if '"' in line:
+        try:
+            return [cell.strip() for cell in next(csv.reader([line], delimiter=separator, skipinitialspace=True))]
+        except csv.Error:
+            pass
+    return [cell.strip() for cell in line.split(separator)]
+
+
+def parse_rows(
+    lines: Iterable[tuple[int, Sequence[str]]], names: Sequence[str], path: Path
+) -> tuple[Array, list[int], list[str]]:
+    """Numbers (R, K) of rows of cells, the line of each, and notes.
+
+    Decimal commas are read where the file has no decimal point beside them.
+
+    Args:
+        lines: number and cells of each line; those without any filled cell are passed over.
+    """
+    rows = [(number, cells) for number, cells in lines if any(cells)]
+    notes = []
+    if any("," in cell for _, cells in rows for cell in cells) and not any(
+        "." in cell for _, cells in rows for cell in cells
+    ):
+        rows = [(number, [cell.replace(",", ".") for cell in cells]) for number, cells in rows]
+        notes.append("Numbers are written with decimal commas.")
+    table = np.array([parse_row(cells, names, path, number) for number, cells in rows])
+    return table, [number for number, _ in rows], notes
 
 
 def parse_row(cells: Sequence[str], names: Sequence[str], path: Path, line: int) -> list[float]:
-    """Numbers of one row, a blank cell is NaN; trailing blank cells beyond the last column are dropped.
+    """Numbers of one row, a blank cell is NaN; blank cells beyond the last column are dropped, and every second one in
+    a row that is parted by doubled tabs.
 
     Raises:
         RecordingError: the number of columns is not that of ``names``, or a cell is no number.
@@ -51,12 +88,14 @@ def parse_row(cells: Sequence[str], names: Sequence[str], path: Path, line: int)
     found = len(cells)
     while found > len(names) and not cells[found - 1]:
         found -= 1
+    if found > len(names) and len(cells[:found:2]) == len(names) and not any(cells[1::2]):
+        cells, found = cells[:found:2], len(names)
     if found != len(names):
         raise RecordingError(f"{path}, line {line}: found {found} columns, expected {len(names)}")
     row = []
     for cell, name in zip(cells, names, strict=False):
         try:
-            value = float(cell) if cell else np.nan
+            value = np.nan if cell.casefold() in _MISSING else float(cell)
             if np.isinf(value):
                 raise ValueError
             row.append(value)
@@ -66,6 +105,34 @@ def parse_row(cells: Sequence[str], names: Sequence[str], path: Path, line: int)
                 f"{path}, line {line}: found {cell!r} in column {name!r}, expected a number{hint}"
             ) from None
     return row
+
+
+def even_times(time: Array, rate_in_header: float | None = None) -> tuple[Array, list[str]]:
+    """Times (T,) s that the file rounds to more than a tenth of a step, put back on the even grid that they come from,
+    and a note; all others as they are.
+
+    The grid is one from which every time of the file follows by rounding; its rate is that of the header, a whole
+    number of Hz, or the mean, the first that does.
+    """
+    if len(time) < _ENOUGH or not np.isfinite(time).all():
+        return time, []
+    rounded_to = next((10.0**-d for d in range(7) if np.abs(time - np.round(time, d)).max() < 1e-9), None)
+    k = np.arange(len(time))
+    centred = k - k.mean()
+    slope = float(centred @ time / (centred @ centred))  # s a frame, by least squares
+    if rounded_to is None or slope <= 0.0 or rounded_to <= _ROUGH * slope or (np.diff(time) < 0).any():
+        return time, []
+    for rate in (rate_in_header, float(np.rint(1.0 / slope)), 1.0 / slope):
+        if rate is None or not rate > 0.0 or np.abs(np.diff(time) - 1.0 / rate).max() >= (1.0 - 1e-6) * rounded_to:
+            continue
+        low, high = (time - k / rate).max() - 0.55 * rounded_to, (time - k / rate).min() + 0.55 * rounded_to
+        if low <= high:
+            even = np.clip(time[0], low, high) + k / rate
+            if np.abs(even - time).max() < 1e-6 / rate:
+                return time, []
+            note = f"Times are rounded to {rounded_to:g} s in the file: taken as an even {rate:.6g} Hz."
+            return even, [note]
+    return time, []
 
 
 def check_time(time: Array, lines: Sequence[int], path: Path) -> None:

@@ -66,10 +66,12 @@ def told_apart(names: tuple[str, ...], markers: Array) -> tuple[tuple[str, ...],
         kept = _distinct(list(places.transpose(1, 0, 2)))
         if len(kept) == 1:
             labels = [name]
-            notes.append(f"Marker {name!r} is in the file {len(doubled)} times: one is empty or the same, one is kept.")
+            notes.append(
+                f"Marker {name!r} is in the file {len(doubled)} times, never at different places: taken as one."
+            )
         else:
             labels = _labels(name, kept, set(counts))
-            who = " and ".join(repr(label) for label in labels)
+            who = " and ".join(repr(label) for label in sorted(labels))
             notes.append(f"Warning: marker {name!r} is in the file {len(doubled)} times, at different places: {who}.")
         new_names += labels
         columns += kept

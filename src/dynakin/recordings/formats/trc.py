@@ -17,16 +17,20 @@ from __future__ import annotations
 import re
 from itertools import pairwise
 from pathlib import Path
-from typing import Literal
-
-import numpy as np
 
 from dynakin.errors import RecordingError
-from dynakin.recordings.formats.textfile import check_time, check_unique, parse_row, read_lines, split_cells, trial_name
-from dynakin.recordings.formats.trajectories import clean_markers, timing_notes
-from dynakin.recordings.recording import Array, Recording
+from dynakin.recordings.formats.textfile import (
+    check_time,
+    check_unique,
+    even_times,
+    parse_rows,
+    read_lines,
+    split_cells,
+    trial_name,
+)
+from dynakin.recordings.formats.trajectories import clean_markers, length_unit, timing_notes, told_apart
+from dynakin.recordings.recording import Recording
 from dynakin.recordings.resampling import ReadOptions
-from dynakin.units import length_factor
 
 _AXES_ROW = re.compile(r"^[XYZ]_?\d*$", re.IGNORECASE)
 
@@ -35,8 +39,7 @@ def read_trc(path: Path, options: ReadOptions | None = None) -> Recording:
     """Read a TRC file; ``options`` concern plates only, which the format does not have.
 
     Raises:
-        RecordingError: not a TRC, wrong column count (with line, found and expected), unknown unit, time that
-            does not increase, a marker name given twice.
+        RecordingError: not a TRC, wrong column count (with line, found and expected), time that does not increase.
     """
     path = Path(path)
     lines = read_lines(path)
@@ -46,29 +49,24 @@ def read_trc(path: Path, options: ReadOptions | None = None) -> Recording:
     names = tuple(cell for cell in split_cells(lines[top])[2:] if cell)
     if not names:
         raise RecordingError(f"{path}, line {top + 1}: found no marker names after 'Frame#' and 'Time'")
-    check_unique(names, "marker", path)
     header = _header(lines[:top])
-
     columns = ["Frame#", "Time", *(f"{name} {axis}" for name in names for axis in "xyz")]
-    rows: list[list[float]] = []
-    numbers: list[int] = []
-    for k in range(top + 1, len(lines)):
-        cells = split_cells(lines[k])
-        filled = [cell for cell in cells if cell]
-        if not filled or (not rows and all(_AXES_ROW.match(cell) for cell in filled)):
-            continue
-        rows.append(parse_row(cells, columns, path, k + 1))
-        numbers.append(k + 1)
-    if not rows:
+    body = [(k + 1, split_cells(lines[k])) for k in range(top + 1, len(lines))]
+    while body and all(_AXES_ROW.match(cell) for cell in body[0][1] if cell):  # blank lines, too
+        del body[0]
+    table, numbers, row_notes = parse_rows(body, columns, path)
+    if not len(table):
         raise RecordingError(f"{path}: has no frames, expected rows of numbers after line {top + 1}")
-    table = np.array(rows)
-    time = table[:, 1]
+    rate = _number(header.get("datarate"))
+    time, time_notes = even_times(table[:, 1], rate)
     check_time(time, numbers, path)
 
-    notes = _count_notes(header, len(rows), len(names)) + timing_notes(time, _number(header.get("datarate")))
-    raw = table[:, 2:].reshape(len(rows), len(names), 3)
-    factor, unit, unit_notes = _unit(header.get("units", ""), raw, path)
-    markers, marker_notes = clean_markers(names, raw * factor)
+    raw = table[:, 2:].reshape(len(table), len(names), 3)
+    factor, unit, unit_notes = length_unit(header.get("units", ""), raw)
+    notes = row_notes + _count_notes(header, len(table), len(names)) + time_notes + timing_notes(time, rate)
+    names, markers, doubled_notes = told_apart(names, raw * factor)
+    check_unique(names, "marker", path)
+    markers, marker_notes = clean_markers(names, markers)
     return Recording(
         name=trial_name(path),
         path=path,
@@ -76,7 +74,7 @@ def read_trc(path: Path, options: ReadOptions | None = None) -> Recording:
         marker_names=names,
         markers=markers,
         length_unit=unit,
-        notes=tuple(notes + unit_notes + marker_notes),
+        notes=tuple(notes + unit_notes + doubled_notes + marker_notes),
     )
 
 
@@ -98,7 +96,7 @@ def _header(lines: list[str]) -> dict[str, str]:
 
 def _number(text: str | None) -> float | None:
     try:
-        return float(text) if text else None
+        return float(text.replace(",", ".")) if text else None
     except ValueError:
         return None
 
@@ -110,19 +108,3 @@ def _count_notes(header: dict[str, str], frames: int, markers: int) -> list[str]
         if said is not None and said != found:
             notes.append(f"The header says {said:g} {word}, the file holds {found}: the latter are used.")
     return notes
-
-
-def _unit(word: str, raw: Array, path: Path) -> tuple[float, Literal["mm", "m"], list[str]]:
-    """Metres per unit of the file, the unit to write back in, and notes."""
-    if not word:
-        # A person's markers span 0.2 to 10 m, so the two units cannot be mistaken for each other.
-        span = np.nanmax(np.ptp(raw[~np.isnan(raw).any(axis=2)], axis=0)) if np.isfinite(raw).any() else 0.0
-        unit: Literal["mm", "m"] = "mm" if span > 50 else "m"
-        note = f"The header names no length unit: {unit} taken, as the markers span {span:.4g} of them."
-        return (1e-3 if unit == "mm" else 1.0), unit, [note]
-    factor = length_factor(word)
-    if factor is None:
-        raise RecordingError(f"{path}: found length unit {word!r} in the header, expected mm, cm or m")
-    if factor == 1e-2:
-        return factor, "m", ["The file is in centimetres; markers are written back in metres."]
-    return factor, ("mm" if factor == 1e-3 else "m"), []

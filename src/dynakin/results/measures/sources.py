@@ -8,6 +8,7 @@ of the assumption. What a contact that nobody declared can reach is *absent* (Na
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -149,15 +150,22 @@ def moment_figures(estimate: Estimate, lost: str = "") -> dict[str, Any]:
     Args:
         lost: the sentence on frames in which the person was lost.
     """
-    data = estimate.data
-    sources = moment_sources(data)
+    said = [str(text) for text in estimate.config.get("ground", {}).get("reasons", [])]
+    return source_figures(estimate.data, moment_sources(estimate.data), [*said, *([lost] if lost else [])])
+
+
+def source_figures(data: xr.Dataset, sources: Codes, reasons: Sequence[str]) -> dict[str, Any]:
+    """`moment_figures` of codes (T, C).
+
+    Args:
+        data: with the coordinates of an estimate; none of its variables is read. reasons: sentences.
+    """
     groups = _groups(data)
     legs = {name: _count(sources[:, columns].max(axis=1)) for name, columns in groups.items()}
-    reasons: list[str] = []
+    why: list[str] = []
     if any(count["measured"] < len(sources) for count in legs.values()):
-        found = [str(text).removeprefix("Warning: ") for text in estimate.config.get("ground", {}).get("reasons", [])]
-        reasons = [sentence(text) for text in [*found, *([lost] if lost else [])]]
-    names = estimate.coordinate_names
+        why = [sentence(text.removeprefix("Warning: ")) for text in reasons]
+    names = [str(name) for name in data["coordinate"].values]
     moving = {str(name) for name in data["element"].values}
     spoken = {leg: [k for k in own if names[k] in moving] or own for leg, own in groups.items()}  # not of locked joints
     return {
@@ -167,16 +175,28 @@ def moment_figures(estimate: Estimate, lost: str = "") -> dict[str, Any]:
         "frames": len(sources),
         "legs": legs,
         "coordinates": {name: _count(sources[:, k]) for k, name in enumerate(names)},
-        "reasons": list(dict.fromkeys(reasons)),
+        "reasons": list(dict.fromkeys(why)),
         "verdict": _words({leg: _by_joint(sources, names, own) for leg, own in spoken.items()}, len(sources)),
     }
 
 
 def _groups(data: xr.Dataset) -> dict[str, list[int]]:
     """Columns by leg; all of a model whose legs are not distinguished."""
-    legs = legs_of(data)
-    groups = {leg: [k for k, own in enumerate(legs) if own == leg] for leg in dict.fromkeys(legs) if leg}
+    legs, toes = legs_of(data), _toes(data)
+    groups = {
+        leg: [k for k, own in enumerate(legs) if own == leg and k not in toes] for leg in dict.fromkeys(legs) if leg
+    }
     return groups or {"": list(range(len(legs)))}
+
+
+def _toes(data: xr.Dataset) -> set[int]:
+    """Columns of coordinates that move what hangs on a foot: absent when it bears load, which says nothing of a leg."""
+    if "foot_segment" not in data.coords or "joint_parent" not in data.coords:
+        return set()
+    segments = [str(name) for name in data["joint_segment"].values]
+    feet = {segments.index(str(name)) for name in data["foot_segment"].values}
+    hung = {segments[k] for k, parent in enumerate(data["joint_parent"].values) if int(parent) in feet - {0}}
+    return {k for k, name in enumerate(data["coordinate_segment"].values) if str(name) in hung}
 
 
 def _count(codes: Codes) -> dict[str, int]:

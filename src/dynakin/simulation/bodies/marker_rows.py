@@ -88,7 +88,7 @@ PAIRED = ("thigh", "shank", "foot", "upper_arm", "forearm", "hand")
 ON_KNEE, ON_ANKLE, ON_ELBOW = 0.0320, 0.0236, 0.0230  # sideways of the joint centre, over the height
 # The length along which a segment's markers are spread, and its part of the height on which the rows rest.
 _SPREAD = {"shank": 0.246, "thigh": 0.245, "torso": 0.260, "upper_arm": 0.186, "forearm": 0.146}
-# Coordinate that moves a region's skin; those of limbs on the marker's own side.
+# Coordinate that moves a region's skin; those of limbs on the marker's own side, on the midline the right one.
 _DRIVERS = {
     "toe": "ankle_angle", "forefoot": "ankle_angle", "heel": "ankle_angle", "ankle": "ankle_angle",
     "shank": "ankle_angle", "knee": "knee_angle", "thigh": "knee_angle", "pelvis": "hip_flexion",
@@ -171,7 +171,7 @@ def draw_sites(
         place = subject.height_m * np.array([row.x, y, row.lateral])
         if row.lateral == 0.0 and row.part not in PAIRED:
             off = scatter_m * rng.standard_normal(3)
-            sites.append(Site(row.stem, row.part, row.region, place + off, row.landmark, _driver(row, "")))
+            sites.append(Site(row.stem, row.part, row.region, place + off, row.landmark, _driver(row, "_r")))
             continue
         for side, sign in (("right", 1.0), ("left", -1.0)):
             off = np.zeros(3) if row.landmark else scatter_m * rng.standard_normal(3)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from dynakin.model.markers.marker_set import load_marker_set
 from dynakin.simulation.bodies.body import Contact, SimulatedBody
 from dynakin.simulation.bodies.marker_rows import SETS, draw_sites
-from dynakin.simulation.bodies.markers import HipCentres
+from dynakin.simulation.bodies.markers import HipCentres, Site
 from dynakin.simulation.bodies.subject import (
     ANKLE_DIRECTION,
     LUMBAR_DIRECTION,
@@ -88,11 +88,6 @@ def _shoulder_in_torso(subject: SimulatedSubject, sign: float) -> Array:
     return np.array([0.0, _SHOULDER_ON_TRUNK * L["trunk"], sign * 0.5 * L["shoulder_width"]])
 
 
-def _joints(subject: SimulatedSubject) -> dict[str, Array]:
-    """Joint centres (3,) m of the right side on the segments of the middle."""
-    return {"hip": hip_in_pelvis(subject, 1.0), "shoulder": _shoulder_in_torso(subject, 1.0)}
-
-
 def _lengths(subject: SimulatedSubject) -> dict[str, float]:
     """By the model's names, the paired ones once for both sides."""
     L = subject.lengths
@@ -162,16 +157,24 @@ def _sided(subject: SimulatedSubject, sign: float) -> Mapping[str, Array]:
     return {name: affine(J, stretch=np.diag([1.0, 1.0, sign])) for name, J in subject.parts.items()}
 
 
-def build_body(subject: SimulatedSubject, rng: np.random.Generator, markers: str = "opencap") -> SimulatedBody:
-    """The whole body with the markers of a set; ``rng`` draws where they are put on.
+def put_on(subject: SimulatedSubject, rng: np.random.Generator, markers: str) -> tuple[Site, ...]:
+    """The sites of a marker set's markers; ``rng`` draws where each is put on.
 
     Args:
-        markers: "opencap" or "plug-in-gait": the lists of `marker_rows`, on which the validation's tables rest; any other
-            built-in set or file: all that it names.
+        markers: "opencap" or "plug-in-gait": the lists of `marker_rows`, on which the validation's tables rest; any
+            other built-in set, or a .toml file: all that it names.
 
     Raises:
         ModelError: no such set, or a wrong file.
     """
+    if markers in SETS:
+        return draw_sites(rng, subject, SETS[markers])
+    joints = {"hip": hip_in_pelvis(subject, 1.0), "shoulder": _shoulder_in_torso(subject, 1.0)}
+    return worn_sites(rng, subject, load_marker_set(markers), joints)
+
+
+def build_body(subject: SimulatedSubject, rng: np.random.Generator, markers: str = "opencap") -> SimulatedBody:
+    """The whole body with the markers of a set; arguments and errors as of `put_on`."""
     tree, L = build_tree(subject), subject.lengths
     joints = {
         "thigh": "hip", "shank": "knee", "foot": "ankle", "torso": "lumbar", "head": "cervical",
@@ -194,9 +197,7 @@ def build_body(subject: SimulatedSubject, rng: np.random.Generator, markers: str
         name="fullbody",
         subject=subject,
         tree=tree,
-        sites=draw_sites(rng, subject, SETS[markers])
-        if markers in SETS
-        else worn_sites(rng, subject, load_marker_set(markers), _joints(subject)),
+        sites=put_on(subject, rng, markers),
         feet=(
             Contact("right foot", "plate 1", "foot_r", np.array([0.0, 0.0, _FOOT_LATERAL * subject.height_m])),
             Contact("left foot", "plate 2", "foot_l", np.array([0.0, 0.0, -_FOOT_LATERAL * subject.height_m])),

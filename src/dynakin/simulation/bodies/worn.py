@@ -1,8 +1,8 @@
 """Any marker set on the simulated whole body: where the places that sets name lie on it.
 
-Rows as in `marker_rows`: in the segment's own frame over the body height, from the joint by which the segment hangs (the
-pelvis: from the middle of the ASIS); lateral is outward. A place is worn under the first of its names. What is not worn:
-the knee alignment device, which nobody walks with.
+Rows as in `marker_rows`: in the segment's own frame over the body height, from the joint by which the segment hangs
+(the pelvis: from the middle of the ASIS); lateral is outward. A place is worn under the first of its names. What is not
+worn: the knee alignment device, which nobody walks with.
 """
 
 from __future__ import annotations
@@ -106,6 +106,7 @@ _CLUSTERS: Mapping[str, tuple[str, str, float, float, float]] = {
     "hand": ("hand", "forearm", 0.015, -0.020, -0.040),
     "head": ("head", "head", 0.050, 0.070, 0.110),
 }
+_BESIDE = 0.014
 _TURN = 2.4  # rad from one marker of a cluster to the next, so that no two lie on a line along the segment
 
 
@@ -133,6 +134,8 @@ def worn_sites(
         if marker.centre:
             rows.append(Row(marker.centre[0], part, region, x, y, 0.0, landmark))
             continue
+        if lateral == 0.0 and part not in PAIRED:
+            lateral = _BESIDE  # of a pair about the midline
         names |= {(marker.name, side): marker.aliases(side)[0] for side in ("right", "left")}
         rows.append(Row(marker.name, part, region, x, y, lateral, landmark))
     drawn = draw_sites(rng, subject, MarkerList(lambda row, side: names[row.stem, side], tuple(rows)))
@@ -159,6 +162,3 @@ def _joint_sites(marker: Marker, joints: Mapping[str, Array]) -> list[Site]:
         for name in marker.aliases(side)[:1]:
             found.append(Site(name, part, region, joints[joint] * [1.0, 1.0, sign], True, driver))
     return found
-
-
-

@@ -1,0 +1,209 @@
+"""Every recording of ``../shared/data``, and of any folder given, through ``dynakin run`` without an option.
+
+    OMP_NUM_THREADS=1 .venv/bin/python benchmarks/corpus.py [FOLDER...] [--jobs 2] [--out FILE.md] [--write]
+
+A second row has what lies beside a recording (`recordings.beside`: ground forces, the same person standing). Then the
+differences from what the files themselves hold: Vicon's angles, moments and powers, OpenSim's IK and ID. Runs are kept
+in ``build/recordings`` by their inputs and the source. ``--write`` puts the tables into ``docs/validation.md``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tomllib
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import xarray as xr
+from corpus_references import Difference, Key, Theirs, differences, of_opensim, of_vicon
+
+from dynakin.errors import DynakinError
+from dynakin.recordings.beside import STANDING_WORDS, forces_beside, static_beside
+from dynakin.recordings.frame import find_laboratory_frame
+from dynakin.recordings.read import read
+from dynakin.recordings.recording import Recording
+from recordings import DATA, _source, kept, put_between
+
+MARKS = ("<!-- corpus: begin -->", "<!-- corpus: end -->")
+ANGLE_GOAL_DEG, MOMENT_GOAL = 5.0, 0.15
+"""RMS after offset; N m/kg. One recording that Vicon processed twice differs by 0.10 to 0.17 N m/kg."""
+_FROM = {"given": "given", "from the plates": "plates", "from the file": "file", "mean vertical force": "movement"}
+
+
+@dataclass(frozen=True, eq=False)
+class Row:
+    """A recording, with nothing or with what lies beside it, and what came of it."""
+
+    path: Path
+    extra: tuple[str, ...]
+    recording: Recording | None
+    code: int
+    said: str
+    seconds: float
+    folder: Path
+
+    @property
+    def name(self) -> str:
+        return str(self.path.relative_to(DATA)) if self.path.is_relative_to(DATA) else str(self.path)
+
+    @property
+    def given(self) -> str:
+        return " ".join(
+            f"{option} {Path(value).name}" for option, value in zip(self.extra[::2], self.extra[1::2], strict=True)
+        )
+
+
+def rows_of(path: Path, source: str) -> list[Row]:
+    """The run without an option, and that with what lies beside the recording, if anything does."""
+    try:
+        recording = read(path)
+    except DynakinError:
+        recording = None
+    beside: list[str] = []
+    if (forces := forces_beside(path)) is not None:
+        beside += ["--forces", str(forces)]
+    if recording is not None and (static := static_beside(path, recording)) is not None:
+        beside += ["--static", str(static)]
+    made = []
+    for options in ([], beside) if beside else ([],):
+        inputs = [path, *(Path(value) for value in options[1::2])]
+        made.append(Row(path, tuple(options), recording, *kept(path, options, inputs, source)))
+    return made
+
+
+def table(rows: list[Row]) -> Iterator[str]:
+    """What ran, and why not."""
+    ran = [sum(row.code == 0 for row in rows if bool(row.extra) == extra) for extra in (False, True)]
+    count = [sum(bool(row.extra) == extra for row in rows) for extra in (False, True)]
+    yield (
+        f"{ran[0]} of {count[0]} recordings run without an option; of {count[1]} with something beside them "
+        f"{ran[1]} run with it."
+    )
+    yield ""
+    yield (
+        "| recording | with | exit | s | frames | set | markers used, of | RMS, mm | mass from | held | right: "
+        "measured / derived / prior / absent | left | why not, or what is doubted |"
+    )
+    yield f"|{'---|' * 13}"
+    for row in rows:
+        frames = "–" if row.recording is None else row.recording.n_frames
+        cells: list[Any] = [f"`{row.name}`", row.given or "–", row.code, f"{row.seconds:.0f}", frames]
+        yield f"| {' | '.join(map(str, [*cells, *_outcome(row)]))} |"
+
+
+def _outcome(row: Row) -> list[Any]:
+    file = row.folder / "metrics.json"
+    if not file.exists():
+        return [*["–"] * 7, row.said.replace("|", "\\|")]
+    metrics = json.loads(file.read_text(encoding="utf-8"))
+    messages = metrics["messages"]
+    chosen = next((text.split(":")[0].split()[-1] for text in messages if text.startswith("Marker set")), "–")
+    mass = next((text for text in messages if text.casefold().removeprefix("warning: ").startswith("mass ")), "")
+    legs = metrics["moments"]["legs"] if metrics["moments"] else {}
+    counts = [" / ".join(str(n) for n in legs[side].values()) if side in legs else "–" for side in ("right", "left")]
+    said = row.said if row.code else "; ".join(_short(text) for text in messages if text.startswith("Warning"))
+    rms = metrics["markers"]["mean_rms_mm"] if metrics["markers"] else None
+    assert row.recording is not None
+    return [
+        chosen,
+        f"{len(metrics['markers']['rms_mm']) if metrics['markers'] else '–'} of {len(row.recording.marker_names)}",
+        "–" if rms is None else f"{rms:.1f}",
+        next((word for part, word in _FROM.items() if part in mass), "–"),
+        sum(text.startswith("Segment") and ("locked" in text or "held" in text) for text in messages) or "–",
+        *counts,
+        said.replace("|", "\\|"),
+    ]
+
+
+def _short(text: str) -> str:
+    text = text.removeprefix("Warning: ")
+    return text if len(text) <= 90 else f"{text[: text.rfind(' ', 0, 90)]} ..."
+
+
+def compared(rows: list[Row]) -> Iterator[str]:
+    """The differences, a row each recording, source and joint; what is beyond the goals is bold."""
+    yield (
+        "| recording | with | against | joint | angle, deg: offset, RMS right | left | moment, N m/kg: RMS (stance, "
+        "swing; frames) right | left | the same loads about their joint: right | left | centres apart, mm: right, left "
+        "| power, W/kg: right, left |"
+    )
+    yield f"|{'---|' * 12}"
+    for row in rows:
+        file = row.folder / "estimate.nc"
+        if row.recording is None or not file.exists():
+            continue
+        config = tomllib.loads((row.folder / "config.toml").read_text(encoding="utf-8"))
+        with xr.open_dataset(file) as opened:
+            data = opened.load()
+        for theirs in _references(row, config["mass_kg"]):
+            ground = find_laboratory_frame(row.recording, vertical=config["ground"]["vertical"], forward="auto")
+            found = differences(data, ground, config["mass_kg"], theirs)
+            for joint in dict.fromkeys(joint for _, joint in found):
+                yield f"| `{row.name}` | {row.given or '–'} | {theirs.what} | {' | '.join(_cells(found, joint))} |"
+
+
+def _references(row: Row, mass_kg: float) -> list[Theirs]:
+    assert row.recording is not None
+    if row.path.suffix.casefold() == ".c3d":
+        vicon = of_vicon(row.path, row.recording.time)
+        return [] if vicon is None else [vicon]
+    trials = [path for path in row.path.parent.glob("*.trc") if not set(path.stem.split("_")) & STANDING_WORDS]
+    return of_opensim(row.path, mass_kg, len(trials) == 1)
+
+
+def _cells(found: dict[Key, Difference], joint: str) -> list[str]:
+    right, left = (found.get((side, joint), Difference()) for side in ("right", "left"))
+    both = (right, left)
+    angles = [
+        "–" if d.rms_deg is None else f"{d.offset_deg:+.0f}, {_judged(d.rms_deg, ANGLE_GOAL_DEG, 1)}" for d in both
+    ]
+    moments = [
+        "–"
+        if d.moment is None
+        else f"{_judged(d.moment, MOMENT_GOAL, 2)} ({_number(d.stance, 2)}, {_number(d.swing, 2)}; {d.frames})"
+        for d in both
+    ]
+    about = ["–" if d.about_theirs is None else _judged(d.about_theirs, MOMENT_GOAL, 2) for d in both]
+    apart = ", ".join(_number(d.centre_mm, 0) for d in both)
+    return [joint, *angles, *moments, *about, apart, ", ".join(_number(d.power, 2) for d in both)]
+
+
+def _judged(value: float, goal: float, digits: int) -> str:
+    return f"**{value:.{digits}f}**" if value > goal else f"{value:.{digits}f}"
+
+
+def _number(value: float | None, digits: int) -> str:
+    return "–" if value is None else f"{value:.{digits}f}"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("folders", nargs="*", type=Path, help="further folders, or single recordings")
+    parser.add_argument("--only", action="append", default=[], help="part of the names of recordings; all else is left")
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--out", type=Path, help="also write the tables here (.md)")
+    parser.add_argument("--write", action="store_true", help="put the tables into docs/validation.md")
+    asked = parser.parse_args()
+    paths = [
+        path.absolute()
+        for folder in [DATA, *asked.folders]
+        for path in ([folder] if folder.is_file() else sorted(folder.rglob("*")))
+        if path.suffix.casefold() in (".c3d", ".trc") and all(part in str(path) for part in asked.only)
+    ]
+    source = _source()
+    with ThreadPoolExecutor(asked.jobs) as pool:
+        rows = [row for each in pool.map(lambda path: rows_of(path, source), paths) for row in each]
+    lines = [*table(rows), "", *compared(rows)]
+    print("\n".join(lines))
+    if asked.out is not None:
+        asked.out.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    if asked.write:
+        put_between(MARKS, lines)
+
+
+if __name__ == "__main__":
+    main()

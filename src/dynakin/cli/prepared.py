@@ -1,0 +1,132 @@
+"""What a run takes for granted, in words: `dynakin run` says it first, `dynakin check` with all that it rests on."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from dynakin.arrays import runs
+from dynakin.filter.prepared import Prepared
+from dynakin.recordings.feet.loads import MEASURED, REASONS, SHARED, SWING, FootLoads
+from dynakin.results.naming import listed, plural
+from dynakin.settings.settings import Settings
+
+Rows = list[tuple[str, str]]
+"""Topics and their sentences; rows of one topic stand together."""
+MARKERS, SIDES, GROUND, SUBJECT = ("Marker set",), ("Limb markers",), ("Vertical", "Forward", "Coordinates"), (
+    "Mass ",
+    "Warning: mass",
+    "Height",
+    "height_m",
+    "Sex",
+)  # fmt: skip
+"""How the sentences of a calibration on these begin."""
+_LONGEST_LIST, _KEPT = 8, 5
+_MOST_SPANS = 6
+_TOPIC = 11  # characters of the longest topic
+_LEAST_S = 0.03
+"""Spans of a foot that are shorter belong to what lies about them."""
+
+
+def print_rows(console: Console, rows: Iterable[tuple[str, str]]) -> None:
+    """In two columns, warnings in yellow; a topic stands where it begins."""
+    grid = Table.grid(padding=(0, 2))
+    grid.add_column(style="bold", no_wrap=True, min_width=_TOPIC)
+    grid.add_column(overflow="fold")
+    before = ""
+    for topic, text in rows:
+        grid.add_row("" if topic == before else topic, Text(text, style="yellow" if text.startswith("Warning") else ""))
+        before = topic or before
+    console.print(grid)
+
+
+def assumed(ready: Prepared, settings: Settings) -> Rows:
+    """Model, marker set, subject, ground and plates of a run, a line or two each."""
+    calibrated, messages = ready.calibrated, ready.calibrated.messages
+    default = "" if settings.model != Settings().model else " (the default; --model for another)"
+    rows = [("Model", f"{settings.model}{default}.")]
+    rows += [("Markers", text) for text in starting(messages, MARKERS)[:1] or [f"{len(calibrated.spec.markers)} used."]]
+    rows += [("Subject", " ".join(starting(messages, SUBJECT)))]
+    ahead = ", ".join(f"{value:.2f}" for value in calibrated.ground.forward + 0.0)
+    rows += [("Ground", f"{calibrated.ground.vertical} is up; the person faces ({ahead}); {_sides(ready)}.")]
+    return [*rows, ("Plates", _plates(ready))]
+
+
+def contacts(ready: Prepared) -> Rows:
+    """When each foot stands where, and when a declared contact bears."""
+    loads, time = ready.ground.loads, ready.recording.time
+    if loads is None:
+        return []
+    rows: Rows = []
+    names = [plate.name for plate in ready.recording.plates]
+    for k, foot in enumerate(loads.feet):
+        spans = _spans(loads, k, names, ready.recording.rate)
+        said = [f"{what} {time[a]:.2f} to {time[b - 1]:.2f} s" for a, b, what in spans]
+        rest = len(said) - _MOST_SPANS
+        text = "; ".join(said[:_MOST_SPANS]) + (f"; and {rest} more" if rest > 0 else "")
+        rows.append(("Contacts", f"{foot}: {text or 'never on the ground'}."))
+    for name, bears in zip(ready.calibrated.contacts, ready.ground.bears.T, strict=True):
+        rows.append(("Contacts", f"{name} (declared): {_times(time, bears)}."))
+    return rows
+
+
+def starting(messages: Sequence[str], openings: tuple[str, ...]) -> list[str]:
+    """The sentences that begin with one of these."""
+    return [text for text in messages if text.startswith(openings)]
+
+
+def short(text: str) -> str:
+    """A sentence whose long list is cut."""
+    parts = text.rstrip(".").split(", ")
+    if len(parts) <= _LONGEST_LIST:
+        return text
+    return f"{', '.join(parts[:_KEPT])} and {len(parts) - _KEPT} more."
+
+
+def _sides(ready: Prepared) -> str:
+    side = ready.calibrated.side
+    return (
+        "both sides are modelled" if ready.calibrated.feet else f"limb markers of {side} side{'s' * (side == 'both')}"
+    )
+
+
+def _plates(ready: Prepared) -> str:
+    plates, loads = ready.recording.plates, ready.ground.loads
+    if not plates:
+        return "none: ground reactions follow from the motion."
+    if loads is None:
+        return f"{plural(len(plates), 'plate')}, their sum is used."
+    bears = [
+        f"{names} under the {foot} foot"
+        for k, foot in enumerate(loads.feet)
+        if (names := listed([plate.name for p, plate in enumerate(plates) if loads.on[:, k, p].any()] or [""]))
+    ]
+    bears += [f"{plates[p].name} under the {name}" for p, name in loads.given.items()]
+    used = f"{', '.join(bears)}" if bears else "no foot stands on any"
+    return f"{len(plates)}: {used}."
+
+
+def _spans(loads: FootLoads, k: int, names: Sequence[str], rate: float) -> list[tuple[int, int, str]]:
+    """(first, end, where) of foot number k, swings left out."""
+    reason, on = loads.reason[:, k], loads.on[:, k]
+    words: dict[str, np.ndarray] = {}
+    for code in np.unique(reason):
+        of_code = reason == code
+        if code in (MEASURED, SHARED):
+            for row in np.unique(on[of_code], axis=0):
+                here = " and ".join(name for name, stands in zip(names, row, strict=True) if stands)
+                words[here + (" (shared)" if code == SHARED else "")] = of_code & (on == row).all(axis=1)
+        elif code != SWING:
+            words[REASONS[code] if names else "on the floor"] = of_code
+    least = _LEAST_S * rate
+    found = [(a, b, what) for what, frames in words.items() for a, b in runs(frames) if b - a >= least]
+    return sorted(found)
+
+
+def _times(time: np.ndarray, frames: np.ndarray) -> str:
+    spans = [f"{time[a]:.2f} to {time[b - 1]:.2f} s" for a, b in runs(frames)]
+    return listed(spans, _MOST_SPANS) if spans else "never"

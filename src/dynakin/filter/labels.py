@@ -1,0 +1,68 @@
+"""What the columns of an estimate are called: coordinates, markers, joints, feet, elements of the state."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.bindings import _core
+from dynakin.filter.contacts import ContactLoads
+from dynakin.filter.sources import moved_segments
+from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.results.estimate import AXES, COMPONENTS
+
+
+def labels(
+    model: _core.Model, initial: CalibratedModel, time: npt.NDArray[np.float64], feet: ContactLoads | None
+) -> dict[str, Any]:
+    """The coordinates of `Estimate.data`, for times (T,) s and the contacts that the moments are made with."""
+    spec = initial.spec
+    names, parents, segments = _joints(spec)
+    found: dict[str, Any] = {
+        "time": time,
+        "coordinate": model.coordinate_names,
+        "coordinate_type": ("coordinate", _types(spec)),
+        "coordinate_segment": ("coordinate", moved_segments(spec)),
+        "marker": list(initial.recorded_markers),
+        "axis": list(AXES),
+        "axis_": list(AXES),
+        "sensor": [*initial.recorded_markers, "plates"],
+        "marker_axes_modelled": ("axis", np.array(spec.markers[0].measured)),
+        "component": list(COMPONENTS),
+        "element": list(model.layout.names),
+        "element_": list(model.layout.names),
+        "joint": names,
+        "joint_parent": ("joint", parents),
+        "joint_segment": ("joint", segments),
+    }
+    if feet is not None:
+        found |= {
+            "foot": list(feet.names),
+            "foot_segment": ("foot", list(feet.segments)),
+            "foot_declared": ("foot", np.array([name in initial.contacts for name in feet.names], dtype=bool)),
+        }
+    return found
+
+
+def _joints(spec: _core.ModelSpec) -> tuple[list[str], list[int], list[str]]:
+    """Name, number of the parent joint (-1: ground) and segment of each joint; a hinge is named as its coordinate."""
+    segments = [segment.name for segment in spec.segments]
+    names = []
+    for segment in spec.segments:
+        coordinates = {axis.coordinate for axis in segment.axes}
+        names.append(coordinates.pop() if len(coordinates) == 1 else segment.name)
+    if len(set(names)) < len(names):
+        names = segments
+    parents = [segments.index(s.parent) if s.parent in segments else -1 for s in spec.segments]
+    return names, parents, segments
+
+
+def _types(spec: _core.ModelSpec) -> list[str]:
+    """A coordinate is a rotation unless every axis that it moves is a translation."""
+    kinds: dict[str, set[str]] = {}
+    for segment in spec.segments:
+        for axis in segment.axes:
+            kinds.setdefault(axis.coordinate, set()).add(axis.kind)
+    return ["translation" if kinds[c.name] == {"translation"} else "rotation" for c in spec.coordinates]

@@ -1,0 +1,79 @@
+"""A recording as the filter is going to take it: what is known before anything is estimated."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+
+from dynakin.filter.contacts import RESIDUAL, ContactLoads
+from dynakin.filter.labels import labels
+from dynakin.filter.sources import ContactSources
+from dynakin.filter.total_wrench import Ground
+from dynakin.filter.tracker import Tracker
+from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.recordings.recording import Recording
+from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, source_figures
+
+Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """What `Estimator.prepare` gives, and `Estimator.follow` takes: a run up to its estimate.
+
+    Attributes:
+        tracker: at its start.
+        markers: (T, M, 3) m, of the model, ground frame. wrench: (T, 6), the total as the plates measure it; NaN where
+            they do not.
+        ground: what is known of the ground reaction. contacts: the wrench of each contact; None of a model that stands
+            on its root.
+        smooth: whether each frame is to be estimated from all frames.
+        doubt: a sentence where the plates contradict the mass. unsmoothed: one where there is no smoother.
+    """
+
+    recording: Recording
+    tracker: Tracker
+    markers: Array
+    wrench: Array
+    ground: Ground
+    contacts: ContactLoads | None
+    smooth: bool
+    doubt: str | None
+    unsmoothed: tuple[str, ...]
+
+    @property
+    def calibrated(self) -> CalibratedModel:
+        """The model of the person, with the states that the noise asks for."""
+        return self.tracker.calibrated
+
+    @property
+    def messages(self) -> list[str]:
+        """What there is to say of the recording, the model and the plates, in the words of a run."""
+        doubt = [self.doubt] if self.doubt else []
+        return [*self.recording.notes, *self.calibrated.messages, *self.ground.notes, *doubt, *self.unsmoothed]
+
+    def undeclared(self, contacts: ContactLoads | None) -> Flags:
+        """(T,) frames in which something bears the person that no plate measures, by these contacts (``contacts``, or
+        them in step with the markers) where they say so."""
+        if contacts is None or contacts.names[-1] != RESIDUAL:
+            return self.ground.undeclared
+        return contacts.undeclared
+
+    def moment_figures(self) -> dict[str, Any]:
+        """Which moments will be measured, derived, a prior and absent, and why, as `moment_figures` of an estimate;
+        frames in which the filter will lose the person are not known yet."""
+        calibrated = self.calibrated
+        sources = ContactSources(calibrated.spec, calibrated.feet.values()).moments(self.contacts)
+        if self.contacts is None:
+            blind = np.isnan(self.wrench).all(axis=1)
+            codes = np.where(self.ground.undeclared, ABSENT, np.where(blind, DERIVED, MEASURED))
+            sources = np.repeat(codes[:, None], sources.shape[1], axis=1).astype(np.uint8)
+        data = xr.Dataset(coords=labels(self.tracker.core_model, calibrated, self.recording.time, self.contacts))
+        if self.contacts is not None:
+            data = data.isel(foot=[name != RESIDUAL for name in self.contacts.names])
+        return source_figures(data, sources, self.ground.reasons)

@@ -1,0 +1,158 @@
+"""What a marker's name says of its place: names of the built-in sets, usual abbreviations, words."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from typing import Any, Literal
+
+from dynakin.errors import ModelError
+from dynakin.model.markers.anatomy import anatomy
+from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
+from dynakin.recordings.landmarks import plain_name
+from dynakin.settings.strict import read_toml
+
+Sure = Literal["sure", "likely", "unsure"]
+
+_FILE = resources.files("dynakin.model") / "markers" / "draft" / "places.toml"
+_WORDS = {
+    "right": ("right", "rechts", "derecha", "droite", "droit", "destro", "destra", "rt", "dx", "r"),
+    "left": ("left", "links", "izquierda", "gauche", "sinistro", "sinistra", "lt", "sx", "l"),
+}
+# Segments whose clusters are named after them, longest word first.
+_SEGMENTS = {
+    "thigh": ("oberschenkel", "upperleg", "thigh", "femur", "cuisse", "muslo", "coscia", "uleg", "tgh", "thi", "th"),
+    "shank": ("unterschenkel", "lowerleg", "shank", "tibia", "jambe", "calf", "shin", "lleg", "leg", "tib", "sha",
+              "shk", "sk", "sh"),
+    "foot": ("foot", "fuss", "pied"),
+    "pelvis": ("pelvis", "becken", "bassin", "pelv", "pel"),
+    "upper_arm": ("upperarm", "oberarm", "humerus", "deltoid", "triceps", "biceps", "uparm", "uarm", "upa", "arm"),
+    "forearm": ("lowerarm", "unterarm", "forearm", "farm", "larm", "frm", "fra"),
+    "hand": ("finger", "thumb", "hand", "fin", "mcp", "hnd"),
+    "thorax": ("thorax", "trunk", "torso", "chest", "rib", "trnk"),
+    "head": ("head", "kopf", "tete"),
+}  # fmt: skip
+_CENTRES = {
+    "hip": "HJC",
+    "knee": "KJC",
+    "ankle": "AJC",
+    "shoulder": "SJC",
+    "h": "HJC",
+    "k": "KJC",
+    "a": "AJC",
+    "s": "SJC",
+}
+_CENTRE = re.compile(r"^(hip|knee|ankle|shoulder|[hkas])(jc|jointcent(?:er|re)|cent(?:er|re)|joint)(?:reg)?$")
+_QUALIFIED = (
+    r"(?:\d+|[a-d]|front|back|top|bottom|upper|lower|up|low|lat|med|ant|post|sup|inf|prox|dist"
+    r"|cluster|tracking|marker)*"
+)
+
+
+@dataclass(frozen=True)
+class Said:
+    """place of anatomy.toml, or else the segment on which it is one of a cluster; side None: the name has none."""
+
+    place: str | None
+    segment: str | None
+    side: str | None
+    sure: Sure
+    why: str
+
+
+@cache
+def places() -> dict[str, Any]:
+    """The contents of places.toml."""
+    return read_toml(Path(str(_FILE)))
+
+
+@cache
+def _sets() -> dict[str, set[tuple[str | None, str | None, str]]]:
+    """Plain name -> what built-in sets have under it: place or None, segment of a cluster or None, side."""
+    found: dict[str, set[tuple[str | None, str | None, str]]] = {}
+    for name in available_marker_sets():
+        try:
+            markers = load_marker_set(name).markers
+        except ModelError:
+            continue
+        for marker in markers:
+            place = marker.name if marker.name in anatomy()["places"] else None
+            for side in ("right", "left", "centre"):
+                for alias in marker.aliases(side):
+                    found.setdefault(plain_name(alias), set()).add((place, None if place else marker.segment, side))
+    return found
+
+
+def said(name: str) -> Said | None:
+    """What a name says, None where it says nothing."""
+    known = _sets().get(plain_name(name), set())
+    if len(known) == 1:
+        place, segment, side = next(iter(known))
+        return Said(place, segment or None, side, "sure", "name of a built-in set")
+    for own_side, rest in _readings(name):
+        place = _place(rest)
+        if place is not None:
+            centre = places().get(place, {}).get("at", (0.0, 0.0, 1.0))[2] == 0.0
+            if centre and own_side is not None:
+                continue  # the side's letter belongs to the word
+            return Said(place, None, "centre" if centre else own_side, "likely", f"its name: {rest}")
+        segment = _segment(rest)
+        if segment is not None:
+            return Said(None, segment, own_side, "likely", f"its name: {rest}")
+    return None
+
+
+def _readings(name: str) -> list[tuple[str | None, str]]:
+    """Ways to part a name into a side and a rest, the likeliest first."""
+    last = name.rsplit(":", 1)[-1]
+    tokens = [t.casefold() for t in re.findall(r"[^\W\d_]?[a-zß-ÿ]+|[A-Z]+(?![a-z])|\d+", last)]
+    found: list[tuple[str | None, str]] = []
+    for side, words in _WORDS.items():
+        for k in (0, len(tokens) - 1):
+            if len(tokens) > 1 and tokens[k] in words:
+                found.append((side, "".join(tokens[:k] + tokens[k + 1 :])))
+    whole = "".join(tokens)
+    for side, words in _WORDS.items():
+        for word in words:
+            if len(word) > 2 and whole.startswith(word) and len(whole) > len(word):
+                found.append((side, whole[len(word) :]))
+            if len(word) > 2 and whole.endswith(word) and len(whole) > len(word):
+                found.append((side, whole[: -len(word)]))
+    for side in ("right", "left"):
+        if len(whole) > 1 and whole[0] == side[0]:
+            found.append((side, whole[1:]))
+    found.append((None, whole))
+    for side in ("right", "left"):
+        if len(whole) > 2 and whole[-1] == side[0]:
+            found.append((side, whole[:-1]))
+    return found
+
+
+def _place(rest: str) -> str | None:
+    """The place of anatomy.toml that a name without its side says."""
+    centre = _CENTRE.match(rest)
+    if centre:
+        return _CENTRES[centre.group(1)]
+    exact = [place for place, about in places().items() if rest in about["names"] or rest == place.casefold()]
+    if len(exact) == 1:
+        return exact[0]
+    best: tuple[int, list[str]] = (0, [])
+    for place, about in places().items():
+        for words in about["words"]:
+            wanted = [word for word in words if not word.startswith("!")]
+            if all(word in rest for word in wanted) and not any(w[1:] in rest for w in words if w.startswith("!")):
+                weight = sum(map(len, wanted))
+                if weight >= best[0]:
+                    best = (weight, [*(best[1] if weight == best[0] else []), place])
+    return best[1][0] if len(set(best[1])) == 1 else None
+
+
+def _segment(rest: str) -> str | None:
+    """The segment whose cluster a name without its side says."""
+    for segment, words in _SEGMENTS.items():
+        if any(re.fullmatch(word + _QUALIFIED, rest) for word in words):
+            return segment
+    return None

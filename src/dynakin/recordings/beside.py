@@ -1,0 +1,102 @@
+"""What lies beside a recording and belongs to it: its ground forces, the same person standing.
+
+By names, then by what is in the files. It is offered, never taken: a name is no proof.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from itertools import combinations
+from pathlib import Path
+
+import numpy as np
+
+from dynakin.errors import DynakinError
+from dynakin.recordings.landmarks import plain_name
+from dynakin.recordings.read import READERS, read
+from dynakin.recordings.recording import Recording
+from dynakin.recordings.standing import standing_window
+
+STANDING_WORDS = frozenset({"static", "standing", "stand", "stance", "cal", "calibration", "pose", "anat", "neutral"})
+_FORCE_WORDS = frozenset({"grf", "force", "forces", "ground", "reaction", "plates", "fp", "analog"})
+_WORD = re.compile(r"[A-Z]?[a-z]+|[A-Z]+(?![a-z])|\d+")
+_TABLES = (".mot", ".sto")
+_MOST_FILES, _LARGEST_BYTES = 8, 50_000_000
+"""Files that are opened to look for somebody who stands, and how large: `dynakin check` is to answer within seconds."""
+_STILL = 0.6
+"""Part of a recording in which the person stands still, from which it is one of somebody standing."""
+_SAME_M = 0.012
+"""Median difference of distances between markers that move as one, up to which two recordings show the same person and
+markers: 0.7 to 7.5 mm in the 15 pairs that we have of a trial and its standing one, 20 mm and more of other people."""
+_RIGID_M = 0.006
+"""Standard deviation of a distance over a trial, up to which its two markers move as one."""
+_NEAR_M = 0.3
+"""How far apart such markers are at most: of those on two segments that hardly move, a posture would be compared."""
+_PAIRS = 6
+
+
+def forces_beside(trial: Path) -> Path | None:
+    """A table of ground forces in the trial's folder whose name is the trial's but for words such as "grf"."""
+    own = _words(trial)
+    found = []
+    for path in _others(trial, _TABLES):
+        theirs = _words(path) - _FORCE_WORDS
+        if _words(path) & _FORCE_WORDS and theirs and theirs <= own and not (own - theirs) & STANDING_WORDS:
+            found.append((len(theirs), path))
+    return max(found, key=lambda pair: (pair[0], pair[1].name))[1] if found else None
+
+
+def static_beside(trial: Path, recording: Recording) -> Path | None:
+    """A recording in the trial's folder of the same person, with the same markers, who stands; None where the trial is
+    one itself."""
+    if _words(trial) & STANDING_WORDS or _still(recording) > _STILL:
+        return None
+    others = sorted(_others(trial, tuple(READERS)), key=lambda path: not _words(path) & STANDING_WORDS)
+    found, named = [], False
+    for path in [path for path in others if path.stat().st_size <= _LARGEST_BYTES][:_MOST_FILES]:
+        says = bool(_words(path) & STANDING_WORDS)
+        if named and not says:
+            break
+        try:
+            other = read(path)
+        except DynakinError:  # somebody else's file
+            continue
+        apart = _apart_m(recording, other)
+        if apart is not None and apart < _SAME_M and (says or _still(other) > _STILL):
+            found.append((apart, path))
+            named = named or says
+    return min(found)[1] if found else None
+
+
+def _words(path: Path) -> set[str]:
+    return {word.casefold() for word in _WORD.findall(path.stem)}
+
+
+def _others(trial: Path, suffixes: tuple[str, ...]) -> Iterator[Path]:
+    try:
+        inside = sorted(trial.parent.iterdir())
+    except OSError:
+        return
+    for path in inside:
+        if path.suffix.casefold() in suffixes and path.is_file() and path.name != trial.name:
+            yield path
+
+
+def _still(recording: Recording) -> float:
+    window = standing_window(recording)
+    return 0.0 if window is None else (window.stop - window.start) / recording.n_frames
+
+
+def _apart_m(trial: Recording, other: Recording) -> float | None:
+    """Median difference of the distances between markers that move as one in the trial; None of too few."""
+    names = {plain_name(name): name for name in other.marker_names}
+    common = [(name, names[plain_name(name)]) for name in trial.marker_names if plain_name(name) in names]
+    apart = []
+    for (a, a_), (b, b_) in combinations(common, 2):
+        here = np.linalg.norm(trial.marker(a) - trial.marker(b), axis=1)
+        there = np.linalg.norm(other.marker(a_) - other.marker(b_), axis=1)
+        here, there = here[np.isfinite(here)], there[np.isfinite(there)]
+        if len(here) > 0.5 * trial.n_frames and len(there) and here.std() < _RIGID_M and here.mean() < _NEAR_M:
+            apart.append(abs(float(np.median(here) - np.median(there))))
+    return float(np.median(apart)) if len(apart) >= _PAIRS else None

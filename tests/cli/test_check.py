@@ -1,0 +1,107 @@
+"""`dynakin check` says what `dynakin run` does, and ends as it would."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dynakin.cli.app import main
+from dynakin.results.files.markers import write_trc
+from dynakin.results.files.storage import write_storage
+from dynakin.simulation.trial import simulate
+
+Said = pytest.CaptureFixture[str]
+
+
+def told(capsys: Said) -> tuple[str, str]:
+    """What stands on stdout and stderr, without line breaks."""
+    said = capsys.readouterr()
+    return " ".join(said.out.split()), " ".join(said.err.split())
+
+
+def ran(arguments: list[str], out: Path) -> int:
+    return main(["run", *arguments, "-o", str(out)])
+
+
+def test_what_is_there_and_what_run_would_do(data_dir: Path, capsys: Said) -> None:
+    trial = str(data_dir / "plugin_gait" / "S1_FlywheelSquat.c3d")
+    assert main(["check", trial, "--model", "squat7", "--mass", "78.6"]) == 0
+    found, _ = told(capsys)
+    for words in ("317 frames at 100 Hz", "2 force plates", "Vertical +Z", "RSHO 78.5 %", "23 of 30", "abdomen"):
+        assert words in found
+    assert "--static S1_StandingRef.c3d (found beside the recording)" in found
+    assert "Moments: absent in all 317 frames." in found  # the cable
+
+
+@pytest.mark.parametrize(
+    ("options", "refusal"),
+    [
+        (["--model", "squat7", "--mass", "66"], "RTOE moves"),
+        (["--model", "sagittal7", "--mass", "66"], "RTOE moves"),
+        (["--model", "fullbody", "--markers", "opencap"], "marker"),
+    ],
+)
+def test_check_refuses_as_run_does(
+    data_dir: Path, tmp_path: Path, options: list[str], refusal: str, capsys: Said
+) -> None:
+    trial = str(data_dir / "plugin_gait" / "GaitNormal_1.c3d")
+    assert main(["check", trial, *options]) == 1
+    _, checked = told(capsys)
+    assert ran([trial, *options], tmp_path / "out") == 2
+    assert told(capsys)[1] == checked
+    assert refusal in checked
+
+
+def test_check_promises_what_run_keeps(data_dir: Path, tmp_path: Path, capsys: Said) -> None:
+    """Without an option: the same moments for the same reasons, what is assumed said first."""
+    trial = str(data_dir / "pycgm" / "Movement_trial.c3d")
+    assert main(["check", trial]) == 0
+    found, _ = told(capsys)
+    assert ran([trial], tmp_path / "out") == 0
+    said, _ = told(capsys)
+    moments = json.loads((tmp_path / "out" / "metrics.json").read_text())["moments"]
+    assert moments["verdict"] in found and all(reason in found for reason in moments["reasons"])
+    first = said[: said.index(moments["verdict"])]
+    for words in ("fullbody (the default", "plug-in-gait", "Mass 85.00 kg: from the file", "plate 2 and plate 4 under"):
+        assert words in first and words in found
+    assert "right: plate 4 0.34 to 1.07 s; plate 2 1.37 to 2.13 s; off the plates 2.48 to 2.68 s." in found
+    assert "--static Static_trial.c3d (found beside the recording)" in found
+
+
+def test_forces_beside_a_recording_are_named_and_do_what_is_said(tmp_path: Path, capsys: Said) -> None:
+    made = simulate("fullbody", "squat", 1, 5.0).recording
+    trial = tmp_path / "squat1.trc"
+    write_trc(trial, made.time, list(made.marker_names), made.markers, unit="mm")
+    columns, values = [], []
+    for number, plate in enumerate(made.plates, 1):
+        for stem, part in (("v", plate.force), ("p", np.nan_to_num(plate.cop)), ("m", plate.free_moment)):
+            columns += [f"ground_force_{number}_{stem}{axis}" for axis in "xyz"]
+            values.append(part)
+    forces = tmp_path / "squat1_grf.mot"
+    write_storage(forces, "forces", made.time, columns, np.hstack(values), in_degrees=False)
+    main(["check", str(trial), "--mass", "70"])
+    assert "--forces squat1_grf.mot (found beside the recording)" in told(capsys)[0]
+    assert main(["check", str(trial), "--mass", "70", "--forces", str(forces)]) == 0
+    found, _ = told(capsys)
+    assert "Leg moments: measured in all" in found and "--forces" not in found
+    assert "1 under the right foot" in found or "2 under the right foot" in found
+    assert "Held: knee adduction (both sides)" in found
+
+
+def test_a_planar_model_is_checked_as_it_runs(tmp_path: Path, capsys: Said) -> None:
+    """Without plates it is refused, as `run` refuses it; a file that nobody can read too."""
+    made = simulate("sagittal7", "squat", 1, 5.0).recording
+    trial = tmp_path / "squat.trc"
+    write_trc(trial, made.time, list(made.marker_names), made.markers, unit="mm")
+    options = [str(trial), "--model", "sagittal7", "--mass", "70"]
+    assert main(["check", *options]) == 1
+    _, checked = told(capsys)
+    assert "no force plates" in checked
+    assert ran(options, tmp_path / "out") == 2
+    assert told(capsys)[1] == checked
+    trial.write_text("nothing")
+    assert main(["check", *options]) == 1
+    assert main(["check", *options, "--side", "middle"]) == 2
