@@ -28,6 +28,7 @@ Order = npt.NDArray[np.intp]
 _GAIN = 8.0
 """How much nearer to a body (`Deviations.cost`) an exchange must bring it. In the recordings of ``shared/data``,
 labelled rightly, none brings more than 2.2; exchanged neighbours on a leg mostly 15 and more, right for left 9."""
+_STILL_WRONG = 4.0  # deviations of a distance
 _OTHER = {"right": "left", "left": "right"}
 _MOST = 6  # exchanges in one recording
 _GROUPS = (
@@ -124,7 +125,7 @@ def _swaps_throughout(
         for pairs, what in _candidates(match, keys, _promise(own, expected, height_m, now)):
             exchanged = _exchanged(len(keys), pairs)
             after = deviations(own.ordered(exchanged), expected, height_m)
-            if (now.cost - after.cost) / _weight(pairs) > gain:
+            if (now.cost - after.cost) / _weight(pairs) > gain and not _nowhere(after, expected, pairs):
                 best, gain = (pairs, what, exchanged, after), (now.cost - after.cost) / _weight(pairs)
         if best is None:
             break
@@ -133,6 +134,15 @@ def _swaps_throughout(
         swaps.append(Swap(tuple((keys[i], keys[j]) for i, j in pairs), what, evidence))
         order = order[exchanged]
     return swaps, order
+
+
+def _nowhere(after: Deviations, expected: Expected, pairs: Sequence[tuple[int, int]]) -> bool:
+    """Whether an exchange would put a marker where it is as wrong: then it is no exchange, but a marker in a wrong
+    place."""
+    own = [k for pair in pairs for k in pair]
+    far = (np.abs(after.distance[own]) > _STILL_WRONG).sum(axis=1)
+    known = np.isfinite(expected.distance[own]).sum(axis=1)
+    return bool((2 * far > known).any())
 
 
 def _weight(pairs: Sequence[tuple[int, int]]) -> float:
@@ -240,7 +250,7 @@ def _swaps_for_a_while(
             if both.sum() < _FEWEST_FRAMES:
                 continue
             other = places.copy()
-            other[np.ix_(both, [i, j])] = places[np.ix_(both, [j, i])]
+            other[both, i], other[both, j] = places[both, j], places[both, i]
             after = _all_off(other, partners, found)
             mended = both & (after[:, [i, j]].max(axis=1) < _MENDED * off[:, [i, j]].max(axis=1))
             if 2 * mended.sum() >= both.sum() and after.sum() < left:
