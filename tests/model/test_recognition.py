@@ -178,7 +178,7 @@ def test_without_what_is_exchanged_there_is_no_person() -> None:
     for name in ("THI", "KNE", "TIB", "ANK", "HEE", "TOE"):
         recording = exchanged(recording, f"R{name}", f"L{name}")
     with pytest.raises(
-        ModelError, match=r"all right and left labels of .* look swapped .*expected the labels corrected"
+        ModelError, match=r"all right and left labels of .* swapped .*the labels corrected"
     ):
         recognise(recording)
 

@@ -140,9 +140,9 @@ def _nowhere(after: Deviations, expected: Expected, pairs: Sequence[tuple[int, i
     """Whether an exchange would put a marker where it is as wrong: then it is no exchange, but a marker in a wrong
     place."""
     own = [k for pair in pairs for k in pair]
-    far = (np.abs(after.distance[own]) > _STILL_WRONG).sum(axis=1)
+    far = np.sum(np.abs(after.distance[own]) > _STILL_WRONG, axis=1)
     known = np.isfinite(expected.distance[own]).sum(axis=1)
-    return bool((2 * far > known).any())
+    return bool(np.any(2 * far > known))
 
 
 def _weight(pairs: Sequence[tuple[int, int]]) -> float:
@@ -171,7 +171,7 @@ def _promise(found: Found, expected: Expected, height_m: float, now: Deviations)
     own = np.diag(cost)
     both = _SLACK + 2.0 * (now.uneven**2).sum(axis=1)
     promise = own[:, None] + own[None] - cost - cost.T + both[:, None] + both[None]
-    known = expected.rigid.any(axis=1)
+    known = np.asarray(expected.rigid.any(axis=1))
     return np.where(known[:, None] & known[None], promise, 0.0)
 
 
