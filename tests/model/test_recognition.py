@@ -177,9 +177,7 @@ def test_without_what_is_exchanged_there_is_no_person() -> None:
     recording = walking("plug-in-gait-lower-body")
     for name in ("THI", "KNE", "TIB", "ANK", "HEE", "TOE"):
         recording = exchanged(recording, f"R{name}", f"L{name}")
-    with pytest.raises(
-        ModelError, match=r"all right and left labels of .* swapped .*the labels corrected"
-    ):
+    with pytest.raises(ModelError, match=r"all right and left labels of .* swapped .*the labels corrected"):
         recognise(recording)
 
 
