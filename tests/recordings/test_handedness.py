@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from dynakin.errors import RecordingError
 from dynakin.recordings.frame import find_ground_frame
+from dynakin.recordings.landmarks import DEFAULT_PAIRS
 from dynakin.recordings.orientation import refuse_mirrored
 from dynakin.recordings.recording import Recording
 from support.made_recordings import standing
@@ -74,15 +75,15 @@ def test_a_body_in_any_pose_is_no_mirror_and_its_image_is(turn: tuple[float, ...
     R = Rotation.from_quat(turn).as_matrix()
     posed = standing()
     posed = replace(posed, markers=posed.markers @ R.T)
-    refuse_mirrored(posed, Y_UP, "+Y")
+    refuse_mirrored(posed, Y_UP, "+Y", DEFAULT_PAIRS)
     with pytest.raises(RecordingError, match="mirror"):
-        refuse_mirrored(negated(posed, 2), Y_UP, "+Y")
+        refuse_mirrored(negated(posed, 2), Y_UP, "+Y", DEFAULT_PAIRS)
 
 
 def test_without_names_nothing_is_said() -> None:
     recording = negated(standing(), 2)
     names = tuple(f"M{k}" for k in range(len(recording.marker_names)))
-    refuse_mirrored(replace(recording, marker_names=names), Y_UP, "+Y")
+    refuse_mirrored(replace(recording, marker_names=names), Y_UP, "+Y", DEFAULT_PAIRS)
 
 
 def test_real_recordings_are_right_handed_and_their_images_are_not(data_dir: Path) -> None:

@@ -129,7 +129,7 @@ def find_ground_frame(
         up = axis_vector(vertical)
         axis = ("+" if up.sum() > 0 else "-") + "XYZ"[int(np.argmax(np.abs(up)))]
         how = [f"Vertical {axis}: given."]
-    refuse_mirrored(recording, up, axis)
+    refuse_mirrored(recording, up, axis, pairs)
     if isinstance(forward, str) and forward.casefold() == "auto":
         ahead, found = find_forward(recording, up, pairs)
         how += found

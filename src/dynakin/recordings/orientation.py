@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -214,16 +214,17 @@ _SURE = 0.3
 """Sine of the angle that the three directions span, below which they say nothing: feet in line, or crossed."""
 
 
-def refuse_mirrored(recording: Recording, up: Array, vertical: str) -> None:
+def refuse_mirrored(recording: Recording, up: Array, vertical: str, pairs: FacingPairs) -> None:
     """Refuse a recording in which pelvis and feet, as far as their markers are named, are all seen in a mirror.
 
     Args:
         up: (3,) unit vector, taken where the pelvis or the feet are not named; vertical: its axis ("+Y").
+        pairs: with these of a marker set the whole body is a witness too.
 
     Raises:
         RecordingError: says which axis looks negated, or that left and right may be exchanged.
     """
-    found = {what: value for what, value in _witnesses(recording, up).items() if abs(value) > _SURE}
+    found = {what: value for what, value in _witnesses(recording, up, pairs).items() if abs(value) > _SURE}
     if not found or max(found.values()) > 0.0:
         return
     if vertical.startswith("-"):
@@ -240,7 +241,7 @@ def refuse_mirrored(recording: Recording, up: Array, vertical: str) -> None:
     )
 
 
-def _witnesses(recording: Recording, up: Array) -> dict[str, float]:
+def _witnesses(recording: Recording, up: Array, pairs: FacingPairs) -> dict[str, float]:
     """Median over the frames of the volume that the unit vectors forward, up and right span: near 1, or -1 mirrored."""
     roles = {
         (role, side): [name for name in recording.marker_names if _is(name, side, words)]
@@ -265,6 +266,11 @@ def _witnesses(recording: Recording, up: Array) -> dict[str, float]:
         "feet": _middle(feet[2:]) - _middle(feet[:2]),
     }
     spanned = {what: _volume(ahead[what], own_up, right[what]) for what in ahead}
+    if pairs.across and (pairs.heel_toe or pairs.pelvis):
+        low, high = (_seen_mean(recording, names) for names in (pairs.below, pairs.above))
+        forward = _seen_difference(recording, [(front, back) for back, front in (*pairs.heel_toe, *pairs.pelvis)])
+        standing = np.where(np.isfinite(high - low), high - low, own_up)
+        spanned["body"] = _volume(forward, standing, _seen_difference(recording, list(pairs.across)))
     return {what: value for what, value in spanned.items() if value is not None}
 
 
@@ -280,6 +286,22 @@ def _mean(recording: Recording, names: list[str]) -> Array:
     if not names:
         return np.full((recording.n_frames, 3), np.nan)
     return np.asarray(np.mean([recording.marker(name) for name in names], axis=0))
+
+
+def _seen_mean(recording: Recording, names: Sequence[str]) -> Array:
+    """Mean (T, 3) m of those of some markers that are seen, NaN where none is."""
+    if not names:
+        return np.full((recording.n_frames, 3), np.nan)
+    places = np.stack([recording.marker(name) for name in names])
+    n = np.isfinite(places).all(axis=2).sum(axis=0)[:, None]
+    return np.where(n > 0, np.nansum(places, axis=0) / np.maximum(n, 1), np.nan)
+
+
+def _seen_difference(recording: Recording, pairs: Sequence[tuple[str, str]]) -> Array:
+    """Mean (T, 3) m from the second to the first of the pairs that are seen whole, NaN where none is."""
+    apart = np.stack([recording.marker(one) - recording.marker(other) for one, other in pairs])
+    n = np.isfinite(apart).all(axis=2).sum(axis=0)[:, None]
+    return np.where(n > 0, np.nansum(apart, axis=0) / np.maximum(n, 1), np.nan)
 
 
 def _middle(places: list[Array]) -> Array:

@@ -267,8 +267,8 @@ def _deviations(found: Found, expected: Expected, height_m: float, own: slice | 
 
 
 def cost_under_names(found: Found, expected: Expected, height_m: float) -> Array:
-    """(n, n) what marker k would add to the cost under the name of i, all others keeping theirs and the evenness of both
-    sides aside."""
+    """(n, n) what marker k would add to the cost under the name of i, all others keeping theirs; the evenness of both
+    sides is left aside."""
     n = len(expected.distance)
     cost = np.empty((n, n))
     for i in range(n):
@@ -284,10 +284,15 @@ def body_height_m(found: Found, expected: Expected) -> float:
     return float(np.median(ratio)) if len(ratio) else _HEIGHT_M
 
 
+def frames_of(recording: Recording) -> npt.NDArray[np.intp]:
+    """Frames that are looked at, spread over the trial."""
+    n = min(_FRAMES, recording.n_frames)
+    return np.unique(np.linspace(0, recording.n_frames - 1, n).round().astype(np.intp))
+
+
 def places_of(
-    recording: Recording, match: MarkerMatch, keys: Sequence[MarkerKey], frames: Array | None = None
+    recording: Recording, match: MarkerMatch, keys: Sequence[MarkerKey], frames: npt.NDArray[np.intp]
 ) -> Array:
-    """Places (T, n, 3) m of markers on frames spread over the trial."""
-    chosen = np.unique(np.linspace(0, recording.n_frames - 1, min(_FRAMES, recording.n_frames)).round().astype(int))
+    """Places (T, n, 3) m of markers on some frames."""
     columns = [recording.marker_names.index(match.names[key]) for key in keys]
-    return np.asarray(recording.markers[chosen][:, columns])
+    return np.asarray(recording.markers[frames][:, columns])

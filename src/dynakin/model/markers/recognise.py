@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynakin.errors import ModelError
-from dynakin.model.markers.geometry import Expected, Found, body_height_m, deviations, places_of
+from dynakin.model.markers.geometry import Expected, Found, body_height_m, deviations
 from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
 from dynakin.model.markers.match import (
     SIDES,
@@ -19,7 +19,7 @@ from dynakin.model.markers.match import (
     match_markers,
 )
 from dynakin.model.markers.schema import MarkerSetFile
-from dynakin.model.markers.swaps import Swap, distance_words, swaps_for_a_while, swaps_throughout
+from dynakin.model.markers.swaps import Swap, distance_words, find_swaps
 from dynakin.recordings.recording import Recording
 
 _LISTED = 8  # names in a sentence
@@ -187,17 +187,9 @@ def checked(recording: Recording, match: MarkerMatch) -> Recognised:
     keys = list(match.names)
     if not keys or not recording.n_frames:
         return Recognised(match, ())
-    places = places_of(recording, match, keys)
+    swaps, found, order = find_swaps(recording, match, keys)
     expected = Expected.of(match, keys)
-    found = Found.of(places, expected)
-    height_m = body_height_m(found, expected)
-    swaps, order = swaps_throughout(match, keys, found, expected, height_m)
-    wrong = _misplaced(match, keys, found, expected, height_m, order)
-    gone = {keys[k] for k in wrong} | {key for swap in swaps for key in swap.keys}
-    if not swaps:
-        swaps = [
-            swap for swap in swaps_for_a_while(recording, match, keys, places, found, expected) if not swap.keys & gone
-        ]
+    wrong = _misplaced(match, keys, found, expected, body_height_m(found.ordered(order), expected), order)
     messages = []
     for swap in swaps:
         match, said = _without_swap(match, swap)
@@ -260,8 +252,8 @@ def _refuse_wrong_set(found: Recognised, where: str) -> None:
         example = next(said for said in found.messages if said.startswith("Warning"))
         raise ModelError(
             f"{where}: the names fit marker set {found.match.marker_set.name}, but {found.wrong_n} of {total} markers "
-            f"are not where it says ({example.removeprefix('Warning: ').split(';')[0]}); expected the set that was used, "
-            "or one of your own: dynakin markers new TRIAL -o my.toml"
+            f"are not where it says ({example.removeprefix('Warning: ').split(';')[0]}); expected the set that was "
+            "used, or one of your own: dynakin markers new TRIAL -o my.toml"
         )
 
 

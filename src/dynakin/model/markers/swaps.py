@@ -3,14 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import runs
-from dynakin.model.markers.geometry import Deviations, Expected, Found, cost_under_names, deviations
+from dynakin.model.markers.geometry import (
+    Deviations,
+    Expected,
+    Found,
+    body_height_m,
+    cost_under_names,
+    deviations,
+    frames_of,
+    places_of,
+)
 from dynakin.model.markers.match import MarkerKey, MarkerMatch
 from dynakin.recordings.recording import Recording
 
@@ -20,6 +28,8 @@ Order = npt.NDArray[np.intp]
 _GAIN = 8.0
 """How much nearer to a body (`Deviations.cost`) an exchange must bring it. In the recordings of ``shared/data``,
 labelled rightly, none brings more than 2.2; exchanged neighbours on a leg mostly 15 and more, right for left 9."""
+_STILL_WRONG = 4.0  # deviations of a distance
+_OTHER = {"right": "left", "left": "right"}
 _MOST = 6  # exchanges in one recording
 _GROUPS = (
     ("leg", ("thigh", "shank", "foot", "toes")),
@@ -34,7 +44,7 @@ _GROUPS = (
 _SLACK = 4.0  # of a marker, in the quick estimate of what its exchange gains
 _OFF_M = 0.03  # a marker so far from its place on its segment is not where it was
 _MENDED = 0.5  # of that, at most, is left after the exchange
-_SHORTEST_S = 0.1
+_FEWEST_FRAMES = 2  # of those that are looked at
 
 
 @dataclass(frozen=True)
@@ -59,22 +69,64 @@ class Swap:
         """All markers that take part."""
         return {key for pair in self.pairs for key in pair}
 
+    def at(self, time: Array) -> npt.NDArray[np.bool_]:
+        """Whether it is so at some times (s)."""
+        if self.span_s is None:
+            return np.ones(len(time), dtype=bool)
+        return np.asarray((time >= self.span_s[0]) & (time <= self.span_s[1]))
 
-def swaps_throughout(
-    match: MarkerMatch, keys: Sequence[MarkerKey], found: Found, expected: Expected, height_m: float
+
+def find_swaps(recording: Recording, match: MarkerMatch, keys: Sequence[MarkerKey]) -> tuple[list[Swap], Found, Order]:
+    """Labels that are exchanged, throughout or for a while; what the recording shows of the markers where they are not
+    exchanged for a while; and the order of the markers that their names belong to.
+
+    Whichever of both is looked for first, the other may be taken for it: the account with the fewest exchanges counts.
+    """
+    expected, frames = Expected.of(match, keys), frames_of(recording)
+    found = Found.of(places_of(recording, match, keys, frames), expected)
+    throughout, order = _swaps_throughout(match, keys, found, expected)
+    shown = {key: match.names[keys[k]] for key, k in zip(keys, order, strict=True)}
+    right = replace(match, names=shown) if throughout else match
+    later = _swaps_for_a_while(recording, right, keys, found.ordered(order), expected)
+    first = (_merged(throughout, later, recording), found, order)
+    if not later:
+        return first
+    clean = _without(frames, recording, _swaps_for_a_while(recording, match, keys, found, expected))
+    found = Found.of(places_of(recording, match, keys, clean), expected)
+    throughout, order = _swaps_throughout(match, keys, found, expected)
+    earlier = _swaps_for_a_while(recording, match, keys, found, expected)
+    second = (_merged(throughout, earlier, recording), found, order)
+    return second if _n_labels(second[0]) < _n_labels(first[0]) else first
+
+
+def _n_labels(swaps: Sequence[Swap]) -> int:
+    return sum(len(swap.keys) for swap in swaps)
+
+
+def _without(frames: Order, recording: Recording, swaps: Sequence[Swap]) -> Order:
+    time = recording.time[frames]
+    clean = np.ones(len(frames), dtype=bool)
+    for swap in swaps:
+        clean &= ~swap.at(time)
+    return frames[clean] if clean.any() else frames
+
+
+def _swaps_throughout(
+    match: MarkerMatch, keys: Sequence[MarkerKey], found: Found, expected: Expected
 ) -> tuple[list[Swap], Order]:
     """Exchanges that mend what contradicts a body, the clearest first, and the order of the markers after them."""
     order = np.arange(len(keys))
     swaps: list[Swap] = []
     while len(swaps) < _MOST:
         own = found.ordered(order)
+        height_m = body_height_m(own, expected)
         now = deviations(own, expected, height_m)
         best, gain = None, _GAIN
         for pairs, what in _candidates(match, keys, _promise(own, expected, height_m, now)):
             exchanged = _exchanged(len(keys), pairs)
             after = deviations(own.ordered(exchanged), expected, height_m)
-            if now.cost - after.cost > gain:
-                best, gain = (pairs, what, exchanged, after), now.cost - after.cost
+            if (now.cost - after.cost) / _weight(pairs) > gain and not _nowhere(after, expected, pairs):
+                best, gain = (pairs, what, exchanged, after), (now.cost - after.cost) / _weight(pairs)
         if best is None:
             break
         pairs, what, exchanged, after = best
@@ -84,13 +136,43 @@ def swaps_throughout(
     return swaps, order
 
 
+def _nowhere(after: Deviations, expected: Expected, pairs: Sequence[tuple[int, int]]) -> bool:
+    """Whether an exchange would put a marker where it is as wrong: then it is no exchange, but a marker in a wrong
+    place."""
+    own = [k for pair in pairs for k in pair]
+    far = np.sum(np.abs(after.distance[own]) > _STILL_WRONG, axis=1)
+    known = np.isfinite(expected.distance[own]).sum(axis=1)
+    return bool(np.any(2 * far > known))
+
+
+def _weight(pairs: Sequence[tuple[int, int]]) -> float:
+    """An account of several exchanges must gain more than one of one."""
+    return 1.0 + 0.25 * (min(len(pairs), 3) - 1)
+
+
+def _merged(throughout: Sequence[Swap], at_times: Sequence[Swap], recording: Recording) -> list[Swap]:
+    """All exchanges; two markers that are exchanged but for a while are so in the rest of the trial."""
+    start_s, end_s = float(recording.time[0]), float(recording.time[-1])
+    found = []
+    for swap in throughout:
+        for other in at_times:
+            if other.keys == swap.keys and other.span_s is not None:
+                first, last = other.span_s
+                rest = (start_s, first) if end_s - last < first - start_s else (last, end_s)
+                swap = replace(swap, span_s=rest, share=1.0 - other.share)
+        found.append(swap)
+    known = [swap.keys for swap in throughout]
+    return [*found, *(swap for swap in at_times if swap.keys not in known)]
+
+
 def _promise(found: Found, expected: Expected, height_m: float, now: Deviations) -> Array:
     """(n, n) about what the exchange of two markers gains, rather too much than too little."""
     cost = cost_under_names(found, expected, height_m)
     own = np.diag(cost)
-    uneven = 2.0 * (now.uneven**2).sum(axis=1)
-    both = _SLACK + uneven
-    return np.asarray(own[:, None] + own[None] - cost - cost.T + both[:, None] + both[None])
+    both = _SLACK + 2.0 * (now.uneven**2).sum(axis=1)
+    promise = own[:, None] + own[None] - cost - cost.T + both[:, None] + both[None]
+    known = np.asarray(expected.rigid.any(axis=1))
+    return np.where(known[:, None] & known[None], promise, 0.0)
 
 
 def _candidates(
@@ -99,8 +181,13 @@ def _candidates(
     """Exchanges worth a trial: which with which, and words for them."""
     names = [match.names[key] for key in keys]
     spot = {key: k for k, key in enumerate(keys)}
-    for i, j in np.argwhere(np.triu(promise > _GAIN, 1)).tolist():
-        yield [(i, j)], f"{names[i]} and {names[j]}"
+    mirror = [spot.get((name, _OTHER.get(side, ""))) for name, side in keys]
+    for i, j in np.argwhere(np.triu(promise > 0.5 * _GAIN, 1)).tolist():
+        if promise[i, j] > _GAIN:
+            yield [(i, j)], f"{names[i]} and {names[j]}"
+        k, m = mirror[i], mirror[j]
+        if keys[i][1] == keys[j][1] == "right" and k is not None and m is not None:
+            yield [(i, j), (k, m)], f"{names[i]} and {names[j]}, and {names[k]} and {names[m]},"
     for what, segments in _GROUPS:
         own = [name for name, side in keys if side == "right" and match.marker_set.marker(name).segment in segments]
         pairs = [(spot[name, "right"], spot[name, "left"]) for name in own if (name, "left") in spot]
@@ -145,80 +232,75 @@ def distance_words(one: str, other: str, found_m: float, usual_m: float) -> str:
     return f"{one} and {other} are {found_m:.2f} m apart{usual}"
 
 
-def swaps_for_a_while(
-    recording: Recording, match: MarkerMatch, keys: Sequence[MarkerKey], places: Array, found: Found, expected: Expected
+def _swaps_for_a_while(
+    recording: Recording, match: MarkerMatch, keys: Sequence[MarkerKey], found: Found, expected: Expected
 ) -> list[Swap]:
     """Exchanges in a part of the trial: two markers leave their places on their segments at the same time, and each is
-    found at the other's.
-
-    Args:
-        places: (T, n, 3) m on some frames, spread over the trial.
-    """
-    partners = _partners(expected)
-    off = np.stack([_off(places, places[:, k], k, partners[k], found) for k in range(len(keys))], axis=1)
-    suspicious = np.flatnonzero((off > _OFF_M).sum(axis=0) >= 2)
+    found at the other's. What is the rule and what the exception, the greater part of the trial says."""
+    frames = frames_of(recording)
+    places = places_of(recording, match, keys, frames)
+    partners = [[int(j) for j in np.flatnonzero(row)] for row in expected.rigid]
     swaps: list[Swap] = []
-    taken: set[int] = set()
-    scored = []
-    for i, j in combinations((int(k) for k in suspicious), 2):
-        both = (off[:, i] > _OFF_M) & (off[:, j] > _OFF_M)
-        if both.sum() < 2:
-            continue
-        mended = _mends(places, i, j, partners, found, off[:, i], off[:, j])
-        if mended.sum() >= max(2, 0.5 * both.sum()):
-            scored.append((int(mended.sum()), i, j))
-    columns = [recording.marker_names.index(match.names[key]) for key in keys]
-    for _, i, j in sorted(scored, reverse=True):
-        if {i, j} & taken:
-            continue
-        needed = sorted({i, j, *partners[i], *partners[j]})
-        every = np.full((recording.n_frames, len(keys), 3), np.nan)
-        every[:, needed] = recording.markers[:, [columns[k] for k in needed]]
-        own = [_off(every, every[:, k], k, partners[k], found) for k in (i, j)]
-        mended = _mends(every, i, j, partners, found, *own)
-        spans = [(a, b) for a, b in runs(mended) if recording.time[b - 1] - recording.time[a] >= _SHORTEST_S]
-        if not spans:
-            continue
-        taken |= {i, j}
-        span = float(recording.time[spans[0][0]]), float(recording.time[spans[-1][1] - 1])
-        one, other = match.names[keys[i]], match.names[keys[j]]
-        worst = max(float(np.nanmax(np.where(mended, values, np.nan))) for values in own)
+    while len(swaps) < _MOST:
+        off = _all_off(places, partners, found)
+        often = np.flatnonzero((off > _OFF_M).sum(axis=0) >= _FEWEST_FRAMES)
+        best, left = None, off.sum()
+        for i, j in combinations((int(k) for k in often), 2):
+            both = (off[:, i] > _OFF_M) & (off[:, j] > 0.5 * _OFF_M) | (off[:, j] > _OFF_M) & (off[:, i] > 0.5 * _OFF_M)
+            if both.sum() < _FEWEST_FRAMES:
+                continue
+            other = places.copy()
+            other[both, i], other[both, j] = places[both, j], places[both, i]
+            after = _all_off(other, partners, found)
+            mended = both & (after[:, [i, j]].max(axis=1) < _MENDED * off[:, [i, j]].max(axis=1))
+            if 2 * mended.sum() >= both.sum() and after.sum() < left:
+                best, left = (i, j, mended, other), after.sum()
+        if best is None:
+            return swaps
+        i, j, mended, places = best
+        start, stop = (int(frames[k]) for k in np.flatnonzero(mended)[[0, -1]])
+        share = float(mended.mean())
+        span = _span(recording, match, [keys[i], keys[j]], start, stop, int(np.diff(frames).max(initial=1)))
+        one, other_name = match.names[keys[i]], match.names[keys[j]]
+        far = float(off[mended][:, [i, j]].max())
         swaps.append(
             Swap(
                 ((keys[i], keys[j]),),
-                f"{one} and {other}",
-                f"each jumps by up to {worst:.2f} m on its segment, to the place of the other",
+                f"{one} and {other_name}",
+                f"each jumps by {far:.2f} m on its segment, to the place of the other",
                 span,
-                sum(b - a for a, b in spans) / recording.n_frames,
+                share,
             )
         )
     return swaps
 
 
-def _partners(expected: Expected) -> list[list[int]]:
-    return [[int(j) for j in np.flatnonzero(row)] for row in expected.rigid]
+def _span(
+    recording: Recording, match: MarkerMatch, keys: Sequence[MarkerKey], start: int, stop: int, step: int
+) -> tuple[float, float]:
+    """Times (s) of the jumps next to the first and the last of the frames that were looked at."""
+    paths = np.stack([recording.marker(match.names[key]) for key in keys], axis=1)
+    with np.errstate(invalid="ignore"):
+        jump = np.nan_to_num(np.linalg.norm(np.diff(paths, axis=0), axis=2).min(axis=1))
+
+    def largest(low: int, high: int) -> int:
+        low, high = max(low, 0), min(high, len(jump))
+        return low + int(np.argmax(jump[low:high])) if high > low and jump[low:high].max() > _OFF_M else -1
+
+    before, after = largest(start - step, start), largest(stop, stop + step)
+    first = before + 1 if before >= 0 else (0 if start < step else start)
+    last = after if after >= 0 else (recording.n_frames - 1 if stop + step >= recording.n_frames else stop)
+    return float(recording.time[first]), float(recording.time[last])
 
 
-def _off(places: Array, own: Array, k: int, partners: Sequence[int], found: Found) -> Array:
-    """How far (T,) m a marker at ``own`` (T, 3) is from where the k-th usually is on its segment: the median over the
-    distances to the others there, 0 where none is seen."""
-    if not partners:
-        return np.zeros(len(places))
-    lengths = np.linalg.norm(places[:, partners] - own[:, None], axis=2)
-    wrong = np.abs(lengths - found.distance[k, partners])
-    n = np.isfinite(wrong).sum(axis=1)
-    ordered = np.sort(wrong, axis=1)
-    middle = ordered[np.arange(len(wrong)), np.maximum((n - 1) // 2, 0)]
-    return np.where(n > 0, middle, 0.0)
-
-
-def _mends(
-    places: Array, i: int, j: int, partners: Sequence[Sequence[int]], found: Found, off_i: Array, off_j: Array
-) -> npt.NDArray[np.bool_]:
-    """(T,) frames in which both are off, and neither is when they change places."""
-    there = [
-        _off(places, places[:, b], a, [k for k in partners[a] if k not in (i, j)], found) for a, b in ((i, j), (j, i))
-    ]
-    was = np.maximum(off_i, off_j)
-    off = (was > _OFF_M) & (np.minimum(off_i, off_j) > 0.5 * _OFF_M)
-    return np.asarray(off & (np.maximum(*there) < _MENDED * was))
+def _all_off(places: Array, partners: Sequence[Sequence[int]], found: Found) -> Array:
+    """How far (T, n) m each marker is from where it usually is on its segment, by the mean over its distances to the
+    others there; 0 where none is seen."""
+    off = np.zeros(places.shape[:2])
+    for k, others in enumerate(partners):
+        if others:
+            lengths = np.linalg.norm(places[:, list(others)] - places[:, k, None], axis=2)
+            wrong = np.abs(lengths - found.distance[k, list(others)])
+            n = np.isfinite(wrong).sum(axis=1)
+            off[:, k] = np.where(n > 0, np.nansum(wrong, axis=1) / np.maximum(n, 1), 0.0)
+    return off

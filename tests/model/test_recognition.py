@@ -1,0 +1,252 @@
+"""The right marker set is recognised however it is spelt, and labels that are not where they say are named."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dynakin.errors import ModelError, RecordingError
+from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
+from dynakin.model.markers.match import MarkerMatch, match_markers
+from dynakin.model.markers.recognise import choose_marker_set, recognise
+from dynakin.recordings.frame import find_ground_frame
+from dynakin.recordings.landmarks import FacingPairs
+from dynakin.recordings.orientation import find_forward
+from dynakin.recordings.read import read
+from dynakin.recordings.recording import Recording
+from dynakin.simulation.bodies.markers import marker_positions
+from dynakin.simulation.bodies.registry import choose_body
+from dynakin.simulation.bodies.subject import Spread
+from dynakin.simulation.contacts import mechanical_state
+from dynakin.simulation.mechanics import TreeMotion
+from dynakin.simulation.motions.registry import choose_movement
+from dynakin.simulation.streams import Streams
+
+Array = np.ndarray
+SEED, WHO = 5, (62.0, 1.66, "female", Spread())
+SETS = [name for name in available_marker_sets() if not name.endswith("-all")]
+WITH_LEGS = [name for name in SETS if {"thigh", "shank"} <= {m.segment for m in load_marker_set(name).markers}]
+OF_REAL = {
+    "c3d_parser/FMC/MH0222_BP01.c3d": "plug-in-gait-lower-body",
+    "c3d_parser/FMC/MH0222_BP06.c3d": "plug-in-gait-lower-body",
+    "c3d_parser/FMC/MH0222_BP08.c3d": "plug-in-gait-lower-body",
+    "c3d_parser/FMC/MH0222_BP15.c3d": "plug-in-gait-lower-body",
+    "c3d_parser/MH/MH_Cal 01.c3d": "plug-in-gait-lower-body",
+    "c3d_parser/MH/MH_Dynamic_BF08.c3d": "plug-in-gait-lower-body",
+    "c3d_parser/RBWH/Max Cal 01.c3d": "plug-in-gait",
+    "c3d_parser/RBWH/bfnd w1.c3d": "plug-in-gait",
+    "functional/anat_pose_ECH.c3d": "biobuddy",
+    "functional/right_hip.c3d": "biobuddy",
+    "functional/right_knee.c3d": "biobuddy",
+    "gait2354/subject01_static.trc": "gait2354",
+    "gait2354/subject01_walk1.trc": "gait2354",
+    "opencap_subject4/DJ1.trc": "opencap",
+    "opencap_subject4/STS1.trc": "opencap",
+    "opencap_subject4/squats1.trc": "opencap",
+    "opencap_subject4/static1.trc": "opencap",
+    "opencap_subject4/walking1.trc": "opencap",
+    "plugin_gait/GaitNormal_1.c3d": "plug-in-gait",
+    "plugin_gait/S1_FlywheelSquat.c3d": "plug-in-gait",
+    "plugin_gait/S1_StandingRef.c3d": "plug-in-gait",
+    "pycgm/Movement_trial.c3d": "plug-in-gait",
+    "pycgm/Static_trial.c3d": "plug-in-gait",
+    "rajagopal/motion_capture_run.trc": "rajagopal-run",
+    "rajagopal/motion_capture_walk.trc": "rajagopal-walk",
+    "rajagopal/static_run.trc": "rajagopal-run",
+    "rajagopal/static_walk_1.trc": "rajagopal-walk",
+    "rajagopal/static_walk_2.trc": "rajagopal-walk",
+}
+
+
+@cache
+def _walk() -> tuple[Array, TreeMotion, float]:
+    streams = Streams(SEED)
+    body = choose_body("fullbody", streams, *WHO)
+    time = np.arange(100) / 25.0
+    movement = choose_movement("gait", body, streams["motion"], 4.0, 6.0)
+    return time, mechanical_state(body, movement, time).moving, body.floor_m
+
+
+@cache
+def walking(marker_set: str) -> Recording:
+    """A woman of 1.66 m, unlike the average, who walks with all of a set on; 1 mm of noise."""
+    time, moving, floor_m = _walk()
+    sites = choose_body("fullbody", Streams(SEED), *WHO, markers=marker_set).sites
+    markers = marker_positions(sites, moving) - [0.0, floor_m, 0.0]
+    markers = markers + 1e-3 * np.random.default_rng(1).standard_normal(markers.shape)
+    return Recording(marker_set, None, time, tuple(site.name for site in sites), markers)
+
+
+def exchanged(recording: Recording, one: str, other: str, frames: slice = slice(None)) -> Recording:
+    i, j = (recording.marker_names.index(name) for name in (one, other))
+    markers = recording.markers.copy()
+    markers[frames, i], markers[frames, j] = recording.markers[frames, j], recording.markers[frames, i]
+    return replace(recording, markers=markers)
+
+
+def renamed(recording: Recording, spelt: Callable[[str], str]) -> Recording:
+    return replace(recording, marker_names=tuple(spelt(name) for name in recording.marker_names))
+
+
+def warnings_of(messages: tuple[str, ...]) -> list[str]:
+    return [said for said in messages if said.startswith("Warning")]
+
+
+@pytest.mark.parametrize("name", WITH_LEGS)
+def test_every_set_is_recognised_on_a_walking_person_and_nothing_is_found_wrong(name: str) -> None:
+    recording = walking(name)
+    found = recognise(recording)
+    assert found.match.marker_set.name == name
+    assert not warnings_of(found.messages)
+    assert found.messages[0].startswith(f"Marker set {name}: {len(found.match.names)} of its ")
+    assert len(found.match.names) >= 0.95 * len(recording.marker_names)
+
+
+@pytest.mark.parametrize("spelt", [
+    lambda name: f"S01:{name}", lambda name: f"Jane_Doe_{name}", str.lower, str.upper,
+    lambda name: name.replace(".", "_"), lambda name: name.replace("_", " "),
+], ids=["colon", "prefix", "lower", "upper", "dots", "blanks"])  # fmt: skip
+@pytest.mark.parametrize("name", WITH_LEGS)
+def test_every_set_is_recognised_however_it_is_spelt(name: str, spelt: Callable[[str], str]) -> None:
+    recording = walking(name)
+    plain = recognise(recording).match
+    other = recognise(renamed(recording, spelt)).match
+    assert other.marker_set.name == name
+    assert other.names == {key: spelt(own) for key, own in plain.names.items()}
+
+
+@pytest.mark.parametrize("name", WITH_LEGS)
+def test_right_for_left_is_named_in_every_set_and_left_out(name: str) -> None:
+    recording = walking(name)
+    match = recognise(recording).match
+    for place in ("KNE", "KJ", "ANK", "AJ"):
+        pair = [match.names.get((place, side)) for side in ("right", "left")]
+        if pair[0] and pair[1]:
+            try:
+                found = recognise(exchanged(recording, pair[0], pair[1]))
+            except ModelError as error:  # a set that has nothing else on the leg
+                assert f"{pair[0]} and {pair[1]} look swapped" in error.message
+                assert "KJ" in place or "AJ" in place
+                continue
+            said = warnings_of(found.messages)
+            assert len(said) == 1
+            assert f"{pair[0]} and {pair[1]} look swapped" in said[0] or f"{pair[1]} and {pair[0]}" in said[0]
+            assert set(found.match.left_out) == {(place, "right"), (place, "left")}
+
+
+@pytest.mark.parametrize("name", WITH_LEGS)
+def test_a_mirrored_person_is_refused_in_every_set_that_shows_the_front(name: str) -> None:
+    recording = walking(name)
+    pairs = recognise(recording).match.facing_pairs
+    if not pairs.heel_toe and not pairs.pelvis:
+        pytest.skip("no place of this set shows where the front is")
+    find_ground_frame(recording, pairs=pairs)
+    mirrored = replace(recording, markers=recording.markers * [1.0, 1.0, -1.0])
+    with pytest.raises(RecordingError, match="seen in a mirror"):
+        find_ground_frame(mirrored, pairs=recognise(mirrored).match.facing_pairs)
+
+
+@pytest.mark.parametrize(
+    ("one", "other"), [("RKNE", "RTHI"), ("RANK", "RHEE"), ("LASI", "LPSI"), ("RELB", "RSHO"), ("C7", "T10")]
+)
+def test_exchanged_neighbours_are_named(one: str, other: str) -> None:
+    found = recognise(exchanged(walking("plug-in-gait"), one, other))
+    (said,) = warnings_of(found.messages)
+    assert one in said.split("look swapped")[0]
+    assert other in said.split("look swapped")[0]
+    assert "correct the labels" in said
+    assert {one, other}.isdisjoint(found.match.names.values())
+    name = one.lstrip("RL") if one != "LASI" else "ASI"
+    assert f"marker {name} cannot be used" in found.match.absent(name)
+
+
+def test_an_exchange_from_a_frame_on_is_named_with_its_time() -> None:
+    recording = walking("plug-in-gait")
+    found = recognise(exchanged(recording, "RKNE", "LKNE", slice(60, None)))
+    (said,) = warnings_of(found.messages)
+    assert "look swapped from 2.40 to 3.96 s" in said
+    assert set(found.match.left_out) == {("KNE", "right"), ("KNE", "left")}
+
+
+def test_without_what_is_exchanged_there_is_no_person() -> None:
+    recording = walking("plug-in-gait-lower-body")
+    for name in ("THI", "KNE", "TIB", "ANK", "HEE", "TOE"):
+        recording = exchanged(recording, f"R{name}", f"L{name}")
+    with pytest.raises(ModelError, match=r"all right and left labels of .* swapped .*the labels corrected"):
+        recognise(recording)
+
+
+def test_a_marker_in_a_wrong_place_is_named_with_what_was_found_and_expected() -> None:
+    recording = walking("plug-in-gait")
+    markers = recording.markers.copy()
+    markers[:, recording.marker_names.index("RANK")] += [0.0, 0.0, 0.9]
+    found = recognise(replace(recording, markers=markers))
+    (said,) = warnings_of(found.messages)
+    assert "RANK" in said
+    assert "m apart, expected about" in said
+    assert set(found.match.left_out) == {("ANK", "right")}
+
+
+def test_names_on_other_places_are_no_set() -> None:
+    recording = walking("plug-in-gait")
+    order = np.random.default_rng(2).permutation(len(recording.marker_names))
+    with pytest.raises(ModelError, match=r"not where it says|look swapped"):
+        recognise(replace(recording, markers=recording.markers[:, order]))
+
+
+def test_a_part_of_a_set_is_enough_and_what_lacks_is_said_at_once() -> None:
+    whole = walking("plug-in-gait")
+    leg = ("RASI", "LASI", "RPSI", "LPSI", "RKNE", "RTHI", "RANK", "RTIB", "RHEE", "RTOE")
+    columns = [whole.marker_names.index(name) for name in leg]
+    found = recognise(replace(whole, marker_names=leg, markers=whole.markers[:, columns]))
+    assert len(found.match.names) == len(leg)
+    with pytest.raises(ModelError, match=r"lacks on the pelvis \(.*on the thigh \(.*dynakin markers new TRIAL"):
+        choose_marker_set(["RTOE", "RHEE", "nose"])
+
+
+def test_sides_before_and_behind_the_rest() -> None:
+    set_ = load_marker_set("rajagopal-walk")
+    for right in ("R.ASIS", "ASIS_R", "RASIS", "Right ASIS", "r_asis"):
+        left = right.replace("Right", "Left").replace("R", "L", 1) if "r_" not in right else "l_asis"
+        names = (right, {"ASIS_R": "ASIS_L", "Right ASIS": "Left ASIS"}.get(right, left))
+        match = match_markers(set_, names, [True, True], "trial")
+        assert match.names == {("ASI", "right"): names[0], ("ASI", "left"): names[1]}
+
+
+def test_two_persons_are_refused() -> None:
+    one = [f"S1_{name}" for name in walking("plug-in-gait").marker_names]
+    both = [*one, *(name.replace("S1_", "S2_") for name in one)]
+    with pytest.raises(ModelError, match="expected one subject"):
+        match_markers(load_marker_set("plug-in-gait"), both, [True] * len(both), "trial")
+
+
+def test_facing_from_right_and_left_hip_alone() -> None:
+    recording = walking("coco17")
+    match = recognise(recording).match
+    hips = tuple(match.names["HJ", side] for side in ("right", "left"))
+    columns = [recording.marker_names.index(name) for name in hips]
+    only = replace(recording, marker_names=hips, markers=recording.markers[:, columns])
+    ahead, how = find_forward(only, np.array([0.0, 1.0, 0.0]), FacingPairs((), (), across=((hips[0], hips[1]),)))
+    assert ahead[0] > 0.98
+    assert "square to the line from right to left" in how[0]
+
+
+def test_without_toe_the_metatarsals_show_the_front() -> None:
+    match = match_markers(load_marker_set("plug-in-gait"), ("RHEE", "RMT5", "LHEE", "LTOE"), [True] * 4, "trial")
+    assert isinstance(match, MarkerMatch)
+    assert match.facing_pairs.heel_toe == (("RHEE", "RMT5"), ("LHEE", "LTOE"))
+
+
+@pytest.mark.parametrize("trial", OF_REAL)
+def test_real_recordings_have_their_set_and_no_false_alarm(trial: str, data_dir: Path) -> None:
+    path = data_dir / trial
+    if not path.exists():
+        pytest.skip(f"{path} is absent")
+    found = recognise(read(path))
+    assert found.match.marker_set.name == OF_REAL[trial]
+    assert not warnings_of(found.messages)
