@@ -56,6 +56,17 @@ def test_check_refuses_as_run_does(
     assert refusal in checked
 
 
+def test_where_only_the_mass_is_missing_all_else_is_said(data_dir: Path, capsys: Said) -> None:
+    """A chair bears part of the person, so that the plates weigh nobody."""
+    folder = data_dir / "opencap_subject4"
+    assert main(["check", str(folder / "STS1.trc"), "--forces", str(folder / "STS1_grf.mot")]) == 1
+    found, refusal = told(capsys)
+    assert "mass_kg is not given and cannot be found" in refusal
+    for words in ("The mass is missing.", "--mass KG", "--static static1.trc", "under the right foot", "Contacts"):
+        assert words in found
+    assert "Results" not in found
+
+
 def test_check_promises_what_run_keeps(data_dir: Path, tmp_path: Path, capsys: Said) -> None:
     """Without an option: the same moments for the same reasons, what is assumed said first."""
     trial = str(data_dir / "pycgm" / "Movement_trial.c3d")
