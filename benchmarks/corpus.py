@@ -31,7 +31,14 @@ from recordings import DATA, _source, kept, put_between
 MARKS = ("<!-- corpus: begin -->", "<!-- corpus: end -->")
 ANGLE_GOAL_DEG, MOMENT_GOAL = 5.0, 0.15
 """RMS after offset; N m/kg. One recording that Vicon processed twice differs by 0.10 to 0.17 N m/kg."""
-_FROM = {"given": "given", "from the plates": "plates", "from the file": "file", "mean vertical force": "movement"}
+_FROM = {
+    "impulse": "plates' impulse",
+    "assumed": "assumed",
+    "from the plates": "plates, standing",
+    "from the file": "file",
+    "mean vertical force": "mean of a movement",
+    ": given": "given",
+}
 
 
 @dataclass(frozen=True, eq=False)

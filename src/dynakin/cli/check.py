@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
@@ -73,9 +74,10 @@ def _rehearsed(case: Case) -> tuple[Prepared | None, DynakinError | None]:
     except DynakinError as error:
         refusal = error
     if case.config.mass_kg is None and isinstance(refusal, ModelError) and refusal.message.startswith("mass_kg"):
-        heavy = case_of(case.config.changed(mass_kg=_SOME_KG), recording=case.recording, static=case.static)
+        somebody = case.config.changed(mass_kg=_SOME_KG).subject()
+        setup = replace(case.setup, definition=case.setup.definition.with_subject(somebody))
         try:
-            return next(iter(prepare_case(heavy).values())), refusal
+            return next(iter(prepare_case(replace(case, setup=setup)).values())), refusal
         except DynakinError:
             pass
     return None, refusal
