@@ -18,8 +18,8 @@ _MOST_WAYS = 300  # of one landmark: of those that others start from the first a
 
 @dataclass(frozen=True)
 class Need:
-    """A landmark of a model: segments that need it, whether these do without, whether each side has its own; ways: the
-    places that give it, the first that are there are taken."""
+    """A landmark of a model: segments that need it, whether these do without (by proportions), whether each side has
+    its own; ways: the places that give it, the first that are there are taken."""
 
     landmark: str
     segments: tuple[str, ...]
@@ -43,7 +43,9 @@ def needs(model: ModelFile) -> list[Need]:
             if plain not in recipes:
                 continue  # the floor
             owner = segment.name.removesuffix(SUFFIXES.get(segment.side or "", ""))
-            optional = segment.without_markers is not None or segment.when_marked
+            # of models in space all but the root is completed from proportions (`completion`)
+            optional = segment.without_markers is not None or segment.when_marked or segment.parent != "ground"
+            optional = optional if model.sided else segment.without_markers is not None
             segments, was_optional, sided = found.get(plain, ([], True, False))
             found[plain] = (
                 list(dict.fromkeys([*segments, owner])), optional and was_optional, sided or bool(suffix)

@@ -70,9 +70,10 @@ def expanded(data: Mapping[str, Any]) -> dict[str, Any]:
             )
         for entry in names:
             given = _entry(entry)
-            if not _patterns(entry):
+            patterns = _patterns(entry)
+            if not patterns and "name" not in given:
                 raise ValueError(f"clusters: {segment}: a marker without names")
-            name = _SIDED.sub("", _patterns(entry)[0]).strip("._- ")
+            name = _SIDED.sub("", patterns[0]).strip("._- ") if patterns else given["name"]
             markers.append({"name": name, "segment": segment, **shared["clusters"][segment], **given})
     rest["markers"] = [*markers, *rest.get("markers", ())]
     there = {marker["name"] for marker in rest["markers"] if isinstance(marker, dict) and "name" in marker}

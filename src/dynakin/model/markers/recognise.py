@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynakin.errors import ModelError
+from dynakin.errors import ModelError, RecordingError
+from dynakin.model.markers.draft.draft import drafted
 from dynakin.model.markers.geometry import Expected, Found, body_height_m, deviations
 from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
 from dynakin.model.markers.match import (
@@ -151,7 +152,10 @@ def recognise(recording: Recording, asked: MarkerSetFile | None = None) -> Recog
         _refuse_wrong_set(found, where)
         return found
     ranked = fits(seen_names(recording))
-    usable = _usable(ranked, where)
+    try:
+        usable = _usable(ranked, where)
+    except ModelError as unknown:
+        return _guessed(recording, seen, unknown)
     best: Recognised | None = None
     for fit in usable:
         if best is not None and (not best.wrong_n or fit.explained_n < _ABOUT_AS_MANY * usable[0].explained_n):
@@ -162,6 +166,31 @@ def recognise(recording: Recording, asked: MarkerSetFile | None = None) -> Recog
     assert best is not None
     _refuse_wrong_set(best, where)
     return Recognised(best.match, (choice_words(best.match, ranked), *best.messages), best.wrong_n)
+
+
+def _guessed(recording: Recording, seen: list[bool], unknown: ModelError) -> Recognised:
+    """By a set of places guessed from names and from where markers lie, as far as that is likely and no body
+    contradicts it.
+
+    Raises:
+        ModelError: `unknown`, where what can be guessed is too little.
+    """
+    where = str(recording.path or recording.name)
+    try:
+        guessed = drafted(recording)
+    except RecordingError:
+        raise unknown from None
+    if guessed is None:
+        raise unknown
+    found = checked(recording, match_markers(guessed, recording.marker_names, seen, where))
+    if found.wrong_n or _lacking(guessed, found.match.names):
+        raise unknown
+    message = (
+        f"Warning: no marker set has these names; {len(found.match.names)} of {len(seen_names(recording))} markers are "
+        "used at places guessed from their names and from where they lie. Look at them: "
+        f"dynakin markers new {recording.path or 'TRIAL'} -o my.toml, then --markers my.toml"
+    )
+    return Recognised(found.match, (message, *found.messages))
 
 
 def choice_words(match: MarkerMatch, ranked: Sequence[Fit]) -> str:

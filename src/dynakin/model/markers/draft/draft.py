@@ -8,13 +8,14 @@ from __future__ import annotations
 
 import json
 import re
+import tomllib
 from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import RecordingError
-from dynakin.model.markers.anatomy import anatomy
+from dynakin.model.markers.anatomy import anatomy, expanded
 from dynakin.model.markers.draft.by_geometry import (
     Stature,
     alike_on_both_sides,
@@ -24,6 +25,7 @@ from dynakin.model.markers.draft.by_geometry import (
     segment_at,
 )
 from dynakin.model.markers.draft.by_name import Sure, places, said
+from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.recordings.frame import UPRIGHT
 from dynakin.recordings.landmarks import DEFAULT_PAIRS, plain_name
 from dynakin.recordings.orientation import find_forward, find_vertical
@@ -79,6 +81,19 @@ def guess_markers(recording: Recording) -> list[Guess]:
         else:
             guesses.append(lies)
     return _one_each(guesses)
+
+
+def drafted(recording: Recording) -> MarkerSetFile | None:
+    """The marker set of what is at least likely among the guesses; None where nothing is.
+
+    Raises:
+        RecordingError: as `guess_markers`.
+    """
+    guesses = [guess for guess in guess_markers(recording) if _RANK[guess.sure] <= _RANK["likely"]]
+    if not any(guess.place for guess in guesses):
+        return None
+    whole = expanded(tomllib.loads(toml_text(guesses, "guessed", recording.name)))
+    return MarkerSetFile.model_validate(whole)
 
 
 def _standing(recording: Recording) -> tuple[list[str], Array]:
