@@ -21,6 +21,7 @@ from dynakin.model.markers.draft.by_name import places, said
 from dynakin.model.markers.draft.draft import Guess, guess_markers, toml_text
 from dynakin.model.markers.marker_set import load_marker_set
 from dynakin.model.markers.match import match_markers
+from dynakin.model.markers.recognise import recognise
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
 from dynakin.simulation.output import save_trial
@@ -139,6 +140,10 @@ def test_what_is_written_loads_and_runs(tmp_path: Path, capsys: pytest.CaptureFi
     ]
     save_trial(replace(trial, recording=replace(trial.recording, marker_names=tuple(names))), tmp_path / "trial")
     file = next((tmp_path / "trial").glob("*.trc"))
+    guessed = recognise(read(file))
+    assert guessed.messages[0].startswith("Warning: no marker set has these names")
+    assert guessed.match.names["KNE", "right"] == "Knie lateral rechts"
+    assert guessed.match.names["HEE", "left"] == "Ferse links"
     draft = tmp_path / "mine.toml"
     assert main(["markers", "new", str(file), "-o", str(draft)]) == 0
     said_first = capsys.readouterr().out
