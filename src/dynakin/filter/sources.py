@@ -67,6 +67,10 @@ def with_sources(
         moment_source=(("time", "coordinate"), moments.astype(np.uint8)),
         joint_source=(("time", "joint"), joints.astype(np.uint8)),
     )
+    unseen = xr.DataArray(np.isin(data["coordinate"].values, list(held)), dims="coordinate")
+    for name in ("coordinates_sd", "speeds_sd", "accelerations_sd"):
+        if name in found:
+            found[name] = found[name].where(~unseen)  # held where nobody sees it is not known for sure
     for name in ("moments", "moments_sd"):
         found[name] = found[name].where(xr.DataArray(known, dims=("time", "coordinate")))
     found["joint_loads"] = found["joint_loads"].where(xr.DataArray(carried, dims=("time", "joint")))

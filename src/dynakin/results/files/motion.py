@@ -169,7 +169,9 @@ def write_wrench(estimate: Estimate, path: Path) -> None:
 
 
 def _frame(estimate: Estimate) -> str:
-    return f"Frame: {estimate.ground.in_words}."
+    """The frame, and the coordinates that are constant because no marker shows them."""
+    held = ", ".join(name for name in estimate.coordinate_names if name in estimate.config.get("held", {}))
+    return f"Frame: {estimate.ground.in_words}." + (f" Held, not estimated (no markers): {held}." if held else "")
 
 
 def _in_degrees(estimate: Estimate, variable: str) -> np.ndarray:
