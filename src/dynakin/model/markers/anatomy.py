@@ -22,14 +22,14 @@ _SIDED = re.compile(r"\{([^{},]*),([^{},]*)\}")
 
 @cache
 def anatomy() -> dict[str, Any]:
-    """Contents of anatomy.toml: ``places``, ``clusters``, ``units``, ``landmarks``, ``in_space``, keys of a whole set."""
+    """Contents of anatomy.toml: ``places``, ``clusters``, ``units``, ``landmarks``, ``in_space``, keys of a set."""
     return read_toml(Path(str(_FOLDER / "anatomy.toml")))
 
 
 @cache
 def standing_at() -> dict[str, tuple[npt.NDArray[np.float64], float]]:
-    """Place, or segment of a cluster -> where it lies on a standing adult, (3,), right side, and its deviation, in parts
-    of the height; those that anatomy.toml gives."""
+    """Place, or segment of a cluster -> where it lies on a standing adult, (3,), right side, and its deviation, over
+    the height; those that anatomy.toml gives."""
     both = {**anatomy()["places"], **anatomy()["clusters"]}
     return {name: (np.array(about["at"]), float(about["at_sd"])) for name, about in both.items() if "at" in about}
 

@@ -25,9 +25,9 @@ _NO_PLACE = 14.0
 _TURNS = 4
 _MIRRORED = 0.05  # of the height: how far from the mirror image of the other side's a marker may lie
 _NAMED_ODD, _ARM = 0.12, 0.28  # of the height: how far from its place a marker may lie that its name says; on an arm
-_LEG_OUT, _ARM_OUT, _ELBOW_BENT = 0.10, 0.25, 0.50
-"""Angles (rad) by which people in laboratories stand otherwise than anatomy.toml has it: five persons of four
-laboratories."""
+_LEAN, _LEG_OUT, _ARM_OUT, _ELBOW_BENT = 0.022, 0.10, 0.25, 0.50
+"""Angles (rad) by which people in laboratories stand otherwise than anatomy.toml has it, forward and outward: of five
+persons of four laboratories. Arms are held anywhere: theirs are means."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,18 +144,19 @@ def segment_at(stature: Stature, marker: int) -> str | None:
 
 @cache
 def _worn_at(place: str) -> Array:
-    """Where a place (3,) of the right side is on people as they stand: feet apart, arms wherever they are held."""
+    """Where a place (3,) of the right side is on people as they stand: feet apart, arms away from the body."""
     known, units = standing_at(), anatomy()["units"]
     at = known[place][0]
-    if place not in units["pelvis"] and any(place in units[unit] for unit in ("thigh", "shank", "foot")):
-        return _outward(at, known["HJC"][0], _LEG_OUT)
-    if place in units["trunk"] or not any(place in units[unit] for unit in ("upper_arm", "forearm")):
-        return at
-    if place not in units["upper_arm"]:
-        elbow, (c, s) = known["EJC"][0], (np.cos(_ELBOW_BENT), np.sin(_ELBOW_BENT))
-        x, y, z = at - elbow
-        at = elbow + np.array([c * x - s * y, s * x + c * y, z])
-    return _outward(at, known["SJC"][0], _ARM_OUT)
+    leg = any(place in units[unit] for unit in ("thigh", "shank", "foot"))
+    arm = any(place in units[unit] for unit in ("upper_arm", "forearm"))
+    if leg and place not in units["pelvis"]:
+        at = _outward(at, known["HJC"][0], _LEG_OUT)
+    if arm and place not in units["trunk"]:
+        if place not in units["upper_arm"]:
+            (x, y, z), c, s = at - known["EJC"][0], np.cos(_ELBOW_BENT), np.sin(_ELBOW_BENT)
+            at = known["EJC"][0] + np.array([c * x - s * y, s * x + c * y, z])
+        at = _outward(at, known["SJC"][0], _ARM_OUT)
+    return np.asarray(at + np.array([_LEAN * at[1], 0.0, 0.0]))
 
 
 def _outward(at: Array, joint: Array, angle: float) -> Array:
