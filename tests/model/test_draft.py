@@ -1,7 +1,7 @@
 """Drafts of marker sets: names in several languages, hidden names, what is written, what a model lacks.
 
-The places were measured on five real recordings; the simulated persons and the other laboratories here were not among
-them; these laboratories were in view when limits were set, the persons were not.
+How people stand was measured on five real recordings; the simulated persons and the other laboratories here were not
+among them, but in view: these laboratories when limits were set, the persons when it was chosen whether people lean.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import pytest
 from dynakin.cli.app import main
 from dynakin.model.calibration.needs import lacking, needs
 from dynakin.model.definition import available_models, load_built_in_or_toml
-from dynakin.model.markers.anatomy import anatomy, expanded
+from dynakin.model.markers.anatomy import anatomy, expanded, standing_at
 from dynakin.model.markers.draft.by_name import places, said
 from dynakin.model.markers.draft.draft import Guess, guess_markers, toml_text
 from dynakin.model.markers.marker_set import load_marker_set
@@ -82,7 +82,8 @@ def test_a_name_that_says_nothing() -> None:
 def test_every_place_of_the_list_is_one_of_the_anatomy() -> None:
     assert set(places()) <= set(anatomy()["places"])
     for place, about in places().items():
-        assert {"names", "words", "at", "sd"} <= set(about), place
+        assert {"names", "words", "sd"} <= set(about), place
+        assert place in standing_at(), place
 
 
 @pytest.mark.parametrize("markers", ["opencap", "plug-in-gait"])

@@ -15,7 +15,7 @@ from dynakin.filter.estimator import Estimator
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.landmarks import corner
 from dynakin.model.definition import load_model
-from dynakin.model.markers.anatomy import anatomy
+from dynakin.model.markers.anatomy import anatomy, expanded, standing_at
 from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
 from dynakin.model.markers.match import match_markers
 from dynakin.model.markers.recognise import recognise
@@ -217,3 +217,16 @@ def test_places_have_numbers_and_reasons() -> None:
     for name, place in anatomy()["places"].items():
         assert place["description"], name
         assert place.get("landmark_only") or (place["variance"] > 0.0 and place["reason"]), name
+        assert ("at" in place) == ("at_sd" in place), name
+
+
+def test_where_places_lie_is_said_of_places_and_not_of_markers() -> None:
+    where = standing_at()
+    assert {"ASI", "KJC", "SHO", "thigh"} <= set(where) and "KAX" not in where
+    for name, (at, sd) in where.items():
+        assert -0.1 < at[0] < 0.13 and 0.0 < at[1] <= 1.0 and 0.0 <= at[2] < 0.14 and 0.01 < sd < 0.07, name
+    for units in anatomy()["units"].values():
+        assert set(units) <= set(where)
+    found = expanded({"places": {"ASI": "{R,L}ASI"}, "clusters": {"thigh": ["{R,L}TH1"]}})
+    assert [marker["name"] for marker in found["markers"]] == ["ASI", "TH1"]
+    assert not any({"at", "at_sd", "description"} & set(marker) for marker in found["markers"])
