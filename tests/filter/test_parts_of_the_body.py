@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
@@ -18,6 +19,7 @@ from dynakin.filter.estimator import Estimator
 from dynakin.model.definition import load_model
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
+from dynakin.results.files.motion import write_coordinates
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.sources import ABSENT, MEASURED, moment_sources
 from dynakin.settings.subject import Subject
@@ -88,8 +90,23 @@ def test_without_the_upper_body_leg_moments_are_the_true_ones(walk: SimulatedTri
     for name in ("lumbar_extension", "arm_flex_r", "elbow_flex_l", "neck_rotation"):
         assert name in estimate.config["held"]
         assert np.isnan(of(estimate, "moments", name)).all()
-        assert np.ptp(of(estimate, "coordinates", name)) == 0.0 and not of(estimate, "speeds", name).any()
+        assert np.isnan(of(estimate, "coordinates_sd", name)).all()  # held where nobody sees it, which is not known
     assert not any("bears or pulls the person" in text or "check the mass" in text for text in estimate.messages)
+
+
+def test_what_is_held_is_in_no_file(walk: SimulatedTrial, tmp_path: Path) -> None:
+    """Arms without elbows and wrists: nothing of what hangs on them, wrists included, is given as measured."""
+    estimate = estimated(without(walk.recording, lambda name: any(w in name for w in ("elbow", "forearm", "wrist"))))
+    held = {"elbow_flex_r", "pro_sup_l", "wrist_flex_r", "wrist_dev_l"}
+    assert held <= set(estimate.held) and "arm_flex_r" not in estimate.held
+    codes = moment_sources(estimate.data)
+    for name in held:
+        assert (codes[:, estimate.coordinate_names.index(name)] == ABSENT).all(), name
+    write_coordinates(estimate, tmp_path / "coordinates.mot")
+    lines = (tmp_path / "coordinates.mot").read_text().splitlines()
+    head = next(k for k, line in enumerate(lines) if line == "endheader")
+    assert not held & set(lines[head + 1].split()) and "hip_flexion_r" in lines[head + 1].split()
+    assert "elbow_flex_r" in " ".join(lines[:head])
 
 
 def test_with_one_leg_its_moments_remain_and_the_other_ones_are_absent(walk: SimulatedTrial, whole: Estimate) -> None:

@@ -54,6 +54,7 @@ class Closure:
         unjudged: number of claimed frames in which too few markers are seen, or which lie at an end.
         load_ratio: the plates' load over that of the declared mass where they carry the person; None where that is
             within 15 % too seldom to be said.
+        limits: parts of the weight from which on, at once and for longer than a second, something is missing.
     """
 
     excess: Array
@@ -61,6 +62,7 @@ class Closure:
     undeclared: Flags
     unjudged: int
     load_ratio: float | None
+    limits: tuple[float, float]
 
     def place(self, frames: slice) -> Array:
         """Where the excess of a stretch acts, (2,) m: X and Z on the ground."""
@@ -102,7 +104,10 @@ def closure(initial: CalibratedModel, time: Array, markers: Array, wrench: Array
         load = float(np.median(wrench[first:end, 1]))
         if end - first > _UNSEEN_S * rate and abs(load - weight) > EXCESS * weight:
             undeclared[first:end] = True
-    return Closure(excess, _smooth(about, judged, rate), undeclared, int(np.sum(claimed & ~judged)), ratio)
+    return Closure(
+        excess, _smooth(about, judged, rate), undeclared, int(np.sum(claimed & ~judged)), ratio,
+        (float(large), float(lasting)),
+    )  # fmt: skip
 
 
 def plates_misfit(initial: CalibratedModel, time: Array, markers: Array, wrench: Array) -> float | None:

@@ -13,7 +13,7 @@ import numpy as np
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.files import is_file
-from dynakin.model.calibration.calibrated import UNMARKED_SHARE, CalibratedModel, first_centre_of_pressure
+from dynakin.model.calibration.calibrated import CalibratedModel, first_centre_of_pressure
 from dynakin.model.calibration.in_space import started
 from dynakin.model.calibration.measure import measure
 from dynakin.model.markers.marker_set import load_marker_set
@@ -21,6 +21,7 @@ from dynakin.model.markers.match import match_markers
 from dynakin.model.markers.recognise import choose_marker_set
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.model.opensim.definition import OpenSimDefinition, load_opensim
+from dynakin.model.plan import ModelPlan
 from dynakin.model.schema import ModelFile
 from dynakin.model.spec import in_layout, to_core
 from dynakin.model.table import BodyTable, load_table
@@ -181,8 +182,7 @@ class ModelDefinition:
             messages += begun.messages
             held = held | begun.held
         unmarked_kg = sum(body.mass for name, body in plan.bodies.items() if name not in plan.marked())
-        if unmarked_kg <= UNMARKED_SHARE * rest.mass_kg:  # a head that is held moves little: its neck has a moment
-            held = {name: why for name, why in held.items() if name not in rest.held}
+        held = _not_known(plan, held)
         spec = to_core(plan)
         core = _core.Model(spec)
         names = list(core.layout.names)
@@ -223,6 +223,24 @@ class ModelDefinition:
             unmarked_kg=unmarked_kg,
             held=held,
         )
+
+
+def _not_known(plan: ModelPlan, held: Mapping[str, str]) -> dict[str, str]:
+    """Held coordinates of which results have none, and why: those of unmarked segments and of all that hangs on these,
+    but for what hardly moves against a neighbour that is seen (`WithoutMarkers.still`)."""
+    marked, unknown = plan.marked(), set[str]()
+    found: dict[str, str] = {}
+    for segment in plan.model.segments:  # parents stand before their children
+        own = list(dict.fromkeys(axis.coordinate for axis in segment.axes))
+        still = segment.without_markers is not None and segment.without_markers.still
+        if segment.parent in unknown and segment.name not in marked:
+            found |= {name: held.get(name, f"it hangs on {segment.parent}, which has no markers") for name in own}
+        elif still and segment.name not in marked:
+            continue
+        found |= {name: held[name] for name in own if name in held}
+        if segment.name not in marked and any(name in found for name in own):
+            unknown.add(segment.name)
+    return found
 
 
 def load_model(

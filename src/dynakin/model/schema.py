@@ -74,6 +74,7 @@ class WithoutMarkers(Strict):
 
     lock_to: str
     value_deg: float | None = None  # None: at the angle found while standing
+    still: bool = False  # moves so little against its neighbour that the joint's moment is given all the same
 
 
 class Segment(Strict):

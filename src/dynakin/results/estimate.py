@@ -97,6 +97,11 @@ class Estimate:
         return [str(name) for name in self.data["coordinate"].values]
 
     @property
+    def held(self) -> dict[str, str]:
+        """Coordinates that no marker shows, and why: constant, so that the body can be posed, and in no file."""
+        return dict(self.config.get("held", {}))
+
+    @property
     def marker_names(self) -> list[str]:
         """Names of the markers used, as in the recording."""
         return [str(name) for name in self.data["marker"].values]

@@ -29,45 +29,41 @@ def moment_columns(estimate: Estimate) -> list[str]:
 
 
 def write_coordinates(estimate: Estimate, path: Path) -> None:
-    """``coordinates.mot``: degrees and metres."""
-    write_storage(
-        path,
-        "Coordinates",
-        estimate.time,
-        estimate.coordinate_names,
-        _in_degrees(estimate, "coordinates"),
-        in_degrees=True,
-        notes=["Rotations in degrees, translations in metres.", _frame(estimate)],
-    )
+    """``coordinates.mot``: degrees and metres, without coordinates that no marker shows."""
+    _write_motion(
+        estimate, path, "Coordinates", "coordinates", "Rotations in degrees, translations in metres.",
+    )  # fmt: skip
 
 
 def write_speeds(estimate: Estimate, path: Path) -> None:
     """``speeds.sto``: degrees/s and m/s, with inDegrees=yes as OpenSim's own Kinematics analysis writes them."""
-    write_storage(
-        path,
-        "Speeds",
-        estimate.time,
-        estimate.coordinate_names,
-        _in_degrees(estimate, "speeds"),
-        in_degrees=True,
-        notes=["Rotations in degrees per second, translations in metres per second.", _frame(estimate)],
-    )
+    _write_motion(
+        estimate, path, "Speeds", "speeds", "Rotations in degrees per second, translations in metres per second.",
+    )  # fmt: skip
 
 
 def write_accelerations(estimate: Estimate, path: Path) -> None:
     """``accelerations.sto``: degrees/s2 and m/s2, with inDegrees=yes as OpenSim's own Kinematics analysis does."""
-    write_storage(
-        path,
-        "Accelerations",
-        estimate.time,
-        estimate.coordinate_names,
-        _in_degrees(estimate, "accelerations"),
-        in_degrees=True,
-        notes=[
-            "Rotations in degrees per second squared, translations in metres per second squared.",
-            _frame(estimate),
-        ],
-    )
+    _write_motion(
+        estimate, path, "Accelerations", "accelerations",
+        "Rotations in degrees per second squared, translations in metres per second squared.",
+    )  # fmt: skip
+
+
+def _write_motion(estimate: Estimate, path: Path, title: str, variable: str, units: str) -> None:
+    seen = _seen(estimate)
+    names = [name for name, own in zip(estimate.coordinate_names, seen, strict=True) if own]
+    held = [name for name, own in zip(estimate.coordinate_names, seen, strict=True) if not own]
+    notes = [units, _frame(estimate)]
+    if held:
+        notes.append(f"Left out, because no marker shows them: {', '.join(held)}.")
+    values = _in_degrees(estimate, variable)[:, seen]
+    write_storage(path, title, estimate.time, names, values, in_degrees=True, notes=notes)
+
+
+def _seen(estimate: Estimate) -> np.ndarray:
+    """(C,) coordinates that are not merely held because no marker shows them."""
+    return np.array([name not in estimate.held for name in estimate.coordinate_names], dtype=bool)
 
 
 def write_moments(estimate: Estimate, path: Path) -> None:
@@ -107,8 +103,9 @@ def write_deviations(estimate: Estimate, path: Path) -> None:
     columns: list[np.ndarray] = []
     for variable, suffix in (("coordinates", ""), ("speeds", "_speed"), ("accelerations", "_acceleration")):
         if f"{variable}_sd" in estimate.data:
-            names += [f"{name}{suffix}" for name in estimate.coordinate_names]
-            columns.append(_in_degrees(estimate, f"{variable}_sd"))
+            seen = _seen(estimate)
+            names += [f"{name}{suffix}" for name, own in zip(estimate.coordinate_names, seen, strict=True) if own]
+            columns.append(_in_degrees(estimate, f"{variable}_sd")[:, seen])
     if "moments_sd" in estimate.data:
         names += moment_columns(estimate)
         deviations = estimate.data["moments_sd"].transpose("time", "coordinate").values
@@ -169,9 +166,7 @@ def write_wrench(estimate: Estimate, path: Path) -> None:
 
 
 def _frame(estimate: Estimate) -> str:
-    """The frame, and the coordinates that are constant because no marker shows them."""
-    held = ", ".join(name for name in estimate.coordinate_names if name in estimate.config.get("held", {}))
-    return f"Frame: {estimate.ground.in_words}." + (f" Held, not estimated (no markers): {held}." if held else "")
+    return f"Frame: {estimate.ground.in_words}."
 
 
 def _in_degrees(estimate: Estimate, variable: str) -> np.ndarray:

@@ -91,6 +91,8 @@ def angle_columns(estimate: Estimate) -> tuple[list[str], Array, list[str]]:
     clinical = estimate.data.attrs["angle_signs"] == "clinical"
     names, columns, lines = [], [], []
     for k in np.flatnonzero(estimate.is_rotation()):
+        if estimate.coordinate_names[k] in estimate.held:
+            continue
         name, sign = estimate.coordinate_names[k], 1
         found = convention_of(name)
         line = f"{name}: as the model has it"

@@ -59,7 +59,7 @@ def asymmetry(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str, An
     stances, legs = compared_stances(estimate, window), sources.legs_of(estimate.data)
     start, end = int(np.flatnonzero(window)[0]), int(np.flatnonzero(window)[-1]) + 1
     found: dict[str, Any] = {}
-    held = estimate.config.get("held", {})
+    held = estimate.held
     for name, *sides in paired(estimate.coordinate_names):
         if any(estimate.coordinate_names[k] in held for k in sides):
             continue  # nothing is known of that side
