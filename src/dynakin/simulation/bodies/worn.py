@@ -4,7 +4,7 @@ Rows as in `marker_rows`: in the segment's own frame over the body height, from 
 (the pelvis: from the middle of the ASIS); lateral is outward. A place is worn under the first of its names. What is not
 worn: the knee alignment device, which nobody walks with.
 
-These are the truth of simulated persons and no copy of anatomy.toml, by which their recordings are recognised, completed
+These are the truth of simulated persons, no copy of anatomy.toml by which their recordings are recognised, completed
 and drafted: with its numbers here those would be tried on what they expect.
 """
 
