@@ -87,6 +87,11 @@ def new(
         raise ConfigError(f"{output}: exists already, expected another name (it may have been edited)")
     recording = read(trial)
     guesses = guess_markers(recording)
+    if not any(guess.place for guess in guesses):
+        raise ConfigError(
+            f"{trial}: neither names nor places of the {len(guesses)} markers say what they are; expected a trial in "
+            "which the person stands still (the same set), or names that say more"
+        )
     text = toml_text(guesses, output.stem, trial.name)
     try:
         output.write_text(text, encoding="utf-8")

@@ -64,6 +64,9 @@ def contacts(ready: Prepared) -> Rows:
     rows: Rows = []
     names = [plate.name for plate in ready.recording.plates]
     for k, foot in enumerate(loads.feet):
+        if foot in ready.calibrated.unmarked_feet:
+            rows.append(("Contacts", f"{foot}: no markers, so when it stands is not known."))
+            continue
         spans = _spans(loads, k, names, ready.recording.rate)
         said = [f"{what} {time[a]:.2f} to {time[b - 1]:.2f} s" for a, b, what in spans]
         rest = len(said) - _MOST_SPANS

@@ -121,7 +121,7 @@ def _averaged(plan: ModelPlan, paths: Array, limits: dict[str, Interval]) -> tup
                 fit = near(model, states[frame], paths[frame], limits)
             else:
                 fit = start_posture(
-                    model, paths[frame], guess=last, limits=limits, good_m=_FAIR_M, where=f"frame {frame + 1}"
+                    model, paths[frame], guess=last, limits=limits, good_m=_FAIR_M, bad_m=np.inf, where=""
                 )
             states[frame] = last = fit.x
             R, p = _core.segment_poses(model, fit.x)

@@ -122,7 +122,11 @@ def measure(
         if functional:
             landmarks, how_found = functional_landmarks(functional, landmarks, finder, source, frames)
             messages += how_found
-        found = completed(model, table, locks, landmarks, standing, finder.height_m or np.nan, trial.match.where)
+        try:
+            found = completed(model, table, locks, landmarks, standing, finder.height_m or np.nan, trial.match.where)
+        except ModelError as error:
+            reasons = dict.fromkeys(source.match.left_out.values())
+            raise ModelError("; ".join([error.message, *reasons])) from None
         landmarks, added = found.landmarks, set(found.added)
     else:
         landmarks, added = finder.find(standing), set[str]()

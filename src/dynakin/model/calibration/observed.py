@@ -13,8 +13,8 @@ from dynakin.model.spec import to_core
 
 Array = npt.NDArray[np.float64]
 
-MARKER_SD_M = 0.005
-"""Skin beside noise."""
+MARKER_SD_M, LOOSE_SD_M, LOOSE_FROM_M = 0.005, 0.015, 0.020
+"""Skin beside noise; and of what moves by 20 mm or more, such as joint centres that cameras guess."""
 PRIOR_SD_RAD, PRIOR_SD_M = np.deg2rad(60.0), 1.0
 """Of each coordinate, before any marker."""
 HELD_SD_RAD = 0.2
@@ -37,8 +37,10 @@ def hold_unseen(plan: ModelPlan, postures: list[tuple[Array, Array]]) -> tuple[M
     kinds = {axis.coordinate: axis.kind for s in plan.model.segments for axis in s.axes}
     model = _core.Model(to_core(plan))
     free = [c.name for c in model.spec.coordinates if not c.locked]
+    loose = np.array([site.soft_tissue_m >= LOOSE_FROM_M for site in plan.sites])
+    sd_m = np.repeat(np.where(loose, LOOSE_SD_M, MARKER_SD_M), 3)
     jacobians = [
-        _core.marker_jacobian(model, x)[np.isfinite(markers).ravel()][:, : len(free)] / MARKER_SD_M
+        (_core.marker_jacobian(model, x)[:, : len(free)] / sd_m[:, None])[np.isfinite(markers).ravel()]
         for x, markers in postures
     ]
     prior = np.array([PRIOR_SD_RAD if kinds[name] == "rotation" else PRIOR_SD_M for name in free])
