@@ -288,6 +288,21 @@ def storage(path: Path) -> tuple[list[str], np.ndarray]:
     return lines[head + 1].split(), np.array([line.split() for line in lines[head + 2 :] if line.strip()], dtype=float)
 
 
+def test_plates_of_twice_the_scale_give_no_moments() -> None:
+    """Given a walk whose plates read double, then the scale is said and no foot that stands is measured."""
+    whole = simulate("fullbody", "gait", 5, 4.0, 50.0).recording
+    doubled = [
+        replace(plate, force=2.0 * plate.force, moment=2.0 * plate.moment, free_moment=2.0 * plate.free_moment)
+        for plate in whole.plates
+    ]
+    found = ground_of(whole.with_plates(tuple(doubled)), person("fullbody"))
+    assert any("times what the motion needs" in text and "their scale or the mass" in text for text in found.reasons)
+    assert found.loads is not None
+    assert not found.loads.total_known.any()
+    right = ground_of(whole, person("fullbody"))
+    assert not any("their scale" in text for text in right.reasons)
+
+
 def test_a_pause_in_the_times_is_no_seat() -> None:
     whole = simulate("fullbody", "squat", 4, 8.0, 50.0).recording
     later = replace(whole, time=np.where(whole.time < 4.0, whole.time, whole.time + 30.0))

@@ -37,6 +37,9 @@ UNSEEN = np.array([0.5, 0.3, 0.1])
 """What a body whose parts are not all marked may do more, of `EXCESS`, `EDGE` and `LASTING`, by the part of its mass
 that is not: without the upper body's markers (0.38) a walk makes 0.20, for longer than a second 0.03, squats 0.11."""
 _MASS_WITHIN, _OFTEN = 0.15, 0.2
+_TOO_MUCH, _STEADY, _TOO_MUCH_S = 1.3, 0.3, 0.3
+"""A plate whose scale is wrong, or a load that nobody declared: so many times too much, for 80 % of the time within
+30 % of that. A cable or a rail that pulls a person down changes by more (a flywheel from 1.0 to 1.9)."""
 _UNSEEN_S = 0.2
 """Where too few markers are seen for longer than this, the plates' mean has to be near the weight."""
 
@@ -55,6 +58,7 @@ class Closure:
         load_ratio: the plates' load over that of the declared mass where they carry the person; None where that is
             within 15 % too seldom to be said.
         limits: parts of the weight from which on, at once and for longer than a second, something is missing.
+        too_much: the plates' load over what the motion needs where that is far too large, and the same all the time.
     """
 
     excess: Array
@@ -63,6 +67,7 @@ class Closure:
     unjudged: int
     load_ratio: float | None
     limits: tuple[float, float]
+    too_much: float | None
 
     def place(self, frames: slice) -> Array:
         """Where the excess of a stretch acts, (2,) m: X and Z on the ground."""
@@ -92,6 +97,7 @@ def closure(initial: CalibratedModel, time: Array, markers: Array, wrench: Array
     need = initial.weighed_kg * (acceleration + np.array([0.0, GRAVITY_M_S2, 0.0]))
     ratio = _load_ratio(need[:, 1], wrench[:, 1], judged, weight, round(LASTING_S * rate))
     need *= 1.0 if ratio is None else ratio  # a mass that is somewhat wrong is no contact
+    too_much = _too_much(need[:, 1] / (1.0 if ratio is None else ratio), wrench[:, 1], judged, weight, rate)
     missing = np.where(axes, need - wrench[:, :3], 0.0)
     excess = _smooth(missing, judged, rate)
     zmp = centre - centre[:, [1]] * acceleration / (acceleration[:, [1]] + GRAVITY_M_S2).clip(1.0)
@@ -106,8 +112,16 @@ def closure(initial: CalibratedModel, time: Array, markers: Array, wrench: Array
             undeclared[first:end] = True
     return Closure(
         excess, _smooth(about, judged, rate), undeclared, int(np.sum(claimed & ~judged)), ratio,
-        (float(large), float(lasting)),
+        (float(large), float(lasting)), too_much,
     )  # fmt: skip
+
+
+def _too_much(need: Array, have: Array, judged: Flags, weight: float, rate: float) -> float | None:
+    loaded = judged & (need > 0.5 * weight)
+    if np.count_nonzero(loaded) < _TOO_MUCH_S * rate:
+        return None
+    low, middle, high = np.percentile(have[loaded] / need[loaded], (10.0, 50.0, 90.0))
+    return float(middle) if middle > _TOO_MUCH and high - low < _STEADY * middle else None
 
 
 def plates_misfit(initial: CalibratedModel, time: Array, markers: Array, wrench: Array) -> float | None:

@@ -155,6 +155,14 @@ def known_ground(
         if found.undeclared.any():
             text, beside = _undeclared_in_words(found, recording, initial, markers, wrench)
             reasons.append(text)
+        if found.too_much is not None and loads is not None:
+            undeclared |= claimed
+            beside = beside | claimed[:, None]
+            reasons.append(
+                f"Warning: the plates carry {found.too_much:.2f} times what the motion needs of "
+                f"{initial.weighed_kg:.1f} kg, all the time: their scale or the mass is wrong, or a load is not "
+                "declared. No moment of the legs is given there. Check the plates' units, --mass, and [[loads]]."
+            )
         if found.unjudged > MANY * n:
             notes.append(
                 f"In {found.unjudged} of {n} frames too few markers are seen to check that the plates carry the person."
