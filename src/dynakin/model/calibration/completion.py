@@ -19,6 +19,7 @@ import numpy.typing as npt
 from dynakin.errors import ModelError
 from dynakin.model.calibration.landmarks import BENT, Positions
 from dynakin.model.calibration.posture import frame_landmarks
+from dynakin.model.markers.anatomy import standing_at
 from dynakin.model.mirroring import SUFFIXES
 from dynakin.model.schema import Frame, ModelFile, Segment
 from dynakin.model.table import BodyTable
@@ -30,7 +31,7 @@ _MARKER_WEIGHT = 0.01
 _HOLD_WEIGHT = 1e-4
 """Of each of six points a tenth of the height away that hold the segment's direction to its parent's."""
 _HOLD = 0.1
-_FLIP = np.array([1.0, 1.0, -1.0])
+_FLIP, _IN_THE_MIDDLE = np.array([1.0, 1.0, -1.0]), np.array([1.0, 1.0, 0.0])
 _ONE_PLACE_M = 1e-3
 _LEAST = 2
 """Landmarks of the root that must be measured."""
@@ -52,13 +53,24 @@ class Proportions:
         text = (resources.files("dynakin.model.calibration") / "proportions.toml").read_text(encoding="utf-8")
         content = tomllib.loads(text)
         landmarks: dict[str, Array] = {}
-        for name, place in content["landmarks"].items():
-            landmarks[name] = np.array(place)
+        for name, given in content["landmarks"].items():
+            place = _middle_of(given)
+            if not name.endswith("_r"):
+                place = place * _IN_THE_MIDDLE
+            landmarks[name] = place
             if name.endswith("_r"):
-                landmarks[f"{name.removesuffix('_r')}_l"] = np.array(place) * _FLIP
-        markers = {name: (entry["segment"], np.array(entry["at"])) for name, entry in content["markers"].items()}
+                landmarks[f"{name.removesuffix('_r')}_l"] = place * _FLIP
+        markers = {
+            name: (segment, standing_at()[name][0]) for segment, names in content["markers"].items() for name in names
+        }
         hinges = {name: (tuple(entry["limb"]), float(entry["forward"])) for name, entry in content["hinges"].items()}
         return cls(landmarks, markers, hinges)
+
+
+def _middle_of(given: list[str] | list[float]) -> Array:
+    """A place (3,) given as such, or as the middle of places of anatomy.toml."""
+    points = [standing_at()[each][0] for each in given if isinstance(each, str)]
+    return np.mean(points, axis=0) if points else np.array(given, dtype=float)
 
 
 @dataclass

@@ -9,16 +9,29 @@ from importlib import resources
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+import numpy.typing as npt
+
 from dynakin.settings.strict import nearest, read_toml
 
 _FOLDER = resources.files("dynakin.model") / "markers"
+_NO_MARKERS = ("description", "at", "at_sd")
+"""Keys of a place that say what and where it is, and nothing of a marker there."""
 _SIDED = re.compile(r"\{([^{},]*),([^{},]*)\}")
 
 
 @cache
 def anatomy() -> dict[str, Any]:
-    """The contents of anatomy.toml: ``places``, ``clusters``, ``landmarks``, ``in_space`` and keys of a whole set."""
+    """Contents of anatomy.toml: ``places``, ``clusters``, ``units``, ``landmarks``, ``in_space``, keys of a whole set."""
     return read_toml(Path(str(_FOLDER / "anatomy.toml")))
+
+
+@cache
+def standing_at() -> dict[str, tuple[npt.NDArray[np.float64], float]]:
+    """Place, or segment of a cluster -> where it lies on a standing adult, (3,), right side, and its deviation, in parts
+    of the height; those that anatomy.toml gives."""
+    both = {**anatomy()["places"], **anatomy()["clusters"]}
+    return {name: (np.array(about["at"]), float(about["at_sd"])) for name, about in both.items() if "at" in about}
 
 
 def sided(pattern: str) -> dict[str, str]:
@@ -60,8 +73,7 @@ def expanded(data: Mapping[str, Any]) -> dict[str, Any]:
                 f"places: {place!r} is no place of the body{nearest(place, shared['places'])}; expected "
                 f"{', '.join(shared['places'])}"
             )
-        numbers = {key: value for key, value in known.items() if key != "description"}
-        markers.append({"name": place, **numbers, **_entry(names)})
+        markers.append({"name": place, **_of_marker(known), **_entry(names)})
     for segment, names in data.get("clusters", {}).items():
         if segment not in shared["clusters"]:
             raise ValueError(
@@ -74,7 +86,7 @@ def expanded(data: Mapping[str, Any]) -> dict[str, Any]:
             if not patterns and "name" not in given:
                 raise ValueError(f"clusters: {segment}: a marker without names")
             name = _SIDED.sub("", patterns[0]).strip("._- ") if patterns else given["name"]
-            markers.append({"name": name, "segment": segment, **shared["clusters"][segment], **given})
+            markers.append({"name": name, "segment": segment, **_of_marker(shared["clusters"][segment]), **given})
     rest["markers"] = [*markers, *rest.get("markers", ())]
     there = {marker["name"] for marker in rest["markers"] if isinstance(marker, dict) and "name" in marker}
     own = {key: rest.get(key, {}) for key in ("landmarks", "in_space")}
@@ -107,6 +119,11 @@ def _extended(data: Mapping[str, Any]) -> dict[str, Any]:
         merged = {**below.get(key, {}), **own.get(key, {})}
         own[key] = {name: names for name, names in merged.items() if names}
     return {**{key: value for key, value in below.items() if key not in ("description", "source")}, **own}
+
+
+def _of_marker(about: Mapping[str, Any]) -> dict[str, Any]:
+    """What a place or cluster says of a marker on it."""
+    return {key: value for key, value in about.items() if key not in _NO_MARKERS}
 
 
 def _entry(given: str | Iterable[str] | Mapping[str, Any]) -> dict[str, Any]:

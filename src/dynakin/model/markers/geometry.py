@@ -6,20 +6,17 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib import resources
-from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.model.markers.anatomy import anatomy, standing_at
 from dynakin.model.markers.match import MarkerKey, MarkerMatch
 from dynakin.recordings.recording import Recording
-from dynakin.settings.strict import read_toml
 
 Array = npt.NDArray[np.float64]
 
-_FILE = resources.files("dynakin.model") / "markers" / "standing.toml"
-_HEIGHT_M = 1.75  # of the person whose deviations standing.toml gives
+_HEIGHT_M = 1.75  # where nothing shows it
 _PROPORTION_SD = 0.08  # of a distance: people are built differently
 _FRAMES = 80  # looked at, spread over the trial
 _FEWEST_FRAMES = 3  # in which both of two markers are seen, to judge them by their distance
@@ -39,40 +36,27 @@ _ANYWHERE = ("", "FRM", "WRA", "WRB", "WRI", "WJ", "forearm")  # arms cross
 _SIGN = {"right": 1.0, "left": -1.0, "centre": 1.0}
 
 
-@dataclass(frozen=True)
-class _Standing:
-    """standing.toml: place -> where (3,) over the height, its deviation over the height, and its units."""
-
-    at: dict[str, Array]
-    sd: dict[str, float]
-    units: dict[str, frozenset[str]]
-
-    def named(self, match: MarkerMatch, name: str) -> tuple[str, frozenset[str]]:
-        """The name here of a marker of a set, "" where it has none, and its units: of a place its own, of others their
-        segment."""
-        if name in self.at:
-            return name, self.units[name]
-        marker = match.marker_set.marker(name)
-        if marker.landmark_only or not marker.segment:
-            return "", frozenset()
-        segment = {"thorax": "trunk", "abdomen": "", "toes": "foot", "hand": ""}.get(marker.segment, marker.segment)
-        return (segment if segment in self.at else ""), frozenset({segment} - {""})
-
-
 @cache
-def _standing() -> _Standing:
-    data = read_toml(Path(str(_FILE)))
-    both = data["places"] | data["clusters"]
-    return _Standing(
-        {name: np.array(entry["at"]) for name, entry in both.items()},
-        {name: entry["sd"] / _HEIGHT_M for name, entry in both.items()},
-        {name: frozenset(u for u, names in data["units"].items() if name in names or name == u) for name in both},
-    )
+def _units(name: str) -> frozenset[str]:
+    """Of a place or a cluster's segment, whose places keep their distances to it."""
+    return frozenset(unit for unit, names in anatomy()["units"].items() if name in names or name == unit)
+
+
+def _named(match: MarkerMatch, name: str) -> tuple[str, frozenset[str]]:
+    """Where anatomy.toml places a marker of a set, "" where it does not, and its units: of a place its own, of others
+    their segment."""
+    if name in standing_at():
+        return name, _units(name)
+    marker = match.marker_set.marker(name)
+    if marker.landmark_only or not marker.segment:
+        return "", frozenset()
+    segment = {"thorax": "trunk", "abdomen": "", "toes": "foot", "hand": ""}.get(marker.segment, marker.segment)
+    return (segment if segment in standing_at() else ""), frozenset({segment} - {""})
 
 
 @dataclass(frozen=True, eq=False)
 class Expected:
-    """What standing.toml says of some markers, all (n, n) over the height, NaN where it says nothing.
+    """What anatomy.toml says of some markers, all (n, n) over the height, NaN where it says nothing.
 
     Attributes:
         distance: between two markers on one segment. sd: how far it may be off.
@@ -95,14 +79,14 @@ class Expected:
     @classmethod
     def of(cls, match: MarkerMatch, keys: Sequence[MarkerKey]) -> Expected:
         """Of the markers of a match."""
-        known, n = _standing(), len(keys)
+        known, n = standing_at(), len(keys)
         at, place_sd = np.full((n, 3), np.nan), np.full(n, np.nan)
         units: list[set[str]] = []
         for k, (name, side) in enumerate(keys):
-            own, parts = known.named(match, name)
+            own, parts = _named(match, name)
             units.append({unit if unit in _CENTRAL else f"{unit} {side}" for unit in parts})
             if own:
-                at[k], place_sd[k] = known.at[own] * [1.0, 1.0, _SIGN[side]], known.sd[own]
+                at[k], place_sd[k] = known[own][0] * [1.0, 1.0, _SIGN[side]], known[own][1]
         rigid = np.array([[bool(a & b) for b in units] for a in units], dtype=bool).reshape(n, n)
         np.fill_diagonal(rigid, False)
         distance = np.linalg.norm(at[:, None] - at[None], axis=2)
@@ -111,7 +95,7 @@ class Expected:
         right, forward = np.full((n, n), np.nan), np.full((n, n), np.nan)
         spot = {key: k for k, key in enumerate(keys)}
         for name in dict.fromkeys(name for name, _ in keys):
-            if known.named(match, name)[0] not in _ANYWHERE:
+            if _named(match, name)[0] not in _ANYWHERE:
                 _put(right, at[:, 2], spot.get((name, "right")), spot.get((name, "left")))
         for side in ("right", "left"):
             for front, back in _FRONT_BACK:
@@ -124,7 +108,7 @@ class Expected:
         up[np.abs(up) < _ABOVE] = np.nan
         other = {"right": "left", "left": "right", "centre": "centre"}
         mirror = np.array([spot.get((name, other[side]), k) for k, (name, side) in enumerate(keys)], dtype=int)
-        paired = np.array([name in known.at and (name, other[side]) in spot for name, side in keys], dtype=bool)
+        paired = np.array([name in known and (name, other[side]) in spot for name, side in keys], dtype=bool)
         even = rigid & paired[:, None] & paired[None]
         return cls(distance, sd, right, forward, up, mirror, even, rigid)
 

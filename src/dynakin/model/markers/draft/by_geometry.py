@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 import numpy.typing as npt
 from scipy.optimize import linear_sum_assignment
 
+from dynakin.model.markers.anatomy import anatomy, standing_at
 from dynakin.model.markers.draft.by_name import places
 
 Array = npt.NDArray[np.float64]
@@ -23,6 +25,9 @@ _NO_PLACE = 14.0
 _TURNS = 4
 _MIRRORED = 0.05  # of the height: how far from the mirror image of the other side's a marker may lie
 _NAMED_ODD, _ARM = 0.12, 0.28  # of the height: how far from its place a marker may lie that its name says; on an arm
+_LEG_OUT, _ARM_OUT, _ELBOW_BENT = 0.10, 0.25, 0.50
+"""Angles (rad) by which people in laboratories stand otherwise than anatomy.toml has it: five persons of four
+laboratories."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,9 +96,9 @@ def lies_at(stature: Stature, marker: int, place: str) -> tuple[bool, str]:
     x, y, z = stature.scaled[marker]
     side = "centre" if abs(z) < 0.015 else "right" if z > 0.0 else "left"
     about = places().get(place)
-    if about is None or "at" not in about:
+    if about is None:
         return True, side
-    apart = np.array([x, y, abs(z)]) - about["at"]
+    apart = np.array([x, y, abs(z)]) - _worn_at(place)
     limit = _ARM if about.get("loose") else max(_NAMED_ODD, 2.5 * float(np.linalg.norm(about["sd"])))
     return float(np.linalg.norm(apart)) < limit, side
 
@@ -137,13 +142,35 @@ def segment_at(stature: Stature, marker: int) -> str | None:
     return "thigh" if y > 0.29 else "shank" if y > 0.055 else "foot"
 
 
+@cache
+def _worn_at(place: str) -> Array:
+    """Where a place (3,) of the right side is on people as they stand: feet apart, arms wherever they are held."""
+    known, units = standing_at(), anatomy()["units"]
+    at = known[place][0]
+    if place not in units["pelvis"] and any(place in units[unit] for unit in ("thigh", "shank", "foot")):
+        return _outward(at, known["HJC"][0], _LEG_OUT)
+    if place in units["trunk"] or not any(place in units[unit] for unit in ("upper_arm", "forearm")):
+        return at
+    if place not in units["upper_arm"]:
+        elbow, (c, s) = known["EJC"][0], (np.cos(_ELBOW_BENT), np.sin(_ELBOW_BENT))
+        x, y, z = at - elbow
+        at = elbow + np.array([c * x - s * y, s * x + c * y, z])
+    return _outward(at, known["SJC"][0], _ARM_OUT)
+
+
+def _outward(at: Array, joint: Array, angle: float) -> Array:
+    """A place (3,) of the right side where a limb is held away from the body by an angle (rad)."""
+    (x, y, z), c, s = at - joint, np.cos(angle), np.sin(angle)
+    return np.asarray(joint + np.array([x, c * y + s * z, c * z - s * y]))
+
+
 def _template() -> tuple[list[Node], Array, Array, Array]:
     nodes: list[Node] = []
     at, sd, rare = [], [], []
     for place, about in places().items():
         if about.get("by_name_only"):
             continue
-        x, y, z = about["at"]
+        x, y, z = _worn_at(place)
         for side, sign in (("centre", 0.0),) if z == 0.0 else (("right", 1.0), ("left", -1.0)):
             nodes.append((place, side))
             at.append([x, y, sign * z])

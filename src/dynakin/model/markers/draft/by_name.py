@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from dynakin.errors import ModelError
-from dynakin.model.markers.anatomy import anatomy
+from dynakin.model.markers.anatomy import anatomy, standing_at
 from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
 from dynakin.recordings.landmarks import plain_name
 from dynakin.settings.strict import read_toml
@@ -96,7 +96,7 @@ def said(name: str) -> Said | None:
     for own_side, rest in _readings(name):
         place = _place(rest)
         if place is not None:
-            centre = places().get(place, {}).get("at", (0.0, 0.0, 1.0))[2] == 0.0
+            centre = place in standing_at() and standing_at()[place][0][2] == 0.0
             if centre and own_side is not None:  # beside the middle: a clavicle's own marker
                 segment = anatomy()["places"][place].get("segment")
                 return Said(None, segment, own_side, "likely", f"its name: {rest}, on one side")
