@@ -199,6 +199,38 @@ def test_names_on_other_places_are_no_set() -> None:
         recognise(replace(recording, markers=recording.markers[:, order]))
 
 
+@pytest.mark.parametrize("factor", [1000.0, 10.0, 0.1, 0.001, 0.0], ids=str)
+def test_a_wrong_unit_of_length_is_named(factor: float) -> None:
+    recording = walking("plug-in-gait")
+    for asked in (None, load_marker_set("plug-in-gait")):
+        with pytest.raises(ModelError, match=r"m tall .*expected 0.5 to 2.6 m: the unit of length"):
+            recognise(replace(recording, markers=factor * recording.markers), asked)
+
+
+def test_a_next_best_set_that_two_names_fit_does_not_refuse_the_recording() -> None:
+    recording = walking("plug-in-gait")
+    markers = recording.markers.copy()
+    markers[:, recording.marker_names.index("RANK")] += [0.0, 0.0, 0.9]
+    sacrum = 0.5 * sum(markers[:, [recording.marker_names.index(name)]] for name in ("RPSI", "LPSI"))
+    found = recognise(
+        replace(
+            recording,
+            marker_names=(*recording.marker_names, "SACR", "sacr"),
+            markers=np.concatenate([markers, sacrum, sacrum + 0.001], axis=1),
+        )
+    )
+    assert found.match.marker_set.name == "plug-in-gait"
+    assert set(found.match.left_out) == {("ANK", "right")}
+
+
+def test_nothing_seen_and_no_name_known_are_said_so() -> None:
+    recording = walking("plug-in-gait")
+    with pytest.raises(ModelError, match="no marker is seen in 100 frames"):
+        recognise(replace(recording, markers=np.full_like(recording.markers, np.nan)))
+    with pytest.raises(ModelError, match=r"none knows any of the names.*dynakin markers list"):
+        choose_marker_set(["q1", "q2"])
+
+
 def test_a_part_of_a_set_is_enough_and_what_lacks_is_said_at_once() -> None:
     whole = walking("plug-in-gait")
     leg = ("RASI", "LASI", "RPSI", "LPSI", "RKNE", "RTHI", "RANK", "RTIB", "RHEE", "RTOE")

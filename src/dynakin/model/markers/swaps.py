@@ -76,14 +76,16 @@ class Swap:
         return np.asarray((time >= self.span_s[0]) & (time <= self.span_s[1]))
 
 
-def find_swaps(recording: Recording, match: MarkerMatch, keys: Sequence[MarkerKey]) -> tuple[list[Swap], Found, Order]:
+def find_swaps(
+    recording: Recording, match: MarkerMatch, keys: Sequence[MarkerKey], found: Found, expected: Expected
+) -> tuple[list[Swap], Found, Order]:
     """Labels that are exchanged, throughout or for a while; what the recording shows of the markers where they are not
     exchanged for a while; and the order of the markers that their names belong to.
 
     Whichever of both is looked for first, the other may be taken for it: the account with the fewest exchanges counts.
+    found: over all `frames_of` the recording.
     """
-    expected, frames = Expected.of(match, keys), frames_of(recording)
-    found = Found.of(places_of(recording, match, keys, frames), expected)
+    frames = frames_of(recording)
     throughout, order = _swaps_throughout(match, keys, found, expected)
     shown = {key: match.names[keys[k]] for key, k in zip(keys, order, strict=True)}
     right = replace(match, names=shown) if throughout else match
