@@ -268,6 +268,28 @@ def test_facing_from_right_and_left_hip_alone() -> None:
     assert "square to the line from right to left" in how[0]
 
 
+def test_the_pelvis_shows_the_front_before_one_foot_that_is_turned_out() -> None:
+    whole, up = walking("plug-in-gait"), np.array([0.0, 1.0, 0.0])
+    markers = whole.markers.copy()
+    heel, toe = (whole.marker_names.index(name) for name in ("RHEE", "RTOE"))
+    c, s = np.cos(np.deg2rad(20.0)), np.sin(np.deg2rad(20.0))
+    x, y, z = np.moveaxis(markers[:, toe] - markers[:, heel], -1, 0)
+    markers[:, toe] = markers[:, heel] + np.stack([c * x - s * z, y, s * x + c * z], axis=-1)
+    leg = ["RKNE", "RTHI", "RANK", "RTIB", "RHEE", "RTOE"]
+    for pelvis, why in (
+        (["RASI", "LASI", "RPSI", "LPSI"], "pelvis to its front."),
+        (["RASI", "LASI"], "line from right to left."),
+        (["RASI", "RPSI"], "(one foot only)."),
+        ([], "(one foot only)."),
+    ):
+        names = (*pelvis, *leg)
+        only = replace(whole, marker_names=names, markers=markers[:, [whole.marker_names.index(n) for n in names]])
+        pairs = match_markers(load_marker_set("plug-in-gait"), names, [True] * len(names), "leg").facing_pairs
+        ahead, how = find_forward(only, up, pairs)
+        assert why in how[0]
+        assert ahead[0] > (0.99 if len(pelvis) > 1 and "foot" not in why else 0.85)
+
+
 def test_without_toe_the_metatarsals_show_the_front() -> None:
     match = match_markers(load_marker_set("plug-in-gait"), ("RHEE", "RMT5", "LHEE", "LTOE"), [True] * 4, "trial")
     assert isinstance(match, MarkerMatch)
