@@ -14,11 +14,12 @@ import numpy as np
 import pytest
 
 from dynakin.cli.app import main
+from dynakin.errors import ModelError, RecordingError
 from dynakin.model.calibration.needs import lacking, needs
 from dynakin.model.definition import available_models, load_built_in_or_toml
 from dynakin.model.markers.anatomy import anatomy, expanded, standing_at
 from dynakin.model.markers.draft.by_name import places, said
-from dynakin.model.markers.draft.draft import Guess, guess_markers, toml_text
+from dynakin.model.markers.draft.draft import Guess, drafted, guess_markers, toml_text
 from dynakin.model.markers.marker_set import load_marker_set
 from dynakin.model.markers.match import match_markers
 from dynakin.model.markers.recognise import recognise
@@ -171,6 +172,37 @@ def test_names_that_toml_and_patterns_know_otherwise() -> None:
     markers = {m["name"]: m for m in expanded(tomllib.loads(text))["markers"]}
     assert markers["KNE"]["right"] == ["R{1},a"] and markers["KNE"]["left"] == ['L"2\\']
     assert markers["thigh1"]["right"] == ["only right"] and "left" not in markers["thigh1"]
+
+
+def test_points_without_a_label_take_no_place_and_names_alike_are_refused() -> None:
+    recording = simulate("fullbody", "squat", seed=36, duration_s=5.0, markers="plug-in-gait").recording
+    toe = recording.marker_names.index("RTOE")
+    more = replace(
+        recording,
+        marker_names=(*recording.marker_names, "Unlabeled 0"),
+        markers=np.concatenate([recording.markers, recording.markers[:, [toe]] + 0.001], axis=1),
+    )
+    found = {guess.recorded: guess.place for guess in guess_markers(more)}
+    assert "Unlabeled 0" not in found and found["RTOE"] == "TOE"
+    alike = replace(recording, marker_names=("m2", "M2", *(f"q{k}" for k in range(len(recording.marker_names) - 2))))
+    with pytest.raises(RecordingError, match="m2 and M2 have one name but for case"):
+        guess_markers(alike)
+    with pytest.raises(ModelError, match=r"no marker set fits .*nor can places be guessed: markers m2 and M2"):
+        recognise(alike)
+
+
+def test_names_that_files_cannot_hold() -> None:
+    recording = simulate("fullbody", "squat", seed=36, duration_s=5.0, markers="plug-in-gait").recording
+    german = {"KNE": "Knie lateral", "ANK": "Knoechel", "HEE": "Ferse", "TOE": "Zehe", "ASI": "SIAS", "PSI": "SIPS"}
+    spelt = [{"R": "rechts\x7f ", "L": "links "}[n[0]] + german[n[1:]] if n[1:] in german else f"q{n}"
+             for n in recording.marker_names]  # fmt: skip
+    spelt[recording.marker_names.index("C7")] = "half \ud800"
+    odd = replace(recording, marker_names=tuple(spelt))
+    guesses = guess_markers(odd)
+    assert "half \ud800" not in [guess.recorded for guess in guesses]
+    found = drafted(odd)
+    assert found is not None and found.marker("KNE").right == ("rechts\x7f Knie lateral",)
+    assert expanded(tomllib.loads(toml_text(guesses, "odd", "a.trc")))["markers"]
 
 
 def test_what_models_need_is_what_calibrating_asks_for() -> None:

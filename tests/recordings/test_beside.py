@@ -13,6 +13,7 @@ from dynakin.recordings.recording import Recording
 from dynakin.results.files.markers import write_trc
 from dynakin.simulation.trial import simulate
 
+# The limit `_SAME_M` was set with these recordings in view.
 PAIRS = {
     "opencap_subject4/walking1.trc": ("walking1_grf.mot", "static1.trc"),
     "opencap_subject4/static1.trc": ("static1_grf.mot", None),

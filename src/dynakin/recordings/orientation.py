@@ -24,21 +24,24 @@ def find_forward(recording: Recording, up: Array, pairs: FacingPairs) -> tuple[A
 
     From heel to toe, mean direction of each foot over the first standing second (the first second where
     nobody stands), both feet with equal weight so that turned-out feet cancel; else from the back of the
-    pelvis to its front; else square to the line from right to left; else the walking direction. The others
-    are compared, and a difference beyond 30 deg is said.
+    pelvis to its front, both sides; else square to the line from right to left; else from heel to toe of one
+    foot, which may be turned out; else by one side of the pelvis; else the walking direction. The others are
+    compared, and a difference beyond 30 deg is said.
 
     Raises:
         RecordingError: no foot or pelvis pair, no pair of sides, and the person does not walk.
     """
     frames = _window(recording)
     feet, n_feet = _mean_direction(recording, pairs.heel_toe, up, frames)
-    pelvis, _ = _mean_direction(recording, pairs.pelvis, up, frames)
+    pelvis, n_sides = _mean_direction(recording, pairs.pelvis, up, frames)
     leftward, _ = _mean_direction(recording, pairs.across, up, frames)
     walk, way = _walking(recording, up)
     found = [
-        (f"from heel to toe ({'both feet' if n_feet > 1 else 'one foot only'})", feet),
-        ("from the back of the pelvis to its front", pelvis),
+        ("from heel to toe (both feet)", feet if n_feet > 1 else None),
+        ("from the back of the pelvis to its front", pelvis if n_sides > 1 else None),
         ("square to the line from right to left", None if leftward is None else np.cross(leftward, up)),
+        ("from heel to toe (one foot only)", feet if n_feet == 1 else None),
+        ("from the back of the pelvis to its front (one side only)", pelvis if n_sides == 1 else None),
         (f"the walking direction ({way:.2g} m)", walk),
     ]
     known = [(why, direction) for why, direction in found if direction is not None]

@@ -9,7 +9,14 @@ import numpy as np
 
 from dynakin.errors import ModelError, RecordingError
 from dynakin.model.markers.draft.draft import drafted
-from dynakin.model.markers.geometry import Expected, Found, body_height_m, deviations
+from dynakin.model.markers.geometry import (
+    Expected,
+    Found,
+    body_height_m,
+    deviations,
+    frames_of,
+    places_of,
+)
 from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
 from dynakin.model.markers.match import (
     SIDES,
@@ -29,6 +36,7 @@ _ON_LEG_AT_LEAST = 2  # segments of one leg
 _ROOT = "pelvis"
 _ABOUT_AS_MANY = 0.9  # of the markers that the first set explains
 _IMPOSSIBLE = 4.5  # deviations of a distance beyond which it is none of a body (2.9 at most in shared/data)
+_HEIGHTS_M = (0.5, 2.6)  # of persons
 _FEW_WRONG, _MANY_WRONG = 2, 0.25
 _SHORT = 0.05  # of a trial: exchanged labels that the filter's own outlier rules are for
 
@@ -113,10 +121,10 @@ def _usable(ranked: Sequence[Fit], where: str) -> list[Fit]:
     found = [fit for fit in ranked if not fit.lacking]
     if not found:
         best = ranked[0]
+        why = f"best: {best.marker_set.name} with {best.explained_n} markers; it lacks {'; '.join(best.lacking)}"
         raise ModelError(
-            f"{where}: no marker set fits (best: {best.marker_set.name} with {best.explained_n} markers; it lacks "
-            f"{'; '.join(best.lacking)}), expected names of a set that `dynakin check` lists, or a set of your own: "
-            "dynakin markers new TRIAL -o my.toml"
+            f"{where}: no marker set fits ({why if best.explained_n else 'none knows any of the names'}), expected "
+            "names of a set of `dynakin markers list`, or a set of your own: dynakin markers new TRIAL -o my.toml"
         )
     return found
 
@@ -143,10 +151,13 @@ def recognise(recording: Recording, asked: MarkerSetFile | None = None) -> Recog
     are left out and said. Of sets that explain about as many names one that the body contradicts gives way.
 
     Raises:
-        ModelError: no set fits, two persons in one file, or what is left out leaves no pelvis or no leg.
+        ModelError: no marker is seen, no set fits, two persons in one file, a size that nobody has, or what is left out
+            leaves no pelvis or no leg.
     """
     where = str(recording.path or recording.name)
     seen = _seen(recording)
+    if not any(seen):
+        raise ModelError(f"{where}: no marker is seen in {recording.n_frames} frames, expected those of a person")
     if asked is not None:
         found = checked(recording, match_markers(asked, recording.marker_names, seen, where))
         _refuse_wrong_set(found, where)
@@ -160,6 +171,8 @@ def recognise(recording: Recording, asked: MarkerSetFile | None = None) -> Recog
     for fit in usable:
         if best is not None and (not best.wrong_n or fit.explained_n < _ABOUT_AS_MANY * usable[0].explained_n):
             break
+        if best is not None and fit.doubled:
+            continue  # no better account of the names
         own = checked(recording, match_markers(fit.marker_set, recording.marker_names, seen, where))
         if best is None or own.wrong_n < best.wrong_n:
             best = own
@@ -178,8 +191,9 @@ def _guessed(recording: Recording, seen: list[bool], unknown: ModelError) -> Rec
     where = str(recording.path or recording.name)
     try:
         guessed = drafted(recording)
-    except RecordingError:
-        raise unknown from None
+    except RecordingError as error:
+        why = error.message.removeprefix(f"{where}: ")
+        raise ModelError(f"{unknown.message}; nor can places be guessed: {why}") from None
     if guessed is None:
         raise unknown
     found = checked(recording, match_markers(guessed, recording.marker_names, seen, where))
@@ -211,13 +225,15 @@ def checked(recording: Recording, match: MarkerMatch) -> Recognised:
     """A match without the markers that lie elsewhere than their names say, each with a Warning.
 
     Raises:
-        ModelError: exchanged labels without which there is no pelvis or no leg.
+        ModelError: exchanged labels without which there is no pelvis or no leg, or a size that nobody has.
     """
     keys = list(match.names)
     if not keys or not recording.n_frames:
         return Recognised(match, ())
-    swaps, found, order = find_swaps(recording, match, keys)
     expected = Expected.of(match, keys)
+    found = Found.of(places_of(recording, match, keys, frames_of(recording)), expected)
+    _refuse_wrong_size(found, expected, match.where)
+    swaps, found, order = find_swaps(recording, match, keys, found, expected)
     wrong = _misplaced(match, keys, found, expected, body_height_m(found.ordered(order), expected), order)
     messages = []
     for swap in swaps:
@@ -228,6 +244,19 @@ def checked(recording: Recording, match: MarkerMatch) -> Recognised:
             match = match.without([keys[k]], f"{why}: it is not where its name says")
             messages.append(f"Warning: {why}; {recording_name(match, keys[k])} is left out: check its label.")
     return Recognised(match, tuple(messages), len(wrong))
+
+
+def _refuse_wrong_size(found: Found, expected: Expected, where: str) -> None:
+    """Where neither the distances that names expect nor the largest one at all can be a person's."""
+    if not np.isfinite(found.distance).any():
+        return
+    height_m, largest_m = body_height_m(found, expected), float(np.nanmax(found.distance))
+    low, high = _HEIGHTS_M
+    if min(height_m, largest_m) > high or max(height_m, largest_m) < low:
+        raise ModelError(
+            f"{where}: a person {height_m:.3g} m tall by the distances of the markers (the largest is {largest_m:.3g} "
+            f"m), expected {low} to {high} m: the unit of length is probably wrong"
+        )
 
 
 def recording_name(match: MarkerMatch, key: MarkerKey) -> str:

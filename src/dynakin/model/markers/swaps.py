@@ -45,6 +45,8 @@ _SLACK = 4.0  # of a marker, in the quick estimate of what its exchange gains
 _OFF_M = 0.03  # a marker so far from its place on its segment is not where it was
 _MENDED = 0.5  # of that, at most, is left after the exchange
 _FEWEST_FRAMES = 2  # of those that are looked at
+_FEWEST_OTHERS = 2  # markers on the segments of two, by which an exchange of them is seen
+_AS_GOOD = 0.9  # of what the best account gains
 
 
 @dataclass(frozen=True)
@@ -76,14 +78,16 @@ class Swap:
         return np.asarray((time >= self.span_s[0]) & (time <= self.span_s[1]))
 
 
-def find_swaps(recording: Recording, match: MarkerMatch, keys: Sequence[MarkerKey]) -> tuple[list[Swap], Found, Order]:
+def find_swaps(
+    recording: Recording, match: MarkerMatch, keys: Sequence[MarkerKey], found: Found, expected: Expected
+) -> tuple[list[Swap], Found, Order]:
     """Labels that are exchanged, throughout or for a while; what the recording shows of the markers where they are not
     exchanged for a while; and the order of the markers that their names belong to.
 
     Whichever of both is looked for first, the other may be taken for it: the account with the fewest exchanges counts.
+    found: over all `frames_of` the recording.
     """
-    expected, frames = Expected.of(match, keys), frames_of(recording)
-    found = Found.of(places_of(recording, match, keys, frames), expected)
+    frames = frames_of(recording)
     throughout, order = _swaps_throughout(match, keys, found, expected)
     shown = {key: match.names[keys[k]] for key, k in zip(keys, order, strict=True)}
     right = replace(match, names=shown) if throughout else match
@@ -235,29 +239,35 @@ def distance_words(one: str, other: str, found_m: float, usual_m: float) -> str:
 def _swaps_for_a_while(
     recording: Recording, match: MarkerMatch, keys: Sequence[MarkerKey], found: Found, expected: Expected
 ) -> list[Swap]:
-    """Exchanges in a part of the trial: two markers leave their places on their segments at the same time, and each is
-    found at the other's. What is the rule and what the exception, the greater part of the trial says."""
+    """Exchanges in a part of the trial: a marker leaves its place on its segment, and it and another fit where each is
+    at the other's place (of the other nothing may show it: a wand's only neighbour is the knee). What is the rule and
+    what the exception, the greater part of the trial says."""
     frames = frames_of(recording)
     places = places_of(recording, match, keys, frames)
     partners = [[int(j) for j in np.flatnonzero(row)] for row in expected.rigid]
     swaps: list[Swap] = []
     while len(swaps) < _MOST:
         off = _all_off(places, partners, found)
-        often = np.flatnonzero((off > _OFF_M).sum(axis=0) >= _FEWEST_FRAMES)
-        best, left = None, off.sum()
-        for i, j in combinations((int(k) for k in often), 2):
-            both = (off[:, i] > _OFF_M) & (off[:, j] > 0.5 * _OFF_M) | (off[:, j] > _OFF_M) & (off[:, i] > 0.5 * _OFF_M)
-            if both.sum() < _FEWEST_FRAMES:
+        accounts = []
+        for i, j in combinations(range(len(keys)), 2):
+            either = (off[:, [i, j]] > _OFF_M).any(axis=1)
+            if either.sum() < _FEWEST_FRAMES or len({*partners[i], *partners[j]} - {i, j}) < _FEWEST_OTHERS:
                 continue
             other = places.copy()
-            other[both, i], other[both, j] = places[both, j], places[both, i]
+            other[either, i], other[either, j] = places[either, j], places[either, i]
             after = _all_off(other, partners, found)
-            mended = both & (after[:, [i, j]].max(axis=1) < _MENDED * off[:, [i, j]].max(axis=1))
-            if 2 * mended.sum() >= both.sum() and after.sum() < left:
-                best, left = (i, j, mended, other), after.sum()
-        if best is None:
+            mended = either & (after[:, [i, j]].max(axis=1) < _MENDED * off[:, [i, j]].max(axis=1))
+            gain = float(off.sum() - after.sum())
+            if 2 * mended.sum() >= either.sum() and gain > 0.0:
+                shorter = _way(places[:, [i, j]]) - _way(other[:, [i, j]])
+                accounts.append((gain, shorter, i, j, mended, other))
+        if not accounts:
             return swaps
-        i, j, mended, places = best
+        most = max(account[0] for account in accounts)
+        # Right for left in front and behind look alike by distances: the ones that jump are it.
+        _, _, i, j, mended, places = max(
+            (account for account in accounts if account[0] > _AS_GOOD * most), key=lambda account: account[1]
+        )
         start, stop = (int(frames[k]) for k in np.flatnonzero(mended)[[0, -1]])
         share = float(mended.mean())
         span = _span(recording, match, [keys[i], keys[j]], start, stop, int(np.diff(frames).max(initial=1)))
@@ -267,7 +277,7 @@ def _swaps_for_a_while(
             Swap(
                 ((keys[i], keys[j]),),
                 f"{one} and {other_name}",
-                f"each jumps by {far:.2f} m on its segment, to the place of the other",
+                f"they jump by up to {far:.2f} m on their segments, each to the place of the other",
                 span,
                 share,
             )
@@ -291,6 +301,11 @@ def _span(
     first = before + 1 if before >= 0 else (0 if start < step else start)
     last = after if after >= 0 else (recording.n_frames - 1 if stop + step >= recording.n_frames else stop)
     return float(recording.time[first]), float(recording.time[last])
+
+
+def _way(places: Array) -> float:
+    """How long (m) the ways of markers (T, k, 3) are together, from each frame to the next as far as they are seen."""
+    return float(np.nansum(np.linalg.norm(np.diff(places, axis=0), axis=2)))
 
 
 def _all_off(places: Array, partners: Sequence[Sequence[int]], found: Found) -> Array:

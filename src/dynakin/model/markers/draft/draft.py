@@ -8,8 +8,9 @@ from __future__ import annotations
 
 import json
 import re
-import tomllib
+from collections import defaultdict
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -25,6 +26,7 @@ from dynakin.model.markers.draft.by_geometry import (
     segment_at,
 )
 from dynakin.model.markers.draft.by_name import Sure, places, said
+from dynakin.model.markers.match import is_unlabelled
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.recordings.frame import UPRIGHT
 from dynakin.recordings.landmarks import DEFAULT_PAIRS, plain_name
@@ -60,11 +62,21 @@ def guess_markers(recording: Recording) -> list[Guess]:
     """A guess for each marker that is seen, in the order of the recording.
 
     Raises:
-        RecordingError: no marker is seen, or two have one name but for case and separators.
+        RecordingError: no marker with a name is seen, or two have one name but for case and separators.
     """
     names, at = _standing(recording)
+    where = recording.path or recording.name
     if not names:
-        raise RecordingError(f"{recording.path or recording.name}: no marker is seen, expected some")
+        raise RecordingError(f"{where}: no marker with a name is seen, expected some")
+    alike: dict[str, list[str]] = defaultdict(list)
+    for name in names:
+        alike[plain_name(name)].append(name)
+    doubled = next((same for same in alike.values() if len(same) > 1), None)
+    if doubled is not None:
+        raise RecordingError(
+            f"{where}: markers {' and '.join(map(_printable, doubled))} have one name but for case, separators or what "
+            "stands before a colon, expected names that differ, of one person"
+        )
     stands = standing_window(recording) is not None
     by_name = {k: found for k, name in enumerate(names) if (found := said(name)) is not None}
     named = {k: (f.place, f.side) for k, f in by_name.items() if f.place in places() and f.side is not None}
@@ -92,8 +104,14 @@ def drafted(recording: Recording) -> MarkerSetFile | None:
     guesses = [guess for guess in guess_markers(recording) if _RANK[guess.sure] <= _RANK["likely"]]
     if not any(guess.place for guess in guesses):
         return None
-    whole = expanded(tomllib.loads(toml_text(guesses, "guessed", recording.name)))
-    return MarkerSetFile.model_validate(whole)
+    places_, clusters = _contents(guesses)
+    whole = {
+        "schema_version": 1,
+        "name": "guessed",
+        "places": {place: _names(own) for place, own in places_.items()},
+        "clusters": {segment: [entry for entry, _ in own] for segment, own in clusters.items()},
+    }
+    return MarkerSetFile.model_validate(expanded(whole))
 
 
 def _standing(recording: Recording) -> tuple[list[str], Array]:
@@ -103,7 +121,9 @@ def _standing(recording: Recording) -> tuple[list[str], Array]:
     window = standing_window(recording)
     found: dict[str, Array] = {}
     for name in recording.marker_names:
-        if (name in bones and name[:-1] in drawn) or _COMPUTED.search(plain_name(name)) or name.startswith("*"):
+        if not _is_text(name):
+            continue  # no file can hold the name
+        if (name in bones and name[:-1] in drawn) or _COMPUTED.search(plain_name(name)) or is_unlabelled(name):
             continue  # points of a model that software drew, unlabelled trajectories
         path = recording.marker(name)
         seen: npt.NDArray[np.bool_] = np.asarray(np.isfinite(path).all(axis=1))
@@ -206,27 +226,35 @@ def toml_text(guesses: list[Guess], name: str, source: str) -> str:
         "",
         "[places]",
     ]
-    for place in anatomy()["places"]:
-        own = [g for g in guesses if g.place == place]
-        if own:
-            lines.append(f"{place} = {_names(own)}  # {_comment(own)}")
-    clusters: dict[str, list[Guess]] = {}
-    for guess in guesses:
-        if not guess.place and guess.segment in anatomy()["clusters"]:
-            clusters.setdefault(str(guess.segment), []).append(guess)
+    places_, clusters = _contents(guesses)
+    lines += [f"{place} = {_toml(_names(own))}  # {_comment(own)}" for place, own in places_.items()]
     if clusters:
         lines += ["", "# Markers that follow a segment and mark no place of it.", "[clusters]"]
-    for segment, own in clusters.items():
-        lines.append(f"{segment} = [")
-        for k, pair in enumerate(_pairs(own)):
-            names = _names(pair)
-            inner = names[1:-1].strip() if names.startswith("{") else f"names = {names}"
-            lines.append(f'  {{ name = "{segment}{k + 1}", {inner} }},  # {_comment(pair)}')
-        lines.append("]")
+    for segment, entries in clusters.items():
+        lines += [f"{segment} = [", *(f"  {_toml(entry)},  # {_comment(pair)}" for entry, pair in entries), "]"]
     unknown = [g for g in guesses if not g.place and g.segment not in anatomy()["clusters"]]
     if unknown:
         lines += ["", "# Unknown, not used:", *(f"#   {_printable(g.recorded)}: {g.why}" for g in unknown)]
     return "\n".join(lines) + "\n"
+
+
+def _contents(
+    guesses: list[Guess],
+) -> tuple[dict[str, list[Guess]], dict[str, list[tuple[dict[str, Any], list[Guess]]]]]:
+    """Of a marker set's file: places, and by segment the entries of clusters; with the guesses behind each."""
+    own = {place: [g for g in guesses if g.place == place] for place in anatomy()["places"]}
+    clusters: dict[str, list[Guess]] = defaultdict(list)
+    for guess in guesses:
+        if not guess.place and guess.segment in anatomy()["clusters"]:
+            clusters[str(guess.segment)].append(guess)
+    entries: dict[str, list[tuple[dict[str, Any], list[Guess]]]] = {}
+    for segment, followers in clusters.items():
+        entries[segment] = []
+        for k, pair in enumerate(_pairs(followers)):
+            names = _names(pair)
+            entry = names if isinstance(names, dict) else {"names": names}
+            entries[segment].append(({"name": f"{segment}{k + 1}", **entry}, pair))
+    return {place: found for place, found in own.items() if found}, entries
 
 
 def _pairs(own: list[Guess]) -> list[list[Guess]]:
@@ -246,14 +274,23 @@ def _rest(name: str) -> str:
     return re.sub(r"right|left|^[rl]|[rl]$", "", plain_name(name))
 
 
-def _names(own: list[Guess]) -> str:
+def _names(own: list[Guess]) -> str | dict[str, Any]:
+    """The names of a place in a marker set's file: a pattern, or by side where they have what patterns use."""
     by_side = {g.side: g.recorded for g in own}
     plain = not any(set(",{}") & set(name) for name in by_side.values())
     if plain and set(by_side) == {"right", "left"}:
-        return _quoted(f"{{{by_side['right']},{by_side['left']}}}")
+        return f"{{{by_side['right']},{by_side['left']}}}"
     if plain and set(by_side) == {"centre"}:
-        return _quoted(by_side["centre"])
-    return "{ " + ", ".join(f"{side} = [{_quoted(name)}]" for side, name in by_side.items()) + " }"
+        return by_side["centre"]
+    return {side: [name] for side, name in by_side.items()}
+
+
+def _toml(entry: str | list[str] | dict[str, Any]) -> str:
+    if isinstance(entry, str):
+        return _quoted(entry)
+    if isinstance(entry, list):
+        return f"[{', '.join(map(_quoted, entry))}]"
+    return "{ " + ", ".join(f"{key} = {_toml(value)}" for key, value in entry.items()) + " }"
 
 
 def _comment(own: list[Guess]) -> str:
@@ -261,8 +298,13 @@ def _comment(own: list[Guess]) -> str:
     return parts[0] if len(parts) == 1 else "; ".join(f"{g.side} {g.sure}: {_printable(g.why)}" for g in own)
 
 
+def _is_text(name: str) -> bool:
+    """Whether a name can be written (halves of a character, which programs hand over, cannot)."""
+    return not any("\ud800" <= c <= "\udfff" for c in name)
+
+
 def _quoted(text: str) -> str:
-    return json.dumps(text, ensure_ascii=False)
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")  # which JSON allows and TOML does not
 
 
 def _printable(text: str) -> str:
