@@ -14,13 +14,8 @@ import pytest
 from dynakin.errors import ModelError
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.frames import Trial
-from dynakin.model.calibration.functional import (
-    JointMotion,
-    angle_deg,
-    functional_landmarks,
-    joint_axis,
-    joint_centre,
-)
+from dynakin.model.calibration.functional import functional_landmarks
+from dynakin.model.calibration.joint_motion import JointMotion, angle_deg, joint_axis, joint_centre
 from dynakin.model.calibration.landmarks import LandmarkFinder
 from dynakin.model.definition import ModelDefinition, load_model
 from dynakin.model.markers.marker_set import load_marker_set
@@ -159,6 +154,16 @@ def test_refusals_say_what_to_do() -> None:
         with pytest.raises(ModelError, match=words) as caught:
             definition(**{joint: trial}).calibrate(good)
         assert "\n" not in caught.value.message and f"for {joint}" in caught.value.message
+    lame = blank(knee, "r_knee", "r_mknee", "r_ankle", "r_mankle")  # clusters alone, as in a CAST trial
+    with pytest.raises(ModelError, match=r"right knee centre and lateral epicondyle .*--static") as caught:
+        definition(knee_r=lame).calibrate(lame)
+    assert "\n" not in caught.value.message and "for knee_r" in caught.value.message
+    few = blank(good, "r_knee", "r_mknee", "r_thigh1", "r_thigh2")
+    with pytest.raises(ModelError, match="2 markers of the right thigh"):
+        definition(hip_r=few).calibrate(few)
+    armless = blank(good, "r.ASIS", "L.ASIS")
+    with pytest.raises(ModelError, match="2 markers of the pelvis"):
+        definition(hip_r=armless).calibrate(armless)
     with pytest.raises(ModelError, match="planar"):
         replace(load_model("squat7", WHO, "opencap"), functional={"hip_r": good}).calibrate(good)
 

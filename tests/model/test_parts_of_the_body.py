@@ -110,6 +110,41 @@ def test_a_person_without_height_or_mass_is_measured_by_the_markers() -> None:
     assert any(text.startswith("Warning: mass") and "mean adult" in text for text in found.messages)
 
 
+def blank(recording: Recording, name: str, frames: slice) -> Recording:
+    markers = recording.markers.copy()
+    markers[frames, recording.marker_names.index(name)] = np.nan
+    return replace(recording, markers=markers)
+
+
+def test_a_marker_that_is_seen_only_where_another_is_not() -> None:
+    """Left out of the joint centres, with a sentence; the centre is then as if it had never been there."""
+    base, k = standing(), standing().marker_names.index("RKNE")
+    medial = np.concatenate([base.markers, base.markers[:, [k]] - [0.0, 0.0, 0.1]], axis=1)
+    whole = replace(base, marker_names=(*base.marker_names, "RKNM"), markers=medial)
+    found = definition().calibrate(blank(blank(whole, "RKNM", slice(0, 90)), "LKNE", slice(90, None)))
+    plain, with_it = measured(), definition().calibrate(whole)
+    assert found.plan is not None and plain.plan is not None and with_it.plan is not None
+    lengths = [one.plan.geometry.lengths["thigh"] for one in (found, plain, with_it) if one.plan is not None]
+    assert lengths[0] == pytest.approx(lengths[1], abs=1e-6) and abs(lengths[2] - lengths[1]) > 1e-4
+    said = next(text for text in found.messages if "no frame of standing shows all markers" in text)
+    assert said.startswith("Warning: ") and "measured without RKNM, which is not seen" in said
+    assert "RKNM" in found.recorded_markers
+    assert not any("no frame of" in text for text in with_it.messages)
+
+    knee = definition().calibrate(blank(blank(base, "RKNE", slice(0, 60)), "LANK", slice(60, None)))
+    assert any("measured without RKNE, which is not seen" in text for text in knee.messages)
+    assert any(text.startswith("From the proportions") and "knee_r" in text for text in knee.messages)
+    assert "RKNE" in knee.recorded_markers
+
+    apart = base
+    for name in ("RASI", "LASI", "RPSI", "LPSI"):
+        apart = blank(apart, name, slice(50, None))
+    for name in (name for name in base.marker_names if name[1:] not in ("ASI", "PSI")):
+        apart = blank(apart, name, slice(0, 50))
+    with pytest.raises(ModelError, match=r"nothing on the pelvis.*expected a frame with pelvis and leg"):
+        definition().calibrate(apart)
+
+
 def test_too_little_of_the_pelvis_is_refused_in_words() -> None:
     pelvis = ["LASI", "RASI", "LPSI", "RPSI"]
     with pytest.raises(ModelError, match=r"segment 'pelvis' .* has 0 of the landmarks .*hip_r.*expected 2 or more"):

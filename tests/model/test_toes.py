@@ -49,6 +49,16 @@ def test_one_side_marked_has_toes_on_that_side(marked: ModelDefinition) -> None:
     assert "toes_r" in found.plan.bodies and "toes_l" not in found.plan.bodies
 
 
+def test_a_great_toe_that_is_never_seen_with_the_rest_gives_no_toes(marked: ModelDefinition) -> None:
+    recording = with_toes(standing())
+    markers = recording.markers.copy()
+    markers[:80, recording.marker_names.index("RHLX")] = np.nan
+    markers[80:, recording.marker_names.index("LANK")] = np.nan
+    found = marked.calibrate(replace(recording, markers=markers))
+    assert "toes_r" not in found.plan.bodies and "toes_l" in found.plan.bodies
+    assert any("measured without RHLX" in text for text in found.messages)
+
+
 def test_a_great_toe_without_metatarsals_stays_on_the_foot(marked: ModelDefinition) -> None:
     recording = with_toes(standing())
     kept = [k for k, name in enumerate(recording.marker_names) if name[1:] not in ("TOE", "MT5")]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,11 +10,13 @@ import pytest
 
 import dynakin
 from dynakin.bindings import _core
+from dynakin.errors import ModelError
 from dynakin.filter.contacts import ContactLoads
+from dynakin.model.markers.recognise import recognise
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import ON_PLATE, SHARED_PLATE, UNMEASURED
 from dynakin.recordings.feet.soles import FootShape
-from dynakin.recordings.recording import Plate
+from dynakin.recordings.recording import Plate, Recording
 from dynakin.settings import presets
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.trial import simulate
@@ -50,6 +53,12 @@ def wrench_of(plate: Plate) -> np.ndarray:
 @pytest.fixture(scope="module")
 def trial() -> SimulatedTrial:
     return simulate("fullbody", "squat", 1, 5.0)
+
+
+@pytest.fixture(scope="module")
+def squat_in_gait() -> Recording:
+    """With plug-in-gait's markers, no plates."""
+    return replace(simulate("fullbody", "squat", 2, 5.0, markers="plug-in-gait").recording, plates=())
 
 
 @pytest.fixture(scope="module")
@@ -94,6 +103,44 @@ def test_live_equals_offline_in_space(trial: SimulatedTrial, squat: tuple[Live, 
         np.stack(loads, axis=1),
     )
     np.testing.assert_allclose(np.stack([f.state for f in frames]), states, atol=1e-8)
+
+
+def test_pelvis_and_one_leg_are_followed_live(
+    trial: SimulatedTrial, squat: tuple[Live, list[LiveFrame], list[str]]
+) -> None:
+    """Less than half of the set's markers: offline takes them, and so does the stream."""
+    whole = recognise(trial.recording).match
+    shown = [
+        whole.names[key]
+        for key in whole.names
+        if (segment := whole.marker_set.marker(key[0]).segment) == "pelvis"
+        or (key[1] == "right" and segment in ("thigh", "shank", "foot", "toes"))
+    ]
+    seen = np.isin(trial.recording.marker_names, shown)
+    part = replace(trial.recording, markers=np.where(seen[:, None], trial.recording.markers, np.nan), plates=())
+    live, frames, said = session(Replay(part, speed=0.0, duration_s=3.5), standing_s=1.0)
+    told = next(text for text in said if "are there" in text)
+    count, of = (int(word) for word in told.split() if word.isdigit())
+    assert 2 * count < of and "Ready: move." in said
+
+    def knee(frames: list[LiveFrame], live: Live) -> np.ndarray:
+        assert live.tracker.calibrated is not None
+        k = live.tracker.calibrated.names.index("knee_angle_r")
+        return np.rad2deg([f.state[k] for f in frames])
+
+    full, alone = knee(squat[1], squat[0]), knee(frames, live)
+    n = min(len(full), len(alone))
+    assert np.ptp(full) > 40.0 and np.sqrt(np.mean((full[-n:] - alone[-n:]) ** 2)) < 2.0
+
+
+def test_a_stream_of_names_that_no_set_knows_is_taken_with_a_warning(squat_in_gait: Recording) -> None:
+    unknown = replace(squat_in_gait, marker_names=tuple(f"M{k}" for k in range(len(squat_in_gait.marker_names))))
+    _, frames, said = session(Replay(unknown, speed=0.0, duration_s=1.5), standing_s=1.0)
+    assert frames and any(text.startswith("Warning: no marker set has these names") for text in said)
+    few = unknown.markers.copy()
+    few[:, 3:] = np.nan
+    with pytest.raises(ModelError, match=r"no marker set fits.*; what came: M0, M1"):
+        session(Replay(replace(unknown, markers=few), speed=0.0, duration_s=1.5), standing_s=1.0)
 
 
 def test_smoothed_moments_and_bands_are_those_with_the_feet(squat: tuple[Live, list[LiveFrame], list[str]]) -> None:

@@ -71,7 +71,10 @@ def test_a_lag_is_shown_as_its_delay(squat: Recording) -> None:
 
 def test_wrong_labels_list_what_came_and_what_was_expected(squat: Recording) -> None:
     strange = replace(squat, marker_names=tuple(f"ball{k}" for k in range(len(squat.marker_names))))
-    with pytest.raises(ModelError, match=r"0 of \d+ found; came: ball0, ball1.*expected those of opencap: "):
+    with pytest.raises(
+        ModelError,
+        match=r"0 of \d+ found, nothing on the pelvis.*; came: ball0, ball1.*expected those of opencap: ",
+    ):
         run(Replay(strange, speed=0.0))
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from importlib import resources
 from pathlib import Path
@@ -18,7 +18,7 @@ from dynakin.model.calibration.in_space import started
 from dynakin.model.calibration.measure import measure
 from dynakin.model.markers.marker_set import load_marker_set
 from dynakin.model.markers.match import match_markers
-from dynakin.model.markers.recognise import choose_marker_set
+from dynakin.model.markers.recognise import Fit, choose_marker_set, recognise, seen_names
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.model.opensim.definition import OpenSimDefinition, load_opensim
 from dynakin.model.plan import ModelPlan
@@ -67,14 +67,12 @@ class Definition(Protocol):
     def with_subject(self, subject: Subject) -> Definition:
         """The same model of somebody else."""
 
-    def markers_among(self, came: Sequence[str], seen: Iterable[bool], where: str) -> tuple[str, list[str], list[str]]:
-        """Whose markers they are (the marker set's or the model's name), those expected, and those among ``came``.
-
-        Args:
-            came: names of markers. seen: whether each was seen at all. where: they came from.
+    def markers_among(self, recording: Recording) -> tuple[str, list[str], list[str], str]:
+        """Whose markers a recording has (the marker set's or the model's name), those expected, those that are there,
+        and what lacks so that they are too few ("" where they are enough).
 
         Raises:
-            ModelError: the names fit no marker set.
+            ModelError: the markers fit no set.
         """
 
     def calibrate(
@@ -145,17 +143,27 @@ class ModelDefinition:
         """The same model of somebody else."""
         return replace(self, subject=subject)
 
-    def markers_among(self, came: Sequence[str], seen: Iterable[bool], where: str) -> tuple[str, list[str], list[str]]:
-        """The marker set's name, its usual markers, and those of them that are among names."""
+    def markers_among(self, recording: Recording) -> tuple[str, list[str], list[str], str]:
+        """The marker set's name, its usual markers, those that the recording has, and what lacks: it is enough where a
+        pelvis and a leg are there, or half of the markers."""
+        came, there = recording.marker_names, set(seen_names(recording))
         try:
-            chosen = self.marker_set or choose_marker_set(came)
+            chosen = self.marker_set or choose_marker_set([name for name in came if name in there], recording.name)
+            match = match_markers(chosen, came, [name in there for name in came], recording.name)
         except ModelError as error:
-            raise ModelError(f"{error.message}; what came: {', '.join(came)}") from None
+            if self.marker_set is not None:
+                raise
+            try:
+                match = recognise(recording).match  # places are guessed
+            except ModelError:
+                raise ModelError(f"{error.message}; what came: {', '.join(came)}") from None
+        usual = {marker.name: marker for marker in match.marker_set.usual}
         sides = ("right", "left", "centre")
-        expected = [marker.aliases(side)[0] for marker in chosen.usual for side in sides if marker.aliases(side)]
-        usual = {marker.name for marker in chosen.usual}
-        matched = match_markers(chosen, came, seen, where).names
-        return chosen.name, expected, [name for (marker, _), name in matched.items() if marker in usual]
+        expected = [marker.aliases(side)[0] for marker in usual.values() for side in sides if marker.aliases(side)]
+        found = [name for (marker, _), name in match.names.items() if marker in usual]
+        lacking = Fit(match.marker_set, match.names, {}, len(expected)).lacking
+        lacks = f"nothing {'; '.join(lacking)}" if lacking and 2 * len(found) < len(expected) else ""
+        return match.marker_set.name, expected, found, lacks
 
     def calibrate(
         self,

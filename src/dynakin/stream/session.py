@@ -272,9 +272,7 @@ class Live:
             return
         plates = self.fusion.plates.names if self.fusion.plates else ()
         if not self._labels_checked:
-            positions = np.stack([one.positions for one in self._window])
-            seen = [bool(np.isfinite(positions[:, k]).all(axis=1).any()) for k in range(len(info.names))]
-            self.say(check_labels(self.estimator.model, info.names, seen))
+            self.say(check_labels(self.estimator.model, recording_of(self._window, info.names, (), "the stream")))
             self._labels_checked = True
         since = t - self.standing_s - 0.5 / info.rate_hz
         recent = [one for one in self._window if one.sample.time_s >= since]

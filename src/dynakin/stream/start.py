@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -31,20 +31,17 @@ _NOW_S = 0.1  # the present posture, from a few frames
 _KINDS = ("length", "marker", "inertia")
 
 
-def check_labels(model: Definition, came: Sequence[str], seen: Iterable[bool]) -> str:
-    """Whether a model's markers are among those that came; gives a sentence on which are used.
-
-    Args:
-        seen: whether each was seen at all.
+def check_labels(model: Definition, recording: Recording) -> str:
+    """Whether a model's markers are among those that came so far; gives a sentence on which are used.
 
     Raises:
-        ModelError: less than half of them; the message lists what came and what was expected.
+        ModelError: too few of them, as of a recording; the message lists what came and what was expected.
     """
-    name, expected, found = model.markers_among(came, seen, "the stream")
-    if 2 * len(found) < len(expected):
+    name, expected, found, lacks = model.markers_among(recording)
+    if lacks:
         raise ModelError(
-            f"the stream's markers do not fit the model: {len(found)} of {len(expected)} found; came: "
-            f"{', '.join(came)}; expected those of {name}: {', '.join(expected)}"
+            f"the stream's markers do not fit the model: {len(found)} of {len(expected)} found, {lacks}; "
+            f"came: {', '.join(recording.marker_names)}; expected those of {name}: {', '.join(expected)}"
         )
     return f"{len(found)} of the {len(expected)} markers of {name} are there."
 

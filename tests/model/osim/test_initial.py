@@ -82,7 +82,7 @@ def test_what_is_estimated_is_a_choice(folder: Path, squats: Recording) -> None:
 
 def test_every_model_answers_to_the_same_questions(folder: Path, squats: Recording) -> None:
     """So that nobody asks which kind a model is."""
-    names, seen = squats.marker_names, [True] * len(squats.marker_names)
+    names = squats.marker_names
     for name, planar, has_mass in (
         (folder / FILE, False, True),
         ("sagittal7", True, False),
@@ -92,8 +92,8 @@ def test_every_model_answers_to_the_same_questions(folder: Path, squats: Recordi
         assert (definition.planar, definition.has_mass) == (planar, has_mass)
         heavier = definition.with_subject(Subject(mass_kg=75.0))
         assert heavier.has_mass and heavier.subject.mass_kg == 75.0 and definition.subject.mass_kg is None
-        whose, expected, found = definition.markers_among(names, seen, "squats1")
-        assert whose and set(found) <= set(names) and len(expected) >= len(found) > 0.8 * len(expected)
+        whose, expected, found, lacks = definition.markers_among(squats)
+        assert whose and not lacks and set(found) <= set(names) and len(expected) >= len(found) > 0.8 * len(expected)
         calibrated = heavier.calibrate(squats)
         assert isinstance(calibrated, CalibratedModel) and calibrated.mass_kg == pytest.approx(75.0)
 

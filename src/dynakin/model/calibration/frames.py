@@ -20,6 +20,8 @@ Array = npt.NDArray[np.float64]
 FIRST_FRAMES = 10
 """How many frames stand in for a standing window where a trial has none (0.1 s at 100 Hz)."""
 
+_WAYS = 200  # in which markers lack together, the ones with fewest markers that lack
+
 
 @dataclass(frozen=True, eq=False)
 class Trial:
@@ -50,6 +52,19 @@ class Trial:
         for key in keys:
             seen &= np.isfinite(self.paths[key]).all(axis=1)
         return seen
+
+    def seen_apart(self, keys: set[MarkerKey]) -> set[MarkerKey]:
+        """Of markers that no frame shows together, the ones to do without: as few as leave `FIRST_FRAMES` frames that
+        show the others, where any do; none where a frame shows all."""
+        if not keys or self.usable(keys).any():
+            return set()
+        ordered = sorted(keys)
+        lacks = np.array([~np.isfinite(self.paths[key]).all(axis=1) for key in ordered]).T
+        ways = np.unique(lacks, axis=0)
+        ways = ways[np.argsort(ways.sum(axis=1), kind="stable")][:_WAYS]
+        frames = (~(lacks.astype(np.float32) @ (~ways).astype(np.float32).T).astype(bool)).sum(axis=0)
+        best = min(range(len(ways)), key=lambda k: (frames[k] < FIRST_FRAMES, ways[k].sum(), -frames[k]))
+        return {key for key, gone in zip(ordered, ways[best], strict=True) if gone}
 
     def median(self, frames: npt.NDArray[np.intp]) -> Positions:
         """Median place (3,) m of each marker over some frames, NaN where it is never seen there."""

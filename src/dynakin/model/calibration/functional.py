@@ -1,23 +1,23 @@
-"""Hip centres and knee axes from functional trials: what the motion of one segment against the next shows of the joint.
-
-Centre: symmetrical SCoRE (Ehrig et al. 2006, J Biomech 39:2798-2809), the point that moves least against both segments,
-as the pelvis carries it. Axis: SARA (Ehrig et al. 2007, J Biomech 40:2150-2157), the mean of both segments' axes. Tried
-on simulated persons with soft tissue, 12 seeds, thigh through 57 by 37 deg: SCoRE 7 mm, a bias-compensated sphere
-(Gamage & Lasenby 2002, Halvorsen 2003) 11 mm; through 29 by 19 deg 9 and 18 mm. Knee through 40 deg: SARA 3.8 deg, mean
-helical axis 5.0, circles of the markers 9.7.
-"""
+"""Hip centres and knee axes from functional trials, in place of what the markers of the standing person give."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial.transform import Rotation
 
 from dynakin.errors import ModelError
 from dynakin.model.calibration.frames import Trial
+from dynakin.model.calibration.joint_motion import (
+    BLOCKS,
+    Centre,
+    JointAxis,
+    JointMotion,
+    angle_deg,
+    joint_axis,
+    joint_centre,
+)
 from dynakin.model.calibration.landmarks import LandmarkFinder
 from dynakin.model.markers.match import match_markers
 from dynakin.recordings.landmarks import find_marker
@@ -29,6 +29,8 @@ Array = npt.NDArray[np.float64]
 _SIDES = {"r": "right", "l": "left"}
 _SEGMENTS = {"hip": ("pelvis", "thigh"), "knee": ("thigh", "shank")}
 _BONES = {"thigh": ("hip", "knee"), "shank": ("knee", "ankle")}
+_COMPARED = {"hip": ("hip",), "knee": ("knee", "knee_lateral", "hip")}  # landmarks of the markers' own joint
+_IN_WORDS = {"hip": "hip centre", "knee": "knee centre", "knee_lateral": "lateral epicondyle"}
 _FEWEST = 3  # markers that show how a segment turns
 _NEAR_BONE_M = (0.015, 0.15)  # of its line: nearer are computed joint centres, farther other segments
 _ALONG_BONE = (0.05, 1.10)
@@ -44,117 +46,6 @@ _HIP_RESIDUAL_M, _KNEE_RESIDUAL_DEG = 0.015, 5.0
 """Largest root mean square by which the joint moves against itself: 6 to 9 mm and 1.5 deg on simulated persons."""
 _HIP_OFF_M, _KNEE_OFF_DEG = 0.06, 30.0
 """Farthest from the markers' own: beyond it a file of another joint, or landmarks that are wrong."""
-_BLOCKS = 6  # of the trial, each left out in turn
-
-
-@dataclass(frozen=True, eq=False)
-class JointMotion:
-    """Motion of a distal segment in its proximal one, both as they stand: x -> turns x + shifts.
-
-    turns: (T, 3, 3); shifts: (T, 3) m; range_deg: (3,) 5 to 95 percentile range about its principal axes, largest
-    first.
-    """
-
-    turns: Array
-    shifts: Array
-    range_deg: Array
-
-    @classmethod
-    def between(cls, proximal: RigidMotion, distal: RigidMotion) -> JointMotion:
-        """Of two segments in the same frames."""
-        turned = np.swapaxes(proximal.rotations, 1, 2)
-        turns = turned @ distal.rotations
-        shifts = (turned @ (distal.translations - proximal.translations)[:, :, None])[:, :, 0]
-        mean = Rotation.from_matrix(turns).mean()
-        vectors = np.rad2deg((mean.inv() * Rotation.from_matrix(turns)).as_rotvec())
-        vectors = vectors - vectors.mean(axis=0)
-        along = vectors @ np.linalg.eigh(vectors.T @ vectors)[1]
-        low, high = np.percentile(along, [5.0, 95.0], axis=0)
-        return cls(turns, shifts, (high - low)[::-1])
-
-    def blocks_left_out(self) -> list[npt.NDArray[np.bool_]]:
-        """Frames without each of some blocks in time."""
-        block = np.arange(len(self.turns)) * _BLOCKS // len(self.turns)
-        return [block != k for k in range(_BLOCKS)]
-
-    def part(self, frames: npt.NDArray[np.bool_] | npt.NDArray[np.intp]) -> JointMotion:
-        """Only these frames."""
-        return JointMotion(self.turns[frames], self.shifts[frames], self.range_deg)
-
-
-@dataclass(frozen=True, eq=False)
-class Centre:
-    """point: (3,) m as the proximal segment carries it, standing; sd_m: of its distance; residual_m: root mean square
-    of the distance between where both segments carry it."""
-
-    point: Array
-    sd_m: float
-    residual_m: float
-
-
-@dataclass(frozen=True, eq=False)
-class JointAxis:
-    """direction: (3,) unit vector, standing; its sign is free; sd_deg: of its angle; residual_deg: root mean square of
-    the angle between where both segments carry it."""
-
-    direction: Array
-    sd_deg: float
-    residual_deg: float
-
-
-def joint_centre(motion: JointMotion) -> Centre:
-    """The point that moves least against both segments.
-
-    sd_m holds what the parts of the trial disagree on (jackknife over blocks, in which skin wanders), what both
-    segments do, whose skin has moved since standing, and the residual, for skin that follows the motion. Without the
-    last it was 0.8 times the error of simulated persons (30 seeds).
-    """
-    a, b = _centres(motion)
-    others = np.array([_centres(motion.part(frames))[0] for frames in motion.blocks_left_out()])
-    variance = (_BLOCKS - 1) / _BLOCKS * float(((others - others.mean(axis=0)) ** 2).sum())
-    apart = a - motion.turns @ b - motion.shifts
-    residual = float((apart**2).sum(axis=1).mean())
-    return Centre(a, float(np.sqrt(variance + ((a - b) ** 2).sum() + residual)), float(np.sqrt(residual)))
-
-
-def joint_axis(motion: JointMotion) -> JointAxis:
-    """The direction that turns least against both segments.
-
-    sd_deg holds what the parts of the trial disagree on, what both segments do, and what the halves of the range do,
-    since skin follows the angle. On simulated persons it is 0.9 to 1.1 times the error above the least range.
-    """
-    a, b = _axes(motion)
-    mean = (a + b) / np.linalg.norm(a + b)
-    others = np.array([_axes(motion.part(frames))[0] for frames in motion.blocks_left_out()])
-    others *= np.sign(others @ a)[:, None]
-    variance = (_BLOCKS - 1) / _BLOCKS * float(((others - others.mean(axis=0)) ** 2).sum())
-    order = np.argsort(Rotation.from_matrix(motion.turns).magnitude())
-    less, more = (_axes(motion.part(half))[0] for half in np.array_split(order, 2))
-    sd_deg = np.sqrt(np.rad2deg(np.sqrt(variance)) ** 2 + angle_deg(a, b) ** 2 + angle_deg(less, more, True) ** 2)
-    apart = np.linalg.norm(a - motion.turns @ b, axis=1)
-    return JointAxis(mean, float(sd_deg), float(np.rad2deg(np.sqrt((apart**2).mean()))))
-
-
-def _centres(motion: JointMotion) -> tuple[Array, Array]:
-    """a, b (3,): least squares of a = turns b + shifts, the centre as the proximal and the distal segment have it."""
-    n, Q = len(motion.turns), motion.turns.sum(axis=0)
-    back = np.einsum("tji,tj->i", motion.turns, motion.shifts)
-    normal = np.block([[n * np.eye(3), -Q], [-Q.T, n * np.eye(3)]])
-    both = np.linalg.lstsq(normal, np.concatenate([motion.shifts.sum(axis=0), -back]), rcond=None)[0]
-    return both[:3], both[3:]
-
-
-def _axes(motion: JointMotion) -> tuple[Array, Array]:
-    """a, b (3,) unit vectors: least squares of a = turns b, the axis as either segment has it."""
-    n, Q = len(motion.turns), motion.turns.sum(axis=0)
-    both = np.linalg.eigh(np.block([[n * np.eye(3), -Q], [-Q.T, n * np.eye(3)]]))[1][:, 0]
-    return both[:3] / np.linalg.norm(both[:3]), both[3:] / np.linalg.norm(both[3:])
-
-
-def angle_deg(a: Array, b: Array, either_way: bool = False) -> float:
-    """Angle between two directions (3,); ``either_way``: as lines, 0 to 90 deg."""
-    cosine = float(a @ b)
-    return float(np.rad2deg(np.arctan2(np.linalg.norm(np.cross(a, b)), abs(cosine) if either_way else cosine)))
 
 
 def functional_landmarks(
@@ -171,12 +62,14 @@ def functional_landmarks(
             the person stands.
 
     Raises:
-        ModelError: markers of a segment are lacking, the joint moves too little, or not as one joint does.
+        ModelError: markers of a segment or of the joint itself are lacking, the joint moves too little, or not as one
+            joint does.
     """
     found, messages = dict(landmarks), []
     for joint in sorted(trials):  # hips first: the thigh's frame is spoken of by its new centre
         name = joint.split("_")[0]
         where = f"functional trial {trials[joint].path or trials[joint].name} for {joint}"
+        _refuse_unmarked(joint, found, finder, where)
         motion, without = _motion(joint, trials[joint], found, source, frames, where)
         if without:
             messages.append(
@@ -199,6 +92,18 @@ def functional_landmarks(
             messages.append(_put_axis(joint_axis(motion), found, finder, joint, turned, where, trials[joint].name))
         _middle(found, *(("hip",) if name == "hip" else ("knee", "knee_lateral")))
     return found, messages
+
+
+def _refuse_unmarked(joint: str, found: Mapping[str, Array], finder: LandmarkFinder, where: str) -> None:
+    """A joint that the markers do not place: nothing shows whether the trial is of that joint."""
+    name, letter = joint.split("_")
+    lacking = [point for point in _COMPARED[name] if f"{point}_{letter}" not in found]
+    if lacking:
+        raise ModelError(
+            f"{where}: no markers of the standing person give the {_SIDES[letter]} "
+            f"{' and '.join(_IN_WORDS[point] for point in lacking)} (marker set {finder.match.marker_set.name}) that "
+            "the trial's is compared with; expected markers there, in the trial or in a static one (--static)"
+        )
 
 
 def _put_centre(centre: Centre, found: dict[str, Array], joint: str, turned: Array, where: str, file: str) -> str:
@@ -287,10 +192,8 @@ def _motion(
         motions.append(motion)
         without += left_out
     good = (motions[0].misfit_m <= 2.0 * _DEFORMED_M) & (motions[1].misfit_m <= 2.0 * _DEFORMED_M)  # NaN: not seen
-    if np.count_nonzero(good) < 10 * _BLOCKS:
-        raise ModelError(
-            f"{where}: {np.count_nonzero(good)} frames show both segments, expected {10 * _BLOCKS} or more"
-        )
+    if np.count_nonzero(good) < 10 * BLOCKS:
+        raise ModelError(f"{where}: {np.count_nonzero(good)} frames show both segments, expected {10 * BLOCKS} or more")
     return JointMotion.between(motions[0].at(good), motions[1].at(good)), without
 
 
@@ -360,10 +263,11 @@ def _markers_of(
         and key in source.match.names
         and np.isfinite(_standing(source, source.match.names[key], frames)).all()
     }
-    if len(names) < _FEWEST and part in _BONES:
+    ends = [landmarks.get(f"{point}_{letter}") for point in _BONES.get(part, ())]
+    if len(names) < _FEWEST and len(ends) == 2 and ends[0] is not None and ends[1] is not None:
         taken = {source.match.names[m.name, s] for m in marker_set.markers if not m.landmark_only
                  for s in ("right", "left", "centre") if (m.name, s) in source.match.names}  # fmt: skip
-        start, end = (landmarks[f"{point}_{letter}"] for point in _BONES[part])
+        start, end = ends[0], ends[1]
         along = (end - start) / np.linalg.norm(end - start)
         near: list[tuple[float, str, str]] = []
         for own in source.recording.marker_names:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -19,7 +19,7 @@ from dynakin.model.calibration.lumping import PlacedPart, segment_bodies
 from dynakin.model.calibration.posture import Posture, find_geometry, find_posture, frame_landmarks
 from dynakin.model.calibration.sites import Candidate, as_marked, candidates, find_locks, place_sites
 from dynakin.model.markers.match import MarkerKey, MarkerMatch
-from dynakin.model.markers.recognise import recognise
+from dynakin.model.markers.recognise import Fit, recognise
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.model.plan import Geometry, ModelPlan
 from dynakin.model.schema import ModelFile
@@ -94,6 +94,9 @@ def measure(
     # A planar model starts from the trial's own landmarks; in space it starts from markers (pose_start).
     common = source.match if model.sided else _common(trial.match, source.match)
     finder = LandmarkFinder(common, side, subject.sex, model.planar, in_space=model.sided)
+    if model.sided:
+        finder, apart = seen_together(model, finder, trial.match, source)
+        messages += apart
     model = as_marked(model, trial.match, finder)
     chosen, left_out = candidates(model, trial.match, side)
     locks, bare, locked = find_locks(model, trial.match, chosen)
@@ -204,6 +207,39 @@ def needed_markers(model: ModelFile, finder: LandmarkFinder, locks: dict[str, fl
         if length.between is not None and all(finder.known(name) for name in length.between):
             keys |= finder.markers_of(length.between[0]) | finder.markers_of(length.between[1])
     return keys
+
+
+def seen_together(
+    model: ModelFile, finder: LandmarkFinder, match: MarkerMatch, source: Trial
+) -> tuple[LandmarkFinder, list[str]]:
+    """The finder without markers that are never seen with the others of the landmarks, whose recipes fall back on what
+    is left, and a sentence on them. They stay markers of their segments.
+
+    Raises:
+        ModelError: what is seen together is no pelvis and leg.
+    """
+    apart: dict[MarkerKey, str] = {}
+    while True:
+        marked = as_marked(model, match, finder)
+        locks = find_locks(marked, match, candidates(marked, match, "both")[0])[0]
+        needed = needed_markers(marked, finder, locks)
+        gone = source.seen_apart(needed)
+        if not gone:
+            break
+        apart |= {key: finder.match.names[key] for key in sorted(gone)}
+        left = finder.match.without(gone, "it is never seen together with the others")
+        if lacks := Fit(left.marker_set, left.names, {}, len(left.names)).lacking:
+            raise ModelError(
+                f"{source.match.where}: no frame shows all {len(needed)} markers of the joint centres, and frames that "
+                f"show most of them have nothing {'; '.join(lacks)}; expected a frame with pelvis and leg"
+            )
+        finder = replace(finder, match=left, _chosen={})
+    if not apart:
+        return finder, []
+    return finder, [
+        f"Warning: no frame of {source.recording.name} shows all markers of the joint centres: measured without "
+        f"{', '.join(apart.values())}, which {'is' if len(apart) == 1 else 'are'} not seen when the others are."
+    ]
 
 
 def flat_slopes(trial: Trial) -> dict[str, float]:

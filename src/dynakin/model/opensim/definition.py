@@ -3,7 +3,6 @@ joints and inertia come from the file, mass and posture are measured."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -84,10 +83,11 @@ class OpenSimDefinition:
         """The same model of somebody else."""
         return replace(self, subject=subject)
 
-    def markers_among(self, came: Sequence[str], seen: Iterable[bool], where: str) -> tuple[str, list[str], list[str]]:
-        """The model's name, its markers, and those of them that are among names."""
+    def markers_among(self, recording: Recording) -> tuple[str, list[str], list[str], str]:
+        """The model's name, its markers, those that the recording has, and what lacks where they are less than half."""
         expected = [marker.name for marker in self.source.markers]
-        return self.name, expected, [name for name in expected if name in came]
+        found = [name for name in expected if name in recording.marker_names]
+        return self.name, expected, found, "expected half of them" if 2 * len(found) < len(expected) else ""
 
     def calibrate(
         self,
