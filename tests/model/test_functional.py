@@ -168,6 +168,24 @@ def test_refusals_say_what_to_do() -> None:
         replace(load_model("squat7", WHO, "opencap"), functional={"hip_r": good}).calibrate(good)
 
 
+def test_trials_of_other_people_are_refused() -> None:
+    """The limit was set on seeds 401 to 414; these are others. Of one that is just as tall the deviation tells."""
+    own, _, _ = functional_trial(1, "hip", SensorNoise())
+    for seed, height_m, words in (
+        (7, 1.75, r"standard deviation of 2. mm, expected at most 18 mm"),
+        (8, 1.60, "another person, or markers put on anew"),
+        (9, 1.90, "another person, or markers put on anew"),
+    ):
+        other, _, _ = functional_trial(seed, "hip", SensorNoise(), height_m=height_m)
+        with pytest.raises(ModelError, match=words):
+            definition(hip_r=other).calibrate(own)
+        said = definition(hip_r=other).calibrate(other).messages
+        assert any(text.startswith("Hip centre right: from simulated") for text in said)
+    short, _, _ = functional_trial(8, "knee", SensorNoise(), height_m=1.60)
+    with pytest.raises(ModelError, match=r"for knee_r: distances .* another person"):
+        definition(knee_r=short).calibrate(own)
+
+
 @pytest.mark.skipif(not REAL.is_dir(), reason=f"no recordings in {REAL}")
 def test_real_hip_and_knee() -> None:
     """One person, clusters of three: the hip lies within 25 mm of Harrington's regression; in `right_hip` the labels of
