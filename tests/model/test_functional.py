@@ -33,7 +33,6 @@ THIGH = ("r_knee", "r_thigh1", "r_thigh2", "r_thigh3", "r_thigh4")
 SHANK = ("r_ankle", "r_sh2", "r_sh3", "r_shank_antsup")
 SEEDS = range(201, 209)
 WHO = Subject(mass_kg=70.0, height_m=1.75, sex="male")
-REAL = Path("/work/shared/data/functional")
 
 
 def joint_motion(recording: Recording, proximal: tuple[str, ...], distal: tuple[str, ...]) -> JointMotion:
@@ -186,11 +185,12 @@ def test_trials_of_other_people_are_refused() -> None:
         definition(knee_r=short).calibrate(own)
 
 
-@pytest.mark.skipif(not REAL.is_dir(), reason=f"no recordings in {REAL}")
-def test_real_hip_and_knee() -> None:
+def test_real_hip_and_knee(data_dir: Path) -> None:
     """One person, clusters of three: the hip lies within 25 mm of Harrington's regression; in `right_hip` the labels of
     the epicondyles change places at half time, which is noticed."""
-    standing, hip, knee = (read(REAL / f"{name}.c3d") for name in ("anat_pose_ECH", "right_hip", "right_knee"))
+    standing, hip, knee = (
+        read(data_dir / f"functional/{name}.c3d") for name in ("anat_pose_ECH", "right_hip", "right_knee")
+    )
     window = slice(0, 800)
 
     def motion(trial: Recording, names: tuple[str, ...]) -> tuple[Array, ...]:
