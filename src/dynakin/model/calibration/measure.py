@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
@@ -11,7 +12,7 @@ import numpy.typing as npt
 from dynakin.errors import ModelError
 from dynakin.model.calibration.body import check_body_mass, find_height, find_mass
 from dynakin.model.calibration.checks import check_masses, fixed_lengths, reach, refuse_moving_origin, report
-from dynakin.model.calibration.completion import completed, free
+from dynakin.model.calibration.completion import Completed, completed, free
 from dynakin.model.calibration.frames import Trial, choose_side
 from dynakin.model.calibration.functional import functional_landmarks
 from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder, slope
@@ -67,21 +68,12 @@ def measure(
     """The model filled with what the recording shows; arguments and errors as of ``Definition.calibrate``."""
     if functional and not model.sided:
         raise ModelError(f"functional is given, but model {model.name} is planar; expected a model in space (fullbody)")
-    messages: list[str] = []
     recognised = recognise(recording, asked_markers)
-    messages += recognised.messages
-
-    def matched(entry: Recording, frame: GroundFrame | None) -> Trial:
-        match = recognised.match
-        if entry is not recording:
-            own = recognise(entry, match.marker_set)
-            messages.extend(f"{said} ({entry.name})" for said in own.messages)
-            match = own.match
-        find = find_laboratory_frame if model.floating else find_ground_frame
-        found = frame or find(entry, vertical=vertical, forward=forward, pairs=match.facing_pairs)
-        return Trial.of(entry, match, found)
-
-    as_asked = matched(recording, ground)
+    messages = list(recognised.messages)
+    find = partial(find_laboratory_frame if model.floating else find_ground_frame, vertical=vertical, forward=forward)
+    as_asked = Trial.of(
+        recording, recognised.match, ground or find(recording, pairs=recognised.match.facing_pairs)
+    )  # fmt: skip
     messages += as_asked.ground.how
     trial = as_asked.facing() if model.floating else as_asked  # what is measured on landmarks takes X for forward
     if not model.sided:
@@ -91,7 +83,10 @@ def measure(
         side = "both"
     source = trial
     if static is not None:
-        source = matched(static, None).facing() if model.floating else matched(static, None)
+        stands = recognise(static, recognised.match.marker_set)
+        messages += [f"{said} ({static.name})" for said in stands.messages]
+        source = Trial.of(static, stands.match, find(static, pairs=stands.match.facing_pairs))
+        source = source.facing() if model.floating else source
         if other := another_person(recording, static):
             messages.append(f"Warning: {other}. Lengths and marker places are those of {static.name}.")
     # A planar model starts from the trial's own landmarks; in space it starts from markers (pose_start).
@@ -123,6 +118,7 @@ def measure(
     source = trial if static is None else _at_origin(model, source, finder, frames)
     messages.append(f"Lengths and marker places: {which}.")
     standing = source.median(frames)
+    found = Completed(finder.find(standing))
     if model.sided:
         landmarks = finder.find_in_space(standing)
         if functional:
@@ -133,9 +129,7 @@ def measure(
         except ModelError as error:
             reasons = dict.fromkeys(source.match.left_out.values())
             raise ModelError("; ".join([error.message, *reasons])) from None
-        landmarks, added = found.landmarks, set(found.added)
-    else:
-        landmarks, added = finder.find(standing), set[str]()
+    landmarks = found.landmarks
 
     set_, names = source.match.marker_set, source.match.names
     mass_kg, how = find_mass(
@@ -149,7 +143,7 @@ def measure(
     if not model.sided:
         height_m, how_high = find_height(subject, [r for r in (static, recording) if r is not None], source)
     messages.append(how_high)
-    messages += found.messages if model.sided else []
+    messages += found.messages
     check_body_mass(subject, mass_kg, height_m)
     if subject.sex is None:
         messages.append(
@@ -166,7 +160,7 @@ def measure(
     check_masses(model, bodies, parts, mass_kg, height_m, messages)
     start = posture if model.sided else _first_posture(model, geometry, finder, trial, needed, posture, messages)
     plan = ModelPlan(
-        model, geometry, start.coordinates, fixed_lengths(model, set(bare), added), bodies,
+        model, geometry, start.coordinates, fixed_lengths(model, set(bare), set(found.added)), bodies,
         {s.name: reach(model, s.name, geometry, parts[s.name]) for s in model.segments}, tuple(sites),
     )  # fmt: skip
     report(model, plan, mass_kg, messages)
