@@ -191,6 +191,28 @@ def test_points_without_a_label_take_no_place_and_names_alike_are_refused() -> N
         recognise(alike)
 
 
+@pytest.mark.parametrize("seed", [37, 38])
+def test_where_a_neighbour_is_as_good_a_reading_a_marker_only_follows_its_segment(seed: int) -> None:
+    """The one marker on a breastbone may be at either end; which side of the ankle a marker is on the foot tells."""
+    whole = simulate("fullbody", "squat", seed=seed, duration_s=5.0, markers="plug-in-gait").recording
+    one = [name for name in whole.marker_names if name != "STRN"]
+    recording = replace(
+        whole,
+        marker_names=tuple(f"M{k}" for k in range(len(one))),
+        markers=whole.markers[:, [whole.marker_names.index(name) for name in one]],
+    )
+    for ankles, place in ((None, "ANK"), ("inner", None)):
+        markers = recording.markers.copy()
+        for side in "RL" if ankles else "":
+            ankle, heel = one.index(f"{side}ANK"), one.index(f"{side}HEE")
+            markers[:, ankle, 2] = 0.9 * markers[:, heel, 2] + 0.1 * markers[:, ankle, 2]  # right behind the shin
+        found = {one[int(g.recorded[1:])]: g for g in guess_markers(replace(recording, markers=markers))}
+        assert found["CLAV"].sure == "unsure" or (found["CLAV"].place, found["CLAV"].segment) == (None, "thorax")
+        for side in "RL":
+            guess = found[f"{side}ANK"]
+            assert guess.sure == "unsure" or guess.place in (place, None)
+
+
 def test_names_that_files_cannot_hold() -> None:
     recording = simulate("fullbody", "squat", seed=36, duration_s=5.0, markers="plug-in-gait").recording
     german = {"KNE": "Knie lateral", "ANK": "Knoechel", "HEE": "Ferse", "TOE": "Zehe", "ASI": "SIAS", "PSI": "SIPS"}
