@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from dynakin.errors import ModelError
 from dynakin.model.markers.schema import Marker, MarkerSetFile
@@ -109,6 +109,11 @@ class MarkerMatch:
         return MarkerMatch(
             self.marker_set, kept, self.recorded, self.where, self.left_out | dict.fromkeys(sorted(gone), why)
         )
+
+    def exchanged(self, one: MarkerKey, other: MarkerKey) -> MarkerMatch:
+        """The same with two markers that bear each other's names."""
+        names = {**self.names, one: self.names[other], other: self.names[one]}
+        return replace(self, names=names)
 
     @property
     def unexplained(self) -> tuple[str, ...]:

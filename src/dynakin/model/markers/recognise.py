@@ -271,6 +271,9 @@ def _without_swap(match: MarkerMatch, swap: Swap) -> tuple[MarkerMatch, str]:
     looks = f"{swap.what} look swapped{when} ({swap.evidence})"
     if swap.share < _SHORT:
         return match, f"Warning: {looks}: correct the labels; so short a time they are used as they are."
+    if swap.span_s is None and len(swap.pairs) == 1 and len({place for place, _ in swap.keys}) == 1:
+        # right for left of one place: both are seen, and nothing else would put both where a body has them
+        return match.exchanged(*swap.pairs[0]), f"Warning: {looks}; each is used as the other: correct the labels."
     left = match.without(swap.keys, looks + ": correct the labels")
     if not _lacking(match.marker_set, match.names) and (lacks := _lacking(left.marker_set, left.names)):
         raise ModelError(
