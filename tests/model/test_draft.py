@@ -6,6 +6,7 @@ among them, but in view: these laboratories when limits were set, the persons wh
 
 from __future__ import annotations
 
+import json
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -155,9 +156,17 @@ def test_what_is_written_loads_and_runs(tmp_path: Path, capsys: pytest.CaptureFi
     assert main(["markers", "new", str(file), "-o", str(draft)]) == 2
     assert "exists already" in capsys.readouterr().err
     forces = str(next((tmp_path / "trial").glob("forces.mot")))
+    assert main(["run", str(file), "--forces", forces, "-o", str(tmp_path / "guessed")]) == 0
+    assert "Warning: no marker set has these names" in capsys.readouterr().out
+    assert json.loads((tmp_path / "guessed" / "metrics.json").read_text())["marker_places"] == "guessed"
+    assert 'marker_places = "guessed"' in (tmp_path / "guessed" / "config.toml").read_text()
+    assert "Guessed marker places" in (tmp_path / "guessed" / "report.html").read_text(encoding="utf-8")
+    again = str(tmp_path / "guessed" / "config.toml")
+    assert main(["run", again, "-o", str(tmp_path / "again")]) == 0
     words = ["--model", "fullbody", "--markers", str(draft), "--forces", forces, "-o", str(tmp_path / "out")]
     assert main(["run", str(file), *words]) == 0
     assert (tmp_path / "out" / "coordinates.mot").exists()
+    assert json.loads((tmp_path / "out" / "metrics.json").read_text())["marker_places"] == "named"
 
 
 def test_names_that_toml_and_patterns_know_otherwise() -> None:

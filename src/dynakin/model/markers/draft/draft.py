@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import re
 from collections import defaultdict
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -34,6 +35,8 @@ from dynakin.recordings.orientation import find_forward, find_vertical
 from dynakin.recordings.recording import Array, Recording
 from dynakin.recordings.standing import standing_window
 
+GUESSED = "guessed"
+"""Name of the marker set of places that a recording's markers probably have."""
 _BONES = re.compile(r"^(PEL|[LR](?:FE|TI|FO|TO|CL|HU|RA|HN)|HED|TRX)[OALP]$")
 _COMPUTED = re.compile(r"cent(er|re)ofmass|ground$|virtual")
 _LIKELY_MARGIN, _LEAST_MARGIN = 3.0, 1.0
@@ -107,7 +110,7 @@ def drafted(recording: Recording) -> MarkerSetFile | None:
     places_, clusters = _contents(guesses)
     whole = {
         "schema_version": 1,
-        "name": "guessed",
+        "name": GUESSED,
         "places": {place: _names(own) for place, own in places_.items()},
         "clusters": {segment: [entry for entry, _ in own] for segment, own in clusters.items()},
     }
@@ -219,14 +222,14 @@ def _without_rivals(guesses: list[Guess], names: list[str], person: Stature | No
     return found
 
 
-def _beside(guess: Guess, at: dict[tuple[str | None, str], Array]) -> bool:
+def _beside(guess: Guess, at: Mapping[tuple[str, str], Array]) -> bool:
     """Whether an ankle's marker lies on its place's side of the foot."""
     heel, toe = at.get(("HEE", guess.side)), at.get(("TOE", guess.side))
     if heel is None:
         return False
     right = 1.0 if guess.side == "right" else -1.0
     ahead, _, aside = (_TURNED_OUT if toe is None else toe - heel) * [1.0, 1.0, right if toe is None else 1.0]
-    own = at[guess.place, guess.side] - heel
+    own = at[str(guess.place), guess.side] - heel
     outward = right * (own[2] * ahead - own[0] * aside) / np.hypot(ahead, aside)
     return bool(outward * _OUTWARD[str(guess.place)] > _BESIDE)
 
