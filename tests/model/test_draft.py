@@ -222,6 +222,21 @@ def test_where_a_neighbour_is_as_good_a_reading_a_marker_only_follows_its_segmen
             assert guess.sure == "unsure" or guess.place in (place, None)
 
 
+def test_too_little_that_is_likely_is_refused_as_before() -> None:
+    """Of a leg and a pelvis without names two markers are no person; nor are likely places that a body contradicts."""
+    whole = simulate("fullbody", "squat", seed=39, duration_s=5.0, markers="plug-in-gait").recording
+    few = [whole.marker_names.index(name) for name in ("RKNE", "RANK", "LANK")]
+    with pytest.raises(ModelError, match="no marker set fits"):
+        recognise(replace(whole, marker_names=("q1", "q2", "q3"), markers=whole.markers[:, few]))
+    german = {"ASI": "SIAS", "PSI": "SIPS", "KNE": "Knie lateral", "ANK": "Knoechel", "HEE": "Ferse", "TOE": "Zehe"}
+    names = [f"{n[0]} {german[n[1:]]}" for n in whole.marker_names if n[1:] in german]
+    columns = [k for k, n in enumerate(whole.marker_names) if n[1:] in german]
+    legs = replace(whole, marker_names=tuple(names), markers=whole.markers[:, columns])
+    order = np.random.default_rng(4).permutation(len(names))
+    with pytest.raises(ModelError, match="no marker set fits"):
+        recognise(replace(legs, markers=legs.markers[:, order]))
+
+
 def test_names_that_files_cannot_hold() -> None:
     recording = simulate("fullbody", "squat", seed=36, duration_s=5.0, markers="plug-in-gait").recording
     german = {"KNE": "Knie lateral", "ANK": "Knoechel", "HEE": "Ferse", "TOE": "Zehe", "ASI": "SIAS", "PSI": "SIPS"}
