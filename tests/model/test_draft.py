@@ -29,7 +29,6 @@ from dynakin.recordings.recording import Recording
 from dynakin.simulation.output import save_trial
 from dynakin.simulation.trial import simulate
 
-DATA = Path("/work/shared/data")
 OTHERS = (  # marker set, and recordings of laboratories that the list of places was not measured on
     ("plug-in-gait", "c3d_parser/MH/MH_Cal 01.c3d"),
     ("plug-in-gait", "c3d_parser/RBWH/Max Cal 01.c3d"),
@@ -106,11 +105,10 @@ def test_hidden_names_of_simulated_persons(markers: str, seed: int) -> None:
     assert right >= 0.8 * sum(counts.values())
 
 
-@pytest.mark.skipif(not DATA.is_dir(), reason=f"no recordings in {DATA}")
-def test_hidden_names_of_other_laboratories() -> None:
+def test_hidden_names_of_other_laboratories(data_dir: Path) -> None:
     total: dict[tuple[str, bool], int] = {}
     for marker_set, file in OTHERS:
-        recording, truth = hidden(read(DATA / file), marker_set)
+        recording, truth = hidden(read(data_dir / file), marker_set)
         for key, count in judged(guess_markers(recording), truth).items():
             total[key] = total.get(key, 0) + count
     print(total)

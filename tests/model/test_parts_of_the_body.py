@@ -145,6 +145,14 @@ def test_a_marker_that_is_seen_only_where_another_is_not() -> None:
         definition().calibrate(apart)
 
 
+def test_a_static_recording_of_another_person_is_doubted() -> None:
+    own = standing()
+    for size, doubted in ((1.0, False), (0.9, True)):
+        other = replace(own, name="other", markers=own.markers * size)
+        said = [text for text in definition().calibrate(own, static=other).messages if "another person" in text]
+        assert len(said) == doubted and all(text.startswith("Warning: distances between markers") for text in said)
+
+
 def test_too_little_of_the_pelvis_is_refused_in_words() -> None:
     pelvis = ["LASI", "RASI", "LPSI", "RPSI"]
     with pytest.raises(ModelError, match=r"segment 'pelvis' .* has 0 of the landmarks .*hip_r.*expected 2 or more"):

@@ -24,14 +24,14 @@ _REST_S, _SECONDS = 1.5, 22.0
 
 
 def functional_trial(
-    seed: int, joint: str, noise: SensorNoise, size: float = 1.0, markers: str = "opencap"
+    seed: int, joint: str, noise: SensorNoise, size: float = 1.0, markers: str = "opencap", height_m: float = 1.75
 ) -> tuple[Recording, Array, Array]:
     """The recording; the right hip's centre (3,) m and the right knee's axis (3,) while standing, laboratory frame.
 
     Args:
         joint: "hip" or "knee". size: of the motion; 1 swings the thigh through 57 by 37 deg, bends the knee to 100 deg.
     """
-    body = choose_body("fullbody", Streams(seed), 70.0, 1.75, "male", Spread(), markers)
+    body = choose_body("fullbody", Streams(seed), 70.0, height_m, "male", Spread(), markers)
     if joint == "hip":  # the thigh's skin follows the knee elsewhere, which hardly moves here
         driven = {s.name: "hip_flexion" + s.segment[-2:] for s in body.sites if s.segment.startswith("thigh")}
         body = replace(body, sites=tuple(replace(s, driver=driven.get(s.name, s.driver)) for s in body.sites))

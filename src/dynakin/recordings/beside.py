@@ -34,6 +34,7 @@ _RIGID_M = 0.006
 _NEAR_M = 0.3
 """How far apart such markers are at most: of those on two segments that hardly move, a posture would be compared."""
 _PAIRS = 6
+_FRAMES = 1000  # spread over a trial, enough for these
 
 
 def forces_beside(trial: Path) -> Path | None:
@@ -88,15 +89,30 @@ def _still(recording: Recording) -> float:
     return 0.0 if window is None else (window.stop - window.start) / recording.n_frames
 
 
+def another_person(trial: Recording, other: Recording) -> str:
+    """What shows that a recording is of somebody else, or of markers put on anew; "" where nothing does."""
+    apart = _apart_m(trial, other)
+    if apart is None or apart < _SAME_M:
+        return ""
+    return (
+        f"distances between markers that move as one differ by {1e3 * apart:.0f} mm from those in {other.name} "
+        f"(median; of one person by {1e3 * _SAME_M:.0f} mm at most): another person, or markers put on anew"
+    )
+
+
 def _apart_m(trial: Recording, other: Recording) -> float | None:
     """Median difference of the distances between markers that move as one in the trial; None of too few."""
     names = {plain_name(name): name for name in other.marker_names}
     common = [(name, names[plain_name(name)]) for name in trial.marker_names if plain_name(name) in names]
+    every = -(-trial.n_frames // _FRAMES)
     apart = []
     for (a, a_), (b, b_) in combinations(common, 2):
-        here = np.linalg.norm(trial.marker(a) - trial.marker(b), axis=1)
+        here = np.linalg.norm((trial.marker(a) - trial.marker(b))[::every], axis=1)
+        n, here = len(here), here[np.isfinite(here)]
+        if len(here) <= 0.5 * n or here.std() >= _RIGID_M or here.mean() >= _NEAR_M:
+            continue
         there = np.linalg.norm(other.marker(a_) - other.marker(b_), axis=1)
-        here, there = here[np.isfinite(here)], there[np.isfinite(there)]
-        if len(here) > 0.5 * trial.n_frames and len(there) and here.std() < _RIGID_M and here.mean() < _NEAR_M:
+        there = there[np.isfinite(there)]
+        if len(there):
             apart.append(abs(float(np.median(here) - np.median(there))))
     return float(np.median(apart)) if len(apart) >= _PAIRS else None

@@ -20,6 +20,7 @@ from dynakin.model.calibration.joint_motion import (
 )
 from dynakin.model.calibration.landmarks import LandmarkFinder
 from dynakin.model.markers.match import match_markers
+from dynakin.recordings.beside import another_person
 from dynakin.recordings.landmarks import find_marker
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.rigidity import RigidMotion, distance_sd_m, rigid_motion
@@ -44,6 +45,9 @@ _HIP_DEG, _KNEE_DEG = 20.0, 40.0
 there (14 mm at 13 deg, 25 mm at 11, where it is skin that turns) and 4 deg (9 deg at half of it)."""
 _HIP_RESIDUAL_M, _KNEE_RESIDUAL_DEG = 0.015, 5.0
 """Largest root mean square by which the joint moves against itself: 6 to 9 mm and 1.5 deg on simulated persons."""
+_HIP_SD_M = 0.018
+"""Largest standard deviation of a hip centre: 7 to 13 mm on simulated persons (seeds 401 to 414), 8 mm on a real one;
+12 to 58 mm by trials of other people, mostly above 24 mm, below 18 mm of such whose size is about the same."""
 _HIP_OFF_M, _KNEE_OFF_DEG = 0.06, 30.0
 """Farthest from the markers' own: beyond it a file of another joint, or landmarks that are wrong."""
 
@@ -62,13 +66,15 @@ def functional_landmarks(
             the person stands.
 
     Raises:
-        ModelError: markers of a segment or of the joint itself are lacking, the joint moves too little, or not as one
-            joint does.
+        ModelError: another person's trial, markers of a segment or of the joint itself are lacking, the joint moves too
+            little, or not as one joint does.
     """
     found, messages = dict(landmarks), []
     for joint in sorted(trials):  # hips first: the thigh's frame is spoken of by its new centre
         name = joint.split("_")[0]
         where = f"functional trial {trials[joint].path or trials[joint].name} for {joint}"
+        if other := another_person(trials[joint], source.recording):
+            raise ModelError(f"{where}: {other}; expected the person and the markers that are measured")
         _refuse_unmarked(joint, found, finder, where)
         motion, without = _motion(joint, trials[joint], found, source, frames, where)
         if without:
@@ -111,6 +117,12 @@ def _put_centre(centre: Centre, found: dict[str, Array], joint: str, turned: Arr
         raise ModelError(
             f"{where}: pelvis and thigh do not turn about one point (it moves by {1e3 * centre.residual_m:.0f} mm, "
             f"expected at most {1e3 * _HIP_RESIDUAL_M:g} mm)"
+        )
+    if centre.sd_m > _HIP_SD_M:
+        raise ModelError(
+            f"{where}: the centre found has a standard deviation of {1e3 * centre.sd_m:.0f} mm, expected at most "
+            f"{1e3 * _HIP_SD_M:g} mm (beyond it the marker set's own is better): another person's trial, or markers "
+            "moved since standing"
         )
     off = centre.point - found[joint]
     if np.linalg.norm(off) > _HIP_OFF_M:

@@ -24,6 +24,7 @@ from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.model.plan import Geometry, ModelPlan
 from dynakin.model.schema import ModelFile
 from dynakin.model.table import BodyTable
+from dynakin.recordings.beside import another_person
 from dynakin.recordings.feet.contact import foot_contacts
 from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_laboratory_frame
 from dynakin.recordings.recording import Recording
@@ -91,6 +92,8 @@ def measure(
     source = trial
     if static is not None:
         source = matched(static, None).facing() if model.floating else matched(static, None)
+        if other := another_person(recording, static):
+            messages.append(f"Warning: {other}. Lengths and marker places are those of {static.name}.")
     # A planar model starts from the trial's own landmarks; in space it starts from markers (pose_start).
     common = source.match if model.sided else _common(trial.match, source.match)
     finder = LandmarkFinder(common, side, subject.sex, model.planar, in_space=model.sided)
