@@ -15,7 +15,7 @@ from dynakin.pipeline.stages import configure
 from dynakin.settings import presets
 from dynakin.settings.model import Bounds, Priors
 from dynakin.settings.noise import Noise
-from dynakin.settings.settings import Settings, read_keys
+from dynakin.settings.settings import RECORDED, Settings, read_keys
 from dynakin.settings.template import config_template
 
 REQUIRED = {"trial": "squat.c3d", "model": "squat7", "output": "out"}
@@ -38,7 +38,7 @@ def test_every_key_is_printed_with_its_default_and_a_comment() -> None:
     text = config_template()
     everything = re.sub(r"^#(?=\w)", "", text, flags=re.MULTILINE)
     content = tomllib.loads(everything)
-    assert set(content) == set(Settings.model_fields) - {"ground", "identified", "versions"}
+    assert set(content) == set(Settings.model_fields) - set(RECORDED)
     config = Settings.of(content, "template")
     assert config.noise == presets.default().model_dump(mode="json")
     assert config.priors == Priors() and config.bounds == Bounds()

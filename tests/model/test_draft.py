@@ -6,6 +6,7 @@ among them, but in view: these laboratories when limits were set, the persons wh
 
 from __future__ import annotations
 
+import json
 import tomllib
 from dataclasses import replace
 from pathlib import Path
@@ -153,9 +154,17 @@ def test_what_is_written_loads_and_runs(tmp_path: Path, capsys: pytest.CaptureFi
     assert main(["markers", "new", str(file), "-o", str(draft)]) == 2
     assert "exists already" in capsys.readouterr().err
     forces = str(next((tmp_path / "trial").glob("forces.mot")))
+    assert main(["run", str(file), "--forces", forces, "-o", str(tmp_path / "guessed")]) == 0
+    assert "Warning: no marker set has these names" in capsys.readouterr().out
+    assert json.loads((tmp_path / "guessed" / "metrics.json").read_text())["marker_places"] == "guessed"
+    assert 'marker_places = "guessed"' in (tmp_path / "guessed" / "config.toml").read_text()
+    assert "Guessed marker places" in (tmp_path / "guessed" / "report.html").read_text(encoding="utf-8")
+    again = str(tmp_path / "guessed" / "config.toml")
+    assert main(["run", again, "-o", str(tmp_path / "again")]) == 0
     words = ["--model", "fullbody", "--markers", str(draft), "--forces", forces, "-o", str(tmp_path / "out")]
     assert main(["run", str(file), *words]) == 0
     assert (tmp_path / "out" / "coordinates.mot").exists()
+    assert json.loads((tmp_path / "out" / "metrics.json").read_text())["marker_places"] == "named"
 
 
 def test_names_that_toml_and_patterns_know_otherwise() -> None:
@@ -187,6 +196,43 @@ def test_points_without_a_label_take_no_place_and_names_alike_are_refused() -> N
         guess_markers(alike)
     with pytest.raises(ModelError, match=r"no marker set fits .*nor can places be guessed: markers m2 and M2"):
         recognise(alike)
+
+
+@pytest.mark.parametrize("seed", [37, 38])
+def test_where_a_neighbour_is_as_good_a_reading_a_marker_only_follows_its_segment(seed: int) -> None:
+    """The one marker on a breastbone may be at either end; which side of the ankle a marker is on the foot tells."""
+    whole = simulate("fullbody", "squat", seed=seed, duration_s=5.0, markers="plug-in-gait").recording
+    one = [name for name in whole.marker_names if name != "STRN"]
+    recording = replace(
+        whole,
+        marker_names=tuple(f"M{k}" for k in range(len(one))),
+        markers=whole.markers[:, [whole.marker_names.index(name) for name in one]],
+    )
+    for ankles, place in ((None, "ANK"), ("inner", None)):
+        markers = recording.markers.copy()
+        for side in "RL" if ankles else "":
+            ankle, heel = one.index(f"{side}ANK"), one.index(f"{side}HEE")
+            markers[:, ankle, 2] = 0.9 * markers[:, heel, 2] + 0.1 * markers[:, ankle, 2]  # right behind the shin
+        found = {one[int(g.recorded[1:])]: g for g in guess_markers(replace(recording, markers=markers))}
+        assert found["CLAV"].sure == "unsure" or (found["CLAV"].place, found["CLAV"].segment) == (None, "thorax")
+        for side in "RL":
+            guess = found[f"{side}ANK"]
+            assert guess.sure == "unsure" or guess.place in (place, None)
+
+
+def test_too_little_that_is_likely_is_refused_as_before() -> None:
+    """Of a leg and a pelvis without names two markers are no person; nor are likely places that a body contradicts."""
+    whole = simulate("fullbody", "squat", seed=39, duration_s=5.0, markers="plug-in-gait").recording
+    few = [whole.marker_names.index(name) for name in ("RKNE", "RANK", "LANK")]
+    with pytest.raises(ModelError, match="no marker set fits"):
+        recognise(replace(whole, marker_names=("q1", "q2", "q3"), markers=whole.markers[:, few]))
+    german = {"ASI": "SIAS", "PSI": "SIPS", "KNE": "Knie lateral", "ANK": "Knoechel", "HEE": "Ferse", "TOE": "Zehe"}
+    names = [f"{n[0]} {german[n[1:]]}" for n in whole.marker_names if n[1:] in german]
+    columns = [k for k, n in enumerate(whole.marker_names) if n[1:] in german]
+    legs = replace(whole, marker_names=tuple(names), markers=whole.markers[:, columns])
+    order = np.random.default_rng(4).permutation(len(names))
+    with pytest.raises(ModelError, match="no marker set fits"):
+        recognise(replace(legs, markers=legs.markers[:, order]))
 
 
 def test_names_that_files_cannot_hold() -> None:

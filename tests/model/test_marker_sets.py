@@ -91,6 +91,10 @@ def test_a_person_who_wears_it_is_found_and_measured(person: SimulatedTrial, nam
     assert unknown == ({"R_forearm", "L_forearm"} if name == "opencap" else set())
     initial = measured(recording, name)
     if name == "rizzoli-trunk":  # no legs: by name only
+        assert {n for (marker, _), n in match.names.items() if marker_set.marker(marker).measures(planar=False)} == set(
+            initial.recorded_markers
+        )
+        assert {"knee_angle_r", "knee_angle_l"} <= set(initial.held)
         return
     assert recognise(recording).match.marker_set.name == name.removesuffix("-all")
     limit = 15.0 if name in NO_BACK_OF_PELVIS else 4.0

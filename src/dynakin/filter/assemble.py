@@ -72,6 +72,7 @@ def assemble(
         "height_m": initial.height_m,
         "side": initial.side,
         "held": dict(initial.held),
+        "marker_places": "guessed" if initial.guessed_places else "named",
         "ground": {
             "vertical": initial.ground.vertical,
             "forward": initial.ground.forward.tolist(),

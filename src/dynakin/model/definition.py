@@ -16,6 +16,7 @@ from dynakin.files import is_file
 from dynakin.model.calibration.calibrated import CalibratedModel, first_centre_of_pressure
 from dynakin.model.calibration.in_space import started
 from dynakin.model.calibration.measure import measure
+from dynakin.model.markers.draft.draft import GUESSED
 from dynakin.model.markers.marker_set import load_marker_set
 from dynakin.model.markers.match import match_markers
 from dynakin.model.markers.recognise import Fit, choose_marker_set, recognise, seen_names
@@ -230,6 +231,7 @@ class ModelDefinition:
             feet={s.side: s.name for s in plan.model.segments if s.side is not None and "foot" in s.parts},
             unmarked_kg=unmarked_kg,
             held=held,
+            guessed_places=self.marker_set is None and rest.trial.match.marker_set.name == GUESSED,
         )
 
 

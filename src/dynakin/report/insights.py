@@ -107,6 +107,17 @@ def _mass(estimate: Estimate, metrics: Metrics) -> Insight | None:
     return Insight("warning", "Mass", sentence(" ".join(doubts)), "Give the mass as weighed, with all that is worn.")
 
 
+def _guessed(estimate: Estimate, metrics: Metrics) -> Insight | None:
+    """Places that no name says: joint centres and all that rests on them are as wrong as these may be."""
+    if estimate.marker_places != "guessed":
+        return None
+    text = (
+        "No marker set has the names of this recording: where the markers sit on the body is guessed from their names "
+        "and from where they lie. Joint centres, angles and moments are as wrong as a place that is guessed wrongly."
+    )
+    return Insight("warning", "Guessed marker places", text, "Look at them: dynakin markers new TRIAL -o my.toml.")
+
+
 def _failed(estimate: Estimate, metrics: Metrics) -> Insight | None:
     failed = [message.removeprefix(FAILED).strip() for message in estimate.messages if message.startswith(FAILED)]
     if not failed:
@@ -377,6 +388,7 @@ def _step_time(estimate: Estimate, metrics: Metrics) -> Insight:
 
 
 FINDINGS: tuple[tuple[Callable[[Estimate, Metrics], Insight | list[Insight] | None], tuple[str, ...]], ...] = (
+    (_guessed, ()),
     (_mass, ()),
     (_failed, ()),
     (_tracking, ()),

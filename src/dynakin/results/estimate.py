@@ -102,6 +102,11 @@ class Estimate:
         return dict(self.config.get("held", {}))
 
     @property
+    def marker_places(self) -> str:
+        """ "named" by a marker set, or "guessed", where no set has the names."""
+        return str(self.config.get("marker_places", "named"))
+
+    @property
     def marker_names(self) -> list[str]:
         """Names of the markers used, as in the recording."""
         return [str(name) for name in self.data["marker"].values]

@@ -31,6 +31,8 @@ _PATHS = ("trial", "forces", "static", "parameters", "output")
 FunctionalJoint = Literal["hip_r", "hip_l", "knee_r", "knee_l"]
 """Joints whose centre or axis a trial of their own can show."""
 NEEDED = {"trial": "TRIAL", "output": "-o OUT"}
+RECORDED = ("ground", "held", "marker_places", "identified", "versions")
+"""Keys that an output's config.toml has for the record: not for people to set, and not read."""
 
 
 class Settings(Strict, use_attribute_docstrings=True):
@@ -120,6 +122,10 @@ class Settings(Strict, use_attribute_docstrings=True):
 
     ground: dict[str, Any] = Field(default_factory=dict)
     """Written into an output's config.toml for the record: the ground frame that was found. Not read."""
+    held: dict[str, str] = Field(default_factory=dict)
+    """Written into an output's config.toml for the record: coordinates that no marker shows, and why. Not read."""
+    marker_places: str | None = None
+    """Written into an output's config.toml for the record: named by a marker set, or guessed. Not read."""
     identified: str | None = None
     """Written into an output's config.toml for the record: what was taken of `parameters`. Not read."""
     versions: dict[str, Any] = Field(default_factory=dict)
@@ -176,7 +182,7 @@ class Settings(Strict, use_attribute_docstrings=True):
 
     def as_used(self) -> dict[str, Any]:
         """Plain data for an output's config.toml: every path absolute, so that the file works from where it lies."""
-        plain = self.model_dump(mode="json", exclude={"ground", "identified", "versions", "grid"})
+        plain = self.model_dump(mode="json", exclude={*RECORDED, "grid"})
         if presets.is_file(self.preset):
             plain["preset"] = str(Path(self.preset).absolute())
         for key in _PATHS:

@@ -11,13 +11,12 @@ from pydantic import BaseModel
 from dynakin.settings import presets
 from dynakin.settings.model import Bounds, OpenSimOptions, Priors
 from dynakin.settings.noise import Noise
-from dynakin.settings.settings import NEEDED, Settings
+from dynakin.settings.settings import NEEDED, RECORDED, Settings
 
 _HEADER = """\
 # Configuration of `dynakin run`. Keys with a # right before them hold their default or, where there is none, an
 # example: take the # away to change them. Options on the command line win over this file.
 """
-_RECORD = {"ground", "identified", "versions"}  # written into outputs, not for people to set
 _TABLES: dict[str, type[BaseModel]] = {"noise": Noise, "priors": Priors, "bounds": Bounds, "opensim": OpenSimOptions}
 _WIDTH = 110
 
@@ -30,7 +29,7 @@ def config_template(preset: str = "default") -> str:
     """
     parts = [_HEADER]
     for key, field in Settings.model_fields.items():
-        if key in _RECORD or key in _TABLES:
+        if key in RECORDED or key in _TABLES:
             continue
         required = key in NEEDED
         value = (field.examples or [None])[0] if required or field.default is None else field.default

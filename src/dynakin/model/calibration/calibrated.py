@@ -61,6 +61,7 @@ class CalibratedModel:
         carried_kg: mass of the known loads (`model.calibration.loads`), not in ``mass_kg``.
         unmarked_kg: mass of the segments that no marker shows, and that hang still on their neighbours.
         held: coordinate -> why nothing shows it, where it is held at an angle for lack of markers: results have none.
+        guessed_places: whether the places of the markers were guessed, because no marker set has their names.
         joint_prior: prior covariance of elements that were identified before; the others are independent.
     """
 
@@ -89,6 +90,7 @@ class CalibratedModel:
     carried_kg: float = 0.0
     unmarked_kg: float = 0.0
     held: dict[str, str] = field(default_factory=dict)
+    guessed_places: bool = False
     joint_prior: JointPrior | None = None
     contacts: dict[str, str] = field(default_factory=dict)
 

@@ -9,13 +9,13 @@ from typing import Any
 
 from dynakin.errors import ConfigError
 from dynakin.files import is_file
-from dynakin.settings.settings import Settings, read_keys
+from dynakin.settings.settings import RECORDED, Settings, read_keys
 from dynakin.settings.strict import nearest
 
 # Keys of their own; all others are those of a run's configuration and hold for everything below them.
 _OF_DATASET = ("subjects", "trials", "presets")
 _OF_SUBJECT = ("name", "folder", "trials")
-_NOT_HERE = ("trial", "ground", "identified", "versions", "grid")
+_NOT_HERE = ("trial", *RECORDED, "grid")
 _PATTERN = "*.c3d"
 # Subjects and trials name folders of the results.
 _NO_FOLDER = re.compile(r"[/\\\x00-\x1f\x7f\ud800-\udfff]")

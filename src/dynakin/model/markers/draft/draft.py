@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import re
 from collections import defaultdict
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -34,6 +35,8 @@ from dynakin.recordings.orientation import find_forward, find_vertical
 from dynakin.recordings.recording import Array, Recording
 from dynakin.recordings.standing import standing_window
 
+GUESSED = "guessed"
+"""Name of the marker set of places that a recording's markers probably have."""
 _BONES = re.compile(r"^(PEL|[LR](?:FE|TI|FO|TO|CL|HU|RA|HN)|HED|TRX)[OALP]$")
 _COMPUTED = re.compile(r"cent(er|re)ofmass|ground$|virtual")
 _LIKELY_MARGIN, _LEAST_MARGIN = 3.0, 1.0
@@ -92,7 +95,7 @@ def guess_markers(recording: Recording) -> list[Guess]:
             guesses.append(_checked(guess, person, k, stands))
         else:
             guesses.append(lies)
-    return _one_each(guesses)
+    return _without_rivals(_one_each(guesses), names, person)
 
 
 def drafted(recording: Recording) -> MarkerSetFile | None:
@@ -107,7 +110,7 @@ def drafted(recording: Recording) -> MarkerSetFile | None:
     places_, clusters = _contents(guesses)
     whole = {
         "schema_version": 1,
-        "name": "guessed",
+        "name": GUESSED,
         "places": {place: _names(own) for place, own in places_.items()},
         "clusters": {segment: [entry for entry, _ in own] for segment, own in clusters.items()},
     }
@@ -191,6 +194,44 @@ def _placed(name: str, person: Stature | None, marker: int, stands: bool) -> Gue
         return Guess(name, mirrored[0], None, mirrored[1], "unsure", "it lies as the one on the other side")
     segment = segment_at(person, marker)
     return Guess(name, None, segment, side, "unsure", "where it lies, at no usual place")
+
+
+_ALONE = ("CLAV", "STRN")  # places of one kind: a marker there alone may as well be at the other, or between
+_OUTWARD = {"ANK": 1.0, "ANM": -1.0}  # beside the line from heel to toe, which tells better than where the foot stands
+_BESIDE = 0.006  # of the height
+_TURNED_OUT = np.array([0.98, 0.0, 0.17])  # a right foot, as people stand
+
+
+def _without_rivals(guesses: list[Guess], names: list[str], person: Stature | None) -> list[Guess]:
+    """Places that only where markers lie tells, as markers that follow the segment where a neighbour of the place is as
+    good a reading."""
+    if person is None:
+        return guesses
+    at = {(g.place, g.side): person.scaled[names.index(g.recorded)] for g in guesses if g.place}
+    found = []
+    for guess in guesses:
+        doubt = ""
+        if guess.place in _ALONE and sum((place, "centre") in at for place in _ALONE) == 1:
+            doubt = f"; {' or '.join(_ALONE)}, or beside them"
+        if guess.place in _OUTWARD and not _beside(guess, at):
+            doubt = f"; {' or '.join(_OUTWARD)}"
+        if doubt and guess.sure == "likely" and said(guess.recorded) is None:
+            segment = str(anatomy()["places"][guess.place]["segment"])
+            guess = replace(guess, place=None, segment=segment, why=guess.why + doubt)
+        found.append(guess)
+    return found
+
+
+def _beside(guess: Guess, at: Mapping[tuple[str, str], Array]) -> bool:
+    """Whether an ankle's marker lies on its place's side of the foot."""
+    heel, toe = at.get(("HEE", guess.side)), at.get(("TOE", guess.side))
+    if heel is None:
+        return False
+    right = 1.0 if guess.side == "right" else -1.0
+    ahead, _, aside = (_TURNED_OUT if toe is None else toe - heel) * [1.0, 1.0, right if toe is None else 1.0]
+    own = at[str(guess.place), guess.side] - heel
+    outward = right * (own[2] * ahead - own[0] * aside) / np.hypot(ahead, aside)
+    return bool(outward * _OUTWARD[str(guess.place)] > _BESIDE)
 
 
 def _one_each(guesses: list[Guess]) -> list[Guess]:
