@@ -172,6 +172,13 @@ def test_an_exchange_from_a_frame_on_is_named_with_its_time() -> None:
     found = recognise(exchanged(recording, "RKNE", "LKNE", slice(60, None)))
     (said,) = warnings_of(found.messages)
     assert "look swapped from 2.40 to 3.96 s" in said
+    assert "used as they are" in said and not found.match.left_out  # the filter refuses them there
+
+
+def test_an_exchange_at_the_start_leaves_both_out() -> None:
+    """Places are measured there."""
+    found = recognise(exchanged(walking("plug-in-gait"), "RKNE", "LKNE", slice(0, 40)))
+    assert any("look swapped from 0.00" in said and "left out" in said for said in warnings_of(found.messages))
     assert set(found.match.left_out) == {("KNE", "right"), ("KNE", "left")}
 
 

@@ -14,6 +14,7 @@ from dynakin.cli.console import out, print_error
 from dynakin.cli.options import OF_A_MODEL, OF_THE_LABORATORY, OF_THE_PLATES, Given, with_settings
 from dynakin.cli.prepared import GROUND, MARKERS, SUBJECT, Rows, assumed, contacts, print_rows, short, starting
 from dynakin.errors import DynakinError, ModelError, RecordingError
+from dynakin.files import is_file
 from dynakin.filter.prepared import Prepared
 from dynakin.model.markers.recognise import fits, seen_names
 from dynakin.pipeline.stages import configure, prepare_case
@@ -45,6 +46,8 @@ def check(
     try:
         case = case_of(settings)
     except (RecordingError, ModelError) as error:
+        if not is_file(Path(trial)):
+            raise
         raise _refused(error) from None
     console.print(f"{case.recording.path or case.recording.name}", style="bold", soft_wrap=True)
     print_rows(console, _recording(case.recording))

@@ -179,7 +179,8 @@ def _common(match: MarkerMatch, other: MarkerMatch) -> MarkerMatch:
         return match
     names = {key: name for key, name in match.names.items() if key in other.names}
     recorded = tuple(name for name in match.recorded if name in other.recorded)
-    return MarkerMatch(match.marker_set, names, recorded, f"{match.where} with {other.where}")
+    where, left_out = f"{match.where} with {other.where}", match.left_out | other.left_out
+    return MarkerMatch(match.marker_set, names, recorded, where, left_out)
 
 
 def needed_markers(model: ModelFile, finder: LandmarkFinder, locks: dict[str, float | None]) -> set[MarkerKey]:

@@ -87,7 +87,13 @@ def expanded(data: Mapping[str, Any]) -> dict[str, Any]:
                 raise ValueError(f"clusters: {segment}: a marker without names")
             name = _SIDED.sub("", patterns[0]).strip("._- ") if patterns else given["name"]
             markers.append({"name": name, "segment": segment, **_of_marker(shared["clusters"][segment]), **given})
-    rest["markers"] = [*markers, *rest.get("markers", ())]
+    homes = list(dict.fromkeys(m.get("segment", "") for m in markers))
+    clustered = [m for m in markers if m["name"] not in data["places"]]  # each after the places of its segment
+    placed = [m for m in markers if m["name"] in data["places"]]
+    for home in homes:
+        last = max((k for k, m in enumerate(placed) if m.get("segment") == home), default=len(placed) - 1)
+        placed[last + 1 : last + 1] = [m for m in clustered if m.get("segment") == home]
+    rest["markers"] = [*placed, *rest.get("markers", ())]
     there = {marker["name"] for marker in rest["markers"] if isinstance(marker, dict) and "name" in marker}
     own = {key: rest.get(key, {}) for key in ("landmarks", "in_space")}
     plain = _possible({**shared["landmarks"], **own["landmarks"]}, there, own["landmarks"])

@@ -38,6 +38,7 @@ _ABOUT_AS_MANY = 0.9  # of the markers that the first set explains
 _IMPOSSIBLE = 4.5  # deviations of a distance beyond which it is none of a body (2.9 at most in shared/data)
 _HEIGHTS_M = (0.5, 2.6)  # of persons
 _FEW_WRONG, _MANY_WRONG = 2, 0.25
+_HALF, _START_S = 0.5, 0.2
 _SHORT = 0.05  # of a trial: exchanged labels that the filter's own outlier rules are for
 
 
@@ -237,7 +238,7 @@ def checked(recording: Recording, match: MarkerMatch) -> Recognised:
     wrong = _misplaced(match, keys, found, expected, body_height_m(found.ordered(order), expected), order)
     messages = []
     for swap in swaps:
-        match, said = _without_swap(match, swap)
+        match, said = _without_swap(match, swap, float(recording.time[0]))
         messages.append(said)
     for k, why in wrong.items():
         if keys[k] in match.names:
@@ -264,13 +265,15 @@ def recording_name(match: MarkerMatch, key: MarkerKey) -> str:
     return match.marker_set.marker(key[0]).aliases(key[1])[0]
 
 
-def _without_swap(match: MarkerMatch, swap: Swap) -> tuple[MarkerMatch, str]:
+def _without_swap(match: MarkerMatch, swap: Swap, start_s: float) -> tuple[MarkerMatch, str]:
+    """Exchanged for less than half of the trial, and not at its start, on which places are measured: as they are."""
     when = ""
     if swap.span_s is not None:
         when = f" from {swap.span_s[0]:.2f} to {swap.span_s[1]:.2f} s"
     looks = f"{swap.what} look swapped{when} ({swap.evidence})"
-    if swap.share < _SHORT:
-        return match, f"Warning: {looks}: correct the labels; so short a time they are used as they are."
+    later = swap.span_s is not None and swap.span_s[0] > start_s + _START_S
+    if swap.share < _SHORT or (later and swap.share < _HALF):
+        return match, f"Warning: {looks}: correct the labels; they are used as they are, and refused where they jump."
     if swap.span_s is None and len(swap.pairs) == 1 and len({place for place, _ in swap.keys}) == 1:
         # right for left of one place: both are seen, and nothing else would put both where a body has them
         return match.exchanged(*swap.pairs[0]), f"Warning: {looks}; each is used as the other: correct the labels."

@@ -153,6 +153,7 @@ def state_paths(estimate: Estimate, block: str) -> dict[str, dict[str, np.ndarra
 
 # Segment -> regions of soft_tissue.toml by a pattern in the marker's plain name, and the region of its other markers.
 _REGIONS: dict[str, tuple[dict[str, str], str]] = {
+    "toes": ({}, "forefoot"),
     "foot": ({"toe": "toe", "hee": "heel", "calc": "heel"}, "forefoot"),
     "shank": ({"(?<!sh)ank": "ankle", "mal": "ankle"}, "shank"),
     "thigh": ({"kne": "knee"}, "thigh"),
