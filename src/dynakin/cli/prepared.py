@@ -124,7 +124,8 @@ def _spans(loads: FootLoads, k: int, names: Sequence[str], rate: float) -> list[
                 here = " and ".join(name for name, stands in zip(names, row, strict=True) if stands)
                 words[here + (" (shared)" if code == SHARED else "")] = of_code & (on == row).all(axis=1)
         elif code != SWING:
-            words[REASONS[code] if names else "on the floor"] = of_code
+            where = REASONS[code] if names else "on the floor"
+            words[where] = words.get(where, np.zeros(len(reason), dtype=bool)) | of_code
     least = _LEAST_S * rate
     found = [(a, b, what) for what, frames in words.items() for a, b in runs(frames) if b - a >= least]
     return sorted(found)
