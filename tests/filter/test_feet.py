@@ -82,6 +82,7 @@ def estimate_of(data: Trial, feet: ContactLoads | None, smooth: bool = False) ->
         contacts={},
         held={},
         unmarked_feet={},
+        guessed_places=False,
         soft_tissue_m=np.zeros(len(SPEC.markers)),
         x0=data.x0,
         sd0=prior_sd(layout),

@@ -31,8 +31,8 @@ def load_marker_set(name_or_path: str | Path) -> MarkerSetFile:
     path = Path(str(_FOLDER / f"{name}.toml")) if name in known else Path(name)
     if name not in known and (path.suffix != ".toml" or not is_file(path)):
         raise ModelError(
-            f"marker set {name!r}: unknown{nearest(name, known)}; expected {', '.join(known)} or a .toml "
-            "file that exists"
+            f"marker set {name!r}: unknown{nearest(name, known)}; expected one that `dynakin markers list` names, or a "
+            ".toml file that exists"
         )
     return _built_in(path) if name in known else _read(path)
 
