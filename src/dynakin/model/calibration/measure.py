@@ -22,6 +22,7 @@ from dynakin.model.calibration.sites import Candidate, as_marked, candidates, fi
 from dynakin.model.markers.match import MarkerKey, MarkerMatch
 from dynakin.model.markers.recognise import Fit, recognise
 from dynakin.model.markers.schema import MarkerSetFile
+from dynakin.model.mirroring import SUFFIXES
 from dynakin.model.plan import Geometry, ModelPlan
 from dynakin.model.schema import ModelFile
 from dynakin.model.table import BodyTable
@@ -168,6 +169,15 @@ def measure(
     window = standing_window(source.recording)
     still = window is not None and window.start <= frames[0] < window.stop
     left = tuple(c for c in chosen if c.recorded not in placed_names)
+    marked = {candidate.segment for candidate in chosen}
+    joints = {f"{joint}{suffix}" for joint in ("knee", "ankle") for suffix in SUFFIXES.values()}
+    supposed = sorted(name for name, own in found.added.items() if name in joints and own in marked)
+    if supposed and not still:
+        messages.append(
+            f"Warning: no marker shows {', '.join(supposed)}, and nobody stands still in the calibration frames: the "
+            "legs are laid out as those of an adult who stands, and their angles may be tens of degrees off. Give a "
+            "standing trial with markers on knees and ankles (--static)."
+        )
     held = {name: f"segment {segment} has no markers" for segment, names in bare.items() for name in names}
     trial = as_asked if model.floating else trial
     return plan, Measured(trial.ground, side, mass_kg, height_m, parts, tuple(messages), trial, left, held, still)
