@@ -1,7 +1,7 @@
 """The errors dynakin raises on purpose.
 
 Each carries one clear line: the file, the line or frame, the marker or key, what was found and what was
-expected. The command line prints that line and exits with code 2; anything else that escapes is a bug of
+expected. The command line prints that line and exits with its code; anything else that escapes is a bug of
 dynakin.
 """
 
@@ -19,6 +19,9 @@ class DynakinError(Exception):
     Names out of damaged files can hold anything: what cannot be printed in a line is written as Python writes it, and
     the middle of what is too long is left out.
     """
+
+    exit_code = 2
+    """With which the command line ends."""
 
     def __init__(self, message: str) -> None:
         message = _UNPRINTABLE.sub(lambda found: ascii(found[0])[1:-1], message)
@@ -54,5 +57,6 @@ class DivergenceError(DynakinError):
 
 
 class LostError(DynakinError):
-    """The filter lost the person in too many frames for the trial to be an estimate; the message names them. The
-    command line exits with code 1."""
+    """The filter lost the person in too many frames for the trial to be an estimate; the message names them."""
+
+    exit_code = 1

@@ -24,7 +24,7 @@ from dynakin.cli.options import print_config
 from dynakin.cli.run import run
 from dynakin.cli.simulate import simulate
 from dynakin.cli.tune import tune
-from dynakin.errors import DynakinError, LostError
+from dynakin.errors import DynakinError
 
 # Typer carries its own copy of click or uses click's, depending on its version; its own name leads to either.
 _USAGE_ERROR: type[Exception] = typer.BadParameter.__mro__[1]
@@ -75,7 +75,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if os.environ.get("DYNAKIN_DEBUG") == "1":
             raise
         print_error(error.message)
-        return 1 if isinstance(error, LostError) else 2
+        return error.exit_code
     except _USAGE_ERROR as error:
         if type(error).__name__ == "NoArgsIsHelpError":  # its message is the help text
             typer.echo(str(getattr(error, "message", error)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
@@ -10,13 +9,13 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from dynakin.cli.console import out, print_error
+from dynakin.cli.console import out
 from dynakin.cli.options import OF_A_MODEL, OF_THE_LABORATORY, OF_THE_PLATES, Given, with_settings
 from dynakin.cli.prepared import GROUND, MARKERS, SUBJECT, Rows, assumed, contacts, print_rows, short, starting
 from dynakin.errors import DynakinError, ModelError, RecordingError
 from dynakin.files import is_file
 from dynakin.filter.prepared import Prepared
-from dynakin.model.markers.recognise import fits, seen_names
+from dynakin.model.markers.recognise import fits
 from dynakin.pipeline.stages import configure, prepare_case
 from dynakin.recordings.beside import forces_beside, static_beside
 from dynakin.recordings.recording import Recording
@@ -62,12 +61,10 @@ def check(
     console.print("`dynakin run` would run it.", style="dim")
 
 
-def _refused(error: DynakinError) -> Exception:
-    """What ends the command with the line of a refusal; DYNAKIN_DEBUG=1 lets the error through."""
-    if os.environ.get("DYNAKIN_DEBUG") == "1":
-        return error
-    print_error(error.message)
-    return typer.Exit(1)
+def _refused(error: DynakinError) -> DynakinError:
+    """A refusal is what was asked for: it ends the command with 1, not as wrong input does."""
+    error.exit_code = 1
+    return error
 
 
 def _rehearsed(case: Case) -> tuple[Prepared | None, DynakinError | None]:
@@ -167,7 +164,7 @@ def _held(ready: Prepared) -> list[str]:
 def _nearest_sets(recording: Recording) -> list[str]:
     """The marker sets that the recording's names fit best, and what each lacks at least."""
     told = []
-    for fit in fits(seen_names(recording))[:_SETS]:
+    for fit in fits(recording.seen_names)[:_SETS]:
         lacks = f"; lacks markers {', '.join(fit.lacking)}" if fit.lacking else ""
         told.append(f"{fit.marker_set.name}: {fit.explained_n} of its {fit.expected_n} markers by name{lacks}.")
     return told

@@ -96,8 +96,8 @@ def closure(initial: CalibratedModel, time: Array, markers: Array, wrench: Array
     weight = initial.weighed_kg * GRAVITY_M_S2
     need = initial.weighed_kg * (acceleration + np.array([0.0, GRAVITY_M_S2, 0.0]))
     ratio = _load_ratio(need[:, 1], wrench[:, 1], judged, weight, round(LASTING_S * rate))
+    too_much = _too_much(need[:, 1], wrench[:, 1], judged, weight, rate)
     need *= 1.0 if ratio is None else ratio  # a mass that is somewhat wrong is no contact
-    too_much = _too_much(need[:, 1] / (1.0 if ratio is None else ratio), wrench[:, 1], judged, weight, rate)
     missing = np.where(axes, need - wrench[:, :3], 0.0)
     excess = _smooth(missing, judged, rate)
     zmp = centre - centre[:, [1]] * acceleration / (acceleration[:, [1]] + GRAVITY_M_S2).clip(1.0)

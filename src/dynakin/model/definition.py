@@ -19,7 +19,7 @@ from dynakin.model.calibration.measure import measure
 from dynakin.model.markers.draft.draft import GUESSED
 from dynakin.model.markers.marker_set import load_marker_set
 from dynakin.model.markers.match import match_markers
-from dynakin.model.markers.recognise import Fit, choose_marker_set, recognise, seen_names
+from dynakin.model.markers.recognise import choose_marker_set, lacking, recognise
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.model.opensim.definition import OpenSimDefinition, load_opensim
 from dynakin.model.plan import ModelPlan
@@ -147,10 +147,10 @@ class ModelDefinition:
     def markers_among(self, recording: Recording) -> tuple[str, list[str], list[str], str]:
         """The marker set's name, its usual markers, those that the recording has, and what lacks: it is enough where a
         pelvis and a leg are there, or half of the markers."""
-        came, there = recording.marker_names, set(seen_names(recording))
+        came = recording.marker_names
         try:
-            chosen = self.marker_set or choose_marker_set([name for name in came if name in there], recording.name)
-            match = match_markers(chosen, came, [name in there for name in came], recording.name)
+            chosen = self.marker_set or choose_marker_set(recording.seen_names, recording.name)
+            match = match_markers(chosen, came, recording.seen, recording.name)
         except ModelError as error:
             if self.marker_set is not None:
                 raise
@@ -162,8 +162,8 @@ class ModelDefinition:
         sides = ("right", "left", "centre")
         expected = [marker.aliases(side)[0] for marker in usual.values() for side in sides if marker.aliases(side)]
         found = [name for (marker, _), name in match.names.items() if marker in usual]
-        lacking = Fit(match.marker_set, match.names, {}, len(expected)).lacking
-        lacks = f"nothing {'; '.join(lacking)}" if lacking and 2 * len(found) < len(expected) else ""
+        missing = lacking(match.marker_set, match.names)
+        lacks = f"nothing {'; '.join(missing)}" if missing and 2 * len(found) < len(expected) else ""
         return match.marker_set.name, expected, found, lacks
 
     def calibrate(
@@ -190,7 +190,8 @@ class ModelDefinition:
             plan, speeds = begun.plan, begun.speeds
             messages += begun.messages
             held = held | begun.held
-        unmarked_kg = sum(body.mass for name, body in plan.bodies.items() if name not in plan.marked())
+        marked = plan.marked()
+        unmarked_kg = sum(body.mass for name, body in plan.bodies.items() if name not in marked)
         held = _not_known(plan, held)
         spec = to_core(plan)
         core = _core.Model(spec)

@@ -131,6 +131,16 @@ class Recording:
         return rate_of(self.time)
 
     @cached_property
+    def seen(self) -> npt.NDArray[np.bool_]:
+        """(M,) markers that some frame shows."""
+        return np.asarray(np.isfinite(self.markers).all(axis=2).any(axis=0))
+
+    @property
+    def seen_names(self) -> list[str]:
+        """Names of the markers that some frame shows."""
+        return [name for name, there in zip(self.marker_names, self.seen, strict=True) if there]
+
+    @cached_property
     def _columns(self) -> dict[str, int]:
         return {name: k for k, name in enumerate(self.marker_names)}
 

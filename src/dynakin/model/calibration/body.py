@@ -72,11 +72,11 @@ def find_mass(
         if not recording.plates:
             reasons.append(f"{recording.name} has no force plates")
             continue
-        check = check_plates(recording, ground, None, foot_markers)
+        loads = foot_loads(recording, ground, foot_markers)
+        check = check_plates(recording, ground, None, foot_markers, loads)
         if check.refusal is not None:
             reasons.append(f"{recording.name}: {check.refusal}")
         elif check.mass_kg_from_plates is None:
-            loads = foot_loads(recording, ground, foot_markers)
             mean, why = steady_load(recording, loads)
             reasons.append(f"nobody stands still on the plates of {recording.name}, and {why}")
             if mean is not None:

@@ -264,8 +264,7 @@ def _markers_of(
         ModelError: fewer than three.
     """
     side, marker_set = _SIDES[letter], source.match.marker_set
-    seen = [bool(np.isfinite(trial.marker(name)).all(axis=1).any()) for name in trial.marker_names]
-    came = match_markers(marker_set, trial.marker_names, seen, str(trial.path or trial.name)).names
+    came = match_markers(marker_set, trial.marker_names, trial.seen, str(trial.path or trial.name)).names
     sides = ("right", "left", "centre") if part == "pelvis" else (side, "centre")
     keys = [(m.name, s) for m in marker_set.markers if m.segment == part and not m.landmark_only for s in sides]
     names = {

@@ -62,10 +62,9 @@ def started(plan: ModelPlan, trial: Trial, unplaced: tuple[Candidate, ...], stil
         if not len(both):
             messages.append(f"Marker {candidate.recorded} left out: never seen together with most of the others.")
             continue
-        chosen = both[np.unique(np.linspace(0, len(both) - 1, _FRAMES).astype(int))]
         k = model.segment_names.index(candidate.segment)
         found = []
-        for frame in chosen:
+        for frame in _spread(both, _FRAMES):
             fit = start_posture(model, paths[frame], limits=limits, good_m=_FAIR_M, where=trial.match.where)
             R, p = _core.segment_poses(model, fit.x)
             found.append(R[k].T @ (path[frame] - p[k]))
@@ -97,10 +96,8 @@ def started(plan: ModelPlan, trial: Trial, unplaced: tuple[Candidate, ...], stil
 
 def _postures(model: _core.Model, paths: Array, limits: dict[str, Interval]) -> list[tuple[Array, Array]]:
     """States fitted to some frames that show enough markers, and these markers."""
-    usable = np.flatnonzero(_enough(paths))
-    frames = usable[np.unique(np.linspace(0, len(usable) - 1, _FRAMES).astype(int))] if len(usable) else usable
     found: list[tuple[Array, Array]] = []
-    for frame in frames:
+    for frame in _spread(np.flatnonzero(_enough(paths)), _FRAMES):
         guess = found[-1][0] if found else None
         fit = start_posture(model, paths[frame], guess=guess, limits=limits, good_m=_FAIR_M, bad_m=np.inf, where="")
         found.append((fit.x, paths[frame]))
@@ -109,8 +106,7 @@ def _postures(model: _core.Model, paths: Array, limits: dict[str, Interval]) -> 
 
 def _averaged(plan: ModelPlan, paths: Array, limits: dict[str, Interval]) -> tuple[ModelPlan, list[str]]:
     """Marker places as their mean over frames of the trial, postures fitted and places averaged by turns."""
-    usable = np.flatnonzero(_enough(paths))
-    frames = usable[np.unique(np.linspace(0, len(usable) - 1, _AVERAGED).astype(int))] if len(usable) else usable
+    frames = _spread(np.flatnonzero(_enough(paths)), _AVERAGED)
     rms: list[float] = []
     states: dict[int, Array] = {}
     for _ in range(_TURNS):
@@ -163,6 +159,11 @@ def _speeds(
     table = np.array([[value[name] for name in fit.coordinates] for value in values])
     slopes = np.linalg.lstsq(powers, table, rcond=None)[0][1]
     return dict(zip(fit.coordinates, map(float, slopes), strict=True))
+
+
+def _spread(frames: npt.NDArray[np.intp], most: int) -> npt.NDArray[np.intp]:
+    """At most so many of the frames, evenly from the first to the last."""
+    return frames[np.unique(np.linspace(0, len(frames) - 1, most).astype(int))] if len(frames) else frames
 
 
 def _paths(trial: Trial, sites: tuple[Site, ...]) -> Array:

@@ -20,7 +20,7 @@ from dynakin.model.calibration.lumping import PlacedPart, segment_bodies
 from dynakin.model.calibration.posture import Posture, find_geometry, find_posture, frame_landmarks
 from dynakin.model.calibration.sites import Candidate, as_marked, candidates, find_locks, place_sites
 from dynakin.model.markers.match import MarkerKey, MarkerMatch
-from dynakin.model.markers.recognise import Fit, recognise
+from dynakin.model.markers.recognise import lacking, recognise
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.model.mirroring import SUFFIXES
 from dynakin.model.plan import Geometry, ModelPlan
@@ -236,7 +236,7 @@ def seen_together(
             break
         apart |= {key: finder.match.names[key] for key in sorted(gone)}
         left = finder.match.without(gone, "it is never seen together with the others")
-        if lacks := Fit(left.marker_set, left.names, {}, len(left.names)).lacking:
+        if lacks := lacking(left.marker_set, left.names):
             raise ModelError(
                 f"{source.match.where}: no frame shows all {len(needed)} markers of the joint centres, and frames that "
                 f"show most of them have nothing {'; '.join(lacks)}; expected a frame with pelvis and leg"

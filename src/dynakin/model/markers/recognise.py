@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,12 +63,12 @@ class Fit:
 
     @property
     def lacking(self) -> list[str]:
-        """What a model needs at least and the recording lacks: the pelvis, and two segments of a leg; with the set's
-        names for them."""
-        return _lacking(self.marker_set, self.names)
+        """What a model needs at least and the recording lacks."""
+        return lacking(self.marker_set, self.names)
 
 
-def _lacking(marker_set: MarkerSetFile, names: dict[MarkerKey, str]) -> list[str]:
+def lacking(marker_set: MarkerSetFile, names: Mapping[MarkerKey, str]) -> list[str]:
+    """What a model needs at least and is not among these markers: the pelvis, two segments of a leg; in words."""
     parts = {
         side: {_segment(marker_set, name) for name, own in names if own in (side, "centre")}
         for side in ("right", "left")
@@ -156,25 +156,24 @@ def recognise(recording: Recording, asked: MarkerSetFile | None = None) -> Recog
             leaves no pelvis or no leg.
     """
     where = str(recording.path or recording.name)
-    seen = _seen(recording)
-    if not any(seen):
+    if not recording.seen.any():
         raise ModelError(f"{where}: no marker is seen in {recording.n_frames} frames, expected those of a person")
     if asked is not None:
-        found = checked(recording, match_markers(asked, recording.marker_names, seen, where))
+        found = checked(recording, match_markers(asked, recording.marker_names, recording.seen, where))
         _refuse_wrong_set(found, where)
         return found
-    ranked = fits(seen_names(recording))
+    ranked = fits(recording.seen_names)
     try:
         usable = _usable(ranked, where)
     except ModelError as unknown:
-        return _guessed(recording, seen, unknown)
+        return _guessed(recording, unknown)
     best: Recognised | None = None
     for fit in usable:
         if best is not None and (not best.wrong_n or fit.explained_n < _ABOUT_AS_MANY * usable[0].explained_n):
             break
         if best is not None and fit.doubled:
             continue  # no better account of the names
-        own = checked(recording, match_markers(fit.marker_set, recording.marker_names, seen, where))
+        own = checked(recording, match_markers(fit.marker_set, recording.marker_names, recording.seen, where))
         if best is None or own.wrong_n < best.wrong_n:
             best = own
     assert best is not None
@@ -182,7 +181,7 @@ def recognise(recording: Recording, asked: MarkerSetFile | None = None) -> Recog
     return Recognised(best.match, (choice_words(best.match, ranked), *best.messages), best.wrong_n)
 
 
-def _guessed(recording: Recording, seen: list[bool], unknown: ModelError) -> Recognised:
+def _guessed(recording: Recording, unknown: ModelError) -> Recognised:
     """By a set of places guessed from names and from where markers lie, as far as that is likely and no body
     contradicts it.
 
@@ -197,11 +196,11 @@ def _guessed(recording: Recording, seen: list[bool], unknown: ModelError) -> Rec
         raise ModelError(f"{unknown.message}; nor can places be guessed: {why}") from None
     if guessed is None:
         raise unknown
-    found = checked(recording, match_markers(guessed, recording.marker_names, seen, where))
-    if found.wrong_n or _lacking(guessed, found.match.names):
+    found = checked(recording, match_markers(guessed, recording.marker_names, recording.seen, where))
+    if found.wrong_n or lacking(guessed, found.match.names):
         raise unknown
     message = (
-        f"Warning: no marker set has these names; {len(found.match.names)} of {len(seen_names(recording))} markers are "
+        f"Warning: no marker set has these names; {len(found.match.names)} of {len(recording.seen_names)} markers are "
         "used at places guessed from their names and from where they lie. Look at them: "
         f"dynakin markers new {recording.path or 'TRIAL'} -o my.toml, then --markers my.toml"
     )
@@ -278,7 +277,7 @@ def _without_swap(match: MarkerMatch, swap: Swap, start_s: float) -> tuple[Marke
         # right for left of one place: both are seen, and nothing else would put both where a body has them
         return match.exchanged(*swap.pairs[0]), f"Warning: {looks}; each is used as the other: correct the labels."
     left = match.without(swap.keys, looks + ": correct the labels")
-    if not _lacking(match.marker_set, match.names) and (lacks := _lacking(left.marker_set, left.names)):
+    if not lacking(match.marker_set, match.names) and (lacks := lacking(left.marker_set, left.names)):
         raise ModelError(
             f"{match.where}: {looks}, and without them there is nothing {'; '.join(lacks)}; expected the labels "
             "corrected"
@@ -327,12 +326,3 @@ def foot_markers_of(recording: Recording) -> dict[str, list[str]]:
         return recognise(recording).match.foot_markers
     except ModelError:
         return {"right": [], "left": []}
-
-
-def seen_names(recording: Recording) -> list[str]:
-    """Names of the markers that are seen at all."""
-    return [name for name, there in zip(recording.marker_names, _seen(recording), strict=True) if there]
-
-
-def _seen(recording: Recording) -> list[bool]:
-    return [bool(np.isfinite(recording.marker(name)).all(axis=1).any()) for name in recording.marker_names]

@@ -32,9 +32,8 @@ def sites(
         if name not in there:
             raise ModelError(f"{source.path}: leave_out: no marker {name!r}{nearest(name, there)}")
     recorded: dict[str, list[str]] = {}
-    for name in recording.marker_names:
-        if np.isfinite(recording.marker(name)).all(axis=1).any():
-            recorded.setdefault(plain_name(name), []).append(name)
+    for name in recording.seen_names:
+        recorded.setdefault(plain_name(name), []).append(name)
     found: list[tuple[Marker, str]] = []
     for marker in there.values():
         names = recorded.get(plain_name(marker.name), [])

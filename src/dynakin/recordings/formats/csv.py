@@ -23,15 +23,7 @@ from dynakin.errors import RecordingError
 from dynakin.recordings.formats.grf_columns import parse_column
 from dynakin.recordings.formats.ground_forces import attach_forces
 from dynakin.recordings.formats.mot import Table
-from dynakin.recordings.formats.textfile import (
-    check_time,
-    check_unique,
-    even_times,
-    parse_rows,
-    read_lines,
-    split_cells,
-    trial_name,
-)
+from dynakin.recordings.formats.textfile import check_unique, read_lines, split_cells, timed_rows, trial_name
 from dynakin.recordings.formats.trajectories import clean_markers, length_unit, timing_notes
 from dynakin.recordings.recording import Array, Recording
 from dynakin.recordings.resampling import ReadOptions
@@ -62,11 +54,8 @@ def read_csv_table(path: Path) -> Table:
             f"{path}, line {first}: found column {names[0]!r} first, expected 'time', then NAME_x, NAME_y, NAME_z"
         )
     check_unique(names, "column", path)
-    values, numbers, notes = parse_rows(((n, split_cells(line, separator)) for n, line in filled[1:]), names, path)
-    if not len(values):
-        raise RecordingError(f"{path}: has no rows of numbers")
-    time, time_notes = even_times(values[:, 0])
-    check_time(time, numbers, path)
+    body = ((number, split_cells(line, separator)) for number, line in filled[1:])
+    values, time, notes, time_notes = timed_rows(body, names, path, empty="has no rows of numbers")
     return Table(tuple(names[1:]), time, values[:, 1:], None, path, tuple(notes + time_notes))
 
 

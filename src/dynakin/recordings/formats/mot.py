@@ -16,14 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from dynakin.errors import RecordingError
-from dynakin.recordings.formats.textfile import (
-    check_time,
-    check_unique,
-    even_times,
-    parse_rows,
-    read_lines,
-    split_cells,
-)
+from dynakin.recordings.formats.textfile import check_unique, read_lines, split_cells, timed_rows
 from dynakin.recordings.recording import Array
 
 _ENTRY = re.compile(
@@ -90,11 +83,8 @@ def read_table(path: str | Path) -> Table:
     check_unique(columns, "column", path)
 
     body = ((k + 1, split_cells(lines[k])) for k in range(top + 1, len(lines)))
-    table, numbers, notes = parse_rows(body, columns, path)
-    if not len(table):
-        raise RecordingError(f"{path}: has no rows of numbers after line {top + 1}")
-    time, time_notes = even_times(table[:, 0])
-    check_time(time, numbers, path)
+    empty = f"has no rows of numbers after line {top + 1}"
+    table, time, notes, time_notes = timed_rows(body, columns, path, empty=empty)
     notes = [f"{path.name}: {note}" for note in notes + time_notes]
     notes += _count_notes(header, len(table), len(columns), path)
     return Table(tuple(columns[1:]), time, table[:, 1:], _in_degrees(header, path), path, tuple(notes))

@@ -107,6 +107,32 @@ def parse_row(cells: Sequence[str], names: Sequence[str], path: Path, line: int)
     return row
 
 
+def timed_rows(
+    lines: Iterable[tuple[int, Sequence[str]]],
+    names: Sequence[str],
+    path: Path,
+    *,
+    empty: str,
+    time_at: int = 0,
+    rate: float | None = None,
+) -> tuple[Array, Array, list[str], list[str]]:
+    """Numbers (R, K) and times (R,) s of a table, notes on its rows and on its times.
+
+    Args:
+        lines, names: as of `parse_rows`. empty: what is said of a file without rows. time_at: the column of the time.
+        rate: Hz, by the header.
+
+    Raises:
+        RecordingError: no rows, or as `parse_rows` and `check_time`.
+    """
+    values, numbers, notes = parse_rows(lines, names, path)
+    if not len(values):
+        raise RecordingError(f"{path}: {empty}")
+    time, time_notes = even_times(values[:, time_at], rate)
+    check_time(time, numbers, path)
+    return values, time, notes, time_notes
+
+
 def even_times(time: Array, rate_in_header: float | None = None) -> tuple[Array, list[str]]:
     """Times (T,) s that the file rounds to more than a tenth of a step, put back on the even grid that they come from,
     and a note; all others as they are.

@@ -19,15 +19,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from dynakin.errors import RecordingError
-from dynakin.recordings.formats.textfile import (
-    check_time,
-    check_unique,
-    even_times,
-    parse_rows,
-    read_lines,
-    split_cells,
-    trial_name,
-)
+from dynakin.recordings.formats.textfile import check_unique, read_lines, split_cells, timed_rows, trial_name
 from dynakin.recordings.formats.trajectories import clean_markers, length_unit, timing_notes, told_apart
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.resampling import ReadOptions
@@ -54,13 +46,9 @@ def read_trc(path: Path, options: ReadOptions | None = None) -> Recording:
     body = [(k + 1, split_cells(lines[k])) for k in range(top + 1, len(lines))]
     while body and all(_AXES_ROW.match(cell) for cell in body[0][1] if cell):  # blank lines, too
         del body[0]
-    table, numbers, row_notes = parse_rows(body, columns, path)
-    if not len(table):
-        raise RecordingError(f"{path}: has no frames, expected rows of numbers after line {top + 1}")
     rate = _number(header.get("datarate"))
-    time, time_notes = even_times(table[:, 1], rate)
-    check_time(time, numbers, path)
-
+    empty = f"has no frames, expected rows of numbers after line {top + 1}"
+    table, time, row_notes, time_notes = timed_rows(body, columns, path, empty=empty, time_at=1, rate=rate)
     raw = table[:, 2:].reshape(len(table), len(names), 3)
     factor, unit, unit_notes = length_unit(header.get("units", ""), raw)
     notes = row_notes + _count_notes(header, len(table), len(names)) + time_notes + timing_notes(time, rate)

@@ -222,4 +222,4 @@ def feet_pass(paths: BodyPaths) -> bool:
 
 def _present(recording: Recording, names: Iterable[str]) -> list[str]:
     own = [marker for name in names if (marker := find_marker(recording, name))]
-    return [name for name in dict.fromkeys(own) if np.isfinite(recording.marker(name)).all(axis=1).any()]
+    return [name for name in dict.fromkeys(own) if name in recording.seen_names]
