@@ -14,7 +14,8 @@ from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.trial import simulate_squat
 from dynakin.validation.extrapolation import extrapolated, held, line, persisted
 from dynakin.validation.setup import Setup
-from dynakin.validation.unseen import Figures, unseen, unseen_figures
+from dynakin.validation.unseen import unseen, unseen_figures
+from dynakin.validation.yardsticks import Figures
 
 
 def test_a_straight_line_is_extrapolated_exactly_and_persistence_lags_by_the_span() -> None:

@@ -24,7 +24,8 @@ from dynakin.validation.files import check_comparison_folder, save_comparison
 from dynakin.validation.held_out import identify_on, judge, predict_blind
 from dynakin.validation.methods import Trial, compare_trial
 from dynakin.validation.table2 import merged, table2
-from dynakin.validation.unseen import HORIZON_S, unseen, unseen_figures
+from dynakin.validation.unseen import unseen, unseen_figures
+from dynakin.validation.yardsticks import HORIZON_S
 
 HORIZON_MS = 1000.0 * HORIZON_S
 

@@ -62,6 +62,10 @@ class Definition(Protocol):
         """Whether it moves in the sagittal plane only."""
 
     @property
+    def floating(self) -> bool:
+        """Whether the body may be anywhere and head anywhere."""
+
+    @property
     def has_mass(self) -> bool:
         """Whether a mass is known without a recording: given, or the model's own."""
 
@@ -134,6 +138,11 @@ class ModelDefinition:
     def planar(self) -> bool:
         """Whether it moves in the sagittal plane only."""
         return self.model.planar
+
+    @property
+    def floating(self) -> bool:
+        """Whether the body may be anywhere and head anywhere."""
+        return self.model.floating
 
     @property
     def has_mass(self) -> bool:

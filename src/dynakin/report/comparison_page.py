@@ -10,7 +10,7 @@ import tomli_w
 
 from dynakin.report.insights import Insight
 from dynakin.report.page import render_page
-from dynakin.report.sections.methods import ABOUT_METHODS, ABOUT_TABLE2, angle_part, moment_part, wrench_part
+from dynakin.report.sections.methods import ABOUT_TABLE2, about_methods, angle_part, moment_part, wrench_part
 from dynakin.report.sections.repetitions import method_repetitions
 from dynakin.report.sections.section import Section
 from dynakin.report.text_tables import angle_text, moment_text, name_of, table2_text, unseen_text
@@ -94,7 +94,9 @@ def _sections(trials: Sequence[Trial], tables: Mapping[str, Sequence[Any]]) -> l
             table2_text(rows, "Every marker", single_markers=True),
         ]
         parts = [part for part in (wrench_part(trials[0], "table2"),) if part.panels] if len(trials) == 1 else []
-        found.append(Section("table2", "Table II", f"{ABOUT_METHODS} {ABOUT_TABLE2}", tables=shown, parts=parts))
+        found.append(
+            Section("table2", "Table II", f"{about_methods(trials[0])} {ABOUT_TABLE2}", tables=shown, parts=parts)
+        )
     for name, title, make, part_of in (
         ("angles", "Joint angles", angle_text, angle_part),
         ("moments", "Joint moments", moment_text, moment_part),

@@ -106,15 +106,15 @@ def _stem(segment: str) -> str:
 
 
 def method_styles(names: Iterable[str]) -> dict[str, LineStyle]:
-    """Line of each method by its name: "measured", "EKF ...", "AT ..." and "classical ..."."""
+    """Line of each method by its name: "measured", "EKF ...", "AT ...", "classical ..." and "IK + ID ..."."""
     found: dict[str, LineStyle] = {}
     filters = 0
     for name in names:
         if name == "measured":
             found[name] = MEASURED_LINE
-        elif name.startswith("AT"):
+        elif name.startswith("AT") or (name.startswith("IK") and not any(each.startswith("IK") for each in found)):
             found[name] = LineStyle(name, REFERENCE, 1.1, "dashed")
-        elif name.startswith("classical"):
+        elif name.startswith(("classical", "IK")):
             found[name] = LineStyle(name, _CLASSICAL, 1.2, "dotted")
         else:
             found[name] = LineStyle(name, _FILTERS[filters % len(_FILTERS)], 1.2, band=filters == 0)

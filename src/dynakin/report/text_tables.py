@@ -48,14 +48,14 @@ def angle_text(rows: Sequence[AngleDifference]) -> TextTable:
         for row in rows
     ]
     headings = ("coordinate", "method", "RMS", "mean", "RMS about mean")
-    return TextTable("Coordinates against the classical method", headings, _once(found), (2, 3, 4))
+    return TextTable(f"Coordinates against {_references(rows)}", headings, _once(found), (2, 3, 4))
 
 
 def moment_text(rows: Sequence[MomentDifference]) -> TextTable:
-    """Differences to AT's joint moments."""
+    """Differences to AT's joint moments (of a whole body, to those of inverse dynamics)."""
     found = [(row.coordinate, row.method, *_fit(row)) for row in rows]
     headings = ("coordinate", "method", "RMS", "of range, %", "of RMS, %", "r")
-    return TextTable("Joint moments against AT", headings, _once(found), (2, 3, 4, 5))
+    return TextTable(f"Joint moments against {_references(rows)}", headings, _once(found), (2, 3, 4, 5))
 
 
 def unseen_text(rows: Sequence[UnseenRow]) -> TextTable:
@@ -76,6 +76,10 @@ def unseen_text(rows: Sequence[UnseenRow]) -> TextTable:
 def name_of(quantity: str) -> str:
     """Components as the paper writes them."""
     return quantity.upper() if quantity in COMPONENTS else quantity
+
+
+def _references(rows: Sequence[AngleDifference] | Sequence[MomentDifference]) -> str:
+    return ", ".join(dict.fromkeys(row.against for row in rows))
 
 
 def _fit(row: Row | MomentDifference) -> tuple[str, str, str, str]:

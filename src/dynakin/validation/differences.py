@@ -1,5 +1,5 @@
 """Between methods, where nothing is measured: joint angles against the classical method (Figure 5), moments against AT
-(Figure 7)."""
+(Figure 7); of a whole body both against inverse kinematics and dynamics."""
 
 from __future__ import annotations
 
@@ -9,7 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynakin.results.measures.fit import SignalFit, TruthError, signal_fit, truth_error
-from dynakin.validation.methods import AT, CLASSICAL, Method, Trial
+from dynakin.results.measures.power import root_coordinates
+from dynakin.validation.methods import AT, CLASSICAL, INVERSE, Method, Trial
 from dynakin.validation.table2 import Spread, spread
 
 
@@ -17,12 +18,14 @@ from dynakin.validation.table2 import Spread, spread
 class AngleDifference:
     """A filter's coordinate less the classical one, mean and sd over trials; degrees (mm for a translation).
 
-    ``mean`` is mostly a matter of where zero is; ``rms_about_mean`` is the movement's difference.
+    ``mean`` is mostly a matter of where zero is; ``rms_about_mean`` is the movement's difference. against: the
+    reference's name.
     """
 
     coordinate: str
     unit: str
     method: str
+    against: str
     rms: Spread
     mean: Spread
     rms_about_mean: Spread
@@ -31,11 +34,12 @@ class AngleDifference:
 @dataclass(frozen=True)
 class MomentDifference:
     """A filter's joint moment against AT's, mean and sd over trials; N m (N for a translation), and per cent of AT's
-    signal: of its RMS and of its range."""
+    signal: of its RMS and of its range. against: the reference's name."""
 
     coordinate: str
     unit: str
     method: str
+    against: str
     rms: Spread
     nrms_rms_percent: Spread
     nrms_range_percent: Spread
@@ -44,15 +48,17 @@ class MomentDifference:
 
 def angle_differences(trials: Sequence[Trial]) -> list[AngleDifference]:
     """Every coordinate of every filter against the classical method; empty where that cannot be had."""
-    found: dict[tuple[str, str, str], list[TruthError]] = {}
+    found: dict[tuple[str, str, str, str], list[TruthError]] = {}
     for trial in trials:
         for method, reference in _pairs(trial, CLASSICAL):
             for k, name in enumerate(trial.coordinate_names):
+                if np.ptp(reference.coordinates[:, k]) == 0.0 == np.ptp(method.coordinates[:, k]):
+                    continue  # locked
                 turn = bool(trial.rotation[k])
                 scale = np.degrees(1.0) if turn else 1000.0
                 w = trial.window
                 error = truth_error(scale * reference.coordinates[w, k], scale * method.coordinates[w, k])
-                found.setdefault((name, "deg" if turn else "mm", method.name), []).append(error)
+                found.setdefault((name, "deg" if turn else "mm", method.name, reference.name), []).append(error)
     return [
         AngleDifference(*key, *(spread([error[k] for error in errors]) for k in range(len(TruthError._fields))))
         for key, errors in found.items()
@@ -61,14 +67,17 @@ def angle_differences(trials: Sequence[Trial]) -> list[AngleDifference]:
 
 def moment_differences(trials: Sequence[Trial]) -> list[MomentDifference]:
     """Every measured joint moment of every filter against AT's; empty where that cannot be had."""
-    found: dict[tuple[str, str, str], list[SignalFit]] = {}
+    found: dict[tuple[str, str, str, str], list[SignalFit]] = {}
     for trial in trials:
         for method, reference in _pairs(trial, AT):
+            residual = root_coordinates(next(iter(trial.estimates.values()))) if reference.kind == INVERSE else set()
             for k, name in enumerate(trial.coordinate_names):
+                if name in residual:
+                    continue  # what plates and motion disagree on is no joint's moment
                 w = trial.window
                 fit = signal_fit(reference.moments[w, k], method.measured_moments()[w, k])
                 unit = "N m" if trial.rotation[k] else "N"
-                found.setdefault((name, unit, method.name), []).append(fit)
+                found.setdefault((name, unit, method.name, reference.name), []).append(fit)
     return [
         MomentDifference(*key, *(spread([fit[k] for fit in fits]) for k in range(len(SignalFit._fields))))
         for key, fits in found.items()
@@ -77,4 +86,5 @@ def moment_differences(trials: Sequence[Trial]) -> list[MomentDifference]:
 
 def _pairs(trial: Trial, kind: str) -> list[tuple[Method, Method]]:
     """Each filter with the reference of that kind."""
-    return [(method, reference) for reference in trial.of_kind(kind) for method in trial.of_kind("EKF")]
+    reference = trial.reference(kind)
+    return [] if reference is None else [(method, reference) for method in trial.of_kind("EKF")]

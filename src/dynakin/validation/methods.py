@@ -1,4 +1,5 @@
-"""One trial worked on by every method, in arrays of the same shape: filters, the table ("AT"), the classical method."""
+"""One trial worked on by every method, in arrays of the same shape: filters, and the classical methods beside them: the
+table ("AT") and "classical" of a planar chain, inverse kinematics and dynamics ("IK + ID") of a whole body."""
 
 from __future__ import annotations
 
@@ -26,6 +27,7 @@ from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.measures.repetitions import Found, repetitions_of
 from dynakin.results.measures.sources import measured_only, moment_sources, wrench_sources
 from dynakin.results.measures.tracking import why_lost
+from dynakin.validation.reference.inverse_dynamics import rigid_motions, usual_cutoffs, with_plates
 from dynakin.validation.reference.methods import Lengths, Reference, reference_methods
 from dynakin.validation.setup import Setup
 
@@ -35,6 +37,7 @@ Progress = Callable[[int, int], None]
 
 AT = "AT"
 CLASSICAL = "classical"
+INVERSE = "IK + ID"
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +45,7 @@ class Method:
     """What one method makes of a trial; ground frame, NaN where it says nothing.
 
     Attributes:
-        name: "EKF (paper)", "AT (6 Hz)", ...; kind: "EKF", "AT" or "classical".
+        name: "EKF (paper)", "AT (6 Hz)", ...; kind: "EKF", "AT", "classical" or "IK + ID".
         coordinates: (T, C) rad or m. moments: (T, C) N m or N.
         markers: (T, M, 3) m. wrench: (T, 6) N and N m, ground on person, about the ground origin.
         data: what it was taken from, named as `Estimate.data`, with speeds and accelerations too.
@@ -94,6 +97,11 @@ class Trial:
         """The methods of one kind, in order."""
         return [method for method in self.methods if method.kind == kind]
 
+    def reference(self, kind: str) -> Method | None:
+        """The classical method of that kind ("AT", "classical"); of a whole body inverse kinematics and dynamics, the
+        first of their cut-offs, stand for both."""
+        return next(iter([*self.of_kind(kind), *self.of_kind(INVERSE)]), None)
+
     def curves(self) -> list[MeanCurve]:
         """Mean curves of each method's coordinates, moments and wrench over the repetitions, and of the plates'."""
         names, rotation = self.coordinate_names, self.rotation
@@ -114,14 +122,15 @@ def compare_trial(
 
     "AT" is the paper's: classical angles, low-passed, on a chain of constant lengths with the table's inertia.
     "classical" lets every joint follow its own landmarks, so that each segment stands for itself; the table's inertia
-    moves with it. The markers of both are carried rigidly from where they were while standing.
+    moves with it. The markers of both are carried rigidly from where they were while standing. A whole body has
+    "IK + ID" instead (`reference.inverse_dynamics`), with each of two cut-offs.
 
     Raises:
         LostError: no filter followed the person. DynakinError: as `Estimator.run`.
     """
     estimates, lost, trackers = estimate_each(recording, setup, static=static, progress=progress)
     initial = list(trackers.values())[-1].calibrated
-    trial = trial_of(estimates, initial, setup.definition, setup.cutoff_hz)
+    trial = trial_of(estimates, initial, setup.definition, setup.cutoff_hz, inverse=True)
     return with_lost(trial, lost)
 
 
@@ -181,6 +190,7 @@ def trial_of(
     cutoff_hz: float = CUTOFF_HZ,
     *,
     tolerant: bool = False,
+    inverse: bool = False,
 ) -> Trial:
     """Estimates of one recording against the reference methods on it; nothing is filtered again.
 
@@ -189,19 +199,22 @@ def trial_of(
             (`Estimator.initial`, `Estimator.model`).
         tolerant: a reference method that fails stops nothing: the notes say why it is left out. Else only a model
             that is no hinge chain in the plane is a note.
+        inverse: a model in space has inverse kinematics and dynamics beside it, which take 4 ms a frame; else no
+            reference.
 
     Raises:
         RecordingError: uneven time steps, or a cut-off that is not below half the rate; not with ``tolerant``.
     """
     methods = [_filtered(preset, estimate) for preset, estimate in estimates.items()]
-    first = facing(next(iter(estimates.values())))
+    given = next(iter(estimates.values()))
+    first = facing(given)
     notes = how_estimated(estimates)
-    options: tuple[tuple[str, Lengths], ...] = ((AT, "constant"), (CLASSICAL, "frame"))
     try:
-        for kind, lengths in options:
-            reference = reference_methods(first.recording, initial, definition, cutoff_hz, lengths=lengths)
-            methods.append(_referred(kind, reference, initial))
-            notes += [f"{kind}: {note}" for note in reference.notes]
+        methods += (
+            _inverse(given, initial, cutoff_hz, notes)
+            if inverse and first.modelled_axes().all()
+            else (_in_plane(first, initial, definition, cutoff_hz, notes))
+        )
     except DynakinError as error:
         if not (tolerant or isinstance(error, ModelError)):
             raise
@@ -236,16 +249,48 @@ def how_estimated(estimates: Mapping[str, Estimate]) -> list[str]:
 
 
 def _filtered(preset: str, estimate: Estimate) -> Method:
-    data = facing(estimate).data
+    return _method(f"EKF ({preset})", "EKF", facing(estimate).data)
+
+
+def _method(name: str, kind: str, data: xr.Dataset) -> Method:
     return Method(
-        f"EKF ({preset})",
-        "EKF",
+        name,
+        kind,
         data["coordinates"].transpose("time", "coordinate").values,
         data["moments"].transpose("time", "coordinate").values,
         data["markers_estimated"].transpose("time", "marker", "axis").values,
         data["wrench_estimated"].transpose("time", "component").values,
         data,
     )
+
+
+def _in_plane(
+    first: Estimate, initial: CalibratedModel, definition: Definition, cutoff_hz: float, notes: list[str]
+) -> list[Method]:
+    options: tuple[tuple[str, Lengths], ...] = ((AT, "constant"), (CLASSICAL, "frame"))
+    found = []
+    for kind, lengths in options:
+        reference = reference_methods(first.recording, initial, definition, cutoff_hz, lengths=lengths)
+        found.append(_referred(kind, reference, initial))
+        notes += [f"{kind}: {note}" for note in reference.notes]
+    return found
+
+
+def _inverse(first: Estimate, initial: CalibratedModel, cutoff_hz: float, notes: list[str]) -> list[Method]:
+    """Inverse kinematics and dynamics at the cut-off that was asked for, and at the other usual one.
+
+    Args:
+        first: any estimate, for what it was given, its plates and their feet; not turned.
+    """
+    found = []
+    data = first.data
+    markers = data["markers_measured"].transpose("time", "marker", "axis").values
+    for cutoff, motion in rigid_motions(initial, first.time, markers, usual_cutoffs(cutoff_hz)).items():
+        name = f"{INVERSE} ({cutoff:g} Hz)"
+        judged, said = with_plates(motion, data)
+        found.append(_method(name, INVERSE, facing(replace(first, data=judged)).data))
+        notes += [f"{name}: {note}" for note in said]
+    return found
 
 
 def _referred(kind: str, reference: Reference, initial: CalibratedModel) -> Method:

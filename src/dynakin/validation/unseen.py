@@ -22,14 +22,11 @@ from dynakin.validation.extrapolation import extrapolated, held, line, persisted
 from dynakin.validation.held_out import halves, identify_on, judge, predict_blind
 from dynakin.validation.setup import Setup
 from dynakin.validation.table2 import MARKERS, Spread, spread, unit_of
+from dynakin.validation.unseen_in_space import figures_in_space
+from dynakin.validation.yardsticks import HORIZON_S, LEFT_OUT, LINEAR, PERSISTENCE, WITHHELD, Figures, ahead, with_mean
 
 Array = npt.NDArray[np.float64]
-Figures = dict[tuple[str, str, str], float | None]  # (yardstick, quantity, method) -> RMS in the quantity's unit
 Progress = Callable[[int, int], None]
-
-HORIZON_S = 0.1
-WITHHELD, LEFT_OUT = "plates withheld", "marker left out"
-PERSISTENCE, LINEAR = "persistence", "linear extrapolation"
 
 
 @dataclass(frozen=True)
@@ -75,11 +72,14 @@ def unseen_figures(
     - Marker left out: from the end of the adaptation on, one marker is not given to the filter; its error there.
     - Ahead: from each frame's estimate the state is predicted ``horizon_s`` on, without an update.
 
-    For each also: the last value held, and the last slope of the raw data carried on.
+    For each also: the last value held, and the last slope of the raw data carried on. A floating model's are those of
+    `figures_in_space`.
 
     Raises:
         ConfigError: the horizon is not within the trial. DynakinError: as `Estimator.run`.
     """
+    if setup.definition.floating:
+        return figures_in_space(recording, setup, static=static, horizon_s=horizon_s, progress=progress)
     figures = plates_withheld(recording, setup, static=static)
     for preset in setup.noise:
         estimator = setup.estimator(preset)
@@ -156,14 +156,14 @@ def _left_out(estimator: Estimator, preset: str, trial: _Trial, progress: Progre
         (LINEAR, [line(time, trial.markers[:, k], first - 1) for k in range(count)]),
     ):
         single |= trial.marker_errors(LEFT_OUT, method, np.stack(guess, axis=1), range(count))
-    return _with_mean(LEFT_OUT, single)
+    return with_mean(LEFT_OUT, single)
 
 
 def _ahead(estimator: Estimator, preset: str, trial: _Trial, horizon_s: float) -> Figures:
     time, initial = trial.recording.time, trial.initial
     if not 0.0 < horizon_s < 0.5 * float(time[-1] - time[0]):
         raise ConfigError(f"the horizon is {horizon_s:g} s, expected more than 0 and less than half of the trial")
-    yardstick = f"{1000.0 * horizon_s:g} ms ahead"
+    yardstick = ahead(horizon_s)
     frames = span_frames(time, horizon_s)
     states = estimator.start(initial).run_arrays(time, trial.markers, trial.wrench)["state"]
     model = _core.Model(initial.spec)
@@ -184,16 +184,4 @@ def _ahead(estimator: Estimator, preset: str, trial: _Trial, horizon_s: float) -
     ):
         figures |= trial.marker_errors(yardstick, method, places, range(markers.shape[1]))
         figures |= trial.wrench_errors(yardstick, method, forces)
-    return _with_mean(yardstick, figures)
-
-
-def _with_mean(yardstick: str, figures: Figures) -> Figures:
-    """The same, opened by the mean over markers of each method."""
-    methods = dict.fromkeys(method for _, _, method in figures)
-    means: Figures = {
-        (yardstick, MARKERS, method): spread(
-            [value for (_, q, m), value in figures.items() if m == method and q not in COMPONENTS]
-        ).mean
-        for method in methods
-    }
-    return means | figures
+    return with_mean(yardstick, figures)

@@ -126,7 +126,7 @@ class _Body:
         self, model: _core.Model, measured: Array, limits: dict[str, Interval], where: str, good_m: float = GOOD_M
     ) -> None:
         self.good_m = good_m
-        self.model = _core.Model(_bare(model.spec))
+        self.model = _core.Model(bare(model.spec))
         spec = self.model.spec
         if measured.shape != (len(spec.markers), 3):
             raise ModelError(f"{where}: markers have shape {measured.shape}, expected ({len(spec.markers)}, 3)")
@@ -300,8 +300,8 @@ def laid(points: Array, targets: Array) -> tuple[Array, Array] | None:
     return turn, targets.mean(axis=0) - turn @ points.mean(axis=0)
 
 
-def _bare(spec: _core.ModelSpec) -> _core.ModelSpec:
-    """The same model with nothing in its state but coordinates, speeds and accelerations."""
+def bare(spec: _core.ModelSpec) -> _core.ModelSpec:
+    """The same model, changed in place, with nothing in its state but coordinates, speeds and accelerations."""
     parameters, segments, markers = spec.parameters, spec.segments, spec.markers
     for parameter in parameters:
         parameter.estimated = False
@@ -310,7 +310,7 @@ def _bare(spec: _core.ModelSpec) -> _core.ModelSpec:
     for marker in markers:
         marker.estimated = marker.soft_tissue = [False] * 3
     spec.parameters, spec.segments, spec.markers = parameters, segments, markers
-    spec.wrench_offset, spec.wrench_delay = [False] * 6, False
+    spec.wrench_offset, spec.wrench_delay, spec.contacts = [False] * 6, False, []
     return spec
 
 

@@ -75,6 +75,11 @@ class OpenSimDefinition:
         return False
 
     @property
+    def floating(self) -> bool:
+        """Whether the body may be anywhere and head anywhere."""
+        return bool(self.source.floating)
+
+    @property
     def has_mass(self) -> bool:
         """Whether a mass is known without a recording: the file has one."""
         return True

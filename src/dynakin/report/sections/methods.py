@@ -17,17 +17,22 @@ from dynakin.results.measures.mean_curves import MEASURED
 from dynakin.results.measures.sources import moment_sources, wrench_sources
 from dynakin.results.naming import number, sentence, words
 from dynakin.validation.differences import AngleDifference, MomentDifference, angle_differences, moment_differences
-from dynakin.validation.methods import AT, CLASSICAL, Trial
+from dynakin.validation.methods import AT, CLASSICAL, INVERSE, Trial
 from dynakin.validation.table2 import Spread, table2
 
 _Difference = TypeVar("_Difference", AngleDifference, MomentDifference)
 ABOUT_TABLE2 = (
     "How far each method is from what was measured. The filter was given these markers and plates, so its small "
-    "figures say that it follows them, not that its state is right; AT and the classical method see no plates."
+    "figures say that it follows them, not that its state is right; the others’ wrenches follow from the motion alone."
 )
 ABOUT_METHODS = (
     "AT: classical joint angles, low-passed and differentiated, on segments of constant length with the table’s "
     "inertia. Classical: the same with joints that follow their landmarks."
+)
+ABOUT_INVERSE = (
+    "IK + ID: rigid segments laid on each frame’s markers by least squares with equal weights, angles low-passed and "
+    "differentiated, inverse dynamics with the plates as measured and the model’s own inertia; what they disagree on "
+    "stays at the root."
 )
 
 
@@ -39,25 +44,31 @@ def methods_section(page: Page) -> Section | None:
     seconds = trial.time[trial.window]
     title = f"Difference to what was measured, {seconds[0]:g} to {seconds[-1]:g} s"
     rows = table2([trial])
-    referred = bool(trial.of_kind(AT) or trial.of_kind(CLASSICAL))
+    referred = trial.reference(AT) is not None
     return Section(
         "methods",
         "Other methods",
-        f"{ABOUT_METHODS} {ABOUT_TABLE2}" if referred else "",
+        f"{about_methods(trial)} {ABOUT_TABLE2}" if referred else "",
         tables=[table2_text(rows, title), table2_text(rows, "Every marker", single_markers=True)] if referred else [],
         notes=trial.notes,
         parts=[part for make in PARTS if (part := make(trial, "methods")).panels] if referred else [],
     )
 
 
+def about_methods(trial: Trial) -> str:
+    """What the reference methods of a trial are."""
+    return ABOUT_INVERSE if trial.of_kind(INVERSE) else ABOUT_METHODS
+
+
 def wrench_part(trial: Trial, key: str) -> Section:
     """Figure 6: each modelled component as measured, by the filters and by AT."""
-    methods = [*trial.of_kind(AT), *trial.of_kind("EKF")]
+    reference = trial.reference(AT)
+    methods = [*([reference] if reference else []), *trial.of_kind("EKF")]
     rms = {(row.quantity, row.method): row.rms for row in table2([trial])}
     source = wrench_sources(next(iter(trial.estimates.values())).data)
     panels = []
     for k, component in enumerate(COMPONENTS):
-        if not trial.of_kind(AT) or not np.isfinite(trial.measured_wrench[:, k]).any():
+        if reference is None or not np.isfinite(trial.measured_wrench[:, k]).any():
             continue
         title, unit = COMPONENT_LABELS[component]
         lines = {MEASURED: trial.measured_wrench[:, k], **{method.name: method.wrench[:, k] for method in methods}}
@@ -71,7 +82,8 @@ def wrench_part(trial: Trial, key: str) -> Section:
 
 def angle_part(trial: Trial, key: str) -> Section:
     """Figure 5: each coordinate by the filters and by the classical method."""
-    methods = [*trial.of_kind("EKF"), *trial.of_kind(CLASSICAL)]
+    reference = trial.reference(CLASSICAL)
+    methods = [*trial.of_kind("EKF"), *([reference] if reference else [])]
     panels = []
     for name, rows in _by_coordinate(angle_differences([trial])).items():
         k = trial.coordinate_names.index(name)
@@ -95,7 +107,9 @@ def angle_part(trial: Trial, key: str) -> Section:
 
 def moment_part(trial: Trial, key: str) -> Section:
     """Figure 7: joint moments by the filters and by AT, knees first, the other joints folded."""
-    methods = [*trial.of_kind("EKF"), *trial.of_kind(AT)]
+    reference = trial.reference(AT)
+    methods = [*trial.of_kind("EKF"), *([reference] if reference else [])]
+    against = AT if reference is None else reference.kind
     panels: dict[str, Panel] = {}
     estimate = next(iter(trial.estimates.values()))
     source = moment_sources(estimate.data)  # by the plates alone, so alike for all filters
@@ -105,7 +119,7 @@ def moment_part(trial: Trial, key: str) -> Section:
         lines = {method.name: method.moments[:, k] for method in methods}
         note = f"RMS difference {_each({row.method: row.rms for row in rows}, unit)}"
         if len(rows) == 1:
-            note += f", {number(rows[0].nrms_rms_percent.mean, digits=2)} % of AT’s RMS"
+            note += f", {number(rows[0].nrms_rms_percent.mean, digits=2)} % of {against}’s RMS"
         if about := moment_note(estimate, name):
             note = f"{about}; {note}"
         panels[name] = _overlaid(trial, f"{sentence(words(name))} moment", unit, lines, note, source[:, k])
@@ -113,11 +127,11 @@ def moment_part(trial: Trial, key: str) -> Section:
     others = [panel for name, panel in panels.items() if "knee" not in name]
     return Section(
         f"{key}-moments",
-        "Joint moments against AT",
+        f"Joint moments against {against}",
         "Nothing measures a joint moment: the difference says how much depends on the method.",
         knees or others,
         folded=others if knees else [],
-        folded_title="The other joints’ moments against AT",
+        folded_title=f"The other joints’ moments against {against}",
         lines=(*_key(trial, [method.name for method in methods]), *source_key(source)),
     )
 

@@ -152,7 +152,7 @@ def _title(curve: MeanCurve) -> str:
 
 def _in_order(group: Sequence[MeanCurve]) -> list[MeanCurve]:
     """What is drawn, the plates' curve at the bottom, the filters' on top; AT's angles are the classical ones."""
-    rank = {"measured": 0, "AT": 1, "classical": 2}
+    rank = {"measured": 0, "AT": 1, "IK": 1, "classical": 2}
     kinds = [curve.method.split(" ")[0] for curve in group]
     same = kind_of(group[0]) == "angles" and "classical" in kinds
     kept = [curve for curve, kind in zip(group, kinds, strict=True) if not (same and kind == "AT")]

@@ -1,0 +1,224 @@
+"""What no method has seen, of a body that is fixed nowhere: markers left out, plates withheld, a moment ahead; by the
+filter and by inverse kinematics and dynamics on the same calibrated model."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+import numpy.typing as npt
+from numpy.lib.stride_tricks import sliding_window_view
+
+from dynakin.bindings import _core
+from dynakin.errors import ConfigError
+from dynakin.filter.core_filter import filter_settings
+from dynakin.filter.estimator import Estimator
+from dynakin.filter.expected import ContactPaths
+from dynakin.filter.prepared import Prepared
+from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.recordings.recording import Recording
+from dynakin.recordings.smoothing import smooth
+from dynakin.results.estimate import COMPONENTS, Estimate
+from dynakin.results.measures.fit import marker_rms_mm, signal_fit
+from dynakin.results.measures.metrics import evaluation_window
+from dynakin.validation.extrapolation import extrapolated, persisted, span_frames
+from dynakin.validation.reference.inverse_dynamics import RigidMotion, rigid_motions, usual_cutoffs
+from dynakin.validation.reference.inverse_kinematics import fixed_model, inverse_kinematics
+from dynakin.validation.setup import Setup
+from dynakin.validation.yardsticks import LEFT_OUT, LINEAR, PERSISTENCE, WITHHELD, Figures, ahead, with_mean
+
+Array = npt.NDArray[np.float64]
+Progress = Callable[[int, int], None]
+
+INVERSE = "IK + ID"
+_PAST_S = 0.5
+"""Of the recording until now, from which the classical method looks ahead: the low-pass forgets in less."""
+
+
+def figures_in_space(
+    recording: Recording,
+    setup: Setup,
+    *,
+    static: Recording | None = None,
+    horizon_s: float = 0.1,
+    progress: Progress | None = None,
+) -> Figures:
+    """All yardsticks on one trial of a floating model, over its window.
+
+    - Marker left out: never given, so that its place is the calibration's; in groups of markers that are neither on one
+      segment nor on neighbours (`left_out_groups`), because a whole body has too many for a run each.
+    - Plates withheld: the whole recording without them, judged where they measure all that acts.
+    - Ahead: from what is known until each frame, ``horizon_s`` on. The filter predicts its live state; the classical
+      method low-passes what lies before and carries coordinates on by their speeds and accelerations there.
+
+    Wrenches are along the way the person faces, moments about the floor's point below the pelvis: about a laboratory's
+    origin they would be forces times metres.
+
+    Raises:
+        ConfigError: the horizon is not within the trial. DynakinError: as `Estimator.run`.
+    """
+    if not 0.0 < horizon_s < 0.5 * float(recording.time[-1] - recording.time[0]):
+        raise ConfigError(f"the horizon is {horizon_s:g} s, expected more than 0 and less than half of the trial")
+    estimators = {f"EKF ({preset})": setup.estimator(preset) for preset in setup.noise}
+    ready = {name: each.prepare(recording, static=static, smooth=setup.smooth) for name, each in estimators.items()}
+    trial = _Judged(next(iter(ready.values())))
+    groups = left_out_groups(trial.calibrated)
+    total, done = len(ready) * (len(groups) + 2), 0
+
+    def stepped() -> None:
+        nonlocal done
+        done += 1
+        if progress is not None:
+            progress(done, total)
+
+    cutoffs = usual_cutoffs(setup.cutoff_hz)
+    left_out: Figures = {}
+    for group in groups:
+        hidden = trial.ready.markers.copy()
+        hidden[:, group] = np.nan
+        for name, each in ready.items():
+            estimate = estimators[name].follow(replace(each, markers=hidden)).estimate
+            left_out |= trial.markers(LEFT_OUT, name, _of(estimate, "markers_estimated", trial.window), group)
+            stepped()
+        for cutoff, motion in rigid_motions(trial.calibrated, trial.time, hidden, cutoffs).items():
+            left_out |= trial.markers(LEFT_OUT, _inverse(cutoff), motion.markers(), group)
+    withheld: Figures = {}
+    ahead_of: dict[str, tuple[Array, Array]] = {}
+    for name, each in ready.items():
+        withheld |= trial.wrench(WITHHELD, {name: _without_plates(estimators[name], each, recording, static)})
+        stepped()
+        ahead_of[name] = _ahead(estimators[name], each, horizon_s)
+        stepped()
+    markers = trial.ready.markers
+    for cutoff, motion in rigid_motions(trial.calibrated, trial.time, markers, cutoffs).items():
+        withheld |= trial.wrench(WITHHELD, {_inverse(cutoff): motion.wrench()})
+    frames = span_frames(trial.time, horizon_s)
+    for cutoff, motion in _classical_ahead(trial, cutoffs, horizon_s).items():
+        ahead_of[_inverse(cutoff)] = motion.markers(), motion.wrench()
+    for name, guess in ((PERSISTENCE, persisted), (LINEAR, lambda a, n: extrapolated(trial.time, a, n))):
+        ahead_of[name] = guess(markers, frames), guess(trial.ready.wrench, frames)
+    return with_mean(LEFT_OUT, left_out) | withheld | _ahead_figures(trial, ahead(horizon_s), ahead_of)
+
+
+def left_out_groups(calibrated: CalibratedModel) -> list[list[int]]:
+    """The model's markers (numbers) in groups, as few as come of it, none with two on one segment or on neighbours."""
+    parents = {segment.name: segment.parent for segment in calibrated.spec.segments}
+    segments = [marker.segment for marker in calibrated.spec.markers]
+
+    def near(a: str, b: str) -> bool:
+        return a == b or parents[a] == b or parents[b] == a
+
+    groups: list[list[int]] = []
+    for k, segment in enumerate(segments):
+        for group in groups:
+            if not any(near(segment, segments[j]) for j in group):
+                group.append(k)
+                break
+        else:
+            groups.append([k])
+    return groups
+
+
+class _Judged:
+    """A trial's measurements, as methods are judged by them."""
+
+    def __init__(self, ready: Prepared) -> None:
+        self.ready, self.calibrated, self.time = ready, ready.calibrated, ready.recording.time
+        self.window = evaluation_window(self.time)
+        ground = self.calibrated.ground
+        self.turn = ground.facing().rotation @ ground.rotation.T
+        self.below = ContactPaths.of(self.calibrated).at(ready.markers)[:, 0] * [1.0, 0.0, 1.0]
+
+    def markers(self, yardstick: str, method: str, places: Array, columns: Sequence[int]) -> Figures:
+        """RMS distance (mm) of some markers (T, M, 3), over the window."""
+        measured, w, axes = self.ready.markers, self.window, np.ones(3, dtype=bool)
+        return {
+            (yardstick, self.calibrated.recorded_markers[k], method): marker_rms_mm(measured[w, k], places[w, k], axes)
+            for k in columns
+        }
+
+    def wrench(self, yardstick: str, wrenches: dict[str, Array]) -> Figures:
+        """RMS (N, N m) of each component of wrenches (T, 6), where the plates measure all that acts."""
+        measured = self._seen(self.ready.wrench)[self.window]
+        if not np.isfinite(measured).any():
+            return {}
+        return {
+            (yardstick, component, method): signal_fit(measured[:, k], self._seen(wrench)[self.window, k]).rms
+            for k, component in enumerate(COMPONENTS)
+            for method, wrench in wrenches.items()
+        }
+
+    def _seen(self, wrench: Array) -> Array:
+        force, moment = wrench[:, :3], wrench[:, 3:] - np.cross(self.below, wrench[:, :3])
+        return np.hstack([force @ self.turn.T, moment @ self.turn.T])
+
+
+def _inverse(cutoff_hz: float) -> str:
+    return f"{INVERSE} ({cutoff_hz:g} Hz)"
+
+
+def _of(estimate: Estimate, name: str, window: npt.NDArray[np.bool_]) -> Array:
+    """A variable of an estimate; of one that is lost within the window nothing: its other frames would look good."""
+    values: Array = estimate.data[name].transpose("time", ...).values
+    return np.full_like(values, np.nan) if estimate.lost[window].any() else values
+
+
+def _without_plates(estimator: Estimator, ready: Prepared, recording: Recording, static: Recording | None) -> Array:
+    """The total wrench (T, 6) by the motion, of a run that has no plates but the same person."""
+    known = {"mass_kg": ready.calibrated.mass_kg, "height_m": ready.calibrated.height_m}
+    subject = estimator.model.subject.changed(**known)
+    without = replace(estimator, model=estimator.model.with_subject(subject))
+    estimate = without.run(replace(recording, plates=()), static=static, smooth=ready.smooth)
+    wrench = _of(estimate, "wrench_estimated", evaluation_window(recording.time))
+    return ready.calibrated.ground.wrench_to_ground(estimate.ground.wrench_to_laboratory(wrench))
+
+
+def _ahead(estimator: Estimator, ready: Prepared, horizon_s: float) -> tuple[Array, Array]:
+    """Places (T, M, 3) and wrench (T, 6) as the live state of ``horizon_s`` before says them."""
+    estimate, tracker = estimator.follow(replace(ready, smooth=False))
+    time, model = ready.recording.time, tracker.core_model
+    frames = span_frames(time, horizon_s)
+    states = _of(estimate, "state", evaluation_window(time))
+    settings = filter_settings(tracker.calibrated, tracker.noise, model.layout, tracker.estimate)
+    covariance = np.diag(tracker.calibrated.sd0**2)  # the mean's prediction does not depend on it
+    probe = _core.Filter(model, settings, tracker.calibrated.x0, covariance)
+    markers, wrench = np.full_like(ready.markers, np.nan), np.full_like(ready.wrench, np.nan)
+    for k in np.flatnonzero(np.isfinite(states[: len(time) - frames]).all(axis=1)):
+        probe.reset(states[k], covariance)
+        probe.predict(float(time[k + frames] - time[k]))
+        markers[k + frames] = _core.marker_positions(model, probe.state)
+        wrench[k + frames] = _core.wrench(model, probe.state)
+    return markers, wrench
+
+
+def _classical_ahead(trial: _Judged, cutoffs: tuple[float, ...], horizon_s: float) -> dict[float, RigidMotion]:
+    """The rigid model as the angles of the half second until ``horizon_s`` before say it."""
+    time, model = trial.time, fixed_model(trial.calibrated)
+    coordinates = inverse_kinematics(trial.calibrated, trial.ready.markers)
+    past, frames = span_frames(time, _PAST_S), span_frames(time, horizon_s)
+    found = {}
+    for cutoff in cutoffs:
+        low_passed = smooth(time[:past], np.eye(past), cutoff)  # linear: of each frame's share in the last one
+        windows = sliding_window_view(coordinates, past, axis=0)[: len(time) - frames - past + 1]  # (K, F, past)
+        states = np.full((3, len(time), coordinates.shape[1]), np.nan)
+        shares = (low_passed.values[-1], low_passed.rates[-1], low_passed.seconds[-1])
+        q, speed, acceleration = (windows @ share for share in shares)
+        at = slice(past - 1 + frames, past - 1 + frames + len(q))
+        h = (time[at] - time[past - 1 : past - 1 + len(q)])[:, None]
+        states[:, at] = q + h * speed + 0.5 * h**2 * acceleration, speed + h * acceleration, acceleration
+        found[cutoff] = RigidMotion.of(model, *states)
+    return found
+
+
+def _ahead_figures(trial: _Judged, yardstick: str, guesses: dict[str, tuple[Array, Array]]) -> Figures:
+    """All methods over the same frames: those that each of them has."""
+    finite = {name: np.isfinite(wrench).all(axis=1) for name, (_, wrench) in guesses.items()}
+    of_models = [known for name, known in finite.items() if name not in (PERSISTENCE, LINEAR)]
+    posed = np.logical_and.reduce(of_models)[:, None, None]
+    loaded = np.logical_and.reduce(list(finite.values()))[:, None]  # raw data have no wrench where the plates had none
+    figures: Figures = {}
+    for name, (places, _) in guesses.items():
+        figures |= trial.markers(yardstick, name, np.where(posed, places, np.nan), range(places.shape[1]))
+    wrenches = {name: np.where(loaded, wrench, np.nan) for name, (_, wrench) in guesses.items()}
+    return with_mean(yardstick, figures) | trial.wrench(yardstick, wrenches)
