@@ -14,6 +14,7 @@ from rich.padding import Padding
 from dynakin.cli.compare_inputs import cases_of, chosen_trials, halves_of
 from dynakin.cli.console import as_table, busy, out, print_error, progress_bar
 from dynakin.cli.options import OF_A_MODEL, OF_THE_LABORATORY, OF_THE_PLATES, ForceEach, Given, Trials, with_settings
+from dynakin.identification.held_out import with_subject
 from dynakin.recordings.smoothing import CUTOFF_HZ
 from dynakin.report.comparison_page import render_comparison
 from dynakin.report.text_tables import angle_text, moment_text, table2_text, unseen_text
@@ -122,8 +123,10 @@ def print_held_out(
     for fitted, judging, same in pairs:
         with busy(f"{judging.recording.name}: judging what was identified"):
             identified = identify_on(fitted.recording, fitted.setup, static=fitted.static, same_recording=same)
+            identified, decided = with_subject(identified)
             blind = predict_blind(identified, judging.recording)
             tables.append(judge(blind, judging.recording))
+            notes += [f"{fitted.recording.name}: {said}" for said in decided]
             notes += [f"{judging.recording.name}: {note}" for note in blind.notes]
     names = f"{pairs[0][0].recording.name} -> {pairs[0][1].recording.name}"
     title = f"Identified -> judged from markers alone: {names if len(pairs) == 1 else f'{len(pairs)} trials'}"

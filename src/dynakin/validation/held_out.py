@@ -12,9 +12,10 @@ from dynakin.errors import LostError, ModelError, RecordingError
 from dynakin.filter.assemble import assemble
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.total_wrench import known_ground
-from dynakin.filter.tracker import Tracker, can_smooth
+from dynakin.filter.tracker import Tracker, whether_to_smooth
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition
+from dynakin.model.identified import IdentifiedSubject
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import COMPONENTS, Estimate
@@ -30,6 +31,8 @@ from dynakin.validation.table2 import Row, spread, unit_of
 
 Array = npt.NDArray[np.float64]
 
+BATCH, CHOSEN = "batch inertia", "chosen"
+
 
 @dataclass(frozen=True, eq=False)
 class IdentifyingTrial:
@@ -37,7 +40,8 @@ class IdentifyingTrial:
 
     initial: the model as measured there. estimates: by preset. static: the recording that lengths were measured on.
     wrench: (T, 6) N and N m, the plates', as `measured_wrench`; ground: of the same laboratory, given to the judging
-    trial too where both are one recording.
+    trial too where both are one recording. subject: what `identify_subject` makes of the trial, where that was asked
+    (`identification.held_out`).
     """
 
     recording: Recording
@@ -47,6 +51,15 @@ class IdentifyingTrial:
     estimates: dict[str, Estimate]
     wrench: Array
     ground: GroundFrame | None = None
+    subject: IdentifiedSubject | None = None
+
+    def constants(self, preset: str) -> dict[str, dict[str, float]]:
+        """Lengths (m), marker places (m) and inertia (SI) that the judging trial may be predicted with, by label."""
+        table = initial_values(self.initial)
+        found = {"identified": final_values(self.estimates[preset]), "table": table}
+        if self.subject is not None:
+            found[BATCH] = table | dict(zip(self.subject.batch.names, self.subject.batch.values, strict=True))
+        return found
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,10 +119,13 @@ def identify_on(
 def predict_blind(identified: IdentifyingTrial, recording: Recording) -> Blind:
     """Every prediction of the judging trial's wrench. Its plates are taken away before anything else is done.
 
-    Filters: `EKF (preset), identified` and `EKF (preset), table`, lengths and inertia frozen at what the identifying
-    trial ended with, or at what was measured standing and the table. Reference: the table's inertia on classical
-    kinematics, then the same kinematics with least squares (in the bounds of (9), and free) and with each filter's
-    inertia. Persistence: the identifying trial's last wrench, and its mean.
+    Filters, smoothed where their noise settings have a smoother and `Setup.smooth` lets them. `EKF (preset),
+    identified` and `EKF (preset), table`: lengths and inertia frozen at what the filter ended with on the identifying
+    trial, or at what was measured standing and the table. Where a subject was identified, `EKF (preset), batch inertia`
+    has its inertia instead of the table's, and `EKF (preset), chosen` is this or the table, as was decided on the
+    identifying trial. Reference: the table's inertia on classical kinematics, then the same kinematics with least
+    squares (in the bounds of (9), and free) and with each filter's inertia. Persistence: the identifying trial's last
+    wrench, and its mean.
 
     Raises:
         ModelError, RecordingError: the trial's markers do not fit the model. DivergenceError: from a filter. LostError:
@@ -122,19 +138,18 @@ def predict_blind(identified: IdentifyingTrial, recording: Recording) -> Blind:
     blank = np.full((recording.n_frames, 6), np.nan)
     coordinates = {c.name: float(c.value) for c in start.spec.coordinates}
     found: dict[str, Array] = {}
-    for preset, estimate in identified.estimates.items():
-        for label, values in (("identified", final_values(estimate)), ("table", initial_values(measured))):
-            estimator = setup.estimator(preset)
-            frozen = freeze(measured, values, coordinates)
-            tracker = estimator.start(frozen)
-            arrays = tracker.run_arrays(recording.time, markers, blank)
-            _refuse_lost(as_estimate(estimator, tracker, arrays, recording, markers), f"EKF ({preset}), {label}")
-            found[f"EKF ({preset}), {label}"] = arrays["wrench_estimated"]
-            if label == "identified" and can_smooth(setup.noise[preset]):
-                tracker = estimator.start(frozen)
-                arrays = tracker.run_smoothed_arrays(recording.time, markers, blank)
-                _refuse_lost(as_estimate(estimator, tracker, arrays, recording, markers), f"EKF ({preset}), smoothed")
-                found[f"EKF ({preset}), smoothed"] = arrays["wrench_estimated"]
+    for preset in identified.estimates:
+        smooth, _ = whether_to_smooth(setup.smooth, setup.noise[preset])
+        for label, values in identified.constants(preset).items():
+            method, estimator = f"EKF ({preset}), {label}", setup.estimator(preset)
+            tracker = estimator.start(freeze(measured, values, coordinates))
+            follow = tracker.run_smoothed_arrays if smooth else tracker.run_arrays
+            arrays = follow(recording.time, markers, blank)
+            _refuse_lost(as_estimate(estimator, tracker, arrays, recording, markers), method)
+            found[method] = arrays["wrench_estimated"]
+        if identified.subject is not None:
+            label = BATCH if identified.subject.use == "bodies" else "table"
+            found[f"EKF ({preset}), {CHOSEN}"] = found[f"EKF ({preset}), {label}"]
     notes: list[str] = []
     try:
         found |= _referred(identified, recording, start)
