@@ -25,6 +25,7 @@ from dynakin.results.estimate import Estimate
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.pressure import floor_height, foot_pressure
 from dynakin.results.measures.sources import DERIVED, MEASURED, PRIOR
+from dynakin.settings.noise import Noise
 from support.core.bridge import filter_of, to_core
 from support.core.random_models import FEET, ROOT, Trial, floating_model, prior_sd, settings, trial
 from support.oracle import measurement
@@ -98,7 +99,7 @@ def estimate_of(data: Trial, feet: ContactLoads | None, smooth: bool = False) ->
     )
     measured = (data.markers, data.wrench)
     covariances = (data.P0, core.covariance)
-    return assemble(arrays, _core.Model(spec), initial, recording, measured, {}, [], covariances, feet)
+    return assemble(arrays, _core.Model(spec), initial, recording, measured, {}, [], covariances, Noise(), feet)
 
 
 @pytest.fixture(scope="module")

@@ -11,9 +11,11 @@ import xarray as xr
 
 from dynakin.arrays import finite
 from dynakin.bindings import _core
+from dynakin.filter.augment import kinematic_scales
 from dynakin.filter.contacts import RESIDUAL, ContactLoads
 from dynakin.filter.events import events_of
 from dynakin.filter.labels import labels
+from dynakin.filter.noise import limit_sd
 from dynakin.filter.parameters import parameters_of
 from dynakin.filter.sources import with_sources
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -22,6 +24,7 @@ from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.facing import nearly_singular
 from dynakin.results.records import Timing
+from dynakin.settings.noise import Noise
 
 Array = npt.NDArray[np.float64]
 
@@ -35,6 +38,7 @@ def assemble(
     config: dict[str, Any],
     notes: Sequence[str],
     covariances: tuple[Array, Array],
+    used: Noise,
     feet: ContactLoads | None = None,
     undeclared: npt.NDArray[np.bool_] | None = None,
 ) -> Estimate:
@@ -46,6 +50,8 @@ def assemble(
         config: what was asked for, as plain data.
         notes: sentences of the plates' check.
         covariances: P (n, n) before the first frame and after the last.
+        used: the noise of the filter. Constants have deviations by the declared variances, without its
+            ``kinematic_variance_scale``: what is wrong with a place or a length does not average out.
         feet: the wrenches that the moments were made with, None where there were none.
         undeclared: (T,) frames in which something bears the person that no plate measures.
     """
@@ -62,10 +68,14 @@ def assemble(
         data = data.isel(foot=[name != RESIDUAL for name in feet.names])
     for name, covariance in zip(("initial_covariance", "final_covariance"), covariances, strict=True):
         data[name] = (("element", "element_"), covariance)
-    prior_sd = np.sqrt(np.diag(covariances[0]))
     noise = config.get("noise", {})
+    declared = 1.0 / np.sqrt(kinematic_scales(initial.names, used))
     parameters = parameters_of(
-        initial, arrays["state"][-1], arrays["state_sd"][-1], prior_sd, noise.get("length_skin_fraction", 0.0)
+        initial,
+        arrays["state"][-1],
+        declared * arrays["state_sd"][-1],
+        declared * np.sqrt(np.diag(covariances[0])),
+        noise.get("length_skin_fraction", 0.0),
     )
     config = {key: value for key, value in config.items() if key != "ground_reasons"} | {
         "mass_kg": initial.mass_kg,
@@ -83,7 +93,7 @@ def assemble(
     estimate = Estimate(
         data=data,
         parameters=parameters,
-        events=events_of(data, parameters, initial, noise.get("unseen_sd")),
+        events=events_of(data, parameters, initial, limit_sd(used, used.unseen_sd)),
         timing=_timing(arrays["step_us"], recording),
         recording=recording,
         ground=initial.ground,

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.bindings import _core
-from dynakin.filter.noise import jerk_densities, plate_sd, soft_tissue_sd
+from dynakin.filter.noise import jerk_densities, joint_groups, plate_sd, soft_tissue_sd
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.settings.model import QUANTITIES, Quantity
 from dynakin.settings.noise import Noise
@@ -102,14 +102,22 @@ def _added_sd(spec: _core.ModelSpec, noise: Noise, soft_tissue: Array) -> dict[s
     return sd | {"plates/delay": noise.plate_delay_sd_s}
 
 
+def kinematic_scales(names: Collection[str], noise: Noise) -> Array:
+    """(n,) factor that these settings have put on the variance of each element of the state, by its name."""
+    dynamic = ("inertia/", "plates/", "contact/")
+    return np.array([1.0 if name.startswith(dynamic) else noise.kinematic_variance_scale for name in names])
+
+
 def initial_covariance(initial: CalibratedModel, noise: Noise) -> Array:
     """P0 (n, n): the priors, and with `total_mass_use` "prior" the total mass as one piece of information on it."""
+    scales = np.sqrt(kinematic_scales(initial.names, noise))
     covariance = np.diag(initial.sd0**2)
     if initial.joint_prior is not None:
         place = {name: k for k, name in enumerate(initial.names)}
         known = [k for k, name in enumerate(initial.joint_prior.names) if name in place]
         at = [place[initial.joint_prior.names[k]] for k in known]
         covariance[np.ix_(at, at)] = initial.joint_prior.covariance[np.ix_(known, known)]
+    covariance *= np.outer(scales, scales)
     if noise.total_mass_use == "frame":
         return covariance
     masses = np.array([float(name.startswith("inertia/") and name.endswith("/mass")) for name in initial.names])
@@ -124,13 +132,15 @@ def continuous_noise(initial: CalibratedModel, noise: Noise, layout: _core.State
     """Density (n,) of the white noise that drives each element, and the rate (n,) 1/s at which it decays."""
     density, decay = np.zeros(layout.size), np.zeros(layout.size)
     kinds = {axis.coordinate: axis.kind for segment in initial.spec.segments for axis in segment.axes}
+    whole, groups = noise.kinematic_variance_scale, joint_groups(initial)
     jerk = jerk_densities(noise, floating=bool(initial.feet))
     offset, size = layout.blocks["accelerations"]
     for k in range(offset, offset + size):
         coordinate = layout.names[k].removesuffix("/acceleration")
-        density[k] = jerk[kinds[coordinate]]
+        group = groups.get(coordinate)
+        density[k] = whole * jerk[kinds[coordinate]] * (1.0 if group is None else noise.jerk_scale.get(group, 1.0))
     offset, size = layout.blocks["lengths"]
-    density[offset : offset + size] = noise.length_drift_density_m2_s
+    density[offset : offset + size] = whole * noise.length_drift_density_m2_s
     skin_s = noise.soft_tissue_time_s
     if initial.feet and noise.floating_soft_tissue_time_s is not None:
         skin_s = noise.floating_soft_tissue_time_s
@@ -141,5 +151,5 @@ def continuous_noise(initial: CalibratedModel, noise: Noise, layout: _core.State
         for k in range(offset, offset + size):
             if layout.names[k] != "plates/delay":
                 decay[k] = 1.0 / time
-                density[k] = 2.0 * initial.sd0[k] ** 2 / time
+                density[k] = 2.0 * initial.sd0[k] ** 2 / time * (whole if block == "soft_tissue" else 1.0)
     return density, decay

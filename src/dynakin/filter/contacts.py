@@ -129,6 +129,11 @@ class ContactLoads:
             return ~self.known
         return np.asarray(self.contact[:, -1] == UNMEASURED)
 
+    def first(self, frames: int) -> ContactLoads:
+        """Those of the first frames."""
+        names = ("wrench", "covariance", "effects", "contact", "known")
+        return replace(self, **{name: getattr(self, name)[:frames] for name in names})
+
     def in_step(self, time: Array, delay_s: float) -> ContactLoads:
         """What belongs to each time (T,) s where the plates lag by ``delay_s``; contacts and priors by the nearest
         frame."""

@@ -10,7 +10,7 @@ import numpy.typing as npt
 from dynakin.bindings import _core
 from dynakin.errors import ConfigError
 from dynakin.filter.augment import continuous_noise, extended, initial_covariance
-from dynakin.filter.noise import gate_limits, marker_variance, process_variance, wrench_covariance
+from dynakin.filter.noise import gate_limits, limit_sd, marker_variance, process_variance, wrench_covariance
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.settings.model import QUANTITIES, Quantity
 from dynakin.settings.noise import Noise
@@ -50,7 +50,7 @@ def filter_settings(
             f"{', '.join(initial.recorded_markers)}"
         )
     point = noise.reference_point_m
-    unseen = np.inf if noise.unseen_sd is None else noise.unseen_sd
+    unseen = limit_sd(noise, noise.unseen_sd)
     recovery = _core.RecoverySettings(blind_s=noise.blind_s, unseen_sd=unseen) if noise.recover else None
     density, decay = continuous_noise(initial, noise, layout)
     return _core.FilterSettings(
@@ -65,9 +65,9 @@ def filter_settings(
         lower=initial.lower,
         upper=initial.upper,
         constraint=noise.constraint,
-        marker_gate=gate_limits(noise.marker_gate),
+        marker_gate=gate_limits(noise.marker_gate, noise.kinematic_variance_scale),
         wrench_gate=gate_limits(noise.wrench_gate),
         wrench_needs_markers=noise.recover,
-        iterate_beyond=np.inf if noise.iterate_beyond_sd is None else noise.iterate_beyond_sd,
+        iterate_beyond=limit_sd(noise, noise.iterate_beyond_sd),
         recovery=recovery,
     )

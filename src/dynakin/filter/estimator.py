@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ConfigError, RecordingError
+from dynakin.filter.adapt import Trial, calibrated_noise
 from dynakin.filter.alignment import PASSES, run_in_step
 from dynakin.filter.assemble import assemble
 from dynakin.filter.augment import initial_covariance
@@ -255,16 +256,20 @@ class Estimator:
             wrench = in_step(recording.time, ready.wrench, shift) if shift else ready.wrench
             on_feet = on_feet and on_feet.in_step(recording.time, shift)
             if smooth:
-                tracker = tracker.fresh()
+                trial = Trial(recording.time, markers, wrench, on_feet)
+                found = calibrated_noise(tracker, arrays, trial) if tracker.noise.adapt else None
+                tracker = tracker.changed(found or tracker.noise)
                 arrays = tracker.run_smoothed_arrays(recording.time, markers, wrench, back, on_feet)
         except ValueError as error:  # a frame that the core refuses, named by it
             raise RecordingError(f"{recording.path or recording.name}: {error}") from None
         config = self.settings() | {"smooth": smooth, "ground_reasons": list(ground.reasons)}
         doubt = [ready.doubt] if ready.doubt else clock if ground.usable else []
+        config["noise_used"] = tracker.noise.scales()
         notes = [*ground.notes, *doubt, *ready.unsmoothed]
         covariances = (initial_covariance(calibrated, tracker.noise), tracker.covariance)
         estimate = assemble(
-            arrays, tracker.core_model, calibrated, recording, (markers, wrench), config, notes, covariances, on_feet,
+            arrays, tracker.core_model, calibrated, recording, (markers, wrench), config, notes, covariances,
+            tracker.noise, on_feet,
             ready.undeclared(on_feet),
         )  # fmt: skip
         return Tracked(without_lost(estimate), tracker)

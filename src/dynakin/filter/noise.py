@@ -11,7 +11,7 @@ from scipy.stats import chi2
 from dynakin.bindings import _core
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.settings.model import QUANTITIES, Quantity
-from dynakin.settings.noise import Noise
+from dynakin.settings.noise import JointGroup, Noise
 
 Array = npt.NDArray[np.float64]
 
@@ -72,10 +72,47 @@ def marker_variance(initial: CalibratedModel, noise: Noise, estimate: Collection
         if "soft_tissue" not in estimate:
             unmodelled = np.maximum(noise.soft_tissue_sd_fraction * declared, noise.soft_tissue_least_sd_m)
         variance = noise.marker_sd_m**2 + unmodelled**2 + initial.unmodelled_m**2
+    variance = noise.kinematic_variance_scale * variance
     names = initial.recorded_markers
     return np.array([noise.marker_variance_m2.get(name, value) for name, value in zip(names, variance, strict=True)])
 
 
-def gate_limits(probability: float) -> list[float] | None:
-    """Largest normalised innovation squared that is believed of 1 to 6 rows; None: no gate."""
-    return None if probability == 0.0 else [float(chi2.isf(probability, rows)) for rows in range(1, 7)]
+def gate_limits(probability: float, scale: float = 1.0) -> list[float] | None:
+    """Largest normalised innovation squared that is believed of 1 to 6 rows; None: no gate.
+
+    Args:
+        scale: on the variances; below 1 the limit goes by those without it.
+    """
+    if probability == 0.0:
+        return None
+    return [float(chi2.isf(probability, rows)) / min(scale, 1.0) for rows in range(1, 7)]
+
+
+def limit_sd(noise: Noise, declared: float | None) -> float:
+    """A limit on the deviation of a coordinate (rad or m) that goes by the declared variances, in those that the filter
+    has; infinite where there is none."""
+    return np.inf if declared is None else float(declared * np.sqrt(noise.kinematic_variance_scale))
+
+
+def joint_groups(initial: CalibratedModel) -> dict[str, JointGroup]:
+    """Coordinate -> its group, by its place between the root and the feet; empty of a model that is fixed in the
+    ground."""
+    parents = {segment.name: segment.parent for segment in initial.spec.segments}
+    joints: dict[str, JointGroup] = {name: "pelvis" for name, parent in parents.items() if parent == "ground"}
+    turning = {segment.name for segment in initial.spec.segments if segment.axes}
+    order: tuple[JointGroup, ...] = ("hips", "knees")
+    for foot in initial.feet.values():
+        leg = [foot]
+        while parents[leg[-1]] not in joints and parents[leg[-1]] != "ground":
+            leg.append(parents[leg[-1]])
+        moving = [name for name in reversed(leg) if name in turning]
+        joints |= {name: order[k] if k < len(order) and name != foot else "feet" for k, name in enumerate(moving)}
+    found: dict[str, JointGroup] = {}
+    for segment in initial.spec.segments if initial.feet else ():
+        below = segment.name
+        while below not in joints and parents[below] != "ground":  # toes, patella: the group of what they hang on
+            below = parents[below]
+        group = joints.get(segment.name) or ("upper_body" if joints[below] == "pelvis" else joints[below])
+        for axis in segment.axes:
+            found.setdefault(axis.coordinate, group)
+    return found

@@ -60,6 +60,10 @@ class Tracker:
         """Another one, at the start of the same model."""
         return Tracker(self.calibrated, self.noise, self.estimate, self.lag)
 
+    def changed(self, noise: Noise) -> Tracker:
+        """Another one, at the start of the same model with other noise, which asks for the same states."""
+        return Tracker(self.calibrated, noise, self.estimate, self.lag)
+
     @property
     def state(self) -> Array:
         """The present state (n,), named by ``calibrated.names``."""

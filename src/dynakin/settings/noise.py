@@ -12,6 +12,8 @@ NotNegative = Annotated[float, Field(ge=0.0)]
 Positive = Annotated[float, Field(gt=0.0, allow_inf_nan=True)]  # infinite: as if there were no such measurement
 Seconds = Annotated[float, Field(gt=0.0)]
 Probability = Annotated[float, Field(ge=0.0, lt=1.0)]
+JointGroup = Literal["pelvis", "upper_body", "hips", "knees", "feet"]
+"""Joints that move alike; ``pelvis``: the six coordinates of a floating model's root."""
 
 
 class Scale(NamedTuple):
@@ -153,9 +155,25 @@ class Noise(Strict, use_attribute_docstrings=True):
     iterate_beyond_sd: Positive | None = 0.2
     """Standard deviation of a coordinate (rad or m) beyond which an update is linearised anew; not given: never."""
 
+    adapt: bool = True
+    """Whether the two scales below are found in the recording, by its innovations (`filter.adapt`). A preset of one's
+    own (a file) fixes them, unless it says otherwise."""
+    kinematic_variance_scale: Positive = scale(1.0, "1", "all noise of markers and movement at once")
+    """Factor on every variance of markers, movement and soft tissue, prior ones too; not on those of plates, residual
+    and inertia. The movement is weighed as before: what changes is how sure of it the filter is, and how much it
+    weighs beside the plates. A smaller one refuses no more markers: that, and when a coordinate counts as unseen, goes
+    by the variances without it."""
+    jerk_scale: dict[JointGroup, Positive] = Field(default_factory=dict)
+    """Factor on the jerk's density of a group of joints, of a model that is fixed nowhere: pelvis, upper_body, hips,
+    knees, feet; 1 where not given."""
+
     constraint: Literal["projection", "gain", "sigmoid", "none"] = "projection"
     """How bounds are kept: by projection in the metric of P^-1, by restricting the gain (7), by a smooth map, or not
     at all."""
+
+    def scales(self) -> dict[str, Any]:
+        """The scales that `adapt` finds, as plain data: a preset's table [noise] fixes them."""
+        return self.model_dump(mode="json", include={"kinematic_variance_scale", "jerk_scale"})
 
 
 SCALES: dict[str, Scale] = {

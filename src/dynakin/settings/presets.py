@@ -55,6 +55,7 @@ def paper() -> Noise:
         recover=False,
         unseen_sd=None,
         iterate_beyond_sd=None,
+        adapt=False,
         constraint="gain",
     )
 
@@ -90,7 +91,7 @@ def title(name: str) -> str:
 
 def read_preset(path: Path) -> Noise:
     """The settings of a file: ``base``, the built-in preset from which it starts ("default" where not given), and the
-    table ``noise`` with what is different.
+    table ``noise`` with what is different. It fixes the noise: nothing is calibrated, unless it says ``adapt = true``.
 
     Raises:
         ConfigError: the file cannot be read, or a key or value is wrong; the message names it.
@@ -107,13 +108,14 @@ def read_preset(path: Path) -> Noise:
     except ConfigError as error:
         raise ConfigError(f"{path}: base: {error.message}") from None
     try:
-        return start.changed(**noise)
+        return start.changed(**({"adapt": False} | noise))
     except ConfigError as error:
         raise ConfigError(f"{path}: {error.message}") from None
 
 
 def write_preset(path: Path, noise: Noise, base: str, remarks: Sequence[str] = ()) -> None:
-    """Write settings so that they stay what they are when presets change: every key that has a value.
+    """Write settings so that they stay what they are when presets change: every key that has a value but ``adapt``,
+    because a file fixes them.
 
     Args:
         base: the built-in preset that they come from. remarks: lines that open the file.
@@ -121,7 +123,9 @@ def write_preset(path: Path, noise: Noise, base: str, remarks: Sequence[str] = (
     Raises:
         OutputError: the file cannot be written.
     """
-    values: dict[str, Any] = {k: v for k, v in noise.model_dump(mode="json").items() if v is not None}
+    values: dict[str, Any] = {
+        k: v for k, v in noise.model_dump(mode="json", exclude={"adapt"}).items() if v is not None
+    }
     text = "".join(f"# {line}\n" for line in remarks) + tomli_w.dumps({"base": base, "noise": values})
     try:
         path.write_text(text, encoding="utf-8", newline="\n")

@@ -217,7 +217,15 @@ def as_estimate(
     covariances = (tracker.covariance, tracker.covariance)
     return without_lost(
         assemble(
-            arrays, tracker.core_model, tracker.calibrated, recording, measured, estimator.settings(), [], covariances
+            arrays,
+            tracker.core_model,
+            tracker.calibrated,
+            recording,
+            measured,
+            estimator.settings(),
+            [],
+            covariances,
+            tracker.noise,
         )
     )
 

@@ -46,6 +46,7 @@ def write_parameters(estimate: Estimate, path: Path) -> None:
         {
             "schema_version": SCHEMA_VERSION,
             "model": estimate.model_name,
+            "noise": estimate.config.get("noise_used", {}),
             "parameters": [asdict(parameter) for parameter in estimate.parameters],
         },
     )

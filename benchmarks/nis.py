@@ -1,0 +1,116 @@
+"""NIS of every recording on the half that was not used to calibrate its noise.
+
+    OMP_NUM_THREADS=1 .venv/bin/python benchmarks/nis.py [NAME...] [--model fullbody] [--write]
+
+Each recording of ``../shared/data`` is prepared as `benchmarks/recordings.py` runs it (its own .osim, else
+``fullbody``). Its noise is calibrated on every other stretch of the first 10 s (`filter.adapt`) and judged on all the
+other stretches, up to 20 s. A stretch is a second, or a tenth of a recording shorter than 10 s. ``--write`` puts the
+table into ``docs/validation.md``; rows are kept in ``build/nis``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+from pathlib import Path
+
+import numpy as np
+
+from dynakin.errors import DynakinError
+from dynakin.filter.adapt import Flags, Trial, calibrated_noise, nis_per_row
+from dynakin.filter.alignment import run_in_step
+from dynakin.filter.tracker import Tracker
+from dynakin.settings.noise import JointGroup
+from dynakin.settings.settings import Settings
+from dynakin.validation.case import case_of
+from recordings import DATA, ROOT, TRIALS, Array, put_between
+from recordings import Trial as Known
+
+KEPT = ROOT / "build" / "nis"
+MARKS = ("<!-- nis: begin -->", "<!-- nis: end -->")
+LONGEST_S = 20.0
+GROUPS: tuple[JointGroup, ...] = ("pelvis", "upper_body", "hips", "knees", "feet")
+HEAD = (
+    "| recording | NIS, declared | NIS, calibrated | of markers alone | of plates alone | variance scale "
+    "| jerk scales: pelvis, upper body, hips, knees, feet |\n|---|---|---|---|---|---|---|"
+)
+
+
+def main() -> None:
+    """One row a recording."""
+    parser = argparse.ArgumentParser()
+    parser.add_argument("names", nargs="*")
+    parser.add_argument("--model", default="own")
+    parser.add_argument("--write", action="store_true")
+    options = parser.parse_args()
+    rows = []
+    for trial in TRIALS:
+        if not options.names or any(name in trial.name for name in options.names):
+            rows.append(row(trial, options.model))
+            print(rows[-1], flush=True)
+    if options.write:
+        put_between(MARKS, [HEAD, *rows])
+
+
+def row(trial: Known, wanted: str) -> str:
+    """A line of the table, or why there is none."""
+    try:
+        found = figures(trial, wanted)
+    except DynakinError as error:
+        return f"| `{trial.name}` | {error.message.replace(str(DATA), '')[:120]} | – | – | – | – | – |"
+    KEPT.mkdir(parents=True, exist_ok=True)
+    (KEPT / f"{trial.name.replace('/', '_')}_{wanted}.json").write_text(json.dumps(found, indent=1), encoding="utf-8")
+    jerk = ", ".join(f"{found['jerk_scale'].get(group, 1.0):.2g}" for group in GROUPS)
+    cells = [_cell(found[key]) for key in ("declared", "calibrated", "markers", "plates", "kinematic_variance_scale")]
+    return f"| `{trial.name}` | {' | '.join(cells)} | {jerk} |"
+
+
+def figures(trial: Known, wanted: str) -> dict[str, object]:
+    """NIS a row before and after, and the scales between them."""
+    given: dict[str, str | None] = {"forces": trial.forces, "static": trial.static}
+    keys: dict[str, object] = {key: DATA / value for key, value in given.items() if value}
+    keys["mass_kg"] = trial.mass_kg
+    keys |= {"trial": DATA / trial.path, "model": trial.model(wanted), "output": Path()}
+    case = case_of(Settings.of(keys, "nis"))
+    recording = case.recording.window(float(case.recording.time[0]), float(case.recording.time[0]) + LONGEST_S)
+    ready = case.setup.estimator("default").prepare(recording, static=case.static)
+    tracker, arrays, shift, _ = run_in_step(
+        ready.tracker.fresh(), recording.time, ready.markers, ready.wrench, None, ready.contacts
+    )
+    contacts = ready.contacts and ready.contacts.in_step(recording.time, shift)
+    run = Trial(recording.time, ready.markers, ready.wrench, contacts)
+    chosen = halves(run.time)
+    noise = calibrated_noise(tracker, arrays, run, chosen)
+    if noise is None:
+        return {"declared": nis_per_row(arrays, ~chosen), "calibrated": None, "markers": None, "plates": None,
+                "kinematic_variance_scale": None, "jerk_scale": {}}  # fmt: skip
+    again = tracker.changed(noise).run_arrays(*run[:3], None, run.contacts)
+    held = ~chosen
+    return {
+        "declared": nis_per_row(arrays, held),
+        "calibrated": nis_per_row(again, held),
+        "markers": squares(tracker, again, held, slice(None, -6)),
+        "plates": squares(tracker, again, held, slice(-6, None)),
+        **noise.scales(),
+    }
+
+
+def halves(time: Array) -> Flags:
+    """(T,) frames of every other stretch, the first one among them."""
+    length = time[-1] - time[0]
+    return np.asarray(np.floor((time - time[0]) / min(1.0, 0.1 * length)) % 2 == 0)
+
+
+def squares(tracker: Tracker, arrays: dict[str, Array], held: Flags, channels: slice) -> float | None:
+    """Mean square of each channel's innovation over its own variance."""
+    value, sd = arrays["innovation"][held, channels], arrays["innovation_sd"][held, channels]
+    seen = np.isfinite(value) & (sd > 0.0)
+    return float(np.mean((value[seen] / sd[seen]) ** 2)) if seen.any() else None
+
+
+def _cell(value: object) -> str:
+    return "–" if value is None else f"{value:.2g}"
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,123 @@
+"""Noise that calibrates itself: the scales of the declared noise that a recording's own innovations ask for.
+
+Two things are found. The jerk's density by group of joints, from how much accelerations change between frames beside
+what the filter expects of that (covariance matching). Then one factor on all variances of markers and movement, so that
+the normalised innovation squared is one a row: it leaves the movement's estimate as it is, because the gain depends on
+the ratio of the variances only, and makes deviations and innovations agree (the variance of unit weight of adjustment
+theory). Why plates, residual and inertia are not in it: docs/design.md.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.filter.augment import continuous_noise
+from dynakin.filter.contacts import ContactLoads
+from dynakin.filter.noise import joint_groups
+from dynakin.filter.tracker import Tracker
+from dynakin.results.records import FOLLOWING
+from dynakin.settings.noise import JointGroup, Noise
+
+Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+
+CALIBRATED_S = 10.0
+"""Part of a recording that is looked at, from its start."""
+SETTLING_S = 0.3
+"""Left out of it: the first frames' covariances are the priors'."""
+LEAST_FRAMES = 25
+"""Fewer say nothing: a quarter of a second."""
+JERK_SHARE = 0.5
+"""Part of a jerk scale's logarithm that is believed: jerk is not white, and what fits the next frame best is too little
+for a step."""
+
+
+class Trial(NamedTuple):
+    """What a tracker runs over, as `Tracker.run_arrays` takes it."""
+
+    time: Array
+    markers: Array
+    wrench: Array
+    contacts: ContactLoads | None
+
+    def first(self, frames: int) -> Trial:
+        """Its first frames."""
+        contacts = self.contacts and self.contacts.first(frames)
+        return Trial(self.time[:frames], self.markers[:frames], self.wrench[:frames], contacts)
+
+
+def calibrated_noise(
+    tracker: Tracker, arrays: dict[str, Array], trial: Trial, frames: Flags | None = None
+) -> Noise | None:
+    """The noise with the scales that a recording asks for; None where it is too short.
+
+    Two more passes over `CALIBRATED_S` for a floating model, none for one that is fixed in the ground.
+
+    Args:
+        tracker: of the run. arrays: of that run, as `Tracker.run_arrays` gives them. frames: (T,) to look at; all of
+            the first seconds where not given.
+    """
+    end = int(np.searchsorted(trial.time, trial.time[0] + CALIBRATED_S, side="right"))
+    trial = trial.first(end)
+    chosen: Flags = trial.time >= trial.time[0] + SETTLING_S
+    if frames is not None:
+        chosen &= frames[:end]
+    noise = tracker.noise
+    ratio = nis_per_row(arrays, chosen)
+    if ratio is None:
+        return None
+    groups = joint_groups(tracker.calibrated)
+    if not groups:
+        return _scaled(noise, ratio)
+    noise = _scaled(noise, ratio, jerk_ratios(tracker, arrays, trial.time, chosen, groups))
+    again = tracker.changed(noise).run_arrays(*trial[:3], None, trial.contacts)
+    ratio = nis_per_row(again, chosen)
+    return None if ratio is None else _scaled(noise, ratio)
+
+
+def nis_per_row(arrays: dict[str, Array], chosen: Flags) -> float | None:
+    """Normalised innovation squared over the measured rows of the chosen frames (K,), the first of those of the run;
+    None where they are too few."""
+    end = len(chosen)
+    nis, rows = arrays["nis"][:end], arrays["n_rows"][:end]
+    used = chosen & np.isfinite(nis) & (rows > 0) & (arrays["tracking"][:end] == FOLLOWING)
+    total = float(nis[used].sum() / rows[used].sum()) if used.sum() >= LEAST_FRAMES else 0.0
+    return total if total > 0.0 else None
+
+
+def jerk_ratios(
+    tracker: Tracker, arrays: dict[str, Array], time: Array, chosen: Flags, groups: dict[str, JointGroup]
+) -> dict[JointGroup, float]:
+    """By group: how much accelerations change from frame to frame, squared, over what the filter expects of it.
+
+    A prediction keeps accelerations, so their change is what an update moved them by; its variance is what the update
+    took off theirs. Where the noise is right the ratio is one.
+    """
+    layout = tracker.core_model.layout
+    density, _ = continuous_noise(tracker.calibrated, tracker.noise, layout)
+    offset, size = layout.blocks["accelerations"]
+    block = slice(offset, offset + size)
+    names = [groups.get(name.removesuffix("/acceleration")) for name in layout.names[block]]
+    value, variance = arrays["state"][: len(time), block], arrays["state_sd"][: len(time), block] ** 2
+    change = np.diff(value, axis=0) ** 2
+    expected = variance[:-1] + density[block] * np.diff(time)[:, None] - variance[1:]
+    following = arrays["tracking"][: len(time)] == FOLLOWING
+    used = chosen[1:] & following[1:] & following[:-1]
+    change, expected = change[used].sum(axis=0), expected[used].sum(axis=0)
+    found: dict[JointGroup, float] = {}
+    for group in sorted({name for name in names if name is not None}):
+        own = [k for k, name in enumerate(names) if name == group and expected[k] > 0.0 and change[k] > 0.0]
+        if own:
+            found[group] = float(np.mean(change[own] / expected[own]))
+    return found
+
+
+def _scaled(noise: Noise, ratio: float, jerk: dict[JointGroup, float] | None = None) -> Noise:
+    """The noise with this factor on all of it, and the jerk's scales moved towards what groups ask for beside it."""
+    scales = dict(noise.jerk_scale)
+    for group, wanted in (jerk or {}).items():
+        scales[group] = scales.get(group, 1.0) * (wanted / ratio) ** JERK_SHARE
+    return noise.changed(kinematic_variance_scale=ratio * noise.kinematic_variance_scale, jerk_scale=scales)

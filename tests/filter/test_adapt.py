@@ -1,0 +1,114 @@
+"""Noise that calibrates itself: what it leaves alone, what it recovers, what it says of frames it has not seen."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dynakin.filter.adapt import LEAST_FRAMES, Trial, calibrated_noise, nis_per_row
+from dynakin.filter.estimator import Estimator
+from dynakin.filter.noise import joint_groups
+from dynakin.filter.prepared import Prepared
+from dynakin.model.definition import load_model
+from dynakin.recordings.recording import Recording
+from dynakin.results.files.config import write_parameters
+from dynakin.settings.noise import Noise
+from dynakin.settings.subject import Subject
+from dynakin.simulation.sensors.sizes import SensorNoise
+from dynakin.simulation.trial import simulate
+
+SUBJECT = Subject(mass_kg=70.0, height_m=1.75, sex="male")
+
+
+def standing(camera_sd_m: float) -> Recording:
+    """Ten seconds of quiet standing, seen by cameras of this noise and without skin."""
+    noise = SensorNoise(marker_sd_m=camera_sd_m, soft_tissue=0.0)
+    return simulate("sagittal7", "sway", 3, 10.0, noise=noise).recording
+
+
+def planar(noise: Noise) -> Estimator:
+    return Estimator(load_model("sagittal7", SUBJECT), noise)
+
+
+def found(ready: Prepared, frames: np.ndarray | None = None) -> tuple[Noise, dict[str, np.ndarray]]:
+    tracker = ready.tracker.fresh()
+    trial = Trial(ready.recording.time, ready.markers, ready.wrench, ready.contacts)
+    arrays = tracker.run_arrays(*trial[:3], None, trial.contacts)
+    noise = calibrated_noise(tracker, arrays, trial, frames)
+    assert noise is not None
+    return noise, tracker.changed(noise).run_arrays(*trial[:3], None, trial.contacts)
+
+
+def test_the_scale_of_all_variances_leaves_the_movement_alone() -> None:
+    # The gain depends on the ratio of the variances. Without plates nothing is left that the scale is not on.
+    blind = Noise(adapt=False, force_variance_n2=np.inf, moment_variance_n2_m2=np.inf)
+    recording = standing(0.001)
+    runs = [planar(blind.changed(kinematic_variance_scale=s)).run(recording) for s in (1.0, 0.09)]
+    for name in ("coordinates", "speeds", "accelerations"):
+        first, second = (run.data[name].values for run in runs)
+        np.testing.assert_allclose(second, first, rtol=1e-5, atol=1e-7)
+    first, second = (run.data["coordinates_sd"].values for run in runs)
+    np.testing.assert_allclose(second, 0.3 * first, rtol=1e-4)
+    # what is not known of lengths and places is no noise, and does not shrink with it
+    for before, after in zip(runs[0].parameters, runs[1].parameters, strict=True):
+        if before.estimated and before.kind in ("length", "marker"):
+            assert after.sd == pytest.approx(before.sd, rel=1e-3)
+            assert after.prior_sd == pytest.approx(before.prior_sd, rel=1e-6)
+
+
+def test_twice_the_noise_of_the_cameras_is_four_times_the_variance() -> None:
+    # Standing, without skin, all else follows the cameras; 10 %: ten seconds are a sample.
+    scales = []
+    for sd in (0.0005, 0.001):
+        noise, _ = found(planar(Noise()).prepare(standing(sd)))
+        scales.append(noise.kinematic_variance_scale)
+    assert scales[1] / scales[0] == pytest.approx(4.0, rel=0.1)
+
+
+@pytest.fixture(scope="module")
+def walk() -> Prepared:
+    made = simulate("fullbody", "gait", 5, 3.0)
+    subject = made.truth.subject
+    model = load_model("fullbody", Subject(mass_kg=subject.mass_kg, height_m=subject.height_m, sex="male"))
+    return Estimator(model).prepare(made.recording)
+
+
+def test_it_holds_on_frames_that_it_has_not_seen(walk: Prepared) -> None:
+    seen = np.floor(walk.recording.time / 0.3) % 2 == 0
+    noise, arrays = found(walk, seen)
+    declared = walk.tracker.fresh().run_arrays(walk.recording.time, walk.markers, walk.wrench, None, walk.contacts)
+    before, after = nis_per_row(declared, ~seen), nis_per_row(arrays, ~seen)
+    assert before is not None and after is not None
+    assert before < 0.5 and 0.7 < after < 1.3
+    assert set(noise.jerk_scale) == {"pelvis", "upper_body", "hips", "knees", "feet"}
+
+
+def test_joints_are_grouped_by_where_they_are(walk: Prepared) -> None:
+    groups = joint_groups(walk.calibrated)
+    expected = {
+        "pelvis_tx": "pelvis", "pelvis_list": "pelvis", "lumbar_bending": "upper_body", "elbow_flex_l": "upper_body",
+        "hip_rotation_r": "hips", "knee_angle_l": "knees", "ankle_angle_r": "feet", "subtalar_angle_l": "feet",
+    }  # fmt: skip
+    assert {name: groups[name] for name in expected} == expected
+    assert not joint_groups(planar(Noise()).calibrate(standing(0.001)))
+
+
+def test_what_was_found_is_written_and_a_preset_fixes_it(tmp_path: Path) -> None:
+    recording = standing(0.0005)
+    estimate = planar(Noise()).run(recording)
+    scale = estimate.config["noise_used"]["kinematic_variance_scale"]
+    assert 0.1 < scale < 0.7
+    write_parameters(estimate, tmp_path / "parameters.json")
+    assert json.loads((tmp_path / "parameters.json").read_text())["noise"]["kinematic_variance_scale"] == scale
+    fixed = planar(Noise(adapt=False, kinematic_variance_scale=0.5)).run(recording)
+    assert fixed.config["noise_used"]["kinematic_variance_scale"] == 0.5
+    # as it would be live, nothing is known of what comes
+    assert planar(Noise()).run(recording, smooth=False).config["noise_used"]["kinematic_variance_scale"] == 1.0
+
+
+def test_too_few_frames_leave_the_noise_as_declared() -> None:
+    recording = standing(0.001).window(0.0, 0.3 + 0.005 * LEAST_FRAMES)
+    assert planar(Noise()).run(recording).config["noise_used"]["kinematic_variance_scale"] == 1.0
