@@ -95,7 +95,7 @@ def identify_on(
     for preset in setup.noise:
         estimator = setup.estimator(preset)
         # only what it ends with is used, which smoothing does not change
-        estimates[preset], tracker = estimator.track(recording, static=static, smooth=False)
+        estimates[preset], tracker = estimator.track(recording, static=static, lag_s=0.0)
         _refuse_lost(estimates[preset], f"EKF ({preset})")
     initial = tracker.calibrated
     wrench = measured_wrench(recording, initial, setup.plates)
