@@ -89,7 +89,7 @@ def outcomes(seed: int, names: tuple[str, ...]) -> list[Outcome]:
     found = []
     for name in names:
         try:
-            estimate = dynakin.Estimator(model, SETTINGS[name]()).run(trial.recording, smooth=False)
+            estimate = dynakin.Estimator(model, SETTINGS[name]()).run(trial.recording, lag_s=0.0)
         except DivergenceError:
             found.append(Outcome(seed, name, lost=True, told=True))
         except DynakinError as error:

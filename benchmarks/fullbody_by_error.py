@@ -97,9 +97,9 @@ def one_trial(motion: str, markers: str, seed: int, changes: dict[str, float]) -
     definition = dynakin.load_model("fullbody", subject=SUBJECT, markers=markers)
     static = None if motion == "squat" else simulate("fullbody", "squat", seed, 5.0, markers=markers).recording
     found = {}
-    for name, smooth in (("live", False), ("smoothed", True)):
+    for name, lag_s in (("live", 0.0), ("smoothed", np.inf)):
         estimator = dynakin.Estimator(definition, Noise(**(presets.default().model_dump() | changes)))
-        estimate = estimator.run(trial.recording, static=static, smooth=smooth)
+        estimate = estimator.run(trial.recording, static=static, lag_s=lag_s)
         found[name] = errors(estimate, trial, motion)
     return found
 

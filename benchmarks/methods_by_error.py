@@ -28,7 +28,7 @@ def one_trial(seed: int) -> dict[str, tuple[float, ...]]:
     recording = trial.recording
     window = recording.time >= START_S
     estimator = dynakin.Estimator(dynakin.load_model("sagittal7", subject=SUBJECT, markers="opencap"))
-    estimate, tracker = estimator.track(recording, smooth=False)
+    estimate, tracker = estimator.track(recording, lag_s=0.0)
     data, initial = {"EKF, `paper`": estimate.data}, tracker.calibrated
     at = reference_methods(recording, initial, estimator.model)
     data["AT, 6 Hz"] = at.data

@@ -143,7 +143,7 @@ def residuals(peer: Kinematics) -> None:
             title = f"{'the file' if mass is None else f'{mass:g} kg'}, {'unfiltered' if cutoff is None else '6 Hz'}"
             print(f"| OpenSim, mass of {title} | {size[0]:.1f} | {size[1]:.1f} |")
     for name, definition in models("squats1").items():
-        left_over(f"dynakin, {name}", dynakin.Estimator(definition).run(recorded("squats1"), smooth=False))
+        left_over(f"dynakin, {name}", dynakin.Estimator(definition).run(recorded("squats1"), lag_s=0.0))
 
 
 GROUPS = (("flexions", FLEXION, 4), ("others of the legs", OTHERS, 6), ("pelvis", PELVIS, 6))
@@ -169,7 +169,7 @@ def angles() -> None:
         estimators = {name: dynakin.Estimator(definition) for name, definition in definitions.items()}
         held = dynakin.Estimator(definitions[".osim"], without_plates(), estimate=())
         for name, estimator in {**estimators, ".osim, held as in OpenSim, markers only": held}.items():
-            estimate = estimator.run(recording, smooth=False)
+            estimate = estimator.run(recording, lag_s=0.0)
             ours = Angles(estimate.coordinate_names, estimate.time, estimate.data["coordinates"].values)
             print(
                 f"\n### `{trial}`, {name}\n\n| what | against the recording's own | with equal weights | goal |\n"

@@ -81,7 +81,13 @@ def judged(case: Case, seed: int, live: bool) -> Judged:
     except (ConfigError, TypeError) as error:
         return Judged(name, 0.0, None, f"not simulated: {error}", [], [])
     who = made.truth.subject
-    settings = {"model": "fullbody", "mass_kg": who.mass_kg, "height_m": who.height_m, "smooth": not live, **case.told}
+    settings = {
+        "model": "fullbody",
+        "mass_kg": who.mass_kg,
+        "height_m": who.height_m,
+        "lag_s": 0.0 if live else None,
+        **case.told,
+    }
     run = kept_run(KEPT, name, made.recording, None, settings)
     time = made.recording.time
     reference = of_truth(made.truth, (time >= time[0] + START_S) & (time <= time[-1] - END_S))

@@ -206,7 +206,12 @@ def judged(case: Case, live: bool, fullbody: bool, say: Callable[[str], None]) -
     recording = given.recording
     runs: dict[str, Run] = {}
     vertical = "+Y"
-    settings = {"model": given.model, "mass_kg": given.mass_kg, "height_m": given.height_m, "smooth": not live}
+    settings = {
+        "model": given.model,
+        "mass_kg": given.mass_kg,
+        "height_m": given.height_m,
+        "lag_s": 0.0 if live else None,
+    }
     for arm in ARMS:
         runs[arm] = kept_run(KEPT, f"{title(case)}-{arm}", without(given, arm, vertical), given.static, settings)
         if arm == NOTHING and (first := runs[arm].found) is not None:

@@ -17,7 +17,7 @@ else:
     trial, forces = simulate_squat(seed=1).recording, None
     subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
 
-result = dynakin.run(  # with smooth=False each frame as it would be live
+result = dynakin.run(  # with lag_s=0.05 each frame as it would be live, 50 ms late
     trial, forces=forces, model="sagittal7", markers="opencap", subject=subject
 )
 

@@ -6,7 +6,7 @@ from dynakin.simulation import simulate_squat
 recording = simulate_squat(seed=1, duration_s=8.0).recording
 subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
 model = dynakin.load_model("sagittal7", subject=subject, markers="opencap")
-estimator = dynakin.Estimator(model, lag=20)  # delayed() then gives the frame 20 frames back, smoothed
+estimator = dynakin.Estimator(model)
 tracker = estimator.start(recording.window(0.0, 1.0))
 
 for k in range(101, recording.n_frames):  # from here on as samples would come from a laboratory

@@ -30,7 +30,7 @@ def filtered(common: Common, recordings: Sequence[Recording], preset: str) -> Ar
         given = common.estimator
         estimator = Estimator(given.model, presets.preset(preset), side=given.side, vertical=given.vertical)
         try:
-            values = final_values(estimator.run(recording, static=common.static, smooth=False))
+            values = final_values(estimator.run(recording, static=common.static, lag_s=0.0))
         except DynakinError:
             continue
         found.append([values[name] for name in names])

@@ -5,57 +5,69 @@
 
 namespace dynakin {
 
-FixedLag::FixedLag(Filter& filter, int lag, bool deviations)
+FixedLag::FixedLag(Filter& filter, int lag)
     : filter_(filter),
       lag_(lag),
-      deviations_(deviations),
-      pass_(filter.model(), filter.settings(), filter.tape_rows(), deviations),
-      x_(filter.state()) {
+      mean_(filter.model(), filter.settings(), filter.tape_rows(), false),
+      both_(filter.model(), filter.settings(), filter.tape_rows(), true),
+      x_(filter.state()),
+      P_(filter.covariance()) {
   if (lag < 1) throw std::invalid_argument("lag: expected 1 frame or more, found " + std::to_string(lag));
-  if (deviations) P_ = filter.covariance();
   ring_.reserve(static_cast<std::size_t>(lag) + 1);
   for (int k = 0; k <= lag; ++k)
     ring_.push_back({0.0, filter.belief(), FrameTape(filter.model().state_size(), filter.tape_rows())});
 }
 
-// A frame that is refused counts as one in which nothing was measured.
-StepReport FixedLag::record(Frame& now, double dt, const MarkerRef& markers, const Vector6& wrench,
-                            const WrenchModel* how) {
-  const auto keep = [&] {
-    filter_.record_to(nullptr);
-    now.dt = dt;
-    now.filtered = filter_.belief();
-  };
+void FixedLag::open(double dt) {
+  ++frames_;
+  Frame& now = back(0);
+  now.dt = dt;
   now.tape.clear();
   filter_.record_to(&now.tape);
-  try {
-    const StepReport report = filter_.update(markers, wrench, how);
-    keep();
-    return report;
-  } catch (...) {
-    keep();
-    throw;
-  }
+}
+
+void FixedLag::close() {
+  filter_.record_to(nullptr);
+  back(0).filtered = filter_.belief();
 }
 
 StepReport FixedLag::step(double dt, const MarkerRef& markers, const Vector6& wrench, const WrenchModel* how) {
   const bool first = frames_ == 0;
   if (!first) filter_.predict(dt);
-  ++frames_;
-  const StepReport report = record(back(0), first ? 0.0 : dt, markers, wrench, how);
-  if (!ready() || report.diverged()) return report;
-
-  pass_.start();
-  delay_ = 0.0;
-  for (int by = 0; by < lag_; ++by) {
-    pass_.undo(back(by).tape, back(by).dt);
-    delay_ += back(by).dt;
+  open(first ? 0.0 : dt);
+  StepReport report;
+  try {
+    report = filter_.update(markers, wrench, how);
+  } catch (...) {
+    close();
+    throw;
   }
-  const Belief& then = back(lag_).filtered;
-  pass_.smooth(then.x, then.P, x_);
-  if (deviations_) pass_.smooth(then.P, P_);
-  pass_.bound(x_, deviations_ ? P_ : then.P);
+  close();
+  if (ready() && !report.diverged()) look_back(lag_);
   return report;
+}
+
+void FixedLag::look_back(int by) {
+  mean_.start();
+  delay_ = 0.0;
+  for (int k = 0; k < by; ++k) {
+    mean_.undo(back(k).tape, back(k).dt);
+    delay_ += back(k).dt;
+  }
+  const Belief& then = back(by).filtered;
+  mean_.smooth(then.x, then.P, x_);
+  mean_.bound(x_, then.P);
+  by_ = by;
+  has_covariance_ = false;
+}
+
+const Eigen::MatrixXd& FixedLag::covariance() {
+  if (has_covariance_) return P_;
+  both_.start();
+  for (int k = 0; k < by_; ++k) both_.undo(back(k).tape, back(k).dt);
+  both_.smooth(back(by_).filtered.P, P_);
+  has_covariance_ = true;
+  return P_;
 }
 
 }  // namespace dynakin

@@ -214,8 +214,8 @@ void check_contacts_allocate_nothing(const dynakin::ModelSpec& spec) {
   }
 }
 
-// Bounds that bind, an equality, a gap; with and without deviations, and what is reported of the state with both.
-void check_fixed_lag_allocates_nothing(const dynakin::ModelSpec& spec, bool deviations) {
+// Bounds that bind, an equality, a gap; with the covariance, and what is reported of the state.
+void check_fixed_lag_allocates_nothing(const dynakin::ModelSpec& spec) {
   using namespace dynakin;
   const Model model(spec);
   FilterSettings settings = settings_for(model);
@@ -228,7 +228,7 @@ void check_fixed_lag_allocates_nothing(const dynakin::ModelSpec& spec, bool devi
   auto markers = markers_at(model, x);
   const Vector6 wrench = Vector6::Constant(10.0);
   Filter filter(model, settings, x, prior_for(model));
-  FixedLag lag(filter, 5, deviations);
+  FixedLag lag(filter, 5);
   const WrenchModel how = wrench_model_for(model);
   OutputDeviation deviation(model);
   std::vector<double> markers_sd(3 * model.markers().size()), moments_sd(model.coordinates().size()), wrench_sd(6);
@@ -241,8 +241,9 @@ void check_fixed_lag_allocates_nothing(const dynakin::ModelSpec& spec, bool devi
     deviation.markers(now.kinematics(), filter.covariance(), markers_sd.data());
     deviation.wrench(now.kinematics(), now.dynamics(), filter.covariance(), wrench_sd.data());
     deviation.moments(filter.state(), now.kinematics(), now.dynamics(), filter.covariance(), moments_sd.data());
+    const bool finite = !lag.ready() || lag.covariance().allFinite();
     CHECK(allocations == before);
-    CHECK(!report.diverged() && lag.state().allFinite());
+    CHECK(!report.diverged() && finite && lag.state().allFinite());
     bound = bound || report.constrained > 0;
   }
   CHECK(lag.ready() && bound && moments_sd[0] > 0.0);
@@ -287,10 +288,8 @@ TEST(contacts_allocate_nothing) {
   check_contacts_allocate_nothing(with_contact(spatial_tree()));
 }
 TEST(a_fixed_lag_allocates_nothing) {
-  for (bool deviations : {false, true}) {
-    check_fixed_lag_allocates_nothing(planar_chain(), deviations);
-    check_fixed_lag_allocates_nothing(spatial_tree(), deviations);
-    check_fixed_lag_allocates_nothing(with_contact(spatial_tree()), deviations);
-  }
+  check_fixed_lag_allocates_nothing(planar_chain());
+  check_fixed_lag_allocates_nothing(spatial_tree());
+  check_fixed_lag_allocates_nothing(with_contact(spatial_tree()));
 }
 #endif

@@ -94,7 +94,7 @@ void check_a_fixed_lag_ends_where_the_smoother_does(const ModelSpec& spec) {
   const Made trial(spec);
   const SmoothRecord out = trial.smoothed(0);
   Filter f(trial.model, trial.settings, trial.model.initial_state(), prior_for(trial.model));
-  FixedLag lag(f, 6, true);
+  FixedLag lag(f, 6);
   const std::size_t m = trial.model.markers().size(), n = trial.model.state_size(), frames = trial.time.size();
   const Trial given = trial.trial();
   WrenchModel how;

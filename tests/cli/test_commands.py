@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import subprocess
 import sys
 import tomllib
@@ -128,21 +129,39 @@ def test_run_smooths_unless_told_otherwise_and_says_where_it_cannot(
     trial = str(data_dir / "plugin_gait" / "S1_FlywheelSquat.c3d")
     options = ["--model", "squat7", "--mass", "78.6", "-o"]
 
-    def used(name: str, *more: str) -> tuple[bool, str]:
+    def used(name: str, *more: str) -> tuple[float, str]:
         out = tmp_path / name
         assert main(["run", trial, *options, str(out), *more]) == 0
         told = " ".join(capsys.readouterr().out.split())
-        return tomllib.loads((out / "config.toml").read_text())["smooth"], told
+        return tomllib.loads((out / "config.toml").read_text())["lag_s"], told
 
-    smooth, told = used("default")
-    assert smooth and "settled after" not in told and "does not settle" not in told
-    smooth, told = used("live", "--live-like")
-    assert not smooth and "settled after" in told and "Not smoothed" not in told
-    smooth, told = used("paper", "--preset", "paper")
-    assert not smooth and "Not smoothed: bounds are kept by constraint 'gain'" in told
+    lag_s, told = used("default")
+    assert lag_s == math.inf and "settled after" not in told and "does not settle" not in told
+    lag_s, told = used("live", "--live-like")
+    assert lag_s == 0.0 and "settled after" in told and "Not smoothed" not in told
+    lag_s, told = used("late", "--lag", "0.05")
+    assert lag_s == pytest.approx(0.05) and "settled after" in told
+    assert "each frame estimated as it would be live, 50 ms late" in (tmp_path / "late" / "report.html").read_text()
+    lag_s, told = used("paper", "--preset", "paper")
+    assert lag_s == 0.0 and "Not smoothed: bounds are kept by constraint 'gain'" in told
     assert "Not smoothed: bounds" in (tmp_path / "paper" / "report.html").read_text()
     assert main(["run", trial, *options, str(tmp_path / "no"), "--preset", "paper", "--smooth"]) == 2
-    assert "smooth: bounds are kept by constraint 'gain'" in capsys.readouterr().err
+    assert "lag_s: bounds are kept by constraint 'gain'" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (["--lag", "20"], "lag_s is 20.0, expected seconds (no longer frames), 0 to 1, such as 0.05"),
+        (["--lag", "-1"], "--lag"),
+        (["--lag", "nan"], "--lag"),
+        (["--lag", "0.05", "--live-like"], "--lag and --live-like: expected one of them"),
+    ],
+)
+def test_lags_that_cannot_be_are_refused(options: list[str], said: str, data_dir: Path, capsys: Said) -> None:
+    trial = str(data_dir / "plugin_gait" / "S1_FlywheelSquat.c3d")
+    assert main(["run", trial, "--model", "squat7", *options, "-o", "nowhere"]) == 2
+    assert said in " ".join(capsys.readouterr().err.split())
 
 
 def test_run_replaces_its_own_output_and_draws_figures(data_dir: Path, tmp_path: Path, capsys: Said) -> None:

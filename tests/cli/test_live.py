@@ -39,8 +39,11 @@ def test_live_estimates_records_and_finishes(tmp_path: Path, capsys: Said) -> No
     assert main(["live", "--finish", str(tmp_path / "r"), "-o", str(tmp_path / "o")]) == 0
     assert (tmp_path / "o" / "report.html").exists()
     known = str(tmp_path / "o" / "parameters.json")
-    assert main(["live", "--source", source, *PERSON, "--parameters", known, "--lag", "10"]) == 0
-    assert "go on from" in capsys.readouterr().out
+    assert main(["live", "--source", source, *PERSON, "--parameters", known, "--lag", "0.1"]) == 0
+    said = capsys.readouterr().out
+    assert "go on from" in said and "Estimates come 100 ms late" in said
+    assert main(["live", "--source", source, *PERSON, "--lag", "20"]) == 2
+    assert "lag_s is 20.0, expected seconds (no longer frames)" in " ".join(capsys.readouterr().err.split())
 
 
 @pytest.mark.skipif(os.name != "posix", reason="limits of processes are set by POSIX calls")

@@ -18,8 +18,8 @@ CASES = {
 }
 
 
-def stepped(c, lag, frames, **options):
-    smoother = _core.FixedLag(c.filter(), lag, **options)
+def stepped(c, lag, frames):
+    smoother = _core.FixedLag(c.filter(), lag)
     d = c.data
     for k in range(frames):
         dt = d.time[k] - d.time[k - 1] if k else 0.0
@@ -32,7 +32,7 @@ def stepped(c, lag, frames, **options):
 def test_equals_the_full_smoother_on_the_data_until_now(name, lag):
     c = CASES[name]()
     frames = len(c.data.time)
-    for k, smoother in stepped(c, lag, frames, deviations=True):
+    for k, smoother in stepped(c, lag, frames):
         assert smoother.ready == (k >= lag)
         if k < lag or k % 5:
             continue
@@ -45,17 +45,25 @@ def test_equals_the_full_smoother_on_the_data_until_now(name, lag):
         np.testing.assert_array_less(np.abs(smoother.state - full["smoothed_state"][there]) / sd, 1e-7)
 
 
-@pytest.mark.parametrize("name", ["planar", "spatial, all blocks", "contacts"])
-def test_without_deviations_the_mean_is_the_same(name):
+@pytest.mark.parametrize("lag", [1, 6, 60])
+@pytest.mark.parametrize("name", CASES)
+def test_a_run_gives_what_the_steps_give(name, lag):
     c = CASES[name]()
-    with_sd = [(s.state, s.delay_s) for _, s in stepped(c, 6, 40, deviations=True) if s.ready]
-    alone = [(s.state, s.delay_s) for _, s in stepped(c, 6, 40) if s.ready]
-    for (a, delay_a), (b, delay_b) in zip(with_sd, alone, strict=True):
-        np.testing.assert_array_equal(a, b)
-        assert delay_a == delay_b
+    frames = len(c.data.time)
+    out = c.lagged(lag)
+    for k, smoother in stepped(c, lag, frames):
+        if smoother.ready and not k % 7:
+            np.testing.assert_array_equal(out["smoothed_state"][k - lag], smoother.state)
+            np.testing.assert_array_equal(out["smoothed_state_sd"][k - lag], smoother.state_sd)
+    filtered, smoothed = c.data.run(c.filter().run), c.smoothed()
+    np.testing.assert_array_equal(out["state"], filtered["state"])
+    last = slice(max(0, frames - lag - 1), None)  # fewer than the lag follow them: as if smoothed
+    np.testing.assert_allclose(out["smoothed_state_sd"][last], smoothed["smoothed_state_sd"][last], rtol=1e-9)
+    off = np.abs(out["smoothed_moments"] - smoothed["smoothed_moments"])[last] / smoothed["smoothed_moments_sd"][last]
+    assert off.max() < 1e-5 or name == "bounds"
 
 
-def test_without_deviations_bounds_are_kept_too():
+def test_bounds_are_kept_too():
     c = CASES["bounds"]()
     for _, smoother in stepped(c, 6, 60):
         if smoother.ready:
@@ -68,7 +76,7 @@ def test_a_refused_sample_counts_as_a_frame_in_which_nothing_was_measured():
     refused.data.markers[15, 0] = np.inf
     missing.data.markers[15], missing.data.wrench[15] = np.nan, np.nan
     d = refused.data
-    a, b = _core.FixedLag(refused.filter(), 4, True), _core.FixedLag(missing.filter(), 4, True)
+    a, b = _core.FixedLag(refused.filter(), 4), _core.FixedLag(missing.filter(), 4)
     for k in range(40):
         dt = d.time[k] - d.time[k - 1] if k else 0.0
         if k == 15:
@@ -89,6 +97,5 @@ def test_what_is_not_there_is_refused_by_name():
     smoother = _core.FixedLag(c.filter(), 3)
     with pytest.raises(ValueError, match="no smoothed frame before frame 3"):
         _ = smoother.state
-    *_, (_, smoother) = stepped(c, 3, 5)
-    with pytest.raises(ValueError, match="made without deviations"):
+    with pytest.raises(ValueError, match="no smoothed frame before frame 3"):
         _ = smoother.state_sd

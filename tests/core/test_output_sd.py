@@ -48,7 +48,7 @@ def test_smoothed(name):
     out = c.smoothed()
     frames = len(c.data.time)
     for lag in (1, 5, frames - 1):
-        smoother = _core.FixedLag(c.filter(), lag, deviations=True)
+        smoother = _core.FixedLag(c.filter(), lag)
         for k in range(frames):
             smoother.step(c.data.time[k] - c.data.time[k - 1] if k else 0.0, c.data.markers[k], c.data.wrench[k])
         there = frames - 1 - lag

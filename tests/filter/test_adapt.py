@@ -106,7 +106,7 @@ def test_what_was_found_is_written_and_a_preset_fixes_it(tmp_path: Path) -> None
     fixed = planar(Noise(adapt=False, kinematic_variance_scale=0.5)).run(recording)
     assert fixed.config["noise_used"]["kinematic_variance_scale"] == 0.5
     # as it would be live, nothing is known of what comes
-    assert planar(Noise()).run(recording, smooth=False).config["noise_used"]["kinematic_variance_scale"] == 1.0
+    assert planar(Noise()).run(recording, lag_s=0.0).config["noise_used"]["kinematic_variance_scale"] == 1.0
 
 
 def test_too_few_frames_leave_the_noise_as_declared() -> None:

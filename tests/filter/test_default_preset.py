@@ -29,12 +29,12 @@ def trial() -> SimulatedTrial:
 
 @pytest.fixture(scope="module")
 def plain(trial: SimulatedTrial) -> Estimate:
-    return estimator().run(trial.recording, smooth=False)
+    return estimator().run(trial.recording, lag_s=0.0)
 
 
 @pytest.fixture(scope="module")
 def smoothed(trial: SimulatedTrial) -> Estimate:
-    return estimator().run(trial.recording, smooth=True)
+    return estimator().run(trial.recording, lag_s=np.inf)
 
 
 def rms(estimate: Estimate, trial: SimulatedTrial, name: str) -> np.ndarray:
@@ -74,12 +74,12 @@ def test_smoothing_comes_closer_to_the_truth_and_is_surer(
         assert (after <= live * (1.0 + 1e-9)).all() or name == "moments_sd", name
         assert after.mean() < live.mean()
     np.testing.assert_array_equal(smoothed.data["nis"].values, plain.data["nis"].values)
-    assert smoothed.config["smooth"] is True
+    assert smoothed.config["lag_s"] == smoothed.lag_s == np.inf and smoothed.smoothed
 
 
 def test_smoothing_needs_bounds_that_have_a_smoother(trial: SimulatedTrial) -> None:
-    with pytest.raises(ConfigError, match="smooth: bounds are kept by constraint 'gain'"):
-        estimator(noise=dynakin.presets.paper()).run(trial.recording, smooth=True)
+    with pytest.raises(ConfigError, match="lag_s: bounds are kept by constraint 'gain'"):
+        estimator(noise=dynakin.presets.paper()).run(trial.recording, lag_s=np.inf)
 
 
 def test_a_recording_is_smoothed_unless_the_settings_have_no_smoother(
@@ -89,9 +89,9 @@ def test_a_recording_is_smoothed_unless_the_settings_have_no_smoother(
     np.testing.assert_array_equal(by_default.data["state"].values, smoothed.data["state"].values)
     assert not any(message.startswith("Not smoothed") for message in by_default.messages)
     paper = estimator(noise=dynakin.presets.paper())
-    refused, live = paper.run(trial.recording), paper.run(trial.recording, smooth=False)
+    refused, live = paper.run(trial.recording), paper.run(trial.recording, lag_s=0.0)
     np.testing.assert_array_equal(refused.data["state"].values, live.data["state"].values)
-    assert refused.config["smooth"] is False
+    assert refused.lag_s == live.lag_s == 0.0
     (said,) = [message for message in refused.messages if message.startswith("Not smoothed")]
     assert "'gain', which has no smoother" in said and "as it would be live" in said
     assert not any(message.startswith("Not smoothed") for message in live.messages)  # it was asked for
@@ -110,7 +110,7 @@ def test_what_only_describes_live_estimates_is_no_headline_of_a_smoothed_one(
 
 
 def test_the_delayed_frame_is_the_smoothers_of_what_was_seen(trial: SimulatedTrial) -> None:
-    live = estimator(lag=15).start(trial.recording)
+    live = estimator().start(trial.recording, lag_s=0.15)
     assert live.delayed() is None
     for sample in samples(trial.recording)[:120]:
         now = live.step(sample)
@@ -121,8 +121,44 @@ def test_the_delayed_frame_is_the_smoothers_of_what_was_seen(trial: SimulatedTri
     markers, wrench = recording_arrays(trial.recording, offline.calibrated)
     arrays = offline.run_smoothed_arrays(trial.recording.time[:120], markers[:120], wrench[:120])
     np.testing.assert_allclose(delayed.speeds, arrays["state"][104, 7:14], atol=1e-8)
-    with pytest.raises(ConfigError, match=r"expected Estimator\(\.\.\., lag=frames\)"):
+    with pytest.raises(ConfigError, match=r"expected Estimator\.start\(\.\.\., lag_s=SECONDS\)"):
         offline.delayed()
+
+
+def test_a_recording_with_a_lag_is_what_live_use_with_that_lag_gives(trial: SimulatedTrial, plain: Estimate) -> None:
+    late = estimator().run(trial.recording, lag_s=0.05)
+    assert late.lag_s == pytest.approx(0.05) and not late.smoothed and "50 ms late" in repr(late)
+    live = estimator().start(trial.recording, lag_s=0.05)
+    data = late.data
+    for k, sample in enumerate(samples(trial.recording)[:400]):
+        live.step(sample)
+        if k < 5 or k % 37:
+            continue
+        delayed, sd = live.delayed(), live.deviations(delayed=True)
+        assert delayed is not None and delayed.time_s == pytest.approx(late.time[k - 5])
+        for name in ("coordinates", "speeds", "accelerations", "moments"):
+            np.testing.assert_allclose(delayed.values[name], data[name].values[k - 5], rtol=1e-9, atol=1e-9)
+            np.testing.assert_allclose(sd[name].values, data[f"{name}_sd"].values[k - 5], rtol=1e-7, atol=1e-12)
+    # the last frame has none after it
+    np.testing.assert_allclose(data["state"].values[-1], plain.data["state"].values[-1], atol=1e-12)
+    assert (data["state_sd"].values <= plain.data["state_sd"].values * (1.0 + 1e-9)).all()
+    assert rms(late, trial, "accelerations").mean() < 0.8 * rms(plain, trial, "accelerations").mean()
+
+
+@pytest.mark.parametrize("lag_s", [-0.1, 1.5, 20, float("nan"), "0.05", True])
+def test_lags_that_nothing_can_hold(trial: SimulatedTrial, lag_s: float) -> None:
+    for use in (estimator().run, estimator().start):
+        with pytest.raises(ConfigError, match=r"lag_s is .*, expected seconds \(no longer frames\), 0 to 1"):
+            use(trial.recording, lag_s=lag_s)
+
+
+def test_a_lag_of_a_calibrated_model_needs_the_rate_of_its_samples(trial: SimulatedTrial) -> None:
+    calibrated = estimator().calibrate(trial.recording)
+    with pytest.raises(ConfigError, match="expected rate_hz"):
+        estimator().start(calibrated, lag_s=0.05)
+    assert [estimator().start(calibrated, lag_s=0.05, rate_hz=rate).lag for rate in (100.0, 60.0, 5.0)] == [5, 3, 1]
+    with pytest.raises(ConfigError, match="all frames are known of a recording alone"):
+        estimator().start(trial.recording, lag_s=np.inf)
 
 
 def test_deviations_on_demand_are_those_of_the_run(trial: SimulatedTrial, plain: Estimate) -> None:
@@ -208,18 +244,16 @@ def test_a_joint_that_nobody_sees_is_held_and_comes_back(trial: SimulatedTrial) 
         markers[400:700, wrist] = np.nan
 
     without = with_markers(trial.recording, hidden)
-    result = estimator(side="right").run(without, smooth=False)
+    result = estimator(side="right").run(without, lag_s=0.0)
     elbow = result.data["coordinates"].sel(coordinate="elbow").values
     sd = result.data["coordinates_sd"].sel(coordinate="elbow").values
     assert (sd[480:700] > 0.2).all() and sd[720] < 0.1
     assert any(event.subject == "elbow" and "held" in event.message for event in result.events)
-    whole = (
-        estimator(side="right").run(trial.recording, smooth=False).data["coordinates"].sel(coordinate="elbow").values
-    )
+    whole = estimator(side="right").run(trial.recording, lag_s=0.0).data["coordinates"].sel(coordinate="elbow").values
     assert np.degrees(np.abs(elbow - whole)[400:700]).max() < 60.0  # carried on, it would be at its joint limit
     later = np.abs(elbow - whole)[750:]
     assert (later < 3.0 * sd[750:]).all()
-    smoothed = estimator(side="right").run(without, smooth=True).data
+    smoothed = estimator(side="right").run(without, lag_s=np.inf).data
     assert np.isfinite(smoothed["state"].values).all()
     assert (smoothed["coordinates_sd"].sel(coordinate="elbow").values[400:700] <= sd[400:700] + 1e-12).all()
 

@@ -29,7 +29,7 @@ def trial() -> SimulatedTrial:
 @pytest.mark.parametrize(("preset", "rows"), [("paper", 38), ("default", 37)])  # the paper's total mass is a row
 def test_live_steps_equal_the_run(trial: SimulatedTrial, preset: str, rows: int) -> None:
     noise = dynakin.presets.preset(preset)
-    offline = estimator(noise=noise).run(trial.recording, smooth=False)
+    offline = estimator(noise=noise).run(trial.recording, lag_s=0.0)
     live = estimator(noise=noise).start(trial.recording)
     for k, sample in enumerate(samples(trial.recording)[:200]):
         step = live.step(sample)
@@ -69,7 +69,7 @@ def test_without_sensor_noise_the_posture_comes_out(trial: SimulatedTrial) -> No
 
 def test_deviations_of_parameters_never_grow_and_coordinates_stay_finite(trial: SimulatedTrial) -> None:
     noise = dynakin.presets.default().changed(length_drift_density_m2_s=0.0)
-    result = estimator(noise=noise).run(trial.recording, smooth=False)
+    result = estimator(noise=noise).run(trial.recording, lag_s=0.0)
     sd = result.data["state_sd"].values
     constants = [k for k, name in enumerate(result.data["element"].values) if str(name).startswith("length/")]
     held = result.data["constrained"].values > 0  # a restricted gain may widen what it holds
@@ -90,7 +90,7 @@ def test_noise_settings_reach_the_filter(trial: SimulatedTrial) -> None:
 def test_bounds_are_kept_at_every_frame(trial: SimulatedTrial, preset: str) -> None:
     bounds = dynakin.Bounds(marker_threshold_m=0.002, length_fraction=0.01)
     tight = estimator(noise=dynakin.presets.preset(preset), bounds=bounds)
-    result, tracker = tight.track(trial.recording, smooth=False)
+    result, tracker = tight.track(trial.recording, lag_s=0.0)
     initial = tracker.calibrated
     state = result.data["state"].values
     assert (state >= initial.lower).all() and (state <= initial.upper).all()
@@ -207,9 +207,11 @@ def test_steps_go_forward_in_time(trial: SimulatedTrial) -> None:
         live.step(first)
 
 
-@pytest.mark.parametrize(("smooth", "frames"), [(False, 601), (True, 3 * 601)])  # forwards, again, and back
-def test_progress_reaches_the_end(trial: SimulatedTrial, smooth: bool, frames: int) -> None:
+@pytest.mark.parametrize(
+    ("lag_s", "frames"), [(0.0, 601), (0.02, 2 * 601), (np.inf, 3 * 601)]
+)  # forwards, again, and back
+def test_progress_reaches_the_end(trial: SimulatedTrial, lag_s: float, frames: int) -> None:
     seen: list[tuple[int, int]] = []
-    estimator().run(trial.recording, smooth=smooth, progress=lambda done, total: seen.append((done, total)))
+    estimator().run(trial.recording, lag_s=lag_s, progress=lambda done, total: seen.append((done, total)))
     assert seen[-1] == (frames, frames)
     assert [done for done, _ in seen] == sorted(done for done, _ in seen)

@@ -91,7 +91,7 @@ def test_a_seat_that_nothing_measures_is_noticed_and_leaves_no_moments(seed: int
 def blind() -> Estimate:
     """A walk without plates."""
     walk = simulate("fullbody", "gait", 3, 4.0, 50.0).recording
-    return person("fullbody").run(walk.with_plates(()), smooth=False)
+    return person("fullbody").run(walk.with_plates(()), lag_s=0.0)
 
 
 def test_without_plates_one_foot_that_may_stand_is_derived_and_two_are_a_prior(blind: Estimate) -> None:
@@ -145,7 +145,7 @@ def test_two_feet_on_one_plate_are_a_prior_and_their_sum_is_measured() -> None:
     force, moment = right.force + left.force, right.moment + left.moment
     cop = (right.cop * right.force[:, [1]] + left.cop * left.force[:, [1]]) / force[:, [1]]
     free = moment - np.cross(cop, force)
-    found = person("fullbody").run(squat.with_plates((Plate("one", force, moment, cop, free, None),)), smooth=False)
+    found = person("fullbody").run(squat.with_plates((Plate("one", force, moment, cop, free, None),)), lag_s=0.0)
     assert (found.data["foot_contact"].values == SHARED_PLATE).all()
     assert (foot_sources(found.data) == PRIOR).all() and not wrench_sources(found.data).any()
     for joint in ("hip_flexion", "knee_angle", "ankle_angle"):
@@ -164,7 +164,7 @@ def test_a_box_that_nothing_measures_is_no_flight() -> None:
     """Someone who stands while the plates read nothing stands on something."""
     recording = simulate("fullbody", "squat", 4, 6.0, 50.0).recording
     off = recording.time < 2.0
-    found = person("fullbody").run(with_loads(recording, np.where(off, 0.0, 1.0)), smooth=False)
+    found = person("fullbody").run(with_loads(recording, np.where(off, 0.0, 1.0)), lag_s=0.0)
     contact = found.data["foot_contact"].transpose("time", "foot").values
     early, late = recording.time < 1.9, recording.time > 2.4
     assert (contact[early] == UNMEASURED).all() and (contact[late] == ON_PLATE).all()
@@ -208,10 +208,10 @@ def on_a_belt(walk: Recording) -> Recording:
     return replace(walk, markers=walk.markers + shift[:, None], plates=plates)
 
 
-@pytest.mark.parametrize("smooth", [False, pytest.param(True, marks=pytest.mark.nightly)])
-def test_a_foot_beside_the_plates_alone_is_derived(smooth: bool) -> None:
+@pytest.mark.parametrize("lag_s", [0.0, pytest.param(np.inf, marks=pytest.mark.nightly)])
+def test_a_foot_beside_the_plates_alone_is_derived(lag_s: float) -> None:
     walk = simulate("fullbody", "gait", 3, 4.0, 50.0).recording
-    found = person("fullbody").run(walk.with_plates(walk.plates[1:]), smooth=smooth)
+    found = person("fullbody").run(walk.with_plates(walk.plates[1:]), lag_s=lag_s)
     codes = sources(found, "ankle_angle_r"), sources(found, "ankle_angle_l")
     assert any((code == DERIVED).any() for code in codes)
     moments = found.data["moments"].sel(coordinate=["ankle_angle_r", "ankle_angle_l"]).values
@@ -225,7 +225,7 @@ class TestRealRecordings:
         folder = data_dir / "opencap_subject4"
         recording = dynakin.read(folder / "STS1.trc", folder / "STS1_grf.mot").window(0.0, 5.2)
         model = load_model("fullbody", Subject(mass_kg=60.05, height_m=1.7), markers="opencap")
-        found = Estimator(model).run(recording, smooth=False)
+        found = Estimator(model).run(recording, lag_s=0.0)
         time = found.time
         seated = (time < 0.8) | ((time > 2.6) & (time < 3.5))
         alone = ((time > 1.07) & (time < 2.26)) | ((time > 3.74) & (time < 4.89))
@@ -253,7 +253,7 @@ class TestRealRecordings:
         folder = data_dir / "rajagopal"
         recording = dynakin.read(folder / "motion_capture_run.trc", folder / "grf_run.mot").window(0.2, 2.5)
         model = load_model(str(folder / "subject_scaled_run.osim"), Subject(mass_kg=72.84, height_m=1.8))
-        found = Estimator(model).run(recording, smooth=True)
+        found = Estimator(model).run(recording, lag_s=np.inf)
         names, reference = storage(folder / "run_id.sto")
         inner = (found.time > 0.5) & (found.time < 2.2)
         assert (found.data["moment_source"].values[inner] == 0).all()

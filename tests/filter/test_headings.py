@@ -114,7 +114,7 @@ def test_lost_frames_of_who_faces_off_x_stay_lost_and_lose_nothing_else(data_dir
     gap = slice(200, 230)
     markers[gap] = np.nan
     trial = replace(trial, markers=markers)
-    estimate = Estimator(load_model("fullbody", Subject(mass_kg=60.05, height_m=1.70))).run(trial, smooth=False)
+    estimate = Estimator(load_model("fullbody", Subject(mass_kg=60.05, height_m=1.70))).run(trial, lag_s=0.0)
     assert estimate.lost[205:230].any() and not estimate.lost[:195].any()
     failures = Failures()
     Result(estimate, failures=failures).save(tmp_path / "gap")

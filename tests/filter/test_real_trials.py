@@ -19,7 +19,7 @@ def squats1(data_dir: Path) -> dynakin.Estimate:
     folder = data_dir / "opencap_subject4"
     recording = dynakin.read(folder / "squats1.trc", forces=folder / "squats1_grf.mot")
     model = dynakin.load_model("sagittal7", subject=dynakin.Subject(mass_kg=60.05), markers="opencap")
-    return dynakin.Estimator(model).run(recording, smooth=False)  # the paper filters
+    return dynakin.Estimator(model).run(recording, lag_s=0.0)  # the paper filters
 
 
 def test_squats1_follows_markers_and_plates_as_the_paper_does(squats1: dynakin.Estimate) -> None:

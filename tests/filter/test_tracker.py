@@ -20,8 +20,8 @@ def test_an_estimator_does_not_change(recording: dynakin.Recording) -> None:
     made = estimator()
     with pytest.raises(dataclasses.FrozenInstanceError):
         made.side = "left"  # type: ignore[misc]
-    other = dataclasses.replace(made, side="right", lag=3)
-    assert (made.side, other.side, other.lag) == ("auto", "right", 3)
+    other = dataclasses.replace(made, side="right", vertical="+Z")
+    assert (made.side, other.side, other.vertical) == ("auto", "right", "+Z")
     assert other.noise is made.noise and other.model is made.model
 
 

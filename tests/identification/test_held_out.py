@@ -56,7 +56,7 @@ def test_chosen_is_the_table_where_the_table_is_kept(
 def test_predictions_are_smoothed_unless_they_are_to_be_as_live(
     fitted: IdentifyingTrial, parts: tuple[Recording, Recording]
 ) -> None:
-    live = replace(fitted, setup=replace(fitted.setup, smooth=False))
+    live = replace(fitted, setup=replace(fitted.setup, lag_s=0.0))
     rms = [
         {(row.quantity, row.method): row.rms.mean for row in judge(predict_blind(one, parts[1]), parts[1])}
         for one in (fitted, live)

@@ -42,7 +42,7 @@ def estimated(folder: Path, name: str, model: str, mass: float, out: Path) -> tu
     definition = load_model(folder / model if model.endswith(".osim") else model, Subject(mass_kg=mass, height_m=1.74))
     noise = presets.default().changed(length_drift_density_m2_s=0.0)
     estimator = Estimator(definition, noise, estimate=("lengths", "markers", "inertia"))
-    estimate, tracker = estimator.track(recording, smooth=True)
+    estimate, tracker = estimator.track(recording, lag_s=np.inf)
     Result(estimate).save(out)
     return definition, estimate, tracker
 

@@ -28,13 +28,13 @@ def squats1(data_dir: Path, noise: dynakin.Noise) -> dynakin.Estimate:
     folder = data_dir / "opencap_subject4"
     recording = dynakin.read(folder / "squats1.trc", forces=folder / "squats1_grf.mot")
     model = dynakin.load_model("sagittal7", subject=dynakin.Subject(mass_kg=60.05), markers="opencap")
-    return dynakin.Estimator(model, noise).run(recording, smooth=False)
+    return dynakin.Estimator(model, noise).run(recording, lag_s=0.0)
 
 
 def simulated(noise: dynakin.Noise) -> dynakin.Estimate:
     subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
     model = dynakin.load_model("sagittal7", subject=subject, markers="opencap")
-    return dynakin.Estimator(model, noise).run(simulate_squat(seed=1, duration_s=6.0).recording, smooth=False)
+    return dynakin.Estimator(model, noise).run(simulate_squat(seed=1, duration_s=6.0).recording, lag_s=0.0)
 
 
 def summary(estimate: dynakin.Estimate, frames: dict[int, float]) -> dict:

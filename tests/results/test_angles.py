@@ -69,12 +69,12 @@ def test_a_standing_trial_gives_the_zero() -> None:
     trial = simulate_squat(seed=3, duration_s=6.0)
     subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
     estimator = dynakin.Estimator(dynakin.load_model("sagittal7", subject=subject, markers="opencap"))
-    estimate = estimator.run(trial.recording, smooth=False)
+    estimate = estimator.run(trial.recording, lag_s=0.0)
     window = standing_window(trial.recording)
     assert window is not None
     still = trial.recording.window(float(trial.recording.time[0]), float(trial.recording.time[window.stop - 1]))
     own, other = standing_zero(estimator, estimate, None), standing_zero(estimator, estimate, still)
-    whole = estimator.run(trial.recording, smooth=True)  # its places are those of the end in every frame
+    whole = estimator.run(trial.recording, lag_s=np.inf)  # its places are those of the end in every frame
     for name in ("ankle", "knee", "hip", "lumbar"):
         mean = float(whole.data["coordinates"].sel(coordinate=name).values[window].mean())
         assert standing_zero(estimator, whole, None)[name] == pytest.approx(mean, abs=1e-12)

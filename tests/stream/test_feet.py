@@ -29,14 +29,15 @@ from support.stream.offline import offline_states
 LAG = 5
 
 
-def session(source: Replay, lag: int = 0, standing_s: float = 2.0) -> tuple[Live, list[LiveFrame], list[str]]:
+def session(source: Replay, lag_s: float = 0.0, standing_s: float = 2.0) -> tuple[Live, list[LiveFrame], list[str]]:
     model = dynakin.load_model("fullbody", dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male"))
     frames: list[LiveFrame] = []
     said: list[str] = []
     live = Live(
-        dynakin.Estimator(model, lag=lag),
+        dynakin.Estimator(model),
         [source],
         [Callback(frames.append)],
+        lag_s=lag_s,
         say=said.append,
         standing_s=standing_s,
         standing_wait_s=standing_s,
@@ -63,7 +64,7 @@ def squat_in_gait() -> Recording:
 
 @pytest.fixture(scope="module")
 def squat(trial: SimulatedTrial) -> tuple[Live, list[LiveFrame], list[str]]:
-    return session(Replay(trial.recording, speed=0.0, duration_s=3.5), lag=LAG, standing_s=1.0)
+    return session(Replay(trial.recording, speed=0.0, duration_s=3.5), lag_s=0.01 * LAG, standing_s=1.0)
 
 
 def test_moments_of_a_whole_body_agree_with_the_offline_run(data_dir: Path) -> None:
@@ -74,7 +75,7 @@ def test_moments_of_a_whole_body_agree_with_the_offline_run(data_dir: Path) -> N
     source = Replay(recording, speed=0.0)
     live = Live(estimator, [source], [Callback(frames.append)], say=lambda text: None, standing_wait_s=2.0)
     live.run()
-    offline = estimator.run(recording, smooth=False)
+    offline = estimator.run(recording, lag_s=0.0)
     names = [str(name) for name in offline.data["coordinate"].values]
     t0 = frames[0].estimate.time_s
     at = [k for k, t in enumerate(recording.time) if t >= t0 - 1e-6][: len(frames)]

@@ -70,7 +70,8 @@ def test_every_channel_has_its_label_unit_and_value() -> None:
                 expected = [frame.state[begun.last.initial.names.index(label)] for label in labels]
             else:
                 assert labels == list(begun.last.model.coordinate_names)
-                expected = getattr(frame.estimate, kind)
+                assert frame.published is not None
+                expected = getattr(frame.published, kind)
             np.testing.assert_array_equal(values, expected)
     finally:
         again.set()

@@ -12,6 +12,7 @@ import pytest
 
 import dynakin
 from dynakin.errors import ModelError, StreamError
+from dynakin.filter.samples import sample_arrays
 from dynakin.recordings.recording import Recording
 from dynakin.simulation.trial import simulate_squat
 from dynakin.stream import start
@@ -30,15 +31,15 @@ def squat() -> Recording:
     return simulate_squat(seed=1, duration_s=8.0).recording
 
 
-def estimator(lag: int = 0) -> dynakin.Estimator:
+def estimator() -> dynakin.Estimator:
     subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
-    return dynakin.Estimator(dynakin.load_model("sagittal7", subject=subject, markers="opencap"), lag=lag)
+    return dynakin.Estimator(dynakin.load_model("sagittal7", subject=subject, markers="opencap"))
 
 
-def run(source: object, lag: int = 0, **options: object) -> tuple[list[LiveFrame], list[str], Live]:
+def run(source: object, **options: object) -> tuple[list[LiveFrame], list[str], Live]:
     frames: list[LiveFrame] = []
     said: list[str] = []
-    live = Live(estimator(lag), [source], [Callback(frames.append)], say=said.append, **options)  # type: ignore[list-item,arg-type]
+    live = Live(estimator(), [source], [Callback(frames.append)], say=said.append, **options)  # type: ignore[list-item,arg-type]
     live.run()
     return frames, said, live
 
@@ -63,10 +64,30 @@ def test_live_equals_offline_on_the_same_samples(squat: Recording) -> None:
 
 
 def test_a_lag_is_shown_as_its_delay(squat: Recording) -> None:
-    frames, _, _ = run(Replay(squat, speed=0.0, duration_s=4.0), lag=20)
+    frames, _, _ = run(Replay(squat, speed=0.0, duration_s=4.0), lag_s=0.2)
     last = frames[-1]
-    assert last.smoothed is not None
+    assert last.smoothed is not None and last.published is last.smoothed
     assert last.status.delay_s == pytest.approx(0.2, abs=1e-6) == last.estimate.time_s - last.smoothed.time_s
+
+
+def test_a_live_session_with_a_lag_gives_what_a_recording_with_it_gives(squat: Recording) -> None:
+    frames, said, live = run(Replay(squat, speed=0.0, duration_s=5.0))
+    assert live.tracker.lag == 5 and any("50 ms late" in text for text in said)  # as recommended
+    assert frames[4].published is None and frames[5].published is not None
+    initial, samples = live.tracker.calibrated, [frame.fused.sample for frame in frames]
+    markers, wrench = (np.stack(rows) for rows in zip(*(sample_arrays(one, initial) for one in samples), strict=True))
+    time_ = np.array([one.time_s for one in samples])
+    arrays = live.tracker.fresh().run_lagged_arrays(time_, markers, wrench, 5)
+    late = [frame.published for frame in frames[5:] if frame.published is not None]
+    np.testing.assert_allclose([one.time_s for one in late], time_[:-5], atol=1e-9)
+    np.testing.assert_allclose(np.stack([one.moments for one in late]), arrays["moments"][:-5], atol=1e-8)
+    spread = [(k, frame.deviations["moments"]) for k, frame in enumerate(frames) if frame.deviations is not None]
+    assert spread  # as the queue allows
+    for k, sd in spread:
+        np.testing.assert_allclose(sd.values, arrays["moments_sd"][k - 5], rtol=1e-7)
+    at_once, said, _ = run(Replay(squat, speed=0.0, duration_s=4.0), lag_s=0.0)
+    assert not any("late" in text for text in said)
+    assert all(frame.published is frame.estimate and frame.status.delay_s == 0.0 for frame in at_once)
 
 
 def test_wrong_labels_list_what_came_and_what_was_expected(squat: Recording) -> None:

@@ -553,6 +553,11 @@ class Filter:
         run, then backwards over the same frames: the arrays of run, and smoothed_state, _markers, _wrench and _moments, each also with _sd, and backward_us. The filter then stands where run would have left it; after an interruption it stands anywhere. progress counts both ways: total is twice the frames. Memory beside the arrays: T / stretch checkpoints and stretch frames; 0: sqrt(T). Raises ValueError where bounds are kept by constraint 'gain' or 'sigmoid'.
         """
 
+    def run_lagged(self, time: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], markers: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], wrench: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], lag: int, progress: object | None = None, feet: ContactLoads | None = None, wrench_covariance: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)] | None = None, wrench_effects: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)] | None = None) -> dict:
+        """
+        run_smoothed's arrays (but backward_us), where each frame is smoothed from the frames until `lag` later alone, as a FixedLag gives it while it is measured; the last ones from those that there are. Time goes with frames times lag. Raises as run_smoothed.
+        """
+
     def score(self, time: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)], markers: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)], wrench: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], first: int, end: int, ahead: int = 0, lost_m: float = float('inf'), trace: bool = False) -> dict:
         """
         run for its figures alone, over frames 0 to end - 1, of which those from first on count: sums of squares and counts a channel (3M + 6: markers, then the body's own wrench) of the estimate (estimated_), of the expectation before the frame (predicted_) and of that so many frames earlier (ahead_); sums of nis, log_likelihood, n_rows, refused sensors; frames counted and done; divergence, a word where the filter diverged or the markers were further off than lost_m for ten frames, which ends the run. With trace also state (T, n) and moments (T, C).
@@ -563,9 +568,9 @@ class FixedLag:
     Steps a Filter and smooths the frame that lies `lag` frames back, from all frames until now.
     """
 
-    def __init__(self, filter: Filter, lag: int, deviations: bool = False) -> None:
+    def __init__(self, filter: Filter, lag: int) -> None:
         """
-        The filter stands before the first frame and is stepped by this object alone. Each step costs in proportion to the lag; with deviations much more.
+        The filter stands before the first frame and is stepped by this object alone. Each step costs in proportion to the lag, and so, much more, do state_sd and covariance where they are asked for.
         """
 
     def step(self, dt: float, markers: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], wrench: Annotated[NDArray[numpy.float64], dict(shape=(6), order='C')], wrench_covariance: Annotated[NDArray[numpy.float64], dict(shape=(6, 6), order='F')] | None = None, wrench_effects: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='F')] | None = None) -> StepReport:

@@ -19,20 +19,14 @@ void check_ready(const FixedLag& lag) {
                                 " (see ready)");
 }
 
-void check_deviations(const FixedLag& lag) {
-  check_ready(lag);
-  if (!lag.deviations()) throw std::invalid_argument("fixed lag: made without deviations");
-}
-
 }  // namespace
 
 void bind_fixed_lag(nb::module_& m) {
   nb::class_<FixedLag>(m, "FixedLag",
                        "Steps a Filter and smooths the frame that lies `lag` frames back, from all frames until now.")
-      .def(nb::init<Filter&, int, bool>(), nb::arg("filter"), nb::arg("lag"), nb::arg("deviations") = false,
-           nb::keep_alive<1, 2>(),
+      .def(nb::init<Filter&, int>(), nb::arg("filter"), nb::arg("lag"), nb::keep_alive<1, 2>(),
            "The filter stands before the first frame and is stepped by this object alone. Each step costs in "
-           "proportion to the lag; with deviations much more.")
+           "proportion to the lag, and so, much more, do state_sd and covariance where they are asked for.")
       .def(
           "step",
           [](FixedLag& lag, double dt, const Array2& markers, const Vector6& wrench,
@@ -56,15 +50,15 @@ void bind_fixed_lag(nb::module_& m) {
           "smoothed x (n,) of the frame delay_s ago")
       .def_prop_ro(
           "state_sd",
-          [](const FixedLag& lag) -> Eigen::VectorXd {
-            check_deviations(lag);
+          [](FixedLag& lag) -> Eigen::VectorXd {
+            check_ready(lag);
             return lag.covariance().diagonal().cwiseMax(0.0).cwiseSqrt();
           },
           "its standard deviations (n,)")
       .def_prop_ro(
           "covariance",
-          [](const FixedLag& lag) -> Eigen::MatrixXd {
-            check_deviations(lag);
+          [](FixedLag& lag) -> Eigen::MatrixXd {
+            check_ready(lag);
             return lag.covariance();
           },
           "its covariance (n, n)");

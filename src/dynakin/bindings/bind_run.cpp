@@ -6,6 +6,7 @@
 
 #include "arrays.hpp"
 #include "contacts.hpp"
+#include "dynakin/lagged_run.hpp"
 #include "dynakin/smoother.hpp"
 #include "module.hpp"
 #include "trial.hpp"
@@ -137,6 +138,31 @@ nb::dict run_smoothed(Filter& filter, const Array1& time, const Array3& markers,
   return out;
 }
 
+nb::dict run_lagged(Filter& filter, const Array1& time, const Array3& markers, const Array2& wrench, int lag,
+                    nb::object progress, const PyContactLoads* loads, const std::optional<Array3>& wrench_covariance,
+                    const std::optional<Array3>& wrench_effects) {
+  const Trial trial = trial_of(filter, time, markers, wrench, wrench_covariance, wrench_effects);
+  Feet feet(filter.model(), loads, trial.frames), lagged_feet(filter.model(), loads, trial.frames);
+  const std::size_t frames = trial.frames;
+  LaggedRun lagged_run(filter, trial, lag);
+  RunRecord record(filter.model(), frames);
+  StateRecord lagged(filter.model(), frames, true);
+  constexpr std::size_t together = 16;  // a frame takes longer than in a run
+  for (std::size_t first = 0; first < frames; first += together) {
+    const std::size_t end = std::min(frames, first + together);
+    {
+      nb::gil_scoped_release release;
+      lagged_run.run(first, end, record, lagged, feet.pointer(), lagged_feet.pointer());
+    }
+    look_up(progress, end, frames);
+  }
+  nb::dict out = arrays_of(std::move(record), frames);
+  add_arrays_of(std::move(lagged), frames, "smoothed_", "", out);
+  feet.add_arrays(filter.model(), "", false, out);
+  lagged_feet.add_arrays(filter.model(), "smoothed_", true, out);
+  return out;
+}
+
 }  // namespace
 
 void bind_run(nb::class_<Filter>& filter) {
@@ -160,5 +186,11 @@ void bind_run(nb::class_<Filter>& filter) {
            "_moments, each also with _sd, and backward_us. The filter then stands where run would have left it; after "
            "an interruption it stands anywhere. progress counts both ways: total is twice the frames. Memory beside "
            "the arrays: T / stretch checkpoints and stretch frames; 0: sqrt(T). Raises ValueError where bounds are "
-           "kept by constraint 'gain' or 'sigmoid'.");
+           "kept by constraint 'gain' or 'sigmoid'.")
+      .def("run_lagged", &run_lagged, nb::arg("time"), nb::arg("markers"), nb::arg("wrench"), nb::arg("lag"),
+           nb::arg("progress") = nb::none(), nb::arg("feet") = nb::none(), nb::arg("wrench_covariance") = nb::none(),
+           nb::arg("wrench_effects") = nb::none(),
+           "run_smoothed's arrays (but backward_us), where each frame is smoothed from the frames until `lag` later "
+           "alone, as a FixedLag gives it while it is measured; the last ones from those that there are. Time goes "
+           "with frames times lag. Raises as run_smoothed.");
 }

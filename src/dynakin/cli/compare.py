@@ -31,7 +31,7 @@ from dynakin.validation.yardsticks import HORIZON_S
 HORIZON_MS = 1000.0 * HORIZON_S
 
 
-@with_settings(*OF_A_MODEL, *OF_THE_LABORATORY, *OF_THE_PLATES, "smooth")
+@with_settings(*OF_A_MODEL, *OF_THE_LABORATORY, *OF_THE_PLATES, "lag_s")
 def compare(
     trials: Trials = None,
     forces: ForceEach = None,

@@ -20,6 +20,7 @@ from dynakin.cli.summary import end, print_summary
 from dynakin.errors import ConfigError
 from dynakin.filter.build import estimator_of
 from dynakin.recordings.read import FORCE_READERS, read
+from dynakin.settings.lag import LIVE_LAG_S
 from dynakin.settings.settings import Settings
 from dynakin.stream.fusion import DELAY_S
 from dynakin.stream.session import Live
@@ -61,7 +62,12 @@ def live(
         float | None, typer.Option(help="Longest wait for somebody to stand still, s (20; replay: 3).")
     ] = None,
     delay: Annotated[float, typer.Option(help="Longest wait for packets that are late, s.")] = DELAY_S,
-    lag: Annotated[int, typer.Option(help="Also smooth, so many frames back.")] = 0,
+    lag: Annotated[
+        float | None,
+        typer.Option(
+            help=f"By how much estimates may be late, s ({LIVE_LAG_S:g}): the frames until then help; 0: at once."
+        ),
+    ] = None,
     view: Annotated[bool, typer.Option("--view", help="Show it as a web page.")] = False,
     host: Annotated[str, typer.Option(help="Address of that page; 0.0.0.0: for everyone in the network.")] = (
         "127.0.0.1"
@@ -102,9 +108,10 @@ def live(
     sinks = _sinks(settings, record, publish, view, host, port)
     try:
         session = Live(
-            estimator_of(Settings.of({}, "live", (), settings), lag),
+            estimator_of(Settings.of({}, "live", (), settings)),
             sources,
             sinks,
+            lag_s=lag,
             delay_s=delay,
             standing_s=standing,
             standing_wait_s=wait if standing_wait is None else standing_wait,

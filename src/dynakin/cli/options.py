@@ -10,6 +10,7 @@ from typing import Annotated, Any, get_args
 
 import typer
 
+from dynakin.settings.lag import ALL_FRAMES
 from dynakin.settings.settings import Settings, option_names
 from dynakin.settings.template import config_template
 
@@ -42,13 +43,19 @@ def with_settings(*keys: str, **meanings: str) -> Callable[[Command], Command]:
         @wraps(command)
         def called(**arguments: Any) -> None:
             values = {key: arguments.pop(key) for key in keys}
+            if "lag_s" in keys:
+                values["lag_s"] = _lag(values["lag_s"], arguments.pop("smooth"))
             given = {key: _READ.get(key, _same)(value) for key, value in values.items() if value is not None}
             command(given=given, **arguments)
 
         parameters = []
         for parameter in inspect.signature(command, eval_str=True).parameters.values():
             own = [parameter.replace(kind=inspect.Parameter.KEYWORD_ONLY)]
-            parameters += [_option(key, meanings) for key in keys] if parameter.name == "given" else own
+            if parameter.name != "given":
+                parameters += own
+                continue
+            for key in keys:
+                parameters += [_option(key, meanings)] + ([_SMOOTH] if key == "lag_s" else [])
         called.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
         return called
 
@@ -63,6 +70,22 @@ def _option(key: str, meanings: dict[str, str]) -> inspect.Parameter:
     text = meanings.get(key) or " ".join(field.description.split("\n\n")[0].split())
     option = typer.Option(None, *option_names(key), help=text)
     return inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=option, annotation=kind | None)
+
+
+_SMOOTH = inspect.Parameter(
+    "smooth",
+    inspect.Parameter.KEYWORD_ONLY,
+    default=typer.Option(None, "--smooth/--live-like", help="Estimate from all frames (--lag inf), or as --lag 0."),
+    annotation=bool | None,
+)
+
+
+def _lag(lag_s: float | None, smooth: bool | None) -> float | None:
+    if smooth is None:
+        return lag_s
+    if lag_s is not None:
+        raise typer.BadParameter(f"--lag and {'--smooth' if smooth else '--live-like'}: expected one of them")
+    return ALL_FRAMES if smooth else 0.0
 
 
 def _forward(text: str) -> str | tuple[float, ...]:

@@ -23,7 +23,7 @@ from dynakin.validation.case import case_of
     *OF_A_MODEL,
     "parameters",
     "preset",
-    "smooth",
+    "lag_s",
     "estimate",
     *OF_THE_LABORATORY,
     *OF_THE_PLATES,

@@ -34,7 +34,7 @@ def identified_of(settings: Settings) -> IdentifiedSubject | None:
     return None if settings.parameters is None else read_identified(settings.parameters)
 
 
-def estimator_of(settings: Settings, lag: int = 0) -> Estimator:
+def estimator_of(settings: Settings) -> Estimator:
     """An estimator of the model with these settings.
 
     Raises:
@@ -53,5 +53,4 @@ def estimator_of(settings: Settings, lag: int = 0) -> Estimator:
         contacts=settings.contacts,
         loads=settings.loads,
         parameters=identified_of(settings),
-        lag=lag,
     )

@@ -19,7 +19,7 @@ from dynakin.filter.expected import ContactPaths, expected_loads
 from dynakin.filter.prepared import Prepared
 from dynakin.filter.samples import in_step, recording_arrays
 from dynakin.filter.total_wrench import Ground, doubtful_mass, known_ground
-from dynakin.filter.tracker import Progress, Tracker, whether_to_smooth
+from dynakin.filter.tracker import Progress, Tracker, known_lag
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.contacts import with_contacts
 from dynakin.model.calibration.loads import with_loads
@@ -31,6 +31,7 @@ from dynakin.results.estimate import Estimate
 from dynakin.results.measures.tracking import without_lost
 from dynakin.settings import presets
 from dynakin.settings.contacts import DeclaredContact, declared
+from dynakin.settings.lag import ALL_FRAMES, check_lag, lag_frames
 from dynakin.settings.model import QUANTITIES, Bounds, Priors, Quantity
 from dynakin.settings.noise import Noise
 from dynakin.settings.strict import nearest
@@ -41,9 +42,6 @@ Feet = Callable[[CalibratedModel], ContactLoads | None]
 
 CLOCK_SHARE = 0.6
 """Part of the frames in which the plates must measure the whole for their delay to be estimated."""
-LARGEST_LAG = 1000
-"""Frames. Each step goes back over all of them and each keeps its covariance: a whole body's take half a gigabyte, and
-no camera's frame is so long that a step would end within it."""
 
 
 class Tracked(NamedTuple):
@@ -73,7 +71,6 @@ class Estimator:
             with ``name`` and ``segment``.
         loads: known masses that the person carries; the subject's mass is then needed, without them.
         parameters: an identified subject (`model.identified`), whose values and deviations the filter starts from.
-        lag: frames by which `Tracker.delayed` lies behind `Tracker.step`, for smoothing while it is measured; 0: none.
     """
 
     model: Definition
@@ -86,7 +83,6 @@ class Estimator:
     estimate: tuple[Quantity, ...]
     plates: Mapping[str, str]
     contacts: tuple[DeclaredContact, ...]
-    lag: int
     loads: tuple[CarriedLoad, ...]
     parameters: IdentifiedSubject | None
 
@@ -103,7 +99,6 @@ class Estimator:
         estimate: Sequence[Quantity] = QUANTITIES,
         plates: Mapping[str, str] | None = None,
         contacts: Sequence[str | Mapping[str, str] | DeclaredContact] = (),
-        lag: int = 0,
         loads: Sequence[CarriedLoad] = (),
         parameters: IdentifiedSubject | None = None,
     ) -> None:
@@ -111,10 +106,6 @@ class Estimator:
             if kind not in QUANTITIES:
                 known = ", ".join(QUANTITIES)
                 raise ConfigError(f"estimate: {kind!r} is unknown{nearest(kind, QUANTITIES)}; expected some of {known}")
-        if not (isinstance(lag, int) and 0 <= lag <= LARGEST_LAG):
-            raise ConfigError(
-                f"lag is {lag!r}, expected 0 to {LARGEST_LAG} frames (all of a recording: run with smooth=True)"
-            )
         if loads and model.subject.mass_kg is None:
             raise ConfigError("loads: the plates carry them too, expected the person's own mass as well (mass_kg)")
         chosen: dict[str, object] = {
@@ -128,7 +119,6 @@ class Estimator:
             "estimate": tuple(kind for kind in QUANTITIES if kind in estimate),
             "plates": dict(plates or {}),
             "contacts": declared(contacts),
-            "lag": lag,
             "loads": tuple(loads),
             "parameters": parameters,
         }
@@ -155,24 +145,39 @@ class Estimator:
             calibrated = with_identified(calibrated, self.parameters)
         return with_contacts(with_loads(calibrated, self.loads), self.contacts)
 
-    def start(self, source: Recording | CalibratedModel, *, static: Recording | None = None) -> Tracker:
+    def start(
+        self,
+        source: Recording | CalibratedModel,
+        *,
+        static: Recording | None = None,
+        lag_s: float = 0.0,
+        rate_hz: float | None = None,
+    ) -> Tracker:
         """A tracker that is ready for its first sample, of a recording to calibrate on or of a calibrated model.
 
         Args:
             static: as in `run`; a calibrated model needs none.
+            lag_s: by which `Tracker.delayed` lies behind `Tracker.step`, s, as many frames as that is about; 0: none.
+            rate_hz: of the samples, where not that of the recording. A calibrated model with a lag needs it.
 
         Raises:
             ModelError, RecordingError: as in `run`. ConfigError: the noise does not fit the model or the lag.
         """
+        if check_lag(lag_s) == ALL_FRAMES:
+            raise ConfigError("lag_s: all frames are known of a recording alone (Estimator.run), expected seconds")
+        if isinstance(source, Recording):
+            rate_hz = rate_hz or source.rate
+        if lag_s and not (rate_hz and np.isfinite(rate_hz)):
+            raise ConfigError("lag_s: a lag needs the rate of the samples, expected rate_hz")
         calibrated = self.calibrate(source, static=static) if isinstance(source, Recording) else source
-        return Tracker(calibrated, self.noise, self.estimate, self.lag)
+        return Tracker(calibrated, self.noise, self.estimate, lag_frames(lag_s, rate_hz or 0.0))
 
     def run(
         self,
         recording: Recording,
         *,
         static: Recording | None = None,
-        smooth: bool | None = None,
+        lag_s: float | None = None,
         feet: Feet | None = None,
         progress: Progress | None = None,
     ) -> Estimate:
@@ -184,8 +189,9 @@ class Estimator:
         Args:
             recording: markers and plates, as `read` gives them.
             static: the same person and markers, standing: lengths and marker places are taken from it.
-            smooth: whether each frame is estimated from all frames, those after it too (`filter.tracker`); False: as
-                it would be live. None: smoothed wherever the noise settings have a smoother, else a message says so.
+            lag_s: each frame is estimated from the frames until so many seconds later, as it would be live with that
+                lag (0: without any); inf: from all frames. None: inf wherever the noise settings have a smoother, else
+                0, and a message says so. A finite lag takes as long as smoothing for every 20 ms or so of it.
             feet: for models with a floating root: gives the wrench of each foot once the model is measured and its
                 ground frame known, instead of the plates' own division by `foot_loads`. Moments are those that the
                 feet's wrenches leave, and their sum is the total wrench that the filter takes.
@@ -193,29 +199,29 @@ class Estimator:
 
         Raises:
             ModelError, RecordingError: model, markers, plates and recording do not fit.
-            ConfigError: smoothing was asked for, and the noise settings have no smoother.
+            ConfigError: a lag that cannot be, or for which the noise settings have no smoother.
             DivergenceError: the filter lost its estimate; the message names the frame.
         """
-        return self.track(recording, static=static, smooth=smooth, feet=feet, progress=progress).estimate
+        return self.track(recording, static=static, lag_s=lag_s, feet=feet, progress=progress).estimate
 
     def track(
         self,
         recording: Recording,
         *,
         static: Recording | None = None,
-        smooth: bool | None = None,
+        lag_s: float | None = None,
         feet: Feet | None = None,
         progress: Progress | None = None,
     ) -> Tracked:
         """`run`, and the tracker that made it: the calibrated model, and the state after the last frame."""
-        return self.follow(self.prepare(recording, static=static, smooth=smooth, feet=feet), progress)
+        return self.follow(self.prepare(recording, static=static, lag_s=lag_s, feet=feet), progress)
 
     def prepare(
         self,
         recording: Recording,
         *,
         static: Recording | None = None,
-        smooth: bool | None = None,
+        lag_s: float | None = None,
         feet: Feet | None = None,
     ) -> Prepared:
         """All of `run` but the estimate: what is known of the person, the plates and the contacts before it.
@@ -223,12 +229,12 @@ class Estimator:
         Raises:
             ModelError, RecordingError, ConfigError: as in `run`.
         """
-        smooth, unsmoothed = whether_to_smooth(smooth, self.noise)
+        lag_s, unsmoothed = known_lag(lag_s, self.noise)
         if problem := rate_problem(recording.time):
             raise RecordingError(f"{recording.path or recording.name}: {problem}")
         calibrated = self.calibrate(recording, static=static)
         markers, wrench, ground = self._measured(recording, calibrated)
-        tracker = Tracker(calibrated, self._noise_for(ground, calibrated), self.estimate, self.lag)
+        tracker = Tracker(calibrated, self._noise_for(ground, calibrated), self.estimate)
         calibrated = tracker.calibrated
         contacts = None
         if feet is not None:
@@ -237,7 +243,7 @@ class Estimator:
             paths = ContactPaths.of(calibrated).at(markers)
             contacts = expected_loads(ground.loads, calibrated, self.noise, paths, ground.undeclared, ground.bears)
         doubt = doubtful_mass(wrench, calibrated.weighed_kg, ground.load_ratio, calibrated.unseen_kg)
-        return Prepared(recording, tracker, markers, wrench, ground, contacts, smooth, doubt, tuple(unsmoothed))
+        return Prepared(recording, tracker, markers, wrench, ground, contacts, lag_s, doubt, tuple(unsmoothed))
 
     def follow(self, ready: Prepared, progress: Progress | None = None) -> Tracked:
         """The estimate of a recording that is prepared, once or again: `ready` does not change.
@@ -246,23 +252,27 @@ class Estimator:
             RecordingError, DivergenceError: as in `run`.
         """
         recording, calibrated, markers = ready.recording, ready.calibrated, ready.markers
-        smooth, ground, on_feet = ready.smooth, ready.ground, ready.contacts
+        lag_s, ground, on_feet = ready.lag_s, ready.ground, ready.contacts
+        if 0.0 < lag_s < ALL_FRAMES:
+            lag_s = lag_frames(lag_s, recording.rate) / recording.rate
         try:
-            there, back = _shares(progress, recording.n_frames) if smooth else (progress, None)
+            ways = 0 if not lag_s else 2 if lag_s == ALL_FRAMES else 1  # over the frames, after the first run
+            there, back = _shares(progress, recording.n_frames, ways)
             passes = 0 if ready.doubt else PASSES
             tracker, arrays, shift, clock = run_in_step(
                 ready.tracker.fresh(), recording.time, markers, ready.wrench, there, on_feet, passes
             )
             wrench = in_step(recording.time, ready.wrench, shift) if shift else ready.wrench
             on_feet = on_feet and on_feet.in_step(recording.time, shift)
-            if smooth:
+            if lag_s == ALL_FRAMES and tracker.noise.adapt:
                 trial = Trial(recording.time, markers, wrench, on_feet)
-                found = calibrated_noise(tracker, arrays, trial) if tracker.noise.adapt else None
-                tracker = tracker.changed(found or tracker.noise)
-                arrays = tracker.run_smoothed_arrays(recording.time, markers, wrench, back, on_feet)
+                tracker = tracker.changed(calibrated_noise(tracker, arrays, trial) or tracker.noise)
+            if lag_s:
+                tracker = tracker.fresh()
+                arrays = tracker.run_late_arrays(lag_s, recording.time, markers, wrench, back, on_feet)
         except ValueError as error:  # a frame that the core refuses, named by it
             raise RecordingError(f"{recording.path or recording.name}: {error}") from None
-        config = self.settings() | {"smooth": smooth, "ground_reasons": list(ground.reasons)}
+        config = self.settings() | {"lag_s": lag_s, "ground_reasons": list(ground.reasons)}
         doubt = [ready.doubt] if ready.doubt else clock if ground.usable else []
         config["noise_used"] = tracker.noise.scales()
         notes = [*ground.notes, *doubt, *ready.unsmoothed]
@@ -314,8 +324,9 @@ class Estimator:
         }
 
 
-def _shares(progress: Progress | None, frames: int) -> tuple[Progress | None, Progress | None]:
-    """One progress for a run forwards and the smoothing after it, which goes over the frames twice."""
+def _shares(progress: Progress | None, frames: int, ways: int) -> tuple[Progress | None, Progress | None]:
+    """One progress for a run forwards and the smoothing after it, which goes over the frames ``ways`` times."""
     if progress is None:
         return None, None
-    return lambda done, total: progress(done, 3 * frames), lambda done, total: progress(frames + done, 3 * frames)
+    total = (1 + ways) * frames
+    return lambda done, _: progress(done, total), lambda done, _: progress(frames + done, total)

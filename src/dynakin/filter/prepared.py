@@ -32,7 +32,7 @@ class Prepared:
             they do not.
         ground: what is known of the ground reaction. contacts: the wrench of each contact; None of a model that stands
             on its root.
-        smooth: whether each frame is to be estimated from all frames.
+        lag_s: each frame is to be estimated from the frames until so much later; inf: from all.
         doubt: a sentence where the plates contradict the mass. unsmoothed: one where there is no smoother.
     """
 
@@ -42,7 +42,7 @@ class Prepared:
     wrench: Array
     ground: Ground
     contacts: ContactLoads | None
-    smooth: bool
+    lag_s: float
     doubt: str | None
     unsmoothed: tuple[str, ...]
 

@@ -17,8 +17,10 @@ from dynakin.filter.samples import Sample, sample_arrays
 from dynakin.filter.sources import ContactSources
 from dynakin.filter.step import Codes, Labelled, Labels, StepEstimate, deviations_of, step_estimate
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.recordings.recording import rate_of
 from dynakin.results.measures.sources import ABSENT
 from dynakin.results.records import NOT_SMOOTHED
+from dynakin.settings.lag import ALL_FRAMES, LIVE_LAG_S, check_lag, lag_frames
 from dynakin.settings.model import QUANTITIES, Quantity
 from dynakin.settings.noise import Noise
 
@@ -31,7 +33,8 @@ class Tracker:
 
     Args:
         calibrated: the model and where it starts.
-        noise, estimate, lag: as of `Estimator`.
+        noise, estimate: as of `Estimator`.
+        lag: frames by which `delayed` lies behind `step`; 0: there is none.
 
     Attributes:
         calibrated: the same with the states that the noise asks for, as the filter has them.
@@ -141,27 +144,50 @@ class Tracker:
         that `step` was given for that frame; without them, of a floating model, they have no ground reaction in them.
 
         Raises:
-            ConfigError: the estimator was made without a lag.
+            ConfigError: the tracker was started without a lag.
         """
-        if self._lag is None:
-            raise ConfigError("delayed: the estimator has no lag, expected Estimator(..., lag=frames)")
-        if self._time is None or not self._lag.ready:
+        lag = self._with_lag()
+        if self._time is None or not lag.ready:
             return None
-        time = self._time - self._lag.delay_s
-        _, loads, sources = min(self._stepped, key=lambda stepped: abs(stepped[0] - time))
-        return step_estimate(self.core_model, self._labels, time, self._lag.state, None, sources, loads)
+        time, loads, sources = self._delayed_step(lag)
+        return step_estimate(self.core_model, self._labels, time, lag.state, None, sources, loads)
 
-    def deviations(self) -> dict[str, Labelled]:
+    def deviations(self, *, delayed: bool = False) -> dict[str, Labelled]:
         """Standard deviations of the present estimate, as it was last stepped: propagated now, not in every step.
+
+        Args:
+            delayed: those of `delayed` instead, once there is one; they take as long as some steps for each frame of
+                the lag.
 
         Returns:
             coordinates, speeds, accelerations, moments (C,), of all coordinates of the model; wrench (6,). Moments as
             `step` gave them: with the feet's wrenches where it had these.
+
+        Raises:
+            ConfigError: ``delayed``, and the tracker was started without a lag.
         """
-        loads, absent = (self._stepped[-1][1], self._stepped[-1][2] == ABSENT) if self._stepped else (None, False)
-        found = deviations_of(self.core_model, self.state, self.covariance, loads)
+        state, covariance, loads, absent = self.state, self.covariance, None, np.bool_(False)
+        if delayed and self._with_lag().ready:
+            lag = self._with_lag()
+            _, loads, sources = self._delayed_step(lag)
+            state, covariance, absent = lag.state, lag.covariance, sources == ABSENT
+        elif self._stepped:
+            loads, absent = self._stepped[-1][1], self._stepped[-1][2] == ABSENT
+        found = deviations_of(self.core_model, state, covariance, loads)
         found["moments"] = np.where(absent, np.nan, found["moments"])
         return {name: Labelled(values, self._labels.on(name)) for name, values in found.items()}
+
+    def _with_lag(self) -> _core.FixedLag:
+        if self._lag is None:
+            raise ConfigError("delayed: the tracker has no lag, expected Estimator.start(..., lag_s=SECONDS)")
+        return self._lag
+
+    def _delayed_step(self, lag: _core.FixedLag) -> tuple[float, _core.ContactLoads | None, Codes]:
+        """Time, feet and sources of the frame at the lag."""
+        assert self._time is not None
+        time = self._time - lag.delay_s
+        _, loads, sources = min(self._stepped, key=lambda stepped: abs(stepped[0] - time))
+        return time, loads, sources
 
     def run_arrays(
         self,
@@ -210,6 +236,49 @@ class Tracker:
         self._time, self._latest = float(time[-1]), None
         return smoothed(arrays)
 
+    def run_lagged_arrays(
+        self,
+        time: Array,
+        markers: Array,
+        wrench: Array,
+        lag: int,
+        progress: Progress | None = None,
+        feet: ContactLoads | None = None,
+    ) -> dict[str, Array]:
+        """`run_smoothed_arrays`, where each frame is smoothed from those until ``lag`` frames later alone: what
+        `delayed` gives of it, with its deviations. The last frames are estimated from those that there are.
+
+        Raises:
+            ConfigError, DivergenceError: as `run_smoothed_arrays`.
+        """
+        check_can_smooth(self.noise)
+        time, markers, wrench = (np.ascontiguousarray(values) for values in (time, markers, wrench))
+        wrench, given = self._given(wrench, feet)
+        arrays = self._filter.run_lagged(time, markers, wrench, lag, progress, **given)
+        self._time, self._latest = float(time[-1]), None
+        return smoothed(arrays)
+
+    def run_late_arrays(
+        self,
+        lag_s: float,
+        time: Array,
+        markers: Array,
+        wrench: Array,
+        progress: Progress | None = None,
+        feet: ContactLoads | None = None,
+    ) -> dict[str, Array]:
+        """Each frame estimated with this lag (s; `ALL_FRAMES`: smoothed; 0: as `run_arrays`), to the nearest frame.
+
+        Raises:
+            ConfigError, DivergenceError: as `run_smoothed_arrays`.
+        """
+        if lag_s == ALL_FRAMES:
+            return self.run_smoothed_arrays(time, markers, wrench, progress, feet)
+        frames = lag_frames(lag_s, rate_of(time)) if lag_s else 0
+        if not frames:
+            return self.run_arrays(time, markers, wrench, progress, feet)
+        return self.run_lagged_arrays(time, markers, wrench, frames, progress, feet)
+
     def _given(self, wrench: Array, feet: ContactLoads | None) -> tuple[Array, dict[str, Any]]:
         """The total wrench, and how it and the contacts are known: what these sum up to where there are any."""
         if feet is None:
@@ -253,20 +322,37 @@ def can_smooth(noise: Noise) -> bool:
     return noise.constraint in ("projection", "none")
 
 
-def whether_to_smooth(asked: bool | None, noise: Noise) -> tuple[bool, list[str]]:
-    """Whether a recording is smoothed: as asked, else wherever these settings have a smoother; a sentence where not.
+def known_lag(asked_s: float | None, noise: Noise) -> tuple[float, list[str]]:
+    """The lag of a recording's estimate, s: as asked, else all frames wherever these settings have a smoother; a
+    sentence where not.
 
     Raises:
-        ConfigError: it was asked for, and these settings have no smoother.
+        ConfigError: no lag that can be, or these settings have no smoother for it.
     """
-    if asked:
-        check_can_smooth(noise)
-    if asked is not None or can_smooth(noise):
-        return asked is not False, []
-    return False, [
+    if asked_s is not None:
+        check_lag(asked_s)
+        if asked_s:
+            check_can_smooth(noise)
+        return float(asked_s), []
+    if can_smooth(noise):
+        return ALL_FRAMES, []
+    return 0.0, [
         f"{NOT_SMOOTHED} bounds are kept by constraint {noise.constraint!r}, which has no smoother; each frame is "
         "estimated from the frames until then, as it would be live."
     ]
+
+
+def live_lag(asked_s: float | None, noise: Noise) -> float:
+    """The lag of live use, s: as asked, else the recommended one wherever these settings have a smoother, else 0.
+
+    Raises:
+        ConfigError: no lag that can be, or these settings have no smoother for it.
+    """
+    if asked_s is None:
+        return LIVE_LAG_S if can_smooth(noise) else 0.0
+    if known_lag(asked_s, noise)[0] == ALL_FRAMES:
+        raise ConfigError(f"lag_s: live, not all frames are known, expected seconds, such as {LIVE_LAG_S:g}")
+    return float(asked_s)
 
 
 def check_can_smooth(noise: Noise) -> None:
@@ -276,6 +362,6 @@ def check_can_smooth(noise: Noise) -> None:
     """
     if not can_smooth(noise):
         raise ConfigError(
-            f"smooth: bounds are kept by constraint {noise.constraint!r}, which changes the covariance; expected "
-            "'projection' or 'none' (preset default)"
+            f"lag_s: bounds are kept by constraint {noise.constraint!r}, which has no smoother; expected 0 "
+            "(--live-like), or 'projection' or 'none' (preset default)"
         )

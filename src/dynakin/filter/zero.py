@@ -58,7 +58,7 @@ def standing_zero(estimator: Estimator, estimate: Estimate, static: Recording | 
             f"{standing.path or standing.name}: nobody stands still for 0.5 s, expected a standing person for the zero "
             "(zero = 'standing'), there or in a trial of its own (--static)"
         )
-    if static is None and estimate.config.get("smooth"):
+    if static is None and estimate.smoothed:
         coordinates = estimate.data["coordinates"].transpose("time", "coordinate").values[window]
         return mean_angles(estimate.coordinate_names, estimate.is_rotation(), coordinates)
     return _estimated_anew(estimator, estimate, standing, window)

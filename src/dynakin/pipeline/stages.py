@@ -58,7 +58,7 @@ def run(
         keep_lost: go on with a trial that was lost.
         observability: whether to judge the observability of the constants; it takes longer than the estimate.
         progress: called with (frames done, frames in all) now and then.
-        settings: further keys of a configuration (`dynakin print-config` lists them), such as ``preset``, ``smooth``.
+        settings: further keys of a configuration (`dynakin print-config` lists them), such as ``preset``, ``lag_s``.
 
     Raises:
         DynakinError: anything that is wrong with the input, in one line. LostError: the person was lost, and
@@ -117,7 +117,7 @@ def prepare_case(case: Case) -> dict[str, Prepared]:
     """
     setup = case.setup
     return {
-        title: setup.estimator(title).prepare(case.recording, static=case.static, smooth=setup.smooth)
+        title: setup.estimator(title).prepare(case.recording, static=case.static, lag_s=setup.lag_s)
         for title in setup.noise
     }
 

@@ -26,6 +26,7 @@ from dynakin.results.measures.facing import facing
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.sources import UNKNOWN
 from dynakin.results.naming import listed, number, plural
+from dynakin.settings.lag import in_words
 from dynakin.validation.methods import Trial
 
 _BOTH = (repetition_section, methods_section, length_section, mass_section, observability_section)
@@ -115,7 +116,7 @@ def _what_was_run(estimate: Estimate) -> str:
     return (
         f"{number(float(time[-1] - time[0]), 's')}{person}: {plural(len(time), 'frame')} at "
         f"{recording.rate:.4g} Hz, {len(estimate.marker_names)} of {len(recording.marker_names)} "
-        f"markers, {plates}; each frame estimated {'from all frames' if estimate.smoothed else 'as it would be live'}."
+        f"markers, {plates}; each frame estimated {in_words(estimate.lag_s)}."
     )
 
 

@@ -11,6 +11,7 @@ import xarray as xr
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Recording
 from dynakin.results.records import Event, Parameter, Timing, Tracking
+from dynakin.settings.lag import ALL_FRAMES
 
 AXES = ("x", "y", "z")
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
@@ -83,7 +84,8 @@ class Estimate:
     """How the person was followed (`results.measures.tracking`), as judged when it was estimated."""
 
     def __repr__(self) -> str:
-        way = "smoothed" if self.smoothed else "filtered"
+        late = f"{1e3 * self.lag_s:.3g} ms late" if self.lag_s else "filtered"
+        way = "smoothed" if self.smoothed else late
         return f"<Estimate of {self.recording.name}: {self.model_name}, {len(self.time)} frames, {way}>"
 
     @property
@@ -132,9 +134,14 @@ class Estimate:
         return [str(name) for name in self.data["foot"].values] if "foot" in self.data.coords else []
 
     @property
+    def lag_s(self) -> float:
+        """Each frame was estimated from the frames until so many seconds later, as it would be live; inf: from all."""
+        return float(self.config.get("lag_s", 0.0))
+
+    @property
     def smoothed(self) -> bool:
-        """Whether each frame was estimated from all frames; else from those until then, as it would be live."""
-        return bool(self.config.get("smooth"))
+        """Whether each frame was estimated from all frames."""
+        return self.lag_s == ALL_FRAMES
 
     @property
     def lost(self) -> np.ndarray:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -12,6 +12,7 @@ from dynakin.errors import ConfigError, DynakinError
 from dynakin.files import is_file
 from dynakin.settings import presets
 from dynakin.settings.contacts import DeclaredContact, check_names
+from dynakin.settings.lag import check_lag
 from dynakin.settings.model import QUANTITIES, Bounds, OpenSimOptions, Priors, Quantity
 from dynakin.settings.noise import Noise
 from dynakin.settings.strict import Strict, read_toml, validate
@@ -23,7 +24,7 @@ _OPTIONS = {
     "output": ("-o", "--output"),
     "mass_kg": ("--mass",),
     "height_m": ("--height",),
-    "smooth": ("--smooth/--live-like",),
+    "lag_s": ("--lag",),
     "contacts": ("--contact",),
 }
 # Keys that name files: relative to the configuration file that they stand in.
@@ -37,6 +38,8 @@ RECORDED = ("ground", "held", "marker_places", "identified", "noise_used", "vers
 
 class Settings(Strict, use_attribute_docstrings=True):
     """What a run needs to know; the keys of a configuration file are the options of the command line."""
+
+    renamed: ClassVar = {"smooth": "lag_s"}
 
     trial: Path = Field(default=Path(), examples=["squat.c3d"])
     """Recording to estimate: .c3d, .trc or .csv.
@@ -71,9 +74,9 @@ class Settings(Strict, use_attribute_docstrings=True):
 
     preset: str = "default"
     """Noise settings to start from (default, paper, or a .toml file that `tune` wrote); [noise] changes single ones."""
-    smooth: bool | None = Field(default=None, examples=[True])
-    """Estimate each frame from all frames, those after it too; false: as it would be live. Not given: true wherever the
-    noise settings have a smoother (preset paper has none)."""
+    lag_s: float | None = Field(default=None, ge=0.0, allow_inf_nan=True, examples=[0.05])
+    """Estimate each frame from the frames until so many seconds later, as it would be live with that lag (0: without
+    any); inf: from all frames. Not given: inf wherever the noise settings have a smoother (preset paper has none)."""
     side: Literal["auto", "right", "left", "both"] = "auto"
     """Which side's markers a model uses that has one leg for both: auto (fewest gaps), right, left, both."""
     estimate: tuple[Quantity, ...] = QUANTITIES
@@ -164,6 +167,8 @@ class Settings(Strict, use_attribute_docstrings=True):
         try:
             self.subject()
             self.noise_settings()
+            if self.lag_s is not None:
+                check_lag(self.lag_s)
             check_names(self.contacts)
             if self.loads and self.mass_kg is None:
                 raise ConfigError("loads: the plates carry them too, expected mass_kg, the person's own")

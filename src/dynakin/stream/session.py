@@ -11,7 +11,7 @@ import numpy as np
 from dynakin.errors import DivergenceError, DynakinError, ModelError, StreamError
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.samples import Sample, sample_arrays
-from dynakin.filter.tracker import Tracker
+from dynakin.filter.tracker import Tracker, live_lag
 from dynakin.recordings.recording import Recording
 from dynakin.stream.feet import LiveFeet
 from dynakin.stream.fusion import DELAY_S, Fused, Fusion
@@ -23,7 +23,7 @@ from dynakin.stream.start import begin, check_labels, quietest, recording_of, st
 
 _POLL_S = 0.005
 _ASK_S = 0.1  # how often sinks are asked for wishes, and the standing person is looked at
-_DEVIATIONS_S = 0.2
+_DEVIATIONS_S, _DELAYED_DEVIATIONS_S = 0.2, 1.0  # those of a lag take as long as some steps for each of its frames
 _SPARSE_S = 0.05  # steps are never further apart than this because the computer is slow
 _CATCH_UP_S = 1.0  # with what came while the model was measured: that is left out too, but is no sign of slowness
 _MASS_KG = 70.0  # of a person of whom nothing is known, so that at least the movement is seen
@@ -33,9 +33,10 @@ class Live:
     """Estimates while it is measured.
 
     Args:
-        estimator: its ``lag`` gives smoothed frames too.
         sources: one with markers; plates from the same or another one.
         sinks: where the estimates go.
+        lag_s: by how much the estimates are late, so that the frames until then help to make them; None: the
+            recommended `LIVE_LAG_S`, or 0 where the noise settings have no smoother.
         delay_s: longest wait for what is missing (`Fusion`).
         standing_s: how long the person stands still at the start.
         standing_wait_s: after so long without, the quietest moment since then is taken.
@@ -52,6 +53,7 @@ class Live:
         sources: Sequence[Source],
         sinks: Sequence[Sink] = (),
         *,
+        lag_s: float | None = None,
         delay_s: float = DELAY_S,
         standing_s: float = 2.0,
         standing_wait_s: float = 20.0,
@@ -63,6 +65,7 @@ class Live:
         say: Callable[[str], None] = print,
     ) -> None:
         self.estimator, self.sinks = estimator, list(sinks)
+        self.lag_s = live_lag(lag_s, estimator.noise)
         self.delay_s, self.standing_s, self.standing_wait_s = delay_s, standing_s, standing_wait_s
         self.static, self.known = static, known
         self.max_late_s = max_late_s
@@ -161,6 +164,8 @@ class Live:
         self.say(f"Streams: {len(markers.names)} markers at {markers.rate_hz:g} Hz, {force_plates}.")
         for note in streams.notes:
             self.say(note)
+        if self.lag_s:
+            self.say(f"Estimates come {1e3 * self.lag_s:.3g} ms late, from the frames until then (--lag 0: at once).")
         if not streams.paced:
             self.max_late_s = np.inf
         self._subject = dict(streams.subject)
@@ -286,7 +291,14 @@ class Live:
             static = static or quiet
             self.say(f"Nobody stood still for {self.standing_s:g} s: {text}")
         try:
-            self._tracker, said, self._use_plates = begin(self.estimator, recording, static=static, known=self.known)
+            self._tracker, said, self._use_plates = begin(
+                self.estimator,
+                recording,
+                static=static,
+                known=self.known,
+                lag_s=self.lag_s,
+                rate_hz=self.fusion.markers.rate_hz,
+            )
         except ModelError as error:
             if waited:
                 raise
@@ -333,11 +345,14 @@ class Live:
         smoothed = tracker.delayed() if tracker.lag else None
         state = tracker.state
         deviations = None
-        if not 0.0 <= sample.time_s - self._sd_shown < _DEVIATIONS_S and self._reader.backlog < 4:
+        every_s = _DELAYED_DEVIATIONS_S if tracker.lag else _DEVIATIONS_S
+        ready = smoothed is not None or not tracker.lag
+        if ready and not 0.0 <= sample.time_s - self._sd_shown < every_s and self._reader.backlog < 4:
             self._sd_shown = sample.time_s
-            deviations = tracker.deviations()
+            deviations = tracker.deviations(delayed=tracker.lag > 0)
         status = monitor.status(self.fusion, fused, whole, estimate, smoothed, state, tracker.verdicts)
-        frame = LiveFrame(estimate, smoothed, fused, state, deviations, status)
+        published = smoothed if tracker.lag else estimate
+        frame = LiveFrame(estimate, smoothed, published, fused, state, deviations, status)
         for sink in self.sinks:
             sink.frame(frame)
         monitor.published(sample.time_s, time.monotonic() - fused.arrived_s)

@@ -134,12 +134,15 @@ def begin(
     *,
     static: Recording | None = None,
     known: Mapping[str, tuple[float, float]] | None = None,
+    lag_s: float = 0.0,
+    rate_hz: float | None = None,
 ) -> tuple[Tracker, list[str], bool]:
     """Calibrate the model on the standing person.
 
     Args:
         static: another recording of the person standing: lengths and places come from it.
         known: value and standard deviation of constants from an earlier session, by their names.
+        lag_s, rate_hz: as in `Estimator.start`.
 
     Returns:
         what is ready to step, what there is to say, and whether the plates can be used.
@@ -147,11 +150,12 @@ def begin(
     Raises:
         ModelError, RecordingError: model, markers and plates do not fit.
     """
-    tracker = estimator.start(standing, static=static)
+    rate_hz = rate_hz or standing.rate
+    tracker = estimator.start(standing, static=static, lag_s=lag_s, rate_hz=rate_hz)
     initial = tracker.calibrated
     said = [message for message in initial.messages if message.startswith("Warning")]
     if known:
-        tracker = estimator.start(_continued(initial, known))
+        tracker = estimator.start(_continued(initial, known), lag_s=lag_s, rate_hz=rate_hz)
         said.append(f"Lengths, marker places and masses go on from {len(known)} saved values.")
     usable = True
     if standing.plates:

@@ -70,7 +70,7 @@ def case_of(
         config.contacts,
         config.loads,
         identified_of(config),
-        config.smooth,
+        config.lag_s,
         config.zero,
         config.signs,
     )

@@ -12,7 +12,7 @@ from dynakin.errors import LostError, ModelError, RecordingError
 from dynakin.filter.assemble import assemble
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.total_wrench import known_ground
-from dynakin.filter.tracker import Tracker, whether_to_smooth
+from dynakin.filter.tracker import Tracker, known_lag
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition
 from dynakin.model.identified import IdentifiedSubject
@@ -108,7 +108,7 @@ def identify_on(
     for preset in setup.noise:
         estimator = setup.estimator(preset)
         # only what it ends with is used, which smoothing does not change
-        estimates[preset], tracker = estimator.track(recording, static=static, smooth=False)
+        estimates[preset], tracker = estimator.track(recording, static=static, lag_s=0.0)
         _refuse_lost(estimates[preset], f"EKF ({preset})")
     initial = tracker.calibrated
     wrench = measured_wrench(recording, initial, setup.plates)
@@ -119,7 +119,7 @@ def identify_on(
 def predict_blind(identified: IdentifyingTrial, recording: Recording) -> Blind:
     """Every prediction of the judging trial's wrench. Its plates are taken away before anything else is done.
 
-    Filters, smoothed where their noise settings have a smoother and `Setup.smooth` lets them. `EKF (preset),
+    Filters, smoothed where their noise settings have a smoother and `Setup.lag_s` lets them. `EKF (preset),
     identified` and `EKF (preset), table`: lengths and inertia frozen at what the filter ended with on the identifying
     trial, or at what was measured standing and the table. Where a subject was identified, `EKF (preset), batch inertia`
     has its inertia instead of the table's, and `EKF (preset), chosen` is this or the table, as was decided on the
@@ -139,12 +139,11 @@ def predict_blind(identified: IdentifyingTrial, recording: Recording) -> Blind:
     coordinates = {c.name: float(c.value) for c in start.spec.coordinates}
     found: dict[str, Array] = {}
     for preset in identified.estimates:
-        smooth, _ = whether_to_smooth(setup.smooth, setup.noise[preset])
+        lag_s, _ = known_lag(setup.lag_s, setup.noise[preset])
         for label, values in identified.constants(preset).items():
             method, estimator = f"EKF ({preset}), {label}", setup.estimator(preset)
             tracker = estimator.start(freeze(measured, values, coordinates))
-            follow = tracker.run_smoothed_arrays if smooth else tracker.run_arrays
-            arrays = follow(recording.time, markers, blank)
+            arrays = tracker.run_late_arrays(lag_s, recording.time, markers, blank)
             _refuse_lost(as_estimate(estimator, tracker, arrays, recording, markers), method)
             found[method] = arrays["wrench_estimated"]
         if identified.subject is not None:

@@ -27,6 +27,7 @@ from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.measures.repetitions import Found, repetitions_of
 from dynakin.results.measures.sources import measured_only, moment_sources, wrench_sources
 from dynakin.results.measures.tracking import why_lost
+from dynakin.settings.lag import in_words
 from dynakin.validation.reference.inverse_dynamics import rigid_motions, usual_cutoffs, with_plates
 from dynakin.validation.reference.methods import Lengths, Reference, reference_methods
 from dynakin.validation.setup import Setup
@@ -168,7 +169,7 @@ def estimate_each(
     trackers: dict[str, Tracker] = {}
     for preset in setup.noise:
         estimator = setup.estimator(preset)
-        made = (ready or {}).get(preset) or estimator.prepare(recording, static=static, smooth=setup.smooth)
+        made = (ready or {}).get(preset) or estimator.prepare(recording, static=static, lag_s=setup.lag_s)
         estimate, trackers[preset] = estimator.follow(made, progress)
         reason = None if keep_lost else why_lost(estimate)
         if reason is not None:
@@ -240,12 +241,9 @@ def trial_of(
 
 def how_estimated(estimates: Mapping[str, Estimate]) -> list[str]:
     """Which filters are smoothed and which are as live, where they are shown together and differ."""
-    if len({estimate.smoothed for estimate in estimates.values()}) < 2:
+    if len({estimate.lag_s for estimate in estimates.values()}) < 2:
         return []
-    return [
-        f"EKF ({preset}): " + ("each frame from all frames." if e.smoothed else "each frame as it would be live.")
-        for preset, e in estimates.items()
-    ]
+    return [f"EKF ({preset}): each frame {in_words(e.lag_s)}." for preset, e in estimates.items()]
 
 
 def _filtered(preset: str, estimate: Estimate) -> Method:

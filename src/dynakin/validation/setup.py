@@ -29,7 +29,7 @@ class Setup:
         cutoff_hz: of the reference methods' zero-lag low-pass, Hz.
         priors, bounds, side, vertical, forward, estimate, plates, contacts, loads, parameters: as `Estimator` takes
             them.
-        smooth: as `Estimator.run`. zero, signs: of the joint angles, as in a run's configuration.
+        lag_s: as `Estimator.run`. zero, signs: of the joint angles, as in a run's configuration.
     """
 
     definition: Definition
@@ -45,7 +45,7 @@ class Setup:
     contacts: tuple[DeclaredContact, ...] = ()
     loads: tuple[CarriedLoad, ...] = ()
     parameters: IdentifiedSubject | None = None
-    smooth: bool | None = None
+    lag_s: float | None = None
     zero: Zero = "model"
     signs: Signs = "opensim"
 

@@ -61,7 +61,7 @@ def figures_in_space(
     if not 0.0 < horizon_s < 0.5 * float(recording.time[-1] - recording.time[0]):
         raise ConfigError(f"the horizon is {horizon_s:g} s, expected more than 0 and less than half of the trial")
     estimators = {f"EKF ({preset})": setup.estimator(preset) for preset in setup.noise}
-    ready = {name: each.prepare(recording, static=static, smooth=setup.smooth) for name, each in estimators.items()}
+    ready = {name: each.prepare(recording, static=static, lag_s=setup.lag_s) for name, each in estimators.items()}
     trial = _Judged(next(iter(ready.values())))
     groups = left_out_groups(trial.calibrated)
     total, done = len(ready) * (len(groups) + 2), 0
@@ -169,14 +169,14 @@ def _without_plates(estimator: Estimator, ready: Prepared, recording: Recording,
     known = {"mass_kg": ready.calibrated.mass_kg, "height_m": ready.calibrated.height_m}
     subject = estimator.model.subject.changed(**known)
     without = replace(estimator, model=estimator.model.with_subject(subject))
-    estimate = without.run(replace(recording, plates=()), static=static, smooth=ready.smooth)
+    estimate = without.run(replace(recording, plates=()), static=static, lag_s=ready.lag_s)
     wrench = _of(estimate, "wrench_estimated", evaluation_window(recording.time))
     return ready.calibrated.ground.wrench_to_ground(estimate.ground.wrench_to_laboratory(wrench))
 
 
 def _ahead(estimator: Estimator, ready: Prepared, horizon_s: float) -> tuple[Array, Array]:
     """Places (T, M, 3) and wrench (T, 6) as the live state of ``horizon_s`` before says them."""
-    estimate, tracker = estimator.follow(replace(ready, smooth=False))
+    estimate, tracker = estimator.follow(replace(ready, lag_s=0.0))
     time, model = ready.recording.time, tracker.core_model
     frames = span_frames(time, horizon_s)
     states = _of(estimate, "state", evaluation_window(time))

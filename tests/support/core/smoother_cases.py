@@ -39,6 +39,9 @@ class Case:
     def filter(self, chunk_rows: int = 28, **changes: Any) -> _core.Filter:
         return filter_of(self.spec, self.options | changes, self.data.x0, self.data.P0, chunk_rows)
 
+    def lagged(self, lag: int) -> dict[str, NDArray]:
+        return self.data.run(self.filter().run_lagged, lag=lag)
+
     def smoothed(self, frames: int | None = None, stretch: int = 0, **changes: Any) -> dict[str, NDArray]:
         return self.data.first(frames).run(self.filter(**changes).run_smoothed, output_sd=True, stretch=stretch)
 

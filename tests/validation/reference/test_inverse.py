@@ -29,7 +29,7 @@ def simulated() -> SimulatedTrial:
 
 @pytest.fixture(scope="module")
 def setup() -> Setup:
-    return Setup(dynakin.load_model("fullbody", dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")), smooth=False)
+    return Setup(dynakin.load_model("fullbody", dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")), lag_s=0.0)
 
 
 @pytest.fixture(scope="module")

@@ -31,7 +31,7 @@ class Status:
         left_out: frames so far for which the computer was too slow.
         late, lost, duplicate: packets so far.
         settled: whether lengths and masses have come to rest.
-        delay_s: by which the smoothed estimate lies behind; 0 without.
+        delay_s: by which the published estimate lies behind the last sample; 0 without a lag.
     """
 
     phase: str = "waiting"
@@ -56,15 +56,18 @@ class LiveFrame:
     """One published step.
 
     Attributes:
-        estimate: of this sample. smoothed: of an earlier one, where a lag was asked for.
+        estimate: of this sample. smoothed: of an earlier one, where there is a lag; None before there is one.
+        published: what to use: the smoothed where the session has a lag, else the estimate; None before there is one.
         fused: what was measured.
         state: (n,) as ``Started.initial.names`` name it.
-        deviations: as `Tracker.deviations`, a few times a second; None in between.
+        deviations: of what is published, as `Tracker.deviations`, a few times a second (with a lag once); None in
+            between.
         status: how it goes.
     """
 
     estimate: StepEstimate
     smoothed: StepEstimate | None
+    published: StepEstimate | None
     fused: Fused
     state: np.ndarray
     deviations: Mapping[str, Labelled] | None

@@ -17,7 +17,7 @@ _KINDS = ("length", "marker", "inertia")
 
 class LslSink(Sink):
     """Outlets NAME-coordinates, NAME-speeds, NAME-moments, NAME-moment-sources and NAME-parameters; a stamp is
-    when its sample arrived, by this machine's clock.
+    when its sample arrived, by this machine's clock, with a lag so much earlier.
 
     Args:
         name: with which the outlets' names begin.
@@ -56,9 +56,11 @@ class LslSink(Sink):
             self._outlets[kind] = pylsl.StreamOutlet(info, max_buffered=10)
 
     def frame(self, frame: LiveFrame) -> None:
-        """Sends it."""
-        stamp = pylsl.local_clock() - max(0.0, _age(frame))
-        estimate = frame.estimate
+        """Sends what is published of it."""
+        if frame.published is None:
+            return
+        stamp = pylsl.local_clock() - max(0.0, _age(frame)) - frame.status.delay_s
+        estimate = frame.published
         values = {
             "coordinates": estimate.coordinates,
             "speeds": estimate.speeds,

@@ -25,6 +25,8 @@ _NAMES, _NAME = 4, 40  # of a list of names, so many are shown, and so many char
 class Picture:
     """Makes the numbers of a frame, ground frame, SI.
 
+    Where estimates are late, the body is drawn as it is now, and time, coordinates and moments are those published.
+
     Blocks, in this order: time (1); joint centres (S, 3); measured and estimated markers (M, 3) each; arrows (A, 6),
     each a centre of pressure and a force, of the plates and, last, of the estimated total; coordinates, moments and the
     moments' standard deviations (C); constants (K).
@@ -56,7 +58,7 @@ class Picture:
 
     def numbers(self, frame: LiveFrame, deviations: Mapping[str, Labelled] | None) -> Array:
         """The frame's numbers, all blocks after one another; deviations keep their last values where None."""
-        ground, estimate = self.initial.ground, frame.estimate
+        ground, estimate, late = self.initial.ground, frame.estimate, frame.published or frame.estimate
         body = _core.whole_body(self.model, np.ascontiguousarray(frame.state[None]))
         sample = frame.fused.sample.markers
         measured = np.stack([np.asarray(sample[name], float) for name in self.initial.recorded_markers])
@@ -67,13 +69,13 @@ class Picture:
         if deviations is not None:
             self._moment_sd = deviations["moments"].values
         parts = (
-            [estimate.time_s],
+            [late.time_s],
             body["joint_centres"][0],
             ground.points_to_ground(measured),
             estimate.markers,
             arrows,
-            estimate.coordinates,
-            estimate.moments,
+            late.coordinates,
+            late.moments,
             self._moment_sd,
             frame.state[self._constants],
         )

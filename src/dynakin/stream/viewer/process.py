@@ -167,7 +167,7 @@ class Page:
         if status["left_out"]:
             rows.append(("Left out", f"{status['left_out']} frames: this computer is too slow"))
         if status["delay_s"]:
-            rows.append(("Smoothed", f"{1e3 * status['delay_s']:.0f} ms later"))
+            rows.append(("Angles, moments", f"{1e3 * status['delay_s']:.0f} ms late, from the frames until then"))
         self.status.content = "\n".join(["| | |", "|---|---|", *(f"| {a} | {as_text(b)} |" for a, b in rows)])
 
 

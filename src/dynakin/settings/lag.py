@@ -1,0 +1,41 @@
+"""By how much an estimate may come late, so that the frames of that time help to make it."""
+
+from __future__ import annotations
+
+import math
+
+from dynakin.errors import ConfigError
+
+LIVE_LAG_S = 0.05
+"""What live use is recommended: accelerations come 16 to 44 ms late without, and need the frames after them."""
+LONGEST_LAG_S = 1.0
+"""An estimate that is later still differs from that of all frames by nothing; each frame takes time with the lag."""
+ALL_FRAMES = math.inf
+"""The lag of an estimate from all frames."""
+
+
+def check_lag(lag_s: float, what: str = "lag_s") -> float:
+    """The lag itself.
+
+    Raises:
+        ConfigError: neither seconds in 0 to `LONGEST_LAG_S` nor `ALL_FRAMES`.
+    """
+    number = isinstance(lag_s, int | float) and not isinstance(lag_s, bool)
+    if number and (0.0 <= lag_s <= LONGEST_LAG_S or lag_s == ALL_FRAMES):
+        return float(lag_s)
+    raise ConfigError(
+        f"{what} is {lag_s!r}, expected seconds (no longer frames), 0 to {LONGEST_LAG_S:g}, such as {LIVE_LAG_S:g}; "
+        "or inf: all frames of a recording"
+    )
+
+
+def lag_frames(lag_s: float, rate_hz: float) -> int:
+    """How many frames a lag (s, not `ALL_FRAMES`) is: the nearest number, one at least but for 0."""
+    return max(1, round(lag_s * rate_hz)) if lag_s > 0.0 else 0
+
+
+def in_words(lag_s: float) -> str:
+    """How each frame was estimated: "from all frames", "as it would be live", "as it would be live, 50 ms late"."""
+    if lag_s == ALL_FRAMES:
+        return "from all frames"
+    return "as it would be live" + (f", {1e3 * lag_s:.3g} ms late" if lag_s else "")
