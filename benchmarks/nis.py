@@ -61,7 +61,7 @@ def row(trial: Known, wanted: str) -> str:
     KEPT.mkdir(parents=True, exist_ok=True)
     (KEPT / f"{trial.name.replace('/', '_')}_{wanted}.json").write_text(json.dumps(found, indent=1), encoding="utf-8")
     jerk = ", ".join(f"{found['jerk_scale'].get(group, 1.0):.2g}" for group in GROUPS)
-    cells = [_cell(found[key]) for key in ("declared", "calibrated", "markers", "plates", "kinematic_variance_scale")]
+    cells = [_cell(found[key]) for key in ("declared", "calibrated", "markers", "plates", "variance_scale")]
     return f"| `{trial.name}` | {' | '.join(cells)} | {jerk} |"
 
 
@@ -83,7 +83,7 @@ def figures(trial: Known, wanted: str) -> dict[str, object]:
     noise = calibrated_noise(tracker, arrays, run, chosen)
     if noise is None:
         return {"declared": nis_per_row(arrays, ~chosen), "calibrated": None, "markers": None, "plates": None,
-                "kinematic_variance_scale": None, "jerk_scale": {}}  # fmt: skip
+                "variance_scale": None, "jerk_scale": {}}  # fmt: skip
     again = tracker.changed(noise).run_arrays(*run[:3], None, run.contacts)
     held = ~chosen
     return {

@@ -46,7 +46,7 @@ def test_the_scale_of_all_variances_leaves_the_movement_alone() -> None:
     # The gain depends on the ratio of the variances. Without plates nothing is left that the scale is not on.
     blind = Noise(adapt=False, force_variance_n2=np.inf, moment_variance_n2_m2=np.inf)
     recording = standing(0.001)
-    runs = [planar(blind.changed(kinematic_variance_scale=s)).run(recording) for s in (1.0, 0.09)]
+    runs = [planar(blind.changed(variance_scale=s)).run(recording) for s in (1.0, 0.09)]
     for name in ("coordinates", "speeds", "accelerations"):
         first, second = (run.data[name].values for run in runs)
         np.testing.assert_allclose(second, first, rtol=1e-5, atol=1e-7)
@@ -54,7 +54,7 @@ def test_the_scale_of_all_variances_leaves_the_movement_alone() -> None:
     np.testing.assert_allclose(second, 0.3 * first, rtol=1e-4)
     # what is not known of lengths and places is no noise, and does not shrink with it
     for before, after in zip(runs[0].parameters, runs[1].parameters, strict=True):
-        if before.estimated and before.kind in ("length", "marker"):
+        if before.estimated and before.kind != "plates":
             assert after.sd == pytest.approx(before.sd, rel=1e-3)
             assert after.prior_sd == pytest.approx(before.prior_sd, rel=1e-6)
 
@@ -64,7 +64,7 @@ def test_twice_the_noise_of_the_cameras_is_four_times_the_variance() -> None:
     scales = []
     for sd in (0.0005, 0.001):
         noise, _ = found(planar(Noise()).prepare(standing(sd)))
-        scales.append(noise.kinematic_variance_scale)
+        scales.append(noise.variance_scale)
     assert scales[1] / scales[0] == pytest.approx(4.0, rel=0.1)
 
 
@@ -99,16 +99,16 @@ def test_joints_are_grouped_by_where_they_are(walk: Prepared) -> None:
 def test_what_was_found_is_written_and_a_preset_fixes_it(tmp_path: Path) -> None:
     recording = standing(0.0005)
     estimate = planar(Noise()).run(recording)
-    scale = estimate.config["noise_used"]["kinematic_variance_scale"]
+    scale = estimate.config["noise_used"]["variance_scale"]
     assert 0.1 < scale < 0.7
     write_parameters(estimate, tmp_path / "parameters.json")
-    assert json.loads((tmp_path / "parameters.json").read_text())["noise"]["kinematic_variance_scale"] == scale
-    fixed = planar(Noise(adapt=False, kinematic_variance_scale=0.5)).run(recording)
-    assert fixed.config["noise_used"]["kinematic_variance_scale"] == 0.5
+    assert json.loads((tmp_path / "parameters.json").read_text())["noise"]["variance_scale"] == scale
+    fixed = planar(Noise(adapt=False, variance_scale=0.5)).run(recording)
+    assert fixed.config["noise_used"]["variance_scale"] == 0.5
     # as it would be live, nothing is known of what comes
-    assert planar(Noise()).run(recording, lag_s=0.0).config["noise_used"]["kinematic_variance_scale"] == 1.0
+    assert planar(Noise()).run(recording, lag_s=0.0).config["noise_used"]["variance_scale"] == 1.0
 
 
 def test_too_few_frames_leave_the_noise_as_declared() -> None:
     recording = standing(0.001).window(0.0, 0.3 + 0.005 * LEAST_FRAMES)
-    assert planar(Noise()).run(recording).config["noise_used"]["kinematic_variance_scale"] == 1.0
+    assert planar(Noise()).run(recording).config["noise_used"]["variance_scale"] == 1.0

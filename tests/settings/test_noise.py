@@ -56,7 +56,7 @@ DEFAULT: dict[str, Any] = {
     "unseen_sd": 0.5,
     "iterate_beyond_sd": 0.2,
     "adapt": True,
-    "kinematic_variance_scale": 1.0,
+    "variance_scale": 1.0,
     "jerk_scale": {},
     "constraint": "projection",
 }
@@ -99,7 +99,7 @@ PAPER: dict[str, Any] = {
     "unseen_sd": None,
     "iterate_beyond_sd": None,
     "adapt": False,
-    "kinematic_variance_scale": 1.0,
+    "variance_scale": 1.0,
     "jerk_scale": {},
     "constraint": "gain",
 }

@@ -1,10 +1,11 @@
 """Noise that calibrates itself: the scales of the declared noise that a recording's own innovations ask for.
 
 Two things are found. The jerk's density by group of joints, from how much accelerations change between frames beside
-what the filter expects of that (covariance matching). Then one factor on all variances of markers and movement, so that
-the normalised innovation squared is one a row: it leaves the movement's estimate as it is, because the gain depends on
-the ratio of the variances only, and makes deviations and innovations agree (the variance of unit weight of adjustment
-theory). Why plates, residual and inertia are not in it: docs/design.md.
+what the filter expects of that (covariance matching). Then one factor on all variances but those of plates, contacts
+and residual, so that the normalised innovation squared is one a row: it leaves the movement as it is weighed, because
+the gain depends on the ratio of the variances only, and makes deviations and innovations agree (the variance of unit
+weight of adjustment theory). Priors are in it as well: what is wrong with a place, a length or a mass does not average
+out, and data that count for more would only bend them further.
 """
 
 from __future__ import annotations
@@ -120,4 +121,4 @@ def _scaled(noise: Noise, ratio: float, jerk: dict[JointGroup, float] | None = N
     scales = dict(noise.jerk_scale)
     for group, wanted in (jerk or {}).items():
         scales[group] = scales.get(group, 1.0) * (wanted / ratio) ** JERK_SHARE
-    return noise.changed(kinematic_variance_scale=ratio * noise.kinematic_variance_scale, jerk_scale=scales)
+    return noise.changed(variance_scale=ratio * noise.variance_scale, jerk_scale=scales)

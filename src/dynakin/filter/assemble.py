@@ -11,7 +11,7 @@ import xarray as xr
 
 from dynakin.arrays import finite
 from dynakin.bindings import _core
-from dynakin.filter.augment import kinematic_scales
+from dynakin.filter.augment import variance_scales
 from dynakin.filter.contacts import RESIDUAL, ContactLoads
 from dynakin.filter.events import events_of
 from dynakin.filter.labels import labels
@@ -51,7 +51,7 @@ def assemble(
         notes: sentences of the plates' check.
         covariances: P (n, n) before the first frame and after the last.
         used: the noise of the filter. Constants have deviations by the declared variances, without its
-            ``kinematic_variance_scale``: what is wrong with a place or a length does not average out.
+            ``variance_scale``: what is wrong with a place or a length does not average out.
         feet: the wrenches that the moments were made with, None where there were none.
         undeclared: (T,) frames in which something bears the person that no plate measures.
     """
@@ -69,7 +69,7 @@ def assemble(
     for name, covariance in zip(("initial_covariance", "final_covariance"), covariances, strict=True):
         data[name] = (("element", "element_"), covariance)
     noise = config.get("noise", {})
-    declared = 1.0 / np.sqrt(kinematic_scales(initial.names, used))
+    declared = 1.0 / np.sqrt(variance_scales(initial.names, used))
     parameters = parameters_of(
         initial,
         arrays["state"][-1],

@@ -102,37 +102,37 @@ def _added_sd(spec: _core.ModelSpec, noise: Noise, soft_tissue: Array) -> dict[s
     return sd | {"plates/delay": noise.plate_delay_sd_s}
 
 
-def kinematic_scales(names: Collection[str], noise: Noise) -> Array:
+def variance_scales(names: Collection[str], noise: Noise) -> Array:
     """(n,) factor that these settings have put on the variance of each element of the state, by its name."""
-    dynamic = ("inertia/", "plates/", "contact/")
-    return np.array([1.0 if name.startswith(dynamic) else noise.kinematic_variance_scale for name in names])
+    of_plates = ("plates/", "contact/")
+    return np.array([1.0 if name.startswith(of_plates) else noise.variance_scale for name in names])
 
 
 def initial_covariance(initial: CalibratedModel, noise: Noise) -> Array:
     """P0 (n, n): the priors, and with `total_mass_use` "prior" the total mass as one piece of information on it."""
-    scales = np.sqrt(kinematic_scales(initial.names, noise))
+    root = np.sqrt(variance_scales(initial.names, noise))
+    scales = np.outer(root, root)
     covariance = np.diag(initial.sd0**2)
     if initial.joint_prior is not None:
         place = {name: k for k, name in enumerate(initial.names)}
         known = [k for k, name in enumerate(initial.joint_prior.names) if name in place]
         at = [place[initial.joint_prior.names[k]] for k in known]
         covariance[np.ix_(at, at)] = initial.joint_prior.covariance[np.ix_(known, known)]
-    covariance *= np.outer(scales, scales)
     if noise.total_mass_use == "frame":
-        return covariance
+        return covariance * scales
     masses = np.array([float(name.startswith("inertia/") and name.endswith("/mass")) for name in initial.names])
     spread = covariance @ masses
     variance = float(masses @ spread)
     if variance > 0.0:
         covariance -= np.outer(spread, spread) / (variance + noise.total_mass_variance_kg2)
-    return covariance
+    return covariance * scales
 
 
 def continuous_noise(initial: CalibratedModel, noise: Noise, layout: _core.StateLayout) -> tuple[Array, Array]:
     """Density (n,) of the white noise that drives each element, and the rate (n,) 1/s at which it decays."""
     density, decay = np.zeros(layout.size), np.zeros(layout.size)
     kinds = {axis.coordinate: axis.kind for segment in initial.spec.segments for axis in segment.axes}
-    whole, groups = noise.kinematic_variance_scale, joint_groups(initial)
+    whole, groups = noise.variance_scale, joint_groups(initial)
     jerk = jerk_densities(noise, floating=bool(initial.feet))
     offset, size = layout.blocks["accelerations"]
     for k in range(offset, offset + size):

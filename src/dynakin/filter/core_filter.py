@@ -65,7 +65,7 @@ def filter_settings(
         lower=initial.lower,
         upper=initial.upper,
         constraint=noise.constraint,
-        marker_gate=gate_limits(noise.marker_gate, noise.kinematic_variance_scale),
+        marker_gate=gate_limits(noise.marker_gate, noise.variance_scale),
         wrench_gate=gate_limits(noise.wrench_gate),
         wrench_needs_markers=noise.recover,
         iterate_beyond=limit_sd(noise, noise.iterate_beyond_sd),

@@ -72,7 +72,7 @@ def marker_variance(initial: CalibratedModel, noise: Noise, estimate: Collection
         if "soft_tissue" not in estimate:
             unmodelled = np.maximum(noise.soft_tissue_sd_fraction * declared, noise.soft_tissue_least_sd_m)
         variance = noise.marker_sd_m**2 + unmodelled**2 + initial.unmodelled_m**2
-    variance = noise.kinematic_variance_scale * variance
+    variance = noise.variance_scale * variance
     names = initial.recorded_markers
     return np.array([noise.marker_variance_m2.get(name, value) for name, value in zip(names, variance, strict=True)])
 
@@ -91,7 +91,7 @@ def gate_limits(probability: float, scale: float = 1.0) -> list[float] | None:
 def limit_sd(noise: Noise, declared: float | None) -> float:
     """A limit on the deviation of a coordinate (rad or m) that goes by the declared variances, in those that the filter
     has; infinite where there is none."""
-    return np.inf if declared is None else float(declared * np.sqrt(noise.kinematic_variance_scale))
+    return np.inf if declared is None else float(declared * np.sqrt(noise.variance_scale))
 
 
 def joint_groups(initial: CalibratedModel) -> dict[str, JointGroup]:

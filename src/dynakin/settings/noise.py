@@ -158,11 +158,10 @@ class Noise(Strict, use_attribute_docstrings=True):
     adapt: bool = True
     """Whether the two scales below are found in the recording, by its innovations (`filter.adapt`). A preset of one's
     own (a file) fixes them, unless it says otherwise."""
-    kinematic_variance_scale: Positive = scale(1.0, "1", "all noise of markers and movement at once")
-    """Factor on every variance of markers, movement and soft tissue, prior ones too; not on those of plates, residual
-    and inertia. The movement is weighed as before: what changes is how sure of it the filter is, and how much it
-    weighs beside the plates. A smaller one refuses no more markers: that, and when a coordinate counts as unseen, goes
-    by the variances without it."""
+    variance_scale: Positive = scale(1.0, "1", "all noise but that of the plates")
+    """Factor on every variance, prior ones too, but those of plates, contacts and residual. The movement is weighed as
+    before: what changes is how sure of it the filter is, and how much it weighs beside the plates. A factor below 1
+    refuses no more markers: that, and when a coordinate counts as unseen, goes by the variances without it."""
     jerk_scale: dict[JointGroup, Positive] = Field(default_factory=dict)
     """Factor on the jerk's density of a group of joints, of a model that is fixed nowhere: pelvis, upper_body, hips,
     knees, feet; 1 where not given."""
@@ -173,7 +172,7 @@ class Noise(Strict, use_attribute_docstrings=True):
 
     def scales(self) -> dict[str, Any]:
         """The scales that `adapt` finds, as plain data: a preset's table [noise] fixes them."""
-        return self.model_dump(mode="json", include={"kinematic_variance_scale", "jerk_scale"})
+        return self.model_dump(mode="json", include={"variance_scale", "jerk_scale"})
 
 
 SCALES: dict[str, Scale] = {
