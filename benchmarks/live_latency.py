@@ -85,7 +85,7 @@ def measure(name: str, seconds: float, view: bool) -> None:
             sinks.insert(0, Viewer(port=8137))
         time.sleep(5.0)  # the page loads its libraries
     source = Replay(recording, loop=True, duration_s=seconds + 4.0)
-    live = Live(estimator, [source], sinks, standing_wait_s=2.5, say=lambda text: None)
+    live = Live(estimator, [source], sinks, lag_s=0.0, standing_wait_s=2.5, say=lambda text: None)
     before = busy_s(), own_s(), time.monotonic()
     live.run()
     after = busy_s(), own_s(), time.monotonic()

@@ -65,9 +65,10 @@ def mylab_source(address: str, options: dict[str, str]) -> MyLab:
 
 
 def show(frame: LiveFrame) -> None:
-    if round(frame.estimate.time_s * 100) % 50 == 0:
-        knee = np.rad2deg(frame.estimate.coordinates["knee"])
-        print(f"{frame.estimate.time_s:5.2f} s  knee {knee:6.1f} deg  moment {frame.estimate.moments['knee']:7.1f} N m")
+    late = frame.published  # 50 ms late, from the frames until then; None of the first frames
+    if late is not None and round(late.time_s * 100) % 50 == 0:
+        knee = np.rad2deg(late.coordinates["knee"])
+        print(f"{late.time_s:5.2f} s  knee {knee:6.1f} deg  moment {late.moments['knee']:7.1f} N m")
 
 
 if __name__ == "__main__":

@@ -131,6 +131,7 @@ def test_metrics_hold_the_keys_of_the_design(estimate: Estimate) -> None:
         "feet",
         "contacts",
         "window",
+        "lag_s",
         "marker_places",
         "markers",
         "wrench",

@@ -48,7 +48,7 @@ ADVICE = {
     ),
     "speeds": (
         "Smaller noise.coordinate_variance and noise.speed_variance tie each speed to its coordinate.",
-        "A live estimate steps where a measurement corrects it; a smoothed one (without --live-like) does not.",
+        "A live estimate steps where a measurement corrects it; one from all frames (--lag inf) does not.",
     ),
 }
 
@@ -200,7 +200,7 @@ def _prediction(estimate: Estimate, metrics: Metrics) -> Insight | None:
             f"{text} At worst that is {ratio[worst]:.1f} times as far as after it is seen "
             f"({COMPONENT_LABELS[worst][0].lower()}).",
         )
-    if estimate.smoothed:  # follows no single measurement
+    if estimate.lag_s:  # follows no single measurement
         return Insight("note", "One frame ahead", text)
     return Insight(
         "warning",

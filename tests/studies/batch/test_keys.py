@@ -50,7 +50,7 @@ def test_its_configuration_is_one_that_run_repeats(plain: Path) -> None:
 
 
 def test_smoothing_zero_and_signs_are_those_that_were_asked_for(subject: Path, plain: Path, tmp_path: Path) -> None:
-    more = 'smooth = false\nzero = "standing"\nsigns = "clinical"\n'
+    more = 'lag_s = 0.05\nzero = "standing"\nsigns = "clinical"\n'
     assert main(["batch", str(study(subject, tmp_path / "out", more))]) == 0
     folder, run = tmp_path / "out" / "one" / "markers", tmp_path / "run"
     assert main(["run", str(folder / "config.toml"), "-o", str(run)]) == 0

@@ -78,6 +78,7 @@ def compute_metrics(estimate: Estimate, failures: Failures | None = None) -> dic
     metrics: dict[str, Any] = {
         "schema_version": SCHEMA_VERSION,
         "window": {"start_s": float(kept[0]), "end_s": float(kept[-1])},
+        "lag_s": None if estimate.smoothed else estimate.lag_s,
         "marker_places": estimate.marker_places,
     }
     for name, block in blocks.items():
