@@ -17,7 +17,7 @@ from dynakin.cli.options import OF_A_MODEL, OF_THE_LABORATORY, OF_THE_PLATES, Fo
 from dynakin.identification.held_out import with_subject
 from dynakin.recordings.smoothing import CUTOFF_HZ
 from dynakin.report.comparison_page import render_comparison
-from dynakin.report.text_tables import angle_text, moment_text, table2_text, unseen_text
+from dynakin.report.text_tables import angle_text, moment_text, table2_text, truth_text, unseen_text
 from dynakin.results.measures.mean_curves import curve_points
 from dynakin.validation.case import Case
 from dynakin.validation.differences import angle_differences, moment_differences
@@ -25,6 +25,7 @@ from dynakin.validation.files import check_comparison_folder, save_comparison
 from dynakin.validation.held_out import identify_on, judge, predict_blind
 from dynakin.validation.methods import Trial, compare_trial
 from dynakin.validation.table2 import merged, table2
+from dynakin.validation.truth import truth_rows
 from dynakin.validation.unseen import unseen, unseen_figures
 from dynakin.validation.yardsticks import HORIZON_S
 
@@ -38,7 +39,9 @@ def compare(
     *,
     given: Given,
     preset: Annotated[list[str] | None, typer.Option(help="Noise settings: default, paper. May be repeated.")] = None,
-    cutoff: Annotated[float, typer.Option("--cutoff-hz", help="Low-pass of AT and classical, Hz.")] = CUTOFF_HZ,
+    cutoff: Annotated[
+        float, typer.Option("--cutoff-hz", help="Low-pass of AT, classical and IK + ID, Hz.")
+    ] = CUTOFF_HZ,
     halved: Annotated[
         bool, typer.Option("--halves", help="Identify on each trial's first half, judge on its second.")
     ] = False,
@@ -108,11 +111,14 @@ def print_comparison(console: Console, compared: Sequence[Trial]) -> dict[str, S
         console.print(as_table(angle_text(angles)))
     if moments:
         console.print(as_table(moment_text(moments)))
+    truth = truth_rows(compared)
+    if truth:
+        console.print(as_table(truth_text(truth)))
     for trial in compared:
         for note in trial.notes:
             text = note if len(compared) == 1 else f"{trial.name}: {note}"
             console.print(Padding(text, (0, 0, 0, 2)), style="dim")
-    return {"table2": rows, "angles": angles, "moments": moments}
+    return {"table2": rows, "angles": angles, "moments": moments, "truth": truth}
 
 
 def print_held_out(

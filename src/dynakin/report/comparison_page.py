@@ -13,7 +13,7 @@ from dynakin.report.page import render_page
 from dynakin.report.sections.methods import ABOUT_TABLE2, about_methods, angle_part, moment_part, wrench_part
 from dynakin.report.sections.repetitions import method_repetitions
 from dynakin.report.sections.section import Section
-from dynakin.report.text_tables import angle_text, moment_text, name_of, table2_text, unseen_text
+from dynakin.report.text_tables import angle_text, moment_text, name_of, table2_text, truth_text, unseen_text
 from dynakin.results.estimate import COMPONENTS
 from dynakin.results.files.config import plain, versions
 from dynakin.results.naming import listed, number, plural, sentence
@@ -23,6 +23,7 @@ from dynakin.validation.unseen import UnseenRow
 
 _FREE = ("persistence", "linear")
 """Methods that cost nothing."""
+ABOUT_TRUTH = "The recording is simulated, so that what every method is to find is known."
 ABOUT_HELD_OUT = (
     "Parameters identified on one trial, frozen, and the other trial’s wrench predicted from its markers alone; its "
     "plates only judge. A filter that identified well is better than the table on the same markers, and better than "
@@ -116,6 +117,8 @@ def _sections(trials: Sequence[Trial], tables: Mapping[str, Sequence[Any]]) -> l
                     tables=[make(rows)],
                 )
             )
+    if rows := tables.get("truth"):
+        found.append(Section("truth", "Truth", ABOUT_TRUTH, tables=[truth_text(rows)]))
     if rows := tables.get("held_out"):
         shown = [table2_text(rows, "Wrench from markers alone")]
         found.append(Section("held-out", "Held out", ABOUT_HELD_OUT, tables=shown))

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from dynakin.results.estimate import COMPONENTS
 from dynakin.validation.differences import AngleDifference, MomentDifference
 from dynakin.validation.table2 import MARKERS, Row, Spread
+from dynakin.validation.truth import TruthRow
 from dynakin.validation.unseen import UnseenRow
 
 
@@ -71,6 +72,18 @@ def unseen_text(rows: Sequence[UnseenRow]) -> TextTable:
         found.append((yardstick, name_of(quantity), *texts))
     numbers = tuple(range(2, 2 + len(methods)))
     return TextTable("What was not seen, RMS error", ("", "", *methods), _once(found), numbers)
+
+
+def truth_text(rows: Sequence[TruthRow]) -> TextTable:
+    """Errors against a simulation's truth: methods side by side."""
+    methods = list(dict.fromkeys(row.method for row in rows))
+    figures = {(row.quantity, row.method): row.rms for row in rows}
+    found = [
+        (f"{quantity}, {unit}", *(shown(figures[quantity, method], 2) for method in methods))
+        for quantity, unit in dict.fromkeys((row.quantity, row.unit) for row in rows)
+    ]
+    title = "Against the simulation's truth, RMS error (moments: of the legs)"
+    return TextTable(title, ("", *methods), found, tuple(range(1, 1 + len(methods))))
 
 
 def name_of(quantity: str) -> str:

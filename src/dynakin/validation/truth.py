@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,10 @@ import numpy.typing as npt
 import xarray as xr
 
 from dynakin.results.measures.adaptation import constant_groups
+from dynakin.results.measures.sources import legs_of
 from dynakin.results.records import Parameter
+from dynakin.validation.methods import Trial
+from dynakin.validation.table2 import Spread, spread
 
 Array = npt.NDArray[np.float64]
 
@@ -31,6 +35,40 @@ FIGURES = (
 )
 
 
+TRUTH = "truth.nc"
+"""Where `dynakin simulate` leaves the truth, beside the recording."""
+
+
+@dataclass(frozen=True)
+class TruthRow:
+    """RMS error of one quantity of `FIGURES` by one method; mean and standard deviation over trials."""
+
+    quantity: str
+    unit: str
+    method: str
+    rms: Spread
+
+
+def truth_rows(trials: Sequence[Trial]) -> list[TruthRow]:
+    """Every method's errors on the trials that were simulated by dynakin; empty where none was."""
+    found: dict[tuple[str, str, str], list[float]] = {}
+    for trial in trials:
+        estimate = next(iter(trial.estimates.values()))
+        path = estimate.recording.path
+        if path is None or not (Path(path).parent / TRUTH).exists():
+            continue
+        with xr.open_dataset(Path(path).parent / TRUTH) as truth:
+            if truth.sizes["time"] != len(trial.time) or not np.allclose(truth["time"].values, trial.time):
+                continue  # another recording's
+            legs = legs_of(estimate.data)
+            joints = [name for name, leg in zip(trial.coordinate_names, legs, strict=True) if leg]
+            for method in trial.methods:
+                values = truth_errors(method.name, method.data, truth, trial.window, joints or LEG).values
+                for (quantity, unit), value in zip(FIGURES, values, strict=True):
+                    found.setdefault((quantity, unit, method.name), []).append(value)
+    return [TruthRow(*key, spread([v for v in values if np.isfinite(v)])) for key, values in found.items()]
+
+
 @dataclass(frozen=True)
 class TruthErrors:
     """RMS errors of one method in the order of `FIGURES`; NaN where it does not give the quantity.
@@ -48,10 +86,15 @@ def truth_errors(
 ) -> TruthErrors:
     """Errors of ``data`` (named as `Estimate.data`) against ``truth`` over the frames ``window`` (T,).
 
+    Of angles, speeds and accelerations those of the turns that both have and that move count, a root's too.
+
     Args:
         joints: coordinates whose moments count; a planar model's toe is the ground's.
     """
-    names = [str(name) for name in truth["coordinate"].values]
+    turns = dict(zip(data["coordinate"].values, data["coordinate_type"].values == "rotation", strict=True))
+    moves = np.ptp(truth["coordinates"].transpose("time", "coordinate").values, axis=0) > 0.0
+    names = [str(name) for name, moving in zip(truth["coordinate"].values, moves, strict=True)
+             if moving and turns.get(name, False)]  # fmt: skip
 
     def error(variable: str, coordinates: Sequence[str] = names) -> Array:
         both = (data[variable].sel(coordinate=list(coordinates)), truth[variable].sel(coordinate=list(coordinates)))
