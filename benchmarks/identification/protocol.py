@@ -63,7 +63,8 @@ def as_trial(common: Common, body: SimulatedBody, gesture: Gesture, like: Measur
         states[:, common.columns(block)] = values[:, order]
     unknowns = Unknowns.of(common, geometry=False)
     wrench = unknowns.wrench(common.core, states, np.zeros(len(unknowns.sd)))
-    return MeasuredTrial(replace(like.movement, time=time, states=states), wrench, True)
+    movement = replace(like.movement, time=time, states=states, unfiltered=states)
+    return MeasuredTrial(movement, wrench, wrench, True)
 
 
 def information(common: Common, trial: MeasuredTrial, unknowns: Unknowns, weight: Array) -> Array:

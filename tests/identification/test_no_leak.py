@@ -72,6 +72,9 @@ def test_a_trial_is_foretold_without_its_plates(case: Case) -> None:
     for use in before:
         np.testing.assert_array_equal(before[use], after[use])
     assert not trials[1].movement.recording.plates
+    full = trials[1].full_band()
+    assert full.movement.states.shape == trials[1].movement.states.shape
+    assert np.diff(full.movement.states, 2, axis=0).std() > np.diff(trials[1].movement.states, 2, axis=0).std()
     assert np.isnan(rms_of(common, judged, after["bodies"])).all()
 
 

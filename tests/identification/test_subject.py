@@ -31,12 +31,36 @@ def test_a_subject_is_possible_weighs_the_same_and_survives_its_file(
     assert read_identified(tmp_path / "subject.toml") == subject
 
 
+def test_a_subject_says_by_how_much_it_predicts_better(identified: Identification, case: Case, tmp_path: Path) -> None:
+    held_out = identified.subject.held_out
+    assert held_out is not None and len(held_out.parts) == 4 and held_out.components == ("fx", "fy", "mz")
+    gain = 100.0 * (1.0 - (np.array(held_out.bodies) / np.array(held_out.table)).mean())
+    assert f"predicted {gain:+.0f} % better (FX" in held_out.in_words()
+    used = with_identified(case.common.initial, identified.subject.model_copy(update={"use": "bodies"}))
+    assert used.messages[-1].endswith(f"{held_out.in_words()}.")
+    before = identified.subject.model_copy(update={"held_out": None})  # a file of an earlier version
+    before.write(tmp_path / "subject.toml")
+    assert read_identified(tmp_path / "subject.toml") == before
+    for wrong in ({"bodies": held_out.bodies[:1]}, {"table": ((0.0, 1.0, 1.0),) * 4}, {"parts": (), "table": ()}):
+        with pytest.raises(ValueError, match=r"row a part|positive|left out"):
+            type(held_out).model_validate(held_out.model_dump() | wrong)
+
+
 def test_the_table_is_kept_where_bodies_do_not_predict_better(identified: Identification) -> None:
     ratios = identified.decision.ratios("bodies")
     assert (identified.decision.use == "bodies") == bool(ratios.mean() <= 0.97 and ratios.max() <= 1.10)
     rms = {"table": np.ones((2, 3)), "bodies": np.full((2, 3), 1.01)}
-    said = Decision("table", ("a", "b"), rms).in_words()  # type: ignore[arg-type]
+    said = Decision("table", ("a", "b"), rms, rms).in_words()  # type: ignore[arg-type]
     assert said[-1].startswith("The table is kept: held-out gain -1 %")
+
+
+@pytest.mark.parametrize(("full_band", "expected"), [(0.99, "bodies"), (1.01, "table")])
+def test_noise_of_accelerations_may_outweigh_what_bodies_explain(full_band: float, expected: str) -> None:
+    table = np.ones((2, 3))
+    decided = Decision("bodies", ("a", "b"), {"table": table, "bodies": 0.7 * table},
+                       {"table": 5.0 * table, "bodies": 5.0 * full_band * table})  # fmt: skip
+    assert decided.full_band_use == expected
+    assert replace(decided, use="table").full_band_use == "table"
 
 
 def test_the_filter_starts_from_an_identified_subject(identified: Identification, case: Case) -> None:

@@ -15,6 +15,7 @@ from dynakin.report.text_tables import table2_text
 from dynakin.results.naming import plural
 from dynakin.studies.batch.dataset import read_dataset
 from dynakin.studies.batch.process import Options, belongs_to, run_batch, write_batch
+from dynakin.studies.batch.subjects import identify_subjects, with_parameters
 from dynakin.studies.engine.folder import ROWS, open_folder
 from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import open_pool
@@ -26,11 +27,18 @@ def batch(
     preset: Annotated[list[str] | None, typer.Option(help="Noise settings to compare. May be repeated.")] = None,
     cutoff: Annotated[float, typer.Option("--cutoff-hz", help="Low-pass of AT and classical, Hz.")] = CUTOFF_HZ,
     tables_only: Annotated[bool, typer.Option("--tables-only", help="Write no results of single trials.")] = False,
+    identify: Annotated[
+        bool,
+        typer.Option("--identify/--no-identify", help="Identify each subject on its trials first."),
+    ] = True,
     backend: Backend = "processes",
     jobs: Jobs = None,
     scheduler: Scheduler = None,
 ) -> None:
     """Work on all trials of all subjects, each by itself: Table II over them, and those that failed by name.
+
+    A subject with two trials or more is identified on them first. What predicts its left-out trials better than the
+    table is what all its trials start from, unless they have `parameters` already.
 
     The exit code is 1 where some failed, or a filter lost the person. A batch that was stopped goes on where it was;
     those that failed are tried again.
@@ -41,9 +49,14 @@ def batch(
     options = Options(tuple(preset or found.presets), cutoff, not tables_only)
     subjects = sorted({session.subject for session in found.sessions})
     folder = open_folder(found.output, ("table2", "batch.", "trials.", *subjects))
-    journal = Journal(folder / ROWS, belongs_to(found, options))
-    with progress_bar("batch") as progress, open_pool(backend, jobs, scheduler) as pool:
-        result = run_batch(found, options, pool, journal=journal, progress=progress)
+    journal = Journal(folder / ROWS, belongs_to(found, options, identify=identify))
+    identified = {}
+    with open_pool(backend, jobs, scheduler) as pool:
+        if identify:
+            with progress_bar("identifying") as progress:
+                identified = identify_subjects(found, pool, journal=journal, progress=progress)
+        with progress_bar("batch") as progress:
+            result = run_batch(with_parameters(found, identified), options, pool, journal=journal, progress=progress)
     console = out()
     if result.rows:
         people = len({name.split("/")[0] for name in result.rows})
@@ -52,8 +65,10 @@ def batch(
         )
         console.print(as_table(table2_text(result.table2(), title)))
     with busy("writing tables"):
-        write_batch(folder, result)
+        write_batch(folder, result, identified)
     console.print(f"Tables  {folder}/table2.csv, table2_subjects.csv, trials.csv, batch.json", soft_wrap=True)
+    for subject, row in identified.items():
+        console.print(f"Subject {subject}: {row['said'][-1]}", soft_wrap=True)
     for name, row in result.rows.items():
         for note in row["notes"]:
             if note.startswith("Warning:"):

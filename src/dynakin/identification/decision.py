@@ -8,7 +8,7 @@ single frames would judge themselves.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 import numpy as np
@@ -36,17 +36,30 @@ class Decision:
 
     Attributes:
         use: the winner. folds: names of what was left out. rms: (folds, r) of what was left out, predicted from its
-            markers, by candidate. components: (r,) of them, fx, fy, fz (N), mx, my, mz (N m).
+            markers, by candidate, low-passed. full_band: (folds, r) the same, neither prediction nor plates low-passed.
+            components: (r,) of them, fx, fy, fz (N), mx, my, mz (N m).
     """
 
     use: Use
     folds: tuple[str, ...]
     rms: dict[Use, Array]
+    full_band: dict[Use, Array]
     components: tuple[str, ...] = ("fx", "fy", "mz")
 
     def ratios(self, use: Use) -> Array:
         """(folds,) RMS over the table's, mean over the components."""
         return np.asarray((self.rms[use] / self.rms["table"]).mean(axis=1))
+
+    def full_band_ratios(self, use: Use) -> Array:
+        """(folds,) the same of predictions that are not low-passed."""
+        return np.asarray((self.full_band[use] / self.full_band["table"]).mean(axis=1))
+
+    @property
+    def full_band_use(self) -> Use:
+        """The winner for predictions that are not low-passed: the table too where more noise of accelerations, which
+        goes with inertia far out on the limbs, outweighs what the identified inertia explains."""
+        ratios = self.full_band_ratios("bodies")
+        return self.use if ratios.mean() <= 1.0 and ratios.max() <= WORST else "table"
 
     def in_words(self) -> list[str]:
         """Sentences."""
@@ -64,6 +77,7 @@ class Decision:
         gain = 100.0 * (1.0 - self.ratios("bodies").mean())
         worst = 100.0 * (self.ratios("bodies").max() - 1.0)
         verdict = f"held-out gain {gain:.0f} % (mean over components and parts; at the worst part {-worst:+.0f} %)"
+        said.append(f"Not low-passed, the gain is {100.0 * (1.0 - self.full_band_ratios('bodies').mean()):.0f} %.")
         if self.use == "table":
             return [
                 *said,
@@ -95,6 +109,15 @@ def estimate(common: Common, trials: Sequence[MeasuredTrial], use: Use) -> Poste
     return at_start(unknowns) if use == "table" else identify_batch(common, trials, unknowns)
 
 
+def posteriors(common: Common, others: Sequence[MeasuredTrial], uses: Sequence[Use] = USES) -> dict[Use, Posterior]:
+    """What trials say, by candidate.
+
+    Raises:
+        RecordingError: they have too few frames with the plates' wrench.
+    """
+    return {use: estimate(common, others, use) for use in uses}
+
+
 def predict_wrench(
     common: Common, others: Sequence[MeasuredTrial], left_out: Movement, uses: Sequence[Use] = USES
 ) -> dict[Use, Array]:
@@ -102,9 +125,9 @@ def predict_wrench(
     `Movement` has none.
 
     Raises:
-        RecordingError: the others have too few frames with the plates' wrench.
+        RecordingError: as `posteriors`.
     """
-    return {use: estimate(common, others, use).wrench(common, left_out.states) for use in uses}
+    return {use: found.wrench(common, left_out.states) for use, found in posteriors(common, others, uses).items()}
 
 
 def rms_of(common: Common, trial: MeasuredTrial, predicted: Array) -> Array:
@@ -124,17 +147,23 @@ def decide(common: Common, trials: Sequence[MeasuredTrial], progress: Progress |
     """
     halves = (", first half", ", second half") * len(trials) if len(trials) <= 2 else ("",) * len(trials)
     parts = parts_of(trials)
-    names, found = [], []
+    names: list[str] = []
+    low_passed: list[dict[Use, Array]] = []
+    full_band: list[dict[Use, Array]] = []
     for k, (left_out, half) in enumerate(zip(parts, halves, strict=True)):
         others = [part for j, part in enumerate(parts) if j != k]
         if np.isfinite(left_out.wrench[:, common.rows]).all(axis=1).any():  # else there is nothing to judge by
-            predicted = predict_wrench(common, others, left_out.movement)
-            found.append({use: rms_of(common, left_out, wrench) for use, wrench in predicted.items()})
+            found = posteriors(common, others)
+            for rows, part in ((low_passed, left_out), (full_band, left_out.full_band())):
+                states = part.movement.states
+                rows.append({use: rms_of(common, part, one.wrench(common, states)) for use, one in found.items()})
             names.append(left_out.movement.recording.name + half)
         if progress is not None:
             progress(k + 1, len(parts))
-    rms: dict[Use, Array] = {use: np.array([each[use] for each in found]) for use in USES}
+    rms, unfiltered = (
+        {use: np.array([each[use] for each in rows]) for use in USES} for rows in (low_passed, full_band)
+    )
     components = tuple(COMPONENTS[k] for k in common.rows)
-    ratios = Decision("bodies", tuple(names), rms, components).ratios("bodies")
-    use: Use = "bodies" if ratios.mean() <= GAIN and ratios.max() <= WORST else "table"
-    return Decision(use, tuple(names), rms, components)
+    decided = Decision("bodies", tuple(names), rms, unfiltered, components)
+    ratios = decided.ratios("bodies")
+    return decided if ratios.mean() <= GAIN and ratios.max() <= WORST else replace(decided, use="table")

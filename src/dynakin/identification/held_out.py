@@ -19,7 +19,8 @@ from dynakin.validation.held_out import IdentifyingTrial
 
 def with_subject(identifying: IdentifyingTrial) -> tuple[IdentifyingTrial, list[str]]:
     """The same with the subject that `identify_subject` makes of this one trial, whose ``use`` says what is chosen; and
-    why, in sentences. Nothing but the identifying trial is looked at.
+    why, in sentences. Nothing but the identifying trial is looked at. Predictions are judged as the filter gives them,
+    so the choice is `Decision.full_band_use`.
 
     Where no subject can be identified there is none, and the sentences say why.
     """
@@ -27,7 +28,10 @@ def with_subject(identifying: IdentifyingTrial) -> tuple[IdentifyingTrial, list[
         found = identify_subject(_estimator(identifying), [identifying.recording], static=identifying.static)
     except DynakinError as error:
         return identifying, [f"No batch inertia, so nothing is chosen: {error.message}"]
-    return replace(identifying, subject=found.subject), found.decision.in_words()
+    chosen, said = found.decision.full_band_use, found.decision.in_words()
+    if chosen != found.decision.use:
+        said.append("Predictions are judged here as the filter gives them, not low-passed, so the table is chosen.")
+    return replace(identifying, subject=found.subject.model_copy(update={"use": chosen})), said
 
 
 def _estimator(identifying: IdentifyingTrial) -> Estimator:

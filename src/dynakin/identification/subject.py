@@ -17,7 +17,7 @@ from dynakin.identification.observability.element_words import base_words
 from dynakin.identification.observability.measured import MeasuredModel
 from dynakin.identification.report import in_words
 from dynakin.identification.trials import Common, MeasuredTrial, measure_all
-from dynakin.model.identified import Batch, IdentifiedSubject
+from dynakin.model.identified import Batch, HeldOut, IdentifiedSubject
 from dynakin.recordings.recording import Recording
 
 Array = npt.NDArray[np.float64]
@@ -75,6 +75,12 @@ def identify_subject(
         use=decision.use,
         trials=tuple(trial.movement.recording.name for trial in trials),
         report=(*lost, *in_words(decision, posterior, batch)),
+        held_out=HeldOut(
+            parts=decision.folds,
+            components=decision.components,
+            table=_rows(decision.rms["table"]),
+            bodies=_rows(decision.rms["bodies"]),
+        ),
         batch=batch,
     )
     return Identification(subject, common, tuple(trials), posterior, decision, tuple(lost))

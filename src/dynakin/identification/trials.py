@@ -40,6 +40,7 @@ class Movement:
     Attributes:
         recording: as read, its plates taken away. time: (T,) s. states: (T, n) of `Common.core`, with the constants
             of the start. start: the trial's own coordinates and ground frame. lost: (T,) frames that are no estimate.
+        unfiltered: (T, n) states with the smoother's own coordinates, speeds and accelerations, not low-passed.
     """
 
     recording: Recording
@@ -47,6 +48,7 @@ class Movement:
     states: Array
     start: CalibratedModel
     lost: npt.NDArray[np.bool_]
+    unfiltered: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,11 +56,13 @@ class MeasuredTrial:
     """A movement and the wrench measured with it.
 
     Attributes:
-        wrench: (T, 6) N and N m about the ground origin; NaN: not known. floating: whether the body is fixed nowhere.
+        wrench: (T, 6) N and N m about the ground origin; NaN: not known. unfiltered: (T, 6) the same, not low-passed.
+        floating: whether the body is fixed nowhere.
     """
 
     movement: Movement
     wrench: Array
+    unfiltered: Array
     floating: bool = False
 
     @property
@@ -70,8 +74,19 @@ class MeasuredTrial:
     def part(self, frames: slice) -> MeasuredTrial:
         """Some of its frames."""
         whole = self.movement
-        kept = replace(whole, time=whole.time[frames], states=whole.states[frames], lost=whole.lost[frames])
-        return MeasuredTrial(kept, self.wrench[frames], self.floating)
+        kept = replace(
+            whole,
+            time=whole.time[frames],
+            states=whole.states[frames],
+            lost=whole.lost[frames],
+            unfiltered=whole.unfiltered[frames],
+        )
+        return MeasuredTrial(kept, self.wrench[frames], self.unfiltered[frames], self.floating)
+
+    def full_band(self) -> MeasuredTrial:
+        """The same movement as the smoother gives it and the plates as they measured: nothing is low-passed."""
+        whole = self.movement
+        return MeasuredTrial(replace(whole, states=whole.unfiltered), self.unfiltered, self.unfiltered, self.floating)
 
 
 @dataclass(frozen=True, eq=False)
@@ -153,12 +168,16 @@ class Common:
         if (reason := why_lost(judged)) is not None:
             raise LostError(f"{recording.path or recording.name}: {reason}")
         every = max(1, round(1.0 / (RATE_HZ * float(np.median(np.diff(recording.time))))))
-        states = np.tile(self.initial.x0, (recording.n_frames, 1))
+        states, unfiltered = (np.tile(self.initial.x0, (recording.n_frames, 1)) for _ in range(2))
         columns = [self.columns(block) for block in ("coordinates", "speeds", "accelerations")]
         quiet = smooth(recording.time, arrays["state"][:, columns[0]], CUTOFF_HZ)
+        names = list(tracker.core_model.layout.names)
         for at, values in zip(columns, (quiet.values, quiet.rates, quiet.seconds), strict=True):
             states[:, at] = values
-        return Movement(recording, recording.time[::every], states[::every], start, judged.lost[::every])
+            own = [names.index(name) for name in self.core.layout.names[at]]
+            unfiltered[:, at] = arrays["state"][:, own]
+        lost = judged.lost[::every]
+        return Movement(recording, recording.time[::every], states[::every], start, lost, unfiltered[::every])
 
     def with_plates(self, movement: Movement, recording: Recording, *, as_measured: bool = False) -> MeasuredTrial:
         """The movement with the plates of its recording; NaN in frames in which the person was lost.
@@ -169,12 +188,14 @@ class Common:
         Raises:
             RecordingError: it has none, or they are refused.
         """
-        wrench = measured_wrench(recording, movement.start, self.estimator.plates)
+        measured = measured_wrench(recording, movement.start, self.estimator.plates)
+        wrench = measured
         if not as_measured:
             first_of_second = movement.time[middle_of(len(movement.time))]
             wrench = _low_passed(recording.time, wrench, int(np.searchsorted(recording.time, first_of_second - 1e-9)))
         every = np.searchsorted(recording.time, movement.time - 1e-9)
-        return MeasuredTrial(movement, np.where(movement.lost[:, None], np.nan, wrench[every]), self.floating)
+        kept, unfiltered = (np.where(movement.lost[:, None], np.nan, w[every]) for w in (wrench, measured))
+        return MeasuredTrial(movement, kept, unfiltered, self.floating)
 
     def check(self, recording: Recording) -> None:
         """Whether a trial can be identified on: before anything that takes long.

@@ -52,8 +52,37 @@ class Batch(Strict):
         return self
 
 
+class HeldOut(Strict):
+    """What cross-validation found: RMS error of the wrench of each part that was left out and predicted from its
+    markers alone, a row a part, N and N m by ``components``; with the table's inertia, and with the identified."""
+
+    parts: tuple[str, ...]
+    components: tuple[str, ...]
+    table: tuple[tuple[float, ...], ...]
+    bodies: tuple[tuple[float, ...], ...]
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> HeldOut:
+        for key in ("table", "bodies"):
+            rows = getattr(self, key)
+            if len(rows) != len(self.parts) or any(len(row) != len(self.components) for row in rows):
+                raise ValueError(f"{key} has no row a part with a number a component")
+            if not all(np.isfinite(x) and x > 0.0 for row in rows for x in row):
+                raise ValueError(f"{key}: an RMS error is not a positive number")
+        if not self.parts or not self.components:
+            raise ValueError("no part was left out")
+        return self
+
+    def in_words(self) -> str:
+        """The gain of the identified inertia over the table, over all and by component."""
+        gain = 100.0 * (1.0 - (np.array(self.bodies) / np.array(self.table)).mean(axis=0))
+        each = [f"{name.upper()} {value:+.0f} %" for name, value in zip(self.components, gain, strict=True)]
+        return f"trials that were left out are predicted {gain.mean():+.0f} % better ({', '.join(each)})"
+
+
 class IdentifiedSubject(Strict):
-    """What was identified of one subject; ``use`` says whether cross-validation lets ``batch`` replace the table."""
+    """What was identified of one subject; ``use`` says whether cross-validation lets ``batch`` replace the table, and
+    ``held_out`` by how much it predicts better (not in files of earlier versions)."""
 
     schema_version: Literal[1] = 1
     model: str
@@ -61,6 +90,7 @@ class IdentifiedSubject(Strict):
     use: Literal["table", "bodies"]
     trials: tuple[str, ...]
     report: tuple[str, ...] = ()
+    held_out: HeldOut | None = None
     batch: Batch
 
     def write(self, path: Path) -> None:
@@ -71,7 +101,8 @@ class IdentifiedSubject(Strict):
         """
         temporary = path.with_name(f".{path.name}.{os.getpid()}")  # so that a file is whole, or the one before
         try:
-            temporary.write_text(tomli_w.dumps(self.model_dump(mode="json")), encoding="utf-8")
+            content = self.model_dump(mode="json", exclude_none=True)
+            temporary.write_text(tomli_w.dumps(content), encoding="utf-8")
             temporary.replace(path)
         except OSError as error:
             temporary.unlink(missing_ok=True)
@@ -112,7 +143,8 @@ def with_identified(initial: CalibratedModel, subject: IdentifiedSubject) -> Cal
             f"{initial.spec.name}, expected parameters of this model: identify again"
         )
     if subject.use == "table":
-        message = "Identified parameters: the table is kept, which predicts as well."
+        gain = "" if subject.held_out is None else f"; with the identified inertia {subject.held_out.in_words()}"
+        message = f"Identified parameters: the table is kept{gain}."
         return replace(initial, messages=(*initial.messages, message))
     scale = initial.mass_kg / subject.mass_kg  # the same body, weighed anew
     values = scale * np.array(subject.batch.values)
@@ -135,7 +167,8 @@ def with_identified(initial: CalibratedModel, subject: IdentifiedSubject) -> Cal
             ]
         )
     spec.segments = segments
-    message = f"Identified inertial parameters are used, from {', '.join(subject.trials)}."
+    gain = "" if subject.held_out is None else f"; {subject.held_out.in_words()}"
+    message = f"Identified inertial parameters are used, from {', '.join(subject.trials)}{gain}."
     return replace(
         initial,
         spec=spec,

@@ -105,12 +105,16 @@ def work_on(options: Options, payload: Session) -> dict[str, Any]:
     }
 
 
-def belongs_to(dataset: Dataset, options: Options) -> dict[str, Any]:
-    """All that the rows of a batch depend on, for its journal: settings, and the files with their sizes and times."""
+def belongs_to(dataset: Dataset, options: Options, *, identify: bool = False) -> dict[str, Any]:
+    """All that the rows of a batch depend on, for its journal: settings, and the files with their sizes and times.
+
+    Args:
+        identify: whether subjects are identified first (`identify_subjects`).
+    """
     return {
         "what": "batch",
         "dynakin": versions()["dynakin"],
-        "options": [*options.presets, options.cutoff_hz, options.files],
+        "options": [*options.presets, options.cutoff_hz, options.files, identify],
         "sessions": [[s.name, s.content, *_stamps(s.content)] for s in dataset.sessions],
     }
 
@@ -140,9 +144,12 @@ def run_batch(
     return Batch(dataset.sessions, rows, failures)
 
 
-def write_batch(folder: Path, batch: Batch) -> None:
+def write_batch(folder: Path, batch: Batch, identified: Mapping[str, Mapping[str, Any]] | None = None) -> None:
     """``table2.csv`` (over trials), ``table2_subjects.csv`` (over subjects), ``trials.csv`` (a row a trial, quantity
-    and method) and ``batch.json`` (what failed and why, notes, events).
+    and method) and ``batch.json`` (what failed and why, notes, events, subjects).
+
+    Args:
+        identified: what came of `identify_subjects`.
 
     Raises:
         OutputError: a file cannot be written.
@@ -161,6 +168,7 @@ def write_batch(folder: Path, batch: Batch) -> None:
         folder / "batch.json",
         {
             "versions": versions(),
+            "subjects": dict(identified or {}),
             "trials": {name: {k: v for k, v in row.items() if k != "fits"} for name, row in batch.rows.items()},
             "failed": {
                 name: {"message": failure.message, "unexpected": failure.unexpected, "details": failure.details}
