@@ -40,8 +40,8 @@ class Axis(Strict):
 
 
 class Placement(Strict):
-    """The joint lies at ``direction * length`` in the parent; a measured direction replaces the nominal one. Terms beside
-    a measured one correct it: their lengths start at zero."""
+    """The joint lies at ``direction * length`` in the parent; a measured direction replaces the nominal one. Terms
+    beside a measured one correct it: their lengths start at zero."""
 
     length: str
     direction: Vector3
