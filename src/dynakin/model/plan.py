@@ -78,16 +78,21 @@ class ModelPlan:
     def _kinds(self) -> dict[str, str]:
         return {axis.coordinate: axis.kind for segment in self.model.segments for axis in segment.axes}
 
+    def _length_sd(self) -> dict[str, float]:
+        return {length.name: length.sd_m for length in self.model.lengths if length.sd_m is not None}
+
     def prior(self, priors: Priors) -> dict[str, float]:
         """Standard deviation of every element that a state can have, by the core's name of it."""
         names = [site.name for site in self.sites]
-        return state_prior(self._kinds(), self.geometry.lengths, names, self.bodies, self.reach, priors)
+        return state_prior(
+            self._kinds(), self.geometry.lengths, self._length_sd(), names, self.bodies, self.reach, priors
+        )
 
     def bounds(self, bounds: Bounds) -> dict[str, Interval]:
         """Bounds of (9) by the core's names; speeds and accelerations have none."""
         limits = {c.name: c.limits for c in self.model.coordinates}
         places = {site.name: site.position for site in self.sites}
-        return state_bounds(limits, self.geometry.lengths, places, self.bodies, self.reach, bounds)
+        return state_bounds(limits, self.geometry.lengths, self._length_sd(), places, self.bodies, self.reach, bounds)
 
     def table_values(self) -> dict[str, float]:
         """What the table gives, by the core's names."""

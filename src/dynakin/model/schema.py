@@ -40,8 +40,8 @@ class Axis(Strict):
 
 
 class Placement(Strict):
-    """The joint lies at ``direction * length`` in the parent; a measured direction replaces the nominal
-    one."""
+    """The joint lies at ``direction * length`` in the parent; a measured direction replaces the nominal one. Terms
+    beside a measured one correct it: their lengths start at zero."""
 
     length: str
     direction: Vector3
@@ -103,7 +103,7 @@ class Segment(Strict):
         rotation = np.array(self.rotation)
         if np.abs(rotation @ rotation.T - np.eye(3)).max() > 1e-6 or np.linalg.det(rotation) < 0.0:
             raise ValueError("rotation is not a proper rotation matrix (three rows, orthonormal, determinant 1)")
-        if any(term.measured for term in self.placement) and len(self.placement) > 1:
+        if sum(term.measured for term in self.placement) > 1:
             raise ValueError("placement: a measured direction is possible with one length only")
         if self.inertia is not None and self.parts:
             raise ValueError("inertia: either ten numbers or parts of the table, not both")
@@ -155,13 +155,16 @@ class Length(Strict):
     name: Name
     between: LandmarkPair | None = None
     shared: bool = False  # the same for both sides: measured on each, the mean is taken
-    value_m: Annotated[float, Field(gt=0.0)] | None = None
+    value_m: Annotated[float, Field(ge=0.0)] | None = None  # zero: a correction of a measured place, with sd_m
+    sd_m: Annotated[float, Field(gt=0.0)] | None = None  # how well it is known; not given: to a part of it (`Priors`)
     estimated: bool = True
 
     @model_validator(mode="after")
     def _known(self) -> Self:
         if (self.between is None) == (self.value_m is None):
             raise ValueError("expected either between = [landmark, landmark] or value_m")
+        if self.value_m == 0.0 and self.sd_m is None:
+            raise ValueError("value_m is 0: expected sd_m, how far from zero it may be")
         return self
 
     def pairs(self) -> tuple[LandmarkPair, ...]:
@@ -237,6 +240,7 @@ class ModelFile(Strict):
             if double:
                 raise ValueError(f"{kind}: the name {double!r} is given twice")
         lengths = {length.name for length in self.lengths}
+        zero = {length.name: length.value_m == 0.0 for length in self.lengths}
         coordinates = {coordinate.name for coordinate in self.coordinates}
         used: set[str] = set()
         seen: list[str] = ["ground"]
@@ -245,6 +249,11 @@ class ModelFile(Strict):
             _need(segment.parent, seen, f"{where}: parent", "a segment that stands before it, or 'ground'")
             for term in segment.placement:
                 _need(term.length, lengths, f"{where}: placement.length", "a name in lengths")
+                if not term.measured and zero[term.length] != any(each.measured for each in segment.placement):
+                    raise ValueError(
+                        f"{where}: placement.length {term.length!r}: expected value_m = 0 of a length that corrects a "
+                        "measured place, and of no other"
+                    )
             for axis in segment.axes:
                 _need(axis.coordinate, coordinates, f"{where}: axes.coordinate", "a name in coordinates")
                 if axis.scale:

@@ -13,10 +13,15 @@ from dynakin.settings.model import Bounds, Priors
 
 Array = npt.NDArray[np.float64]
 
+_LENGTH_SDS = 4.0
+"""Half width of the bounds of a length that has a standard deviation of its own: the +-20 % of the others are as much
+of theirs."""
+
 
 def state_prior(
     kinds: Mapping[str, str],
     lengths: Mapping[str, float],
+    length_sd: Mapping[str, float],
     markers: Iterable[str],
     bodies: Mapping[str, RigidBody],
     reach: Mapping[str, float],
@@ -26,6 +31,7 @@ def state_prior(
 
     Args:
         kinds: "rotation" or "translation" of each coordinate. lengths: values of the geometry parameters.
+        length_sd: of those that are known otherwise than to a part of their value.
         reach: length (m) that a segment's first moments are compared with.
     """
     sd: dict[str, float] = {}
@@ -37,7 +43,7 @@ def state_prior(
             np.deg2rad(priors.rotation_acceleration_sd_deg_s2) if turn else priors.translation_acceleration_sd_m_s2
         )
     for name, value in lengths.items():
-        sd[f"length/{name}"] = priors.length_sd_fraction * value
+        sd[f"length/{name}"] = length_sd.get(name, priors.length_sd_fraction * value)
     for marker in markers:
         sd |= {f"marker/{marker}/{axis}": priors.marker_sd_m for axis in "xyz"}
     for segment, body in bodies.items():
@@ -49,6 +55,7 @@ def state_prior(
 def state_bounds(
     limits: Mapping[str, Interval],
     lengths: Mapping[str, float],
+    length_sd: Mapping[str, float],
     places: Mapping[str, Array],
     bodies: Mapping[str, RigidBody],
     reach: Mapping[str, float],
@@ -61,10 +68,8 @@ def state_bounds(
     """
     found: dict[str, Interval] = dict(limits)
     for name, value in lengths.items():
-        found[f"length/{name}"] = (
-            (1 - bounds.length_fraction) * value,
-            (1 + bounds.length_fraction) * value,
-        )
+        half = _LENGTH_SDS * length_sd[name] if name in length_sd else bounds.length_fraction * value
+        found[f"length/{name}"] = (value - half, value + half)
     for name, place in places.items():
         for axis, at in zip("xyz", place, strict=True):
             half = bounds.marker_threshold_m

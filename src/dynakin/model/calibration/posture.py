@@ -222,9 +222,10 @@ def find_geometry(
         above = _without(model, segment)
         posture = find_posture(above, geometry, landmarks)
         offset = posture.to_local(segment.parent, landmarks[segment.origin]) - np.array(segment.translation)
+        own = next(k for k, term in enumerate(segment.placement) if term.measured)  # the others are zero as yet
         if segment.side is None:
-            lengths[segment.placement[0].length] = float(np.linalg.norm(offset))
-        directions[segment.name] = [offset / np.linalg.norm(offset)]
+            lengths[segment.placement[own].length] = float(np.linalg.norm(offset))
+        directions[segment.name][own] = offset / np.linalg.norm(offset)
     posture = find_posture(model, geometry, landmarks)
     locked = {name: posture.coordinates[name] if value is None else value for name, value in locks.items()}
     return Geometry(lengths, directions, locked), posture

@@ -160,7 +160,7 @@ class OpenSimDefinition:
         lengths = {parameter.name: 1.0 for parameter in spec.parameters}
         places = {marker.name: np.array(marker.location) for marker, _ in chosen}
         kinds = {axis.coordinate: axis.kind for s in reversed(spec.segments) for axis in reversed(s.axes)}
-        intervals = state_bounds(limits, lengths, places, bodies, reach, bounds or Bounds())
+        intervals = state_bounds(limits, lengths, {}, places, bodies, reach, bounds or Bounds())
         lower = in_layout(names, {name: pair[0] for name, pair in intervals.items()}, -np.inf)
         upper = in_layout(names, {name: pair[1] for name, pair in intervals.items()}, np.inf)
         x0 = np.array(core.initial_state(), dtype=float)
@@ -174,7 +174,7 @@ class OpenSimDefinition:
             spec=spec,
             names=tuple(names),
             x0=np.clip(x0, lower, upper),
-            sd0=in_layout(names, state_prior(kinds, lengths, places, bodies, reach, known), np.nan),
+            sd0=in_layout(names, state_prior(kinds, lengths, {}, places, bodies, reach, known), np.nan),
             lower=lower,
             upper=upper,
             table=in_layout(names, table, np.nan),

@@ -34,6 +34,7 @@ Direction = tuple[float, float, float]
 SIDES = (("r", 1.0), ("l", -1.0))
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 # Rajagopal et al. 2016, IEEE TBME 63:2068-2079: up and medial towards the toes.
+_ANKLE = np.array([-0.10501355, -0.17402245, 0.97912632])
 _SUBTALAR = np.array([0.78717961, 0.60474746, -0.12094949])
 # Middle of the ASIS from the middle of the hip centres, over the height: Harrington et al. (2007, J Biomech 40:595-602)
 # for the pelvis of the marker lists.
@@ -126,7 +127,8 @@ def build_tree(subject: SimulatedSubject) -> tuple[Segment, ...]:
         part = _sided(subject, sign)
         hip = _hinges(side, sign, ("hip_flexion", Z), ("hip_adduction", X), ("hip_rotation", Y))
         knee = _hinges(side, sign, ("knee_angle", (0.0, 0.0, -1.0)), ("knee_adduction", X))
-        ankle = _hinges(side, sign, ("tibial_torsion", Y), ("ankle_angle", Z), ("subtalar_angle", _unit(_SUBTALAR)))
+        axes = ("tibial_torsion", Y), ("ankle_angle", _unit(_ANKLE)), ("subtalar_angle", _unit(_SUBTALAR))
+        ankle = _hinges(side, sign, *axes)
         tree += [
             segment(f"thigh_{side}", "pelvis", hip_in_pelvis(subject, sign), hip, part["thigh"]),
             segment(f"shank_{side}", f"thigh_{side}", -L["thigh"] * np.array(Y), knee, part["shank"]),

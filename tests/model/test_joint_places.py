@@ -1,0 +1,78 @@
+"""Joint centres that the movement may correct: lengths of zero with a standard deviation of their own."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from pydantic import ValidationError
+
+from dynakin.bindings import _core
+from dynakin.filter.estimator import Estimator
+from dynakin.model.schema import Length, ModelFile, Segment
+from support.made_in_space import RATE, definition, measured, recording_of, standing, states
+
+HIPS = ("hip_forward", "hip_up", "hip_outward")
+
+
+def test_a_correction_of_zero_says_how_far_it_may_go() -> None:
+    assert Length(name="out", value_m=0.0, sd_m=0.01).sd_m == 0.01
+    with pytest.raises(ValidationError, match="expected sd_m"):
+        Length(name="out", value_m=0.0)
+
+
+def test_one_term_of_a_place_is_measured_at_most() -> None:
+    terms: list[dict[str, Any]] = [{"length": "a", "direction": [1.0, 0.0, 0.0], "measured": True}]
+    Segment(name="thigh", placement=[*terms, {"length": "b", "direction": [0.0, 1.0, 0.0]}])
+    with pytest.raises(ValidationError, match="one length only"):
+        Segment(name="thigh", placement=[*terms, *terms])
+
+
+def test_the_hip_starts_where_the_markers_have_it_and_may_move_on_both_sides_alike() -> None:
+    initial = measured()
+    names = list(initial.names)
+    for name in HIPS:
+        k = names.index(f"length/{name}")
+        assert initial.x0[k] == 0.0 and initial.sd0[k] == pytest.approx(0.010)
+        assert (initial.lower[k], initial.upper[k]) == pytest.approx((-0.04, 0.04))
+    assert "length/pelvis" not in names  # along its direction the three say the same
+    core = _core.Model(initial.spec)
+    x = core.initial_state()
+    segments = list(core.segment_names)
+    right, left = (segments.index(f"thigh_{side}") for side in "rl")
+    R, before = _core.segment_poses(core, x)
+    for name, axis, signs in (("hip_forward", 0, (1, 1)), ("hip_up", 1, (1, 1)), ("hip_outward", 2, (1, -1))):
+        moved = x.copy()
+        moved[names.index(f"length/{name}")] = 0.01
+        change = (_core.segment_poses(core, moved)[1] - before) @ R[segments.index("pelvis")]
+        for segment, sign in zip((right, left), signs, strict=True):
+            expected = np.zeros(3)
+            expected[axis] = 0.01 * sign
+            np.testing.assert_allclose(change[segment], expected, atol=1e-12)
+
+
+@pytest.mark.parametrize(("name", "value_m"), [("hip_up", 0.02), ("shank", 0.0)])
+def test_corrections_start_at_zero_and_lengths_do_not(name: str, value_m: float) -> None:
+    lengths = [length.model_dump() for length in definition().model.lengths]
+    for length in lengths:
+        if length["name"] == name:
+            length |= {"between": None, "shared": False, "value_m": value_m, "sd_m": 0.01}
+    with pytest.raises(ValidationError, match=f"{name}.*expected value_m = 0"):
+        ModelFile.model_validate(definition().model.model_dump() | {"lengths": lengths})
+
+
+def test_the_movement_finds_hips_that_the_pelvis_markers_misplace() -> None:
+    initial = measured()
+    time = np.arange(300) / RATE
+    sway, swing = np.sin(2.0 * np.pi * time), np.sin(np.pi * time)
+    motion = {"pelvis_list": 0.15 * sway, "hip_flexion_r": 0.7 * swing**2, "hip_flexion_l": 0.5 * sway**2}
+    motion |= {f"hip_adduction_{side}": 0.2 * swing * sign for side, sign in (("r", 1.0), ("l", -1.0))}
+    x = states(initial, motion, 0.0, np.zeros(3), time)
+    hips = [list(initial.names).index(f"length/{name}") for name in HIPS]
+    true = np.array([-0.012, 0.008, -0.012])
+    x[:, hips] = true
+    trial = recording_of(initial, x, time, plates=False, noise_m=0.0005)
+    found = Estimator(definition(), vertical="+Y", estimate=["lengths"]).run(trial, static=standing(), smooth=True)
+    values = {parameter.name: parameter.value for parameter in found.parameters}
+    np.testing.assert_allclose([values[f"length/{name}"] for name in HIPS], true, atol=0.004)
