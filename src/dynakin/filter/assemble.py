@@ -16,6 +16,7 @@ from dynakin.filter.events import events_of
 from dynakin.filter.labels import labels
 from dynakin.filter.parameters import parameters_of
 from dynakin.filter.sources import with_sources
+from dynakin.filter.systematic import Systematic
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.contact import ON_PLATE
 from dynakin.recordings.recording import Recording
@@ -37,6 +38,7 @@ def assemble(
     covariances: tuple[Array, Array],
     feet: ContactLoads | None = None,
     undeclared: npt.NDArray[np.bool_] | None = None,
+    systematic: Systematic | None = None,
 ) -> Estimate:
     """Label what `Filter.run` returned and keep what is needed to judge it.
 
@@ -48,6 +50,7 @@ def assemble(
         covariances: P (n, n) before the first frame and after the last.
         feet: the wrenches that the moments were made with, None where there were none.
         undeclared: (T,) frames in which something bears the person that no plate measures.
+        systematic: what is added to the filter's deviations of angles, speeds, accelerations and moments.
     """
     data = _dataset(arrays, model, initial, recording, measured, feet)
     data = with_sources(
@@ -80,10 +83,13 @@ def assemble(
             "reasons": list(config.get("ground_reasons", ())),
         },
     }
+    events = events_of(data, parameters, initial, noise.get("unseen_sd"))  # by what the filter itself believes
+    if systematic is not None:
+        data = systematic.added_over_time(data)
     estimate = Estimate(
         data=data,
         parameters=parameters,
-        events=events_of(data, parameters, initial, noise.get("unseen_sd")),
+        events=events,
         timing=_timing(arrays["step_us"], recording),
         recording=recording,
         ground=initial.ground,
