@@ -73,6 +73,6 @@ def test_the_movement_finds_hips_that_the_pelvis_markers_misplace() -> None:
     true = np.array([-0.012, 0.008, -0.012])
     x[:, hips] = true
     trial = recording_of(initial, x, time, plates=False, noise_m=0.0005)
-    found = Estimator(definition(), vertical="+Y", estimate=["lengths"]).run(trial, static=standing(), smooth=True)
+    found = Estimator(definition(), vertical="+Y", estimate=["lengths"]).run(trial, static=standing())
     values = {parameter.name: parameter.value for parameter in found.parameters}
     np.testing.assert_allclose([values[f"length/{name}"] for name in HIPS], true, atol=0.004)

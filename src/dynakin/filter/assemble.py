@@ -18,6 +18,7 @@ from dynakin.filter.labels import labels
 from dynakin.filter.noise import limit_sd
 from dynakin.filter.parameters import parameters_of
 from dynakin.filter.sources import with_sources
+from dynakin.filter.systematic import Systematic
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.contact import ON_PLATE
 from dynakin.recordings.recording import Recording
@@ -41,6 +42,7 @@ def assemble(
     used: Noise,
     feet: ContactLoads | None = None,
     undeclared: npt.NDArray[np.bool_] | None = None,
+    systematic: Systematic | None = None,
 ) -> Estimate:
     """Label what `Filter.run` returned and keep what is needed to judge it.
 
@@ -54,6 +56,7 @@ def assemble(
             ``variance_scale``: what is wrong with a place or a length does not average out.
         feet: the wrenches that the moments were made with, None where there were none.
         undeclared: (T,) frames in which something bears the person that no plate measures.
+        systematic: what is added to the filter's deviations of angles, speeds, accelerations and moments.
     """
     data = _dataset(arrays, model, initial, recording, measured, feet)
     data = with_sources(
@@ -90,10 +93,13 @@ def assemble(
             "reasons": list(config.get("ground_reasons", ())),
         },
     }
+    events = events_of(data, parameters, initial, limit_sd(used, used.unseen_sd))  # by what the filter itself believes
+    if systematic is not None:
+        data = systematic.added_over_time(data)
     estimate = Estimate(
         data=data,
         parameters=parameters,
-        events=events_of(data, parameters, initial, limit_sd(used, used.unseen_sd)),
+        events=events,
         timing=_timing(arrays["step_us"], recording),
         recording=recording,
         ground=initial.ground,

@@ -111,8 +111,8 @@ def variance_scales(names: Collection[str], noise: Noise) -> Array:
 def initial_covariance(initial: CalibratedModel, noise: Noise) -> Array:
     """P0 (n, n): the priors, and with `total_mass_use` "prior" the total mass as one piece of information on it."""
     root = np.sqrt(variance_scales(initial.names, noise))
-    scales = np.outer(root, root)
-    covariance = np.diag(initial.sd0**2)
+    scales: Array = np.outer(root, root)
+    covariance: Array = np.diag(initial.sd0**2)
     if initial.joint_prior is not None:
         place = {name: k for k, name in enumerate(initial.names)}
         known = [k for k, name in enumerate(initial.joint_prior.names) if name in place]

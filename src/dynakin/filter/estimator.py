@@ -279,8 +279,7 @@ class Estimator:
         covariances = (initial_covariance(calibrated, tracker.noise), tracker.covariance)
         estimate = assemble(
             arrays, tracker.core_model, calibrated, recording, (markers, wrench), config, notes, covariances,
-            tracker.noise, on_feet,
-            ready.undeclared(on_feet),
+            tracker.noise, on_feet, ready.undeclared(on_feet), tracker.systematic,
         )  # fmt: skip
         return Tracked(without_lost(estimate), tracker)
 

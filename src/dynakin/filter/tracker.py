@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Collection
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from dynakin.filter.core_filter import core_filter
 from dynakin.filter.samples import Sample, sample_arrays
 from dynakin.filter.sources import ContactSources
 from dynakin.filter.step import Codes, Labelled, Labels, StepEstimate, deviations_of, step_estimate
+from dynakin.filter.systematic import Systematic
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.recording import rate_of
 from dynakin.results.measures.sources import ABSENT
@@ -56,6 +58,7 @@ class Tracker:
         self._labels = Labels.of(self.core_model)
         self._sources = ContactSources.of(self.calibrated)
         self._time: float | None = None
+        self._contacts: tuple[str, ...] = ()
         self._latest: StepEstimate | None = None
         self._stepped: deque[tuple[float, _core.ContactLoads | None, Codes]] = deque(maxlen=lag + 1)
 
@@ -87,6 +90,11 @@ class Tracker:
         """What each sensor said in the last step: innovation and innovation_sd (3 M + 6,), 3 a marker, then the
         plates'; test_ratio (M + 1,) as in `Estimate`. NaN: not measured."""
         return self._filter.sensors
+
+    @cached_property
+    def systematic(self) -> Systematic | None:
+        """What is added to the filter's own deviations when they are reported; None where the noise asks for none."""
+        return Systematic(self.calibrated, self.noise) if self.noise.systematic_scale else None
 
     @property
     def latest(self) -> StepEstimate:
@@ -133,6 +141,7 @@ class Tracker:
             raise DivergenceError(f"the filter diverged at {sample.time_s} s: {report.status}")
         self._time = sample.time_s
         sources = self._sources.moments(feet)[0]
+        self._contacts = () if feet is None else feet.segments
         self._stepped.append((sample.time_s, loads, sources))
         self._latest = step_estimate(self.core_model, self._labels, sample.time_s, self.state, report, sources, loads)
         return self._latest
@@ -153,7 +162,8 @@ class Tracker:
         return step_estimate(self.core_model, self._labels, time, lag.state, None, sources, loads)
 
     def deviations(self, *, delayed: bool = False) -> dict[str, Labelled]:
-        """Standard deviations of the present estimate, as it was last stepped: propagated now, not in every step.
+        """Standard deviations of the present estimate, as it was last stepped: propagated now, not in every step. They
+        hold what the filter cannot know, too (`systematic`).
 
         Args:
             delayed: those of `delayed` instead, once there is one; they take as long as some steps for each frame of
@@ -174,6 +184,11 @@ class Tracker:
         elif self._stepped:
             loads, absent = self._stepped[-1][1], self._stepped[-1][2] == ABSENT
         found = deviations_of(self.core_model, state, covariance, loads)
+        if self.systematic is not None:
+            wrench = np.zeros((0, 6))
+            if loads is not None:
+                wrench = _core.contact_moments(self.core_model, state, loads)["foot_wrench"]
+            found |= self.systematic.added(found, state, wrench, self._contacts)
         found["moments"] = np.where(absent, np.nan, found["moments"])
         return {name: Labelled(values, self._labels.on(name)) for name, values in found.items()}
 

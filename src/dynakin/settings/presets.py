@@ -33,6 +33,7 @@ def paper() -> Noise:
         floating_translation_jerk_density_m2_s5=None,
         length_drift_density_m2_s=0.0,
         length_skin_fraction=0.0,
+        systematic_scale=0.0,
         soft_tissue_sd_fraction=0.0,
         soft_tissue_least_sd_m=0.0,
         soft_tissue_time_s=1.0,

@@ -1,0 +1,184 @@
+"""A model whose joints may be misplaced and turned: each error is a coordinate that stands still, so that the core's own
+derivatives say what it does to markers and moments ([derivations](derivations.md), section 17)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.bindings import _core
+
+Array = npt.NDArray[np.float64]
+Kind = Literal["centre", "hinge", "ball", "root"]
+"""A joint's centre beside where it is on the bones; the axes of a hinge (or of two) or of a ball joint turned on both of
+its bones; the root's frame turned in its bone."""
+Column = dict[str, float]
+
+_AXES = np.eye(3)
+
+
+@dataclass(frozen=True, eq=False)
+class JointErrors:
+    """Errors of a model's joints, as coordinates of a larger model.
+
+    Attributes:
+        model: the original's coordinates first, then those of the errors; nothing else is estimated.
+        free: (K,) places of the original's free coordinates among the larger model's.
+        placed: (E,) places of the errors' coordinates among the same.
+        sources: (E, S) how far each of these is moved by a unit of each source of error: m a m, rad a rad.
+        kinds: (S,) what each source is.
+    """
+
+    model: _core.Model
+    free: npt.NDArray[np.intp]
+    placed: npt.NDArray[np.intp]
+    sources: Array
+    kinds: tuple[Kind, ...]
+
+    @classmethod
+    def of(cls, spec: _core.ModelSpec, reference: Array) -> JointErrors:
+        """Those of a model.
+
+        Args:
+            reference: (C,) posture in which the bones were found: there a misplaced joint displaces no bone but its own.
+        """
+        spec = _without_parameters(spec)
+        orientations = _orientations(spec, reference)
+        larger, added = _with_errors(spec)
+        found = _sources(spec, orientations)
+        place = {name: k for k, name in enumerate(c.name for c in larger.coordinates if not c.locked)}
+        sources = np.array([[column.get(name, 0.0) for _, column in found] for name in added])
+        return cls(
+            _core.Model(larger),
+            np.array([place[c.name] for c in spec.coordinates if c.name in place], dtype=np.intp),
+            np.array([place[name] for name in added], dtype=np.intp),
+            sources.reshape(len(added), len(found)),
+            tuple(kind for kind, _ in found),
+        )
+
+    def state(self, q: Array, qd: Array, qdd: Array) -> Array:
+        """(n,) of the larger model with its errors at 0.
+
+        Args:
+            q, qd, qdd: (K,) of the original's free coordinates.
+        """
+        x = np.zeros((3, len(self.free) + len(self.placed)))
+        x[:, self.free] = q, qd, qdd
+        return x.ravel()
+
+
+def floats(segment: _core.SegmentSpec) -> bool:
+    """Whether a segment moves freely in the laboratory."""
+    return bool(segment.parent == "ground" and len({axis.coordinate for axis in segment.axes}) == 6)
+
+
+def _without_parameters(spec: _core.ModelSpec) -> _core.ModelSpec:
+    spec = copy(spec)
+    parameters, segments, markers = spec.parameters, spec.segments, spec.markers
+    for parameter in parameters:
+        parameter.estimated = False
+    for segment in segments:
+        segment.inertia_estimated = [False] * 10
+    for marker in markers:
+        marker.estimated = marker.soft_tissue = [False] * 3
+    spec.parameters, spec.segments, spec.markers = parameters, segments, markers
+    spec.wrench_offset, spec.wrench_delay, spec.contacts = [False] * 6, False, []
+    return spec
+
+
+def _orientations(spec: _core.ModelSpec, reference: Array) -> dict[str, Array]:
+    """R_GB of each segment in the reference posture."""
+    model = _core.Model(spec)
+    x = np.zeros(model.layout.size)
+    free = [k for k, coordinate in enumerate(spec.coordinates) if not coordinate.locked]
+    x[: len(free)] = reference[free]
+    return dict(zip(model.segment_names, _core.segment_poses(model, x)[0], strict=True))
+
+
+def _turning(spec: _core.ModelSpec) -> dict[str, set[str]]:
+    """Segment -> free rotations of its joint, without those that follow a joint before it (a patella's)."""
+    free = {c.name for c in spec.coordinates if not c.locked}
+    seen: set[str] = set()
+    found = {}
+    for segment in spec.segments:
+        own = {axis.coordinate for axis in segment.axes if axis.kind == "rotation" and axis.coordinate in free}
+        if own - seen:
+            found[segment.name] = own
+        seen |= own
+    return found
+
+
+def _with_errors(spec: _core.ModelSpec) -> tuple[_core.ModelSpec, list[str]]:
+    """Each segment may be displaced in its parent; a joint's axes may be turned in the parent, and the segment behind
+    them: three translations and three rotations before the joint, three rotations behind its own."""
+    joints, added = _turning(spec), []
+    larger = copy(spec)
+    segments, coordinates = larger.segments, larger.coordinates
+
+    def errors(segment: str, place: str, kind: str) -> list[_core.AxisSpec]:
+        names = _names(segment, place)
+        added.extend(names)
+        coordinates.extend(_core.CoordinateSpec(name) for name in names)
+        return [_core.AxisSpec(name, kind, axis) for name, axis in zip(names, _AXES, strict=True)]
+
+    for segment in segments:
+        axes, name, inner = list(segment.axes), segment.name, segment.parent != "ground"
+        if name in joints:
+            last = max(k for k, axis in enumerate(axes) if axis.kind == "rotation")
+            axes[last + 1 : last + 1] = errors(name, "behind", "rotation")
+            axes[:0] = errors(name, "turned", "rotation") if inner else []
+        axes[:0] = errors(name, "moved", "translation") if inner else []
+        segment.axes = axes
+    larger.segments, larger.coordinates = segments, coordinates
+    return larger, added
+
+
+def _names(segment: str, place: str) -> list[str]:
+    return [f"{segment}_{place}_{axis}" for axis in "xyz"]
+
+
+def _sources(spec: _core.ModelSpec, orientations: dict[str, Array]) -> list[tuple[Kind, Column]]:
+    """Unit errors along the ground's axes in the reference posture, by the errors' coordinates that they move."""
+    planar = not all(spec.markers[0].measured)
+    joints = _turning(spec)
+    found: list[tuple[Kind, Column]] = []
+    for segment in spec.segments:
+        if segment.name not in joints:
+            continue
+        name, R_B = segment.name, orientations[segment.name]
+        children = [child for child in spec.segments if child.parent == name]
+        if segment.parent == "ground":
+            if not planar and floats(segment):
+                found += [
+                    ("root", _root_turned(name, R_B, [c for c in children if c.name in joints], e)) for e in _AXES
+                ]
+            continue
+        R_J = orientations[segment.parent] @ segment.rotation
+        for e in _AXES[: 2 if planar else 3]:
+            column = _along(name, "moved", R_J, e)
+            for child in children:
+                column |= _along(child.name, "moved", R_B @ child.rotation, -e)
+            found.append(("centre", column))
+        if not planar:
+            kind: Kind = "ball" if len(joints[name]) >= 3 else "hinge"
+            found += [(kind, _along(name, "turned", R_J, e) | _along(name, "behind", R_B, -e)) for e in _AXES]
+    return found
+
+
+def _root_turned(name: str, R_B: Array, children: Sequence[_core.SegmentSpec], e: Array) -> Column:
+    """The root's frame turned by e in its bone: seen from the frame, the bone with its markers and the centres of its
+    joints is turned by -e; the axes of these joints stay with the frame."""
+    column = _along(name, "behind", R_B, -e)
+    for child in children:
+        column |= _along(child.name, "turned", R_B @ child.rotation, e)
+    return column
+
+
+def _along(segment: str, place: str, R: Array, vector: Array) -> Column:
+    """A vector of ground axes as displacements of three of the errors' coordinates whose axes are R's columns."""
+    return dict(zip(_names(segment, place), (R.T @ vector).tolist(), strict=True))

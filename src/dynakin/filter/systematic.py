@@ -1,0 +1,279 @@
+"""What the filter's covariance cannot know: joints beside where they are, and skin that follows them.
+
+A consider covariance (Schmidt 1966): these errors are no states, and nothing is learned of them; their effect on what
+is reported is worked out afterwards and added to the filter's own variances ([derivations](derivations.md), section 17).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import astuple, dataclass
+
+import numpy as np
+import numpy.typing as npt
+import xarray as xr
+from scipy.linalg import cho_factor, cho_solve
+
+from dynakin.bindings import _core
+from dynakin.filter.joint_errors import JointErrors, floats
+from dynakin.filter.noise import marker_variance, soft_tissue_sd
+from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.settings.noise import Noise
+
+Array = npt.NDArray[np.float64]
+
+BLOCKS = ("coordinates", "speeds", "accelerations", "moments")
+KINDS = ("centre", "hinge", "ball", "root", "skin")
+
+
+@dataclass(frozen=True)
+class Sizes:
+    """Standard deviations of the errors, of each component; where they come from is in docs/derivations.md.
+
+    Attributes:
+        centre: m, of a joint's centre. hinge: rad, of the turn of the axes of a joint with one or two; ball: of one
+            with three. root: rad, of the turn of the pelvis' frame in the pelvis.
+        skin: of the displacement of a marker that follows a joint's angle, as a fraction of the declared size.
+    """
+
+    centre: float
+    hinge: float
+    ball: float
+    root: float
+    skin: float
+
+    def scaled(self, factor: float) -> Sizes:
+        """All of them times a factor."""
+        return Sizes(*(factor * value for value in astuple(self)))
+
+
+LANDMARKS = Sizes(centre=0.006, hinge=np.radians(4.0), ball=np.radians(1.5), root=np.radians(3.0), skin=0.3)
+"""Joints that are found from markers on the skin."""
+SCALED = Sizes(centre=0.003, hinge=np.radians(1.5), ball=np.radians(1.0), root=np.radians(1.5), skin=0.3)
+"""Joints of a skeleton that was scaled to the person (.osim)."""
+
+
+def usual_sizes(calibrated: CalibratedModel) -> Sizes:
+    """By where the joints of a model come from."""
+    return SCALED if calibrated.plan is None else LANDMARKS
+
+
+SKIN_ANGLE_RAD = np.radians(50.0)
+"""How far a joint turns until its skin has moved three quarters of its way."""
+COMMON = 0.36
+"""Part of that displacement's variance that all markers of a segment share."""
+SAMPLE_S = 0.1
+"""Frames of a recording further apart than this are worked out, variances of those between by straight lines."""
+_STEP_S = 0.005
+"""Step along the motion over which effects are differentiated."""
+_UNSEEN_SD = 0.5
+"""Standard deviation, rad or m, of a coordinate before any marker is seen: keeps what no marker shows finite."""
+
+Parts = dict[str, dict[str, Array]]
+
+
+class Systematic:
+    """Effects of systematic errors on what is estimated of one person.
+
+    Args:
+        calibrated: with the states that the filter has. noise: how surely the markers are known, for their weights.
+        sizes: of the errors; by where the joints come from where not given.
+    """
+
+    def __init__(self, calibrated: CalibratedModel, noise: Noise, sizes: Sizes | None = None) -> None:
+        spec = calibrated.spec
+        self.sizes = sizes or usual_sizes(calibrated).scaled(noise.systematic_scale)
+        self._free = np.array([k for k, c in enumerate(spec.coordinates) if not c.locked])
+        self._count = len(spec.coordinates)
+        reference = _neutral(calibrated)
+        self._errors = JointErrors.of(spec, reference)
+        self._reference = reference[self._free]
+        self._measured = np.array([marker.measured for marker in spec.markers]).ravel()
+        sd = np.hypot(np.sqrt(marker_variance(calibrated, noise)), soft_tissue_sd(noise, calibrated.soft_tissue_m))
+        self._root_weight = np.repeat(1.0 / sd, 3) * self._measured
+        segments = [segment.name for segment in spec.segments]
+        self._segment = np.array([segments.index(marker.segment) for marker in spec.markers])
+        self._declared = np.repeat(calibrated.soft_tissue_m, 3)
+        members = np.equal.outer(self._segment, np.arange(len(segments))).astype(float)
+        self._members = np.kron(members, np.eye(3))
+        self._drives = _drives(spec, self._free)
+        still = np.zeros_like(self._reference)
+        x = self._errors.state(self._reference, still, still)
+        self._R0 = _core.segment_poses(self._errors.model, x)[0]
+        self._D0 = self._displacements(_core.marker_jacobian(self._errors.model, x))
+        self._D0[:, [kind == "root" for kind in self._errors.kinds]] = 0.0
+        gain, N = self._gain(x)
+        self._B0 = gain @ N
+        self._segments = {name: k for k, name in enumerate(segments)}
+
+    def _displacements(self, jacobian: Array) -> Array:
+        """(3 M, S): what each source does to the markers of the model as it is posed."""
+        return np.asarray(jacobian[:, self._errors.placed] @ self._errors.sources)
+
+    def _gain(self, x: Array) -> tuple[Array, Array]:
+        """Minus the least squares gain (K, 3 M) of the markers, and the net displacements N (3 M, S) of the geometry:
+        markers sit where the reference posture showed them, whatever is wrong with the joints."""
+        jacobian = _core.marker_jacobian(self._errors.model, x)
+        turned = (_core.segment_poses(self._errors.model, x)[0] @ self._R0.swapaxes(-1, -2))[self._segment]
+        carried = turned @ self._D0.reshape(len(self._segment), 3, -1)
+        N = self._displacements(jacobian) - carried.reshape(self._D0.shape)
+        A = jacobian[:, self._errors.free] * self._root_weight[:, None]
+        normal = A.T @ A
+        normal[np.diag_indices_from(normal)] += _UNSEEN_SD**-2
+        return -cho_solve(cho_factor(normal), (A * self._root_weight[:, None]).T), N
+
+    def parts(self, q: Array, qd: Array, qdd: Array, external: Array | None = None) -> Parts:
+        """Variances by kind of error, of errors of size 1 (m, rad, declared size): block -> (C,).
+
+        Args:
+            q, qd, qdd: (K,) of the free coordinates. external: (S, 6) wrenches on the segments, about the ground's
+                origin.
+        """
+        errors = self._errors
+        gains, effects = [], []
+        for h in (-_STEP_S, 0.0, _STEP_S):
+            x = errors.state(q + h * qd + 0.5 * h * h * qdd, qd, qdd)
+            gain, N = self._gain(x)
+            gains.append(gain)
+            effects.append(gain @ N)
+        G, Gd, Gdd = _differences(gains)
+        B, Bd, Bdd = _differences(effects)
+        x = errors.state(q, qd, qdd)
+        T = _core.moment_jacobian(errors.model, x, external)[: self._count]
+        size = len(errors.free) + len(errors.placed)
+        Tq, Tv, Ta = (T[:, k * size + errors.free] for k in range(3))
+        direct = T[:, errors.placed] @ errors.sources
+        moved = Tq @ B + Tv @ Bd + Ta @ Bdd + direct
+        found: Parts = {}
+        for kind in KINDS[:-1]:
+            chosen = [k for k, own in enumerate(errors.kinds) if own == kind]
+            outputs = (B - self._B0, Bd, Bdd, moved)  # of angles what changes with the posture: a zero is a definition
+            found[kind] = self._labelled(*(np.square(values[:, chosen]).sum(axis=1) for values in outputs))
+        found["skin"] = self._labelled(*self._skin(q, qd, qdd, (G, Gd, Gdd), (Tq, Tv, Ta)))
+        return found
+
+    def _skin(
+        self, q: Array, qd: Array, qdd: Array, gains: tuple[Array, Array, Array], T: tuple[Array, Array, Array]
+    ) -> list[Array]:
+        """Variances of angles, speeds, accelerations, moments by skin that follows the joints of its segment."""
+        Tq, Tv, Ta = T
+        s = np.tanh((q - self._reference) / SKIN_ANGLE_RAD)
+        slope = (1.0 - s * s) / SKIN_ANGLE_RAD
+        rates = np.array([s, slope * qd, slope * qdd - 2.0 * s * slope / SKIN_ANGLE_RAD * qd * qd])  # (3, K)
+        products = (rates[:, None] * rates[None]) @ self._drives.T  # (3, 3, segments)
+        weights = np.repeat(np.concatenate([products[:, :, self._segment], products], axis=-1), 3, axis=-1)
+        G, Gd, Gdd = (self._displaced(values) for values in gains)
+        T0, T1, T2 = Tq @ G + Tv @ Gd + Ta @ Gdd, Tv @ G + 2.0 * Ta @ Gd, Ta @ G
+        found = []
+        for by_rate in ((G,), (Gd, G), (Gdd, 2.0 * Gd, G), (T0, T1, T2)):  # what goes with skin, its speed, ...
+            pairs = [(a, b) for a in range(len(by_rate)) for b in range(len(by_rate))]
+            found.append(sum((by_rate[a] * by_rate[b] @ weights[a, b] for a, b in pairs), np.zeros(1)))
+        return found
+
+    def _displaced(self, values: Array) -> Array:
+        """(., 3 M + 3 S): effects of each marker's own share of the displacement and of each segment's common one."""
+        own = values * self._declared
+        return np.hstack([np.sqrt(1.0 - COMMON) * own, np.sqrt(COMMON) * own @ self._members])
+
+    def _labelled(self, q: Array, qd: Array, qdd: Array, moments: Array) -> dict[str, Array]:
+        found = {}
+        for name, values in zip(BLOCKS, (q, qd, qdd), strict=False):
+            found[name] = np.zeros(self._count)
+            found[name][self._free] = values
+        return found | {"moments": moments}
+
+    def over_time(self, data: xr.Dataset) -> dict[str, dict[str, Array]]:
+        """`parts` of a recording: kind -> block -> (T, C). NaN around frames whose state or contacts are not numbers.
+
+        Args:
+            data: as of `Estimate`, with ``state``, and ``foot_wrench`` of a model whose contacts have been used.
+        """
+        time = np.asarray(data["time"].values)
+        states = data["state"].transpose("time", "element").values
+        wrench, segments = np.zeros((len(time), 0, 6)), []
+        if "foot_wrench" in data:
+            wrench = np.nan_to_num(data["foot_wrench"].transpose("time", "foot", "component").values)
+            segments = [str(name) for name in data["foot_segment"].values]
+        chosen = _sampled(time)
+        each = [self._at(states[k], wrench[k], segments) for k in chosen]
+        return {
+            kind: {block: _between(time, time[chosen], np.array([p[kind][block] for p in each])) for block in BLOCKS}
+            for kind in KINDS
+        }
+
+    def _at(self, x: Array, wrench: Array, segments: Sequence[str]) -> Parts:
+        """`parts` of a state (n,) with wrenches (F, 6) of contacts on these segments."""
+        K = len(self._free)
+        if not np.isfinite(x[: 3 * K]).all():
+            return {kind: {block: np.full(self._count, np.nan) for block in BLOCKS} for kind in KINDS}
+        external = np.zeros((len(self._segments), 6))
+        for name, values in zip(segments, wrench, strict=True):
+            external[self._segments[name]] += values
+        return self.parts(x[:K], x[K : 2 * K], x[2 * K : 3 * K], external)
+
+    def variances(self, parts: Mapping[str, Mapping[str, Array]]) -> dict[str, Array]:
+        """Sum of the parts at the sizes of this person: block -> (..., C)."""
+        return {
+            block: np.asarray(sum(getattr(self.sizes, kind) ** 2 * parts[kind][block] for kind in KINDS))
+            for block in BLOCKS
+        }
+
+    def added(self, found: Mapping[str, Array], x: Array, wrench: Array, segments: Sequence[str]) -> dict[str, Array]:
+        """The filter's standard deviations of one frame (block -> (C,)) with these errors.
+
+        Args:
+            x: (n,) state. wrench: (F, 6) of the contacts on these segments.
+        """
+        variances = self.variances(self._at(x, wrench, segments))
+        return {block: np.hypot(found[block], np.sqrt(variances[block])) for block in BLOCKS}
+
+    def added_over_time(self, data: xr.Dataset) -> xr.Dataset:
+        """The same of a recording: ``data`` with other ``coordinates_sd`` ... ``moments_sd``."""
+        variances = self.variances(self.over_time(data))
+        order = ("time", "coordinate")
+        sd = {f"{block}_sd": data[f"{block}_sd"].transpose(*order).values for block in BLOCKS}
+        return data.assign(
+            {name: (order, np.hypot(sd[name], np.sqrt(variances[name.removesuffix("_sd")]))) for name in sd}
+        )
+
+
+def _differences(values: list[Array]) -> tuple[Array, Array, Array]:
+    before, now, after = values
+    return now, (after - before) / (2.0 * _STEP_S), (after - 2.0 * now + before) / _STEP_S**2
+
+
+def _sampled(time: Array) -> npt.NDArray[np.intp]:
+    """Places of frames that lie ``SAMPLE_S`` apart or more, the first and the last among them."""
+    step = np.floor((time - time[0]) / SAMPLE_S + 1e-9)
+    chosen = np.flatnonzero(np.diff(step, prepend=-1.0) > 0)
+    return np.unique(np.append(chosen, len(time) - 1))
+
+
+def _between(time: Array, known: Array, values: Array) -> Array:
+    return np.array([np.interp(time, known, column) for column in values.T]).T
+
+
+def _neutral(calibrated: CalibratedModel) -> Array:
+    """(C,) upright posture: all free coordinates 0, or as near to it as their bounds allow."""
+    q = np.array([c.value for c in calibrated.spec.coordinates], dtype=float)
+    free = [k for k, c in enumerate(calibrated.spec.coordinates) if not c.locked]
+    K = len(free)
+    q[free] = np.clip(0.0, calibrated.lower[:K], calibrated.upper[:K])
+    return q
+
+
+def _drives(spec: _core.ModelSpec, free: npt.NDArray[np.intp]) -> Array:
+    """(S, K) 1 where a free rotation moves a segment's skin: those of its own joint and of the joints that hang on it,
+    but for the root's, which turn the whole body."""
+    place = {spec.coordinates[k].name: i for i, k in enumerate(free)}
+    index = {segment.name: k for k, segment in enumerate(spec.segments)}
+    found = np.zeros((len(index), len(place)))
+    for segment in spec.segments:
+        if floats(segment):
+            continue
+        for axis in segment.axes:
+            if axis.kind == "rotation" and axis.coordinate in place:
+                found[index[segment.name], place[axis.coordinate]] = 1.0
+                if segment.parent in index:
+                    found[index[segment.parent], place[axis.coordinate]] = 1.0
+    return found

@@ -1,0 +1,222 @@
+"""Errors of joints and skin that the filter does not know: their effects against models that are really changed."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scipy.optimize import least_squares
+
+from dynakin.bindings import _core
+from dynakin.filter.systematic import _STEP_S, COMMON, KINDS, SKIN_ANGLE_RAD, Sizes, Systematic
+from dynakin.settings.noise import Noise
+
+Array = npt.NDArray[np.float64]
+
+X, Y, Z = np.eye(3)
+REFERENCE = np.zeros(10)
+Q = np.array([0.1, 0.9, -0.2, 0.2, 0.1, 0.3, 0.6, -0.2, 0.25, -0.9])
+QD = np.array([0.4, -0.1, 0.2, 0.5, -0.3, 0.6, 1.2, 0.4, -0.7, -1.5])
+QDD = np.array([1.0, 0.5, -1.0, 2.0, 1.0, -2.0, 5.0, -3.0, 2.0, 6.0])
+CONTACT = np.array([40.0, 500.0, -60.0, 30.0, -20.0, 90.0])
+"""N, N m about the ground's origin, on the shank."""
+DECLARED = np.repeat([0.014, 0.018, 0.010], 4)
+
+
+def spec(hip: Array = np.zeros(3), knee: Array = np.zeros(3), turned: Array = np.eye(3)) -> _core.ModelSpec:
+    """Pelvis, thigh and shank; the hip and the knee misplaced on all their bones, the knee's axis turned on both."""
+    names = ["tx", "ty", "tz", "tilt", "list", "rotation", "flexion", "adduction", "turn", "knee"]
+    root = [_core.AxisSpec(n, "translation", e) for n, e in zip(names[:3], (X, Y, Z), strict=True)]
+    root += [_core.AxisSpec(n, "rotation", e) for n, e in zip(names[3:6], (Z, X, Y), strict=True)]
+    ball = [_core.AxisSpec(n, "rotation", e) for n, e in zip(names[6:9], (Z, X, Y), strict=True)]
+    inertia = {
+        "pelvis": np.array([10.0, 0.1, 0.2, 0.0, 0.1, 0.1, 0.1, 0.0, 0.0, 0.0]),
+        "thigh": np.array([8.0, 0.1, -1.6, 0.1, 0.5, 0.05, 0.5, 0.0, 0.0, 0.0]),
+        "shank": np.array([4.0, 0.0, -0.8, 0.0, 0.3, 0.02, 0.3, 0.0, 0.0, 0.0]),
+    }
+    segments = [
+        _core.SegmentSpec("pelvis", axes=root, inertia=inertia["pelvis"]),
+        _core.SegmentSpec(
+            "thigh", "pelvis", translation=np.array([-0.05, -0.08, 0.08]) + hip, axes=ball, inertia=inertia["thigh"]
+        ),
+        _core.SegmentSpec(
+            "shank",
+            "thigh",
+            translation=np.array([0.0, -0.4, 0.0]) - hip + knee,
+            axes=[_core.AxisSpec("knee", "rotation", turned @ Z)],
+            inertia=inertia["shank"],
+        ),
+    ]
+    rng = np.random.default_rng(1)
+    markers = [
+        _core.MarkerSpec(f"{s}{k}", s, rng.normal(0.0, 0.1, 3) + centre, estimated=[False] * 3)
+        for s, centre in (("pelvis", np.zeros(3)), ("thigh", -0.2 * Y), ("shank", -0.2 * Y))
+        for k in range(4)
+    ]
+    return _core.ModelSpec("leg", [_core.CoordinateSpec(n) for n in names], [], segments, markers)
+
+
+def changed(**errors: Array) -> _core.Model:
+    """A misplaced model whose markers lie on its bones where the reference posture shows them."""
+    right, wrong = _core.Model(spec()), spec(**errors)
+    places = _core.marker_positions(right, np.zeros(30))
+    R, p = _core.segment_poses(_core.Model(wrong), np.zeros(30))
+    markers = wrong.markers
+    for marker, place in zip(markers, places, strict=True):
+        k = ["pelvis", "thigh", "shank"].index(marker.segment)
+        marker.position = R[k].T @ (place - p[k])
+    wrong.markers = markers
+    return _core.Model(wrong)
+
+
+def calibrated() -> Any:
+    model = spec()
+    return SimpleNamespace(
+        spec=model,
+        plan=None,
+        soft_tissue_m=DECLARED,
+        marker_variance=np.zeros(12),
+        unmodelled_m=0.0,
+        recorded_markers=tuple(m.name for m in model.markers),
+        lower=np.full(30, -np.inf),
+        upper=np.full(30, np.inf),
+    )
+
+
+def systematic() -> Systematic:
+    return Systematic(calibrated(), Noise())
+
+
+def found(wrong: _core.Model, q: Array) -> Array:
+    """The posture in which the wrong model fits the right one's markers best, with the filter's weights."""
+    places = _core.marker_positions(_core.Model(spec()), np.r_[q, np.zeros(20)])
+    sd = np.hypot(np.hypot(0.0007, 0.0), 0.5 * DECLARED)[:, None]
+
+    def misfit(x: Array) -> Array:
+        return np.r_[((_core.marker_positions(wrong, np.r_[x, np.zeros(20)]) - places) / sd).ravel(), (x - q) / 0.5]
+
+    return np.asarray(least_squares(misfit, q, xtol=1e-14, ftol=1e-14, gtol=1e-14).x)
+
+
+def effects(wrong: _core.Model) -> tuple[Array, Array, Array, Array]:
+    """Errors of angles, speeds, accelerations, moments of a wrong model."""
+    times = (-_STEP_S, 0.0, _STEP_S)
+    before, now, after = (
+        found(wrong, Q + h * QD + 0.5 * h * h * QDD) - (Q + h * QD + 0.5 * h * h * QDD) for h in times
+    )
+    speed, acceleration = (after - before) / (2.0 * _STEP_S), (after - 2.0 * now + before) / _STEP_S**2
+    external = np.zeros((3, 6))
+    external[2] = CONTACT
+    right = _core.joint_moments(_core.Model(spec()), np.r_[Q, QD, QDD], external)
+    moments = _core.joint_moments(wrong, np.r_[Q + now, QD + speed, QDD + acceleration], external) - right
+    return now, speed, acceleration, moments
+
+
+def rotation(vector: Array) -> Array:
+    from scipy.spatial.transform import Rotation
+
+    return np.asarray(Rotation.from_rotvec(vector).as_matrix())
+
+
+@pytest.mark.parametrize("kind", ["centre", "hinge"])
+def test_effects_of_a_joint_are_those_of_a_model_that_is_changed(kind: str) -> None:
+    external = np.zeros((3, 6))
+    external[2] = CONTACT
+    parts = systematic().parts(Q, QD, QDD, external)[kind]
+    size = 1e-5
+    if kind == "centre":
+        wrong = [changed(**{joint: size * e}) for joint in ("hip", "knee") for e in (X, Y, Z)]
+    else:
+        wrong = [changed(turned=rotation(size * e)) for e in (X, Y, Z)]
+    each = [effects(model) for model in wrong]
+    for k, block in enumerate(("coordinates", "speeds", "accelerations", "moments")):
+        expected = np.sqrt(sum(np.square(values[k] / size) for values in each))
+        tolerance = 2e-3 * expected.max()
+        np.testing.assert_allclose(np.sqrt(parts[block]), expected, rtol=0.02, atol=tolerance, err_msg=block)
+
+
+def test_in_the_reference_posture_a_wrong_joint_changes_lever_arms_and_no_angle() -> None:
+    still = np.zeros(10)
+    external = np.zeros((3, 6))
+    external[2, 1] = 500.0
+    parts = systematic().parts(REFERENCE, still, still, external)["centre"]
+    np.testing.assert_allclose(parts["coordinates"], 0.0, atol=1e-12)
+    np.testing.assert_allclose(parts["speeds"], 0.0, atol=1e-9)
+    # the knee's moment: 500 N up less the shank's weight, which stays with the foot, times the place forward
+    np.testing.assert_allclose(np.sqrt(parts["moments"][9]), 500.0, rtol=0.1)
+
+
+def test_skin_that_follows_the_knee_is_that_of_displaced_markers() -> None:
+    """One marker's own displacement and one segment's common one, drawn: the variances are those of the fits."""
+    rng = np.random.default_rng(2)
+    model, right = _core.Model(spec()), np.r_[Q, np.zeros(20)]
+    places = _core.marker_positions(model, right)
+    sd = 0.5 * np.repeat([0.014, 0.018, 0.010], 4)
+    weight = 1.0 / np.hypot(0.0007, sd)[:, None]
+    J = (_core.marker_jacobian(model, right)[:, :10].reshape(12, 3, 10) * weight[..., None]).reshape(36, 10)
+    drives = {"pelvis": [6, 7, 8], "thigh": [6, 7, 8, 9], "shank": [9]}
+    s = np.tanh(Q / SKIN_ANGLE_RAD)
+    draws = []
+    for _ in range(4000):
+        d = np.zeros((12, 3))
+        for k, (_, coordinates) in enumerate(drives.items()):
+            for c in coordinates:
+                own, common = rng.standard_normal((4, 3)), rng.standard_normal(3)
+                d[4 * k : 4 * k + 4] += s[c] * (np.sqrt(1.0 - COMMON) * own + np.sqrt(COMMON) * common)
+        d *= DECLARED[:, None] * weight
+        draws.append(np.linalg.solve(J.T @ J + 4.0 * np.eye(10), J.T @ d.ravel()))
+    parts = systematic().parts(Q, QD, QDD)["skin"]
+    np.testing.assert_allclose(np.sqrt(parts["coordinates"]), np.std(draws, axis=0), rtol=0.06)
+    assert places.shape == (12, 3)
+
+
+def test_speeds_of_skin_are_the_rates_of_its_angles() -> None:
+    """The same random displacement along the motion: its variance of speed, by differences of its effect in time."""
+    subject = systematic()
+    parts = subject.parts(Q, QD, np.zeros(10))["skin"]
+    h = 1e-3
+    ahead, back = (subject.parts(Q + t * QD, QD, np.zeros(10))["skin"]["coordinates"] for t in (h, -h))
+    # d/dt sd^2 = 2 cov(angle, speed), at most 2 sd(angle) sd(speed)
+    slope = np.abs(ahead - back) / (2.0 * h)
+    assert (slope <= 2.0 * np.sqrt(parts["coordinates"] * parts["speeds"]) * 1.001).all()
+    still = subject.parts(Q, np.zeros(10), np.zeros(10))["skin"]
+    np.testing.assert_allclose(still["speeds"], 0.0, atol=1e-12)
+
+
+def test_a_pelvis_frame_that_is_turned_mixes_its_angles_and_leaves_the_moments_of_the_knee() -> None:
+    still = np.zeros(10)
+    q = np.zeros(10)
+    q[5] = 0.3  # rotation
+    external = np.zeros((3, 6))
+    external[2, 1] = 500.0
+    parts = systematic().parts(q, still, still, external)["root"]
+    expected = np.zeros(3)
+    R = rotation(0.3 * Y)
+    for e in (X, Y, Z):
+        from scipy.spatial.transform import Rotation
+
+        turned = Rotation.from_matrix(R @ rotation(1e-6 * e)).as_euler("ZXY") - np.array([0.0, 0.0, 0.3])
+        at_zero = np.array([e[2], e[0], e[1]]) * 1e-6
+        expected += ((turned - at_zero) / 1e-6) ** 2
+    np.testing.assert_allclose(np.sqrt(parts["coordinates"][3:6]), np.sqrt(expected), rtol=0.03, atol=2e-3)
+    assert np.sqrt(parts["moments"][9]) < 1.0
+
+
+def test_reported_deviations_hold_both_parts_and_a_scale_of_zero_leaves_the_filters_own() -> None:
+    subject = Systematic(calibrated(), Noise(), Sizes(0.01, 0.05, 0.05, 0.05, 0.3))
+    x = np.r_[Q, QD, QDD]
+    own = {block: np.full(10, 0.02) for block in ("coordinates", "speeds", "accelerations", "moments")}
+    both = subject.added(own, x, CONTACT[None], ["shank"])
+    external = np.zeros((3, 6))
+    external[2] = CONTACT
+    parts = subject.parts(Q, QD, QDD, external)
+    sizes = dict(zip(KINDS, (0.01, 0.05, 0.05, 0.05, 0.3), strict=True))
+    for block, sd in both.items():
+        total = 0.02**2 + sum(sizes[kind] ** 2 * parts[kind][block] for kind in KINDS)
+        np.testing.assert_allclose(sd, np.sqrt(total))
+    nothing = subject.sizes.scaled(0.0)
+    none = Systematic(calibrated(), Noise(), nothing).added(own, x, CONTACT[None], ["shank"])
+    np.testing.assert_allclose(none["moments"], 0.02)
