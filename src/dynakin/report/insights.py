@@ -11,7 +11,6 @@ from dynakin.results.estimate import Estimate
 from dynakin.results.failures import FAILED, LOG
 from dynakin.results.measures.adaptation import convergence
 from dynakin.results.measures.bounds import counts_in_words
-from dynakin.results.measures.consistency import CONSISTENT
 from dynakin.results.measures.metrics import ADAPTATION_S, evaluation_window, speed_consistency, window_consistency
 from dynakin.results.measures.soft_tissue import excess_in_words
 from dynakin.results.measures.tracking import why_lost
@@ -28,28 +27,14 @@ Metrics = dict[str, Any]
 # How the sentences begin that a run says of its plates as a whole.
 PLATE_WORDS = ("The plates are ", "Warning: the plates carry ")
 
-# What to try: with the paper's process noise, with white jerk.
+# What to do, in the words of a laboratory.
 ADVICE = {
-    "follows": (
-        "Smaller process noise (noise.coordinate_variance, noise.speed_variance, noise.acceleration_variance) lets the "
-        "model carry more.",
-        "A smaller noise.jerk_density_rad2_s5 lets the model carry more.",
-    ),
-    "cautious": (
-        "Smaller noise.coordinate_variance, noise.speed_variance and noise.acceleration_variance; then a smaller "
-        "noise.marker_variance_scale.",
-        "A smaller noise.marker_sd_m and noise.jerk_density_rad2_s5; then a smaller noise.soft_tissue_sd_fraction.",
-    ),
-    "overconfident": (
-        "A larger noise.marker_variance_scale, noise.force_variance_n2 and noise.moment_variance_n2_m2; look for "
-        "markers that fit badly first.",
-        "A larger noise.soft_tissue_sd_fraction, noise.force_variance_n2 and noise.moment_variance_n2_m2; look for "
-        "markers that fit badly first.",
-    ),
-    "speeds": (
-        "Smaller noise.coordinate_variance and noise.speed_variance tie each speed to its coordinate.",
-        "A live estimate steps where a measurement corrects it; one from all frames (--lag inf) does not.",
-    ),
+    "follows": "Look at --live-like estimates with care; smoothed ones (the default) do not follow single frames.",
+    "conservative": "Nothing need be done. For narrower intervals fit the noise to your laboratory with dynakin tune, "
+    "and give what it writes as --preset.",
+    "overconfident": "Look at the film whether {worst}, which fits worst, is loose, swapped or shifted, and leave it "
+    "out if so. If none is, fit the noise to your laboratory with dynakin tune, and give what it writes as --preset.",
+    "speeds": "Run it without --live-like or --lag: a live estimate steps where a measurement corrects it.",
 }
 
 
@@ -207,7 +192,7 @@ def _prediction(estimate: Estimate, metrics: Metrics) -> Insight | None:
         "One frame ahead",
         f"{text} That is {ratio[worst]:.0f} times as far as after it is seen ({COMPONENT_LABELS[worst][0].lower()}): "
         "the good fit above comes from following each measurement, less from a model that explains the movement.",
-        _advice(estimate, "follows"),
+        ADVICE["follows"],
     )
 
 
@@ -215,28 +200,21 @@ def _consistency(estimate: Estimate, metrics: Metrics) -> Insight | None:
     if why_lost(estimate) is not None:
         return None
     found = window_consistency(estimate, evaluation_window(estimate.time))
-    ratio = metrics["consistency"]["mean_nis_per_dof"]
-    good = ratio is not None and CONSISTENT[0] <= ratio <= CONSISTENT[1] and "not white" not in found.verdict
-    figure = "" if ratio is None else f" (Mean normalised innovation squared {number(ratio)}, 1 is right.)"
-    advice = ""
-    if ratio is not None and ratio < CONSISTENT[0]:
-        advice = _advice(estimate, "cautious")
-    elif ratio is not None and ratio > CONSISTENT[1]:
-        advice = _advice(estimate, "overconfident")
-    cautious = found.judgement == "conservative" and "not white" not in found.verdict
-    level: Level = "good" if good else "note" if cautious else "warning"
-    return Insight(level, "Uncertainty", found.verdict + figure, advice)
+    if found.judgement is None:
+        return Insight("note", "Uncertainty", found.verdict)
+    levels: dict[str, Level] = {"consistent": "good", "conservative": "note", "overconfident": "warning"}
+    advice = ADVICE.get(found.judgement, "").format(worst=_worst_marker(estimate, metrics))
+    return Insight(levels[found.judgement], "Uncertainty", found.verdict, advice)
+
+
+def _worst_marker(estimate: Estimate, metrics: Metrics) -> str:
+    rms = {name: value for name, value in metrics["markers"]["rms_mm"].items() if value is not None}
+    return short_marker_names(estimate.marker_names)[max(rms, key=lambda name: rms[name])] if rms else "the marker"
 
 
 def _speeds(estimate: Estimate, metrics: Metrics) -> Insight | None:
     _, verdict = speed_consistency(estimate, evaluation_window(estimate.time))
-    return Insight("warning", "Speeds", verdict, _advice(estimate, "speeds")) if verdict else None
-
-
-def _advice(estimate: Estimate, finding: str) -> str:
-    """What to try, for the process model of this run: the paper's, or white jerk."""
-    white_jerk = float(estimate.config.get("noise", {}).get("jerk_density_rad2_s5", 0.0)) > 0.0
-    return ADVICE[finding][int(white_jerk)]
+    return Insight("warning", "Speeds", verdict, ADVICE["speeds"]) if verdict else None
 
 
 def _constants(estimate: Estimate, metrics: Metrics) -> list[Insight]:
@@ -396,7 +374,7 @@ FINDINGS: tuple[tuple[Callable[[Estimate, Metrics], Insight | list[Insight] | No
     (_markers, ("markers",)),
     (_wrench, ("wrench",)),
     (_prediction, ("prediction", "wrench")),
-    (_consistency, ("consistency",)),
+    (_consistency, ("consistency", "markers")),
     (_speeds, ()),
     (_adaptation, ("adaptation",)),
     (_constants, ()),

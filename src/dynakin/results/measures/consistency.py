@@ -1,20 +1,55 @@
-"""Does the filter believe what it should? Innovations against the covariance that the filter gives them."""
+"""Does the filter believe what it should? Innovations against the covariance that the filter gives them.
+
+Innovations of single frames are mostly the cameras' noise, which hardly moves an angle; what does, skin and geometry,
+lasts longer. Averaged over `AVERAGED_S`, the noise falls and the rest stays. Which statistic speaks for which word, and
+from where on, was found on trials with known truth: ``verdicts.toml``, chosen and judged by
+``benchmarks/verdicts.py``.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Literal
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cache
+from importlib import resources
+from typing import Literal, NamedTuple
 
 import numpy as np
 from scipy import stats
 
+from dynakin.results.naming import listed
+
 Judgement = Literal["overconfident", "consistent", "conservative"]
 
-# A ratio within these is called consistent: model error always moves it a little from one, while noise settings
-# wrong by a factor of two in standard deviation move it by four.
-CONSISTENT = (0.5, 2.0)
-# Innovations of a filter whose model is complete are white; above this the model leaves motion unexplained.
-WHITE = 0.3
+SD_OVER_ERROR = (0.5, 2.5)
+"""Standard deviations over errors that are called consistent: what a laboratory can plan with. Below, overconfident."""
+INSIDE = 0.85
+"""Truth in the 95 % interval at least this often; less is overconfident whatever the ratio is."""
+CONSISTENT = (SD_OVER_ERROR[1] ** -2, SD_OVER_ERROR[0] ** -2)
+"""The same of mean normalised squares."""
+AVERAGED_S = 0.3
+"""Innovations are averaged over this time: longer than the filter takes to follow, shorter than half a step."""
+GROUPS = {"motion": "angles and speeds", "moments": "moments"}
+"""What is judged, and its words."""
+
+
+Innovations = tuple[np.ndarray, np.ndarray | None]
+"""Measured less predicted (T, N), NaN where missing, and standard deviations, None where they were not kept."""
+
+
+class Limit(NamedTuple):
+    """A statistic of `Consistency.statistics`, and the value from which on a word is said."""
+
+    statistic: str
+    value: float
+
+
+class Limits(NamedTuple):
+    """Of one group: conservative below the first, overconfident above the second."""
+
+    conservative: Limit
+    overconfident: Limit
 
 
 @dataclass(frozen=True)
@@ -28,8 +63,8 @@ class Consistency:
         measured_dof: number of measured rows.
         whiteness_markers, whiteness_wrench: lag-1 autocorrelation of the innovations (see `lag_one`); None if there
             are too few frames.
-        judgement: of that number; None without a measured row.
-        judged_by: by what: the practical band, or the chi-square interval where the data are the filter's own.
+        statistics: what is judged by (see `statistics_of`); empty where the run kept no covariance of innovations.
+        judgements: of each group of `GROUPS`; empty likewise.
         verdict: the same in words.
     """
 
@@ -38,39 +73,106 @@ class Consistency:
     measured_dof: int
     whiteness_markers: float | None
     whiteness_wrench: float | None
-    judgement: Judgement | None
-    judged_by: str
-    verdict: str
+    statistics: Mapping[str, float] = field(default_factory=dict)
+    judgements: Mapping[str, Judgement] = field(default_factory=dict)
+    verdict: str = ""
+
+    @property
+    def judgement(self) -> Judgement | None:
+        """Of all groups: overconfident where one is, else conservative where one is; None where none was judged."""
+        words: tuple[Judgement, ...] = ("overconfident", "conservative", "consistent")
+        return next((word for word in words if word in self.judgements.values()), None)
 
 
 def consistency(
+    time: np.ndarray,
     nis: np.ndarray,
     n_rows: np.ndarray,
-    marker_innovations: np.ndarray,
-    wrench_innovations: np.ndarray,
-    *,
-    own_model: bool = False,
+    markers: Innovations,
+    wrench: Innovations,
 ) -> Consistency:
     """Judge a run.
 
     Args:
+        time: (T,) s, evenly spaced.
         nis: (T,) normalised innovation squared of each frame, v' S^-1 v.
         n_rows: (T,) measured rows of each frame.
-        marker_innovations: (T, N) m, measured less predicted, one column a marker and axis; NaN where missing.
-        wrench_innovations: (T, K) N or N m, likewise.
-        own_model: the data were drawn from the filter's own model and noise, so the chi-square interval is strict;
-            no recording of a person is, and there the practical band (0.5 to 2) and whiteness judge.
+        markers: (T, N) m, measured less predicted, one column a marker and axis, NaN where missing; and their standard
+            deviations, None where they were not kept.
+        wrench: (T, K) N or N m, likewise.
     """
     used = np.isfinite(nis) & (n_rows > 0)
     dof = int(np.sum(n_rows[used]))
-    ratio = float(np.sum(nis[used]) / dof) if dof else None
-    interval = mean_interval_95(dof) if dof else None
-    white_markers, white_wrench = lag_one(marker_innovations), lag_one(wrench_innovations)
-    band = interval if own_model and interval else CONSISTENT
-    judgement = None if ratio is None else judge(ratio, band)
-    judged_by = "95 % chi-square interval" if own_model else f"practical band, {band[0]:g} to {band[1]:g}"
-    verdict = _verdict(ratio, judgement, white_markers, white_wrench)
-    return Consistency(ratio, interval, dof, white_markers, white_wrench, judgement, judged_by, verdict)
+    found = Consistency(
+        float(np.sum(nis[used]) / dof) if dof else None,
+        mean_interval_95(dof) if dof else None,
+        dof,
+        lag_one(markers[0]),
+        lag_one(wrench[0]),
+        statistics_of(time, markers, wrench),
+    )
+    judgements = {group: judged for group in GROUPS if (judged := judge_group(found.statistics, limits()[group]))}
+    verdict = "Nothing was measured in this window, so nothing can be said." if not dof else _verdict(judgements)
+    return Consistency(**(vars(found) | {"judgements": judgements, "verdict": verdict}))
+
+
+def statistics_of(
+    time: np.ndarray,
+    markers: Innovations,
+    wrench: Innovations,
+) -> dict[str, float]:
+    """Mean squares of normalised innovations, by name; 1 where covariances are right and innovations white.
+
+    ``markers``, ``wrench``: of single frames. ``markers_averaged``, ``wrench_averaged``: of their means over
+    `AVERAGED_S`, times the frames in a mean. ``markers_larger``, ``wrench_larger``: the larger of the two. Arguments as
+    in `consistency`.
+    """
+    found = {}
+    frames = max(2, round(AVERAGED_S / float(np.median(np.diff(time))))) if len(time) > 2 else len(time) + 1
+    for name, (innovations, sd) in {"markers": markers, "wrench": wrench}.items():
+        if sd is None:
+            continue
+        with np.errstate(invalid="ignore", divide="ignore"):
+            z = np.where(sd > 0.0, innovations / sd, np.nan)
+        if np.isfinite(z).any():
+            found[name] = float(np.nanmean(z**2))
+        averaged = averaged_square(z, frames)
+        if averaged is not None:
+            found[f"{name}_averaged"] = averaged
+            found[f"{name}_larger"] = max(averaged, found[name])
+    return found
+
+
+def averaged_square(z: np.ndarray, frames: int) -> float | None:
+    """Mean square of the means of ``frames`` successive values of each column of z (T, N), over what white ones of
+    unit variance would have; NaN left out, and means of fewer than half of the frames. None where there is none."""
+    whole = len(z) // frames * frames
+    blocks = z[:whole].reshape(-1, frames, z.shape[1])
+    count = np.isfinite(blocks).sum(axis=1)
+    kept = count > frames // 2
+    if not kept.any():
+        return None
+    return float(np.mean(np.nansum(blocks, axis=1)[kept] ** 2 / count[kept]))
+
+
+@cache
+def limits() -> dict[str, Limits]:
+    """Of each group of `GROUPS`, from ``verdicts.toml``."""
+    text = (resources.files("dynakin.results.measures") / "verdicts.toml").read_text(encoding="utf-8")
+    return {
+        group: Limits(*(Limit(row[word]["statistic"], row[word]["value"]) for word in Limits._fields))
+        for group, row in tomllib.loads(text)["limits"].items()
+    }
+
+
+def judge_group(statistics: Mapping[str, float], own: Limits) -> Judgement | None:
+    """The word on one group; None where the run lacks what it is judged by."""
+    high, low = statistics.get(own.overconfident.statistic), statistics.get(own.conservative.statistic)
+    if high is None or low is None:
+        return None
+    if high > own.overconfident.value:
+        return "overconfident"
+    return "conservative" if low < own.conservative.value else "consistent"
 
 
 def mean_interval_95(dof: float) -> tuple[float, float]:
@@ -79,7 +181,7 @@ def mean_interval_95(dof: float) -> tuple[float, float]:
 
 
 def judge(ratio: float, band: tuple[float, float] = CONSISTENT) -> Judgement:
-    """A mean normalised square in words: above ``band`` the filter trusts itself too much, below too little."""
+    """A mean normalised square in words: above ``band`` deviations are too small, below too large."""
     if ratio > band[1]:
         return "overconfident"
     return "conservative" if ratio < band[0] else "consistent"
@@ -101,35 +203,22 @@ def lag_one(innovations: np.ndarray) -> float | None:
     return float(np.mean(np.sum(first * second, axis=0)[kept] / power[kept]))
 
 
-def _verdict(ratio: float | None, judgement: Judgement | None, markers: float | None, wrench: float | None) -> str:
-    if ratio is None:
-        return "Nothing was measured in this window, so nothing can be said."
-    if judgement == "overconfident":
-        text = (
-            f"The filter is overconfident: its innovations are {_times(ratio)} times as large as its covariances "
-            "say. P, Q or R may be too small, or the model does not fit."
+def _verdict(judgements: Mapping[str, Judgement]) -> str:
+    said = {word: [GROUPS[g] for g, j in judgements.items() if j == word] for word in judgements.values()}
+    parts = []
+    if over := said.get("overconfident"):
+        parts.append(
+            f"The standard deviations of {listed(over)} are too small (overconfident): this recording departs from the "
+            "model by more than they allow for."
         )
-    elif judgement == "conservative":
-        text = (
-            "The filter is conservative, its standard deviations are larger than needed: its innovations are "
-            f"{_times(1.0 / max(ratio, 1e-300))} times smaller than its covariances say. Q or R are larger than this "
-            "recording needs."
+    if wide := said.get("conservative"):
+        parts.append(
+            f"The standard deviations of {listed(wide)} are larger than needed (conservative); the values themselves "
+            "are not the worse for it."
         )
-    else:
-        text = "The filter is consistent: its innovations are as large as its covariances say."
-    slow = [name for name, value in (("marker", markers), ("wrench", wrench)) if value is not None and value > WHITE]
-    if slow:
-        text += (
-            f" The {' and '.join(slow)} innovations are not white: a frame's error predicts the next one's, so there "
-            "is something in the recording that the model does not explain."
-        )
-    return text
-
-
-def _times(ratio: float) -> str:
-    """Ratio of standard deviations, from one of variances."""
-    root = float(np.sqrt(ratio))
-    return f"{root:.2g}" if root < 10.0 else f"{root:.0f}"
+    if not parts and said:
+        parts.append("The standard deviations fit this recording.")
+    return " ".join(parts) or "Innovations were kept without their covariances, so the deviations are not judged."
 
 
 # A mismatch below half of the coordinate's own speed is left unsaid: differencing measured angles makes noise too.

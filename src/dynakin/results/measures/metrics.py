@@ -14,7 +14,7 @@ from dynakin.results.estimate import COMPONENTS, Estimate
 from dynakin.results.failures import Failures
 from dynakin.results.measures.adaptation import adaptation
 from dynakin.results.measures.bounds import parameter_bounds
-from dynakin.results.measures.consistency import Consistency, consistency, mismatch_in_words, speed_mismatch
+from dynakin.results.measures.consistency import AVERAGED_S, Consistency, consistency, mismatch_in_words, speed_mismatch
 from dynakin.results.measures.facing import facing
 from dynakin.results.measures.feet import contact_figures, foot_figures
 from dynakin.results.measures.fit import WrenchFit, marker_rms_mm, wrench_fit
@@ -25,6 +25,7 @@ from dynakin.results.measures.sources import moment_figures
 from dynakin.results.measures.stances import counted
 from dynakin.results.measures.symmetry import asymmetry
 from dynakin.results.measures.tracking import lost_in_words, tracking_figures, why_lost
+from dynakin.results.records import REFUSED
 
 SCHEMA_VERSION = 2
 """Version of ``metrics.json``, ``parameters.json`` and ``estimate.nc``; it grows when a key changes its meaning."""
@@ -145,15 +146,24 @@ def _wrench(estimate: Estimate, kind: str, window: np.ndarray) -> dict[str, dict
 
 
 def window_consistency(estimate: Estimate, window: np.ndarray) -> Consistency:
-    """Consistency over the frames ``window`` (T,) bool."""
-    markers = _array(estimate, "markers_measured") - _array(estimate, "markers_predicted")
-    wrench = _array(estimate, "wrench_measured") - _array(estimate, "wrench_predicted")
-    markers = markers[:, :, estimate.modelled_axes()]
+    """Consistency over the frames ``window`` (T,) bool; markers that were refused are not judged by."""
+    axes = estimate.modelled_axes()
+    kept = "markers_innovation_sd" in estimate.data  # not of every live run
+    pairs = {}
+    for name in ("markers", "wrench"):
+        sd = _array(estimate, f"{name}_innovation_sd")[window] if kept else None
+        off = _array(estimate, f"{name}_measured") - _array(estimate, f"{name}_predicted")
+        pairs[name] = (_array(estimate, f"{name}_innovation") if kept else off)[window], sd
+    markers, sd = pairs["markers"]
+    if sd is not None:
+        refused = estimate.data["verdict"].transpose("time", "sensor").values[window, :-1] == REFUSED
+        sd = np.where(refused[:, :, None], np.nan, sd)[:, :, axes].reshape(len(sd), -1)
     return consistency(
+        estimate.time[window],
         estimate.data["nis"].values[window],
         estimate.data["n_rows"].values[window],
-        markers.reshape(len(markers), -1)[window],
-        wrench[window],
+        (markers[:, :, axes].reshape(len(markers), -1), sd),
+        pairs["wrench"],
     )
 
 
@@ -170,7 +180,7 @@ def _consistency(estimate: Estimate, window: np.ndarray) -> dict[str, Any]:
     found = window_consistency(estimate, window)
     mismatch, speeds_verdict = speed_consistency(estimate, window)
     if why_lost(estimate) is not None:
-        found = replace(found, judgement=None, verdict="The person was lost, so nothing is said of consistency.")
+        found = replace(found, judgements={}, verdict="The person was lost, so nothing is said of consistency.")
         speeds_verdict = ""
     elif estimate.lost.any():
         found = replace(found, verdict=f"Of the frames that are not lost: {found.verdict}")
@@ -179,7 +189,12 @@ def _consistency(estimate: Estimate, window: np.ndarray) -> dict[str, Any]:
         "interval_95": list(found.interval_95) if found.interval_95 else None,
         "measured_dof": found.measured_dof,
         "judgement": found.judgement,
-        "judged_by": found.judged_by,
+        "judgements": dict(found.judgements),
+        "statistics": {
+            "what": "mean squares of normalised innovations, 1 if covariances are right; averaged: of their means over "
+            f"{AVERAGED_S:g} s, what lasts longer than noise",
+            **found.statistics,
+        },
         "whiteness": {
             "what": "lag-1 autocorrelation of the innovations, 0 if white",
             "markers": found.whiteness_markers,

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dynakin.results.measures.consistency import CONSISTENT
+from dynakin.results.measures.consistency import judge
 from dynakin.studies.tuning.fit import Fit
 
 WORSE = 1.05
 """A prediction that is this much worse counts as worse."""
+NIS = (0.5, 2.0)
+"""Of a row, as fitted settings should have it: the likelihood's best scale has 1, and half of it says otherwise."""
 
 
 def recommendation(fit: Fit) -> list[str]:
@@ -27,8 +29,7 @@ def recommendation(fit: Fit) -> list[str]:
     if unknown:
         found.append(f"Not identified by these recordings (interval wider than a factor 3): {', '.join(unknown)}.")
     nis = fit.figures["fitted"]["nis_per_row"]
-    if nis is not None and not CONSISTENT[0] <= nis <= CONSISTENT[1]:
-        kind = "conservative" if nis < CONSISTENT[0] else "overconfident"
+    if nis is not None and (kind := judge(nis, NIS)) != "consistent":
         found.append(f"With the fitted settings the filter is {kind}: its NIS is {nis:.2g} a row, expected about 1.")
     if len(fit.shared.trials) == 1:
         found.append(

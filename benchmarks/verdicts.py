@@ -1,0 +1,286 @@
+"""Thresholds of the verdicts, chosen on trials with known truth and judged on others.
+
+    OMP_NUM_THREADS=1 .venv/bin/python benchmarks/verdicts.py [--write] [--again] [--truth3d FOLDER]
+
+Simulated planar squats, and squats and walks of the whole body, good ones and with one trouble each
+(`known_truth_cases.TROUBLES`), and whatever dynakin made of truth3d's trials in FOLDER (its cache; the newest results
+of each method). Of each run: what it can compute itself (`statistics_of`), and its true deviation over error and
+coverage by group. A group *is* overconfident where deviations are below half of the errors or hold the truth in less
+than 85 %, conservative where they are above 2.5 times. For each group and word the statistic and threshold with the best
+balanced accuracy on one half of the seeds are taken; the tables are of the other.
+
+``--write`` puts thresholds into ``results/measures/verdicts.toml`` and the tables into ``docs/validation.md``;
+``--again`` runs everything anew (else what was kept); ``--kept`` takes only what was kept.
+"""
+
+from __future__ import annotations
+
+import argparse
+import warnings
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+import xarray as xr
+from known_truth import KEPT, ROOT, Array, run
+from known_truth_cases import TROUBLES, troubled
+
+from dynakin.results.measures.consistency import (
+    INSIDE,
+    SD_OVER_ERROR,
+    Judgement,
+    Limit,
+    Limits,
+    judge_group,
+    statistics_of,
+)
+from dynakin.results.measures.sources import MEASURED
+from dynakin.results.records import REFUSED
+from dynakin.validation.coverage import Z_95
+
+TRUTH3D = Path("/work/t3d/cache")
+TARGET = ROOT / "src" / "dynakin" / "results" / "measures" / "verdicts.toml"
+PAGE = ROOT / "docs" / "validation.md"
+MARKS = ("<!-- verdicts: begin -->", "<!-- verdicts: end -->")
+SEEDS = {"sagittal": (1, 2, 3, 4), "gait": (1, 2), "squat": (1, 2)}
+WINDOWS_S = {"squat": (2.0, np.inf), "walk": (0.3, 3.1)}
+"""As truth3d judges."""
+BLOCKS = {"motion": ("coordinates", "speeds"), "moments": ("moments",)}
+WORDS: tuple[Judgement, ...] = ("conservative", "consistent", "overconfident")
+PULL = 0.1
+"""Of two thresholds whose balanced accuracies differ by less, that with more room to the nearest trials is taken."""
+
+
+class Truth(NamedTuple):
+    """Of one group: deviation over error (geometric mean over coordinates), share of the truth in 95 %."""
+
+    ratio: float
+    inside: float
+
+    @property
+    def word(self) -> Judgement:
+        if self.ratio < SD_OVER_ERROR[0] or self.inside < INSIDE:
+            return "overconfident"
+        return "conservative" if self.ratio > SD_OVER_ERROR[1] else "consistent"
+
+
+@dataclass(frozen=True)
+class Trial:
+    motion: str
+    trouble: str
+    seed: int
+    statistics: Mapping[str, float]
+    truth: Mapping[str, Truth]
+
+    @property
+    def chooses(self) -> bool:
+        """Whether thresholds are chosen on it; else they are judged on it. Own simulator: odd seeds; truth3d: 1, 2."""
+        return self.seed <= 2 if self.motion.startswith("truth3d") else self.seed % 2 == 1
+
+
+def simulated(again: bool, kept: bool) -> Iterator[Trial]:
+    for motion, seeds in SEEDS.items():
+        for seed in seeds:
+            for trouble in TROUBLES:
+                spec = troubled(trouble, motion, seed)
+                if kept and not (KEPT / f"{spec.key()}.pickle").exists():
+                    continue
+                found = run(spec, again)
+                if found.data is None or found.truth is None or found.window is None:
+                    print(f"{motion}, {trouble}, {seed}: refused: {found.said}", flush=True)
+                    continue
+                yield _trial(motion, trouble, seed, found.data, found.truth, found.window)
+
+
+def of_truth3d(cache: Path) -> Iterator[Trial]:
+    """What was made of truth3d's trials: of each method and trial the newest."""
+    for folder in sorted(cache.glob("trials/*_s[0-9]*")):
+        motion, _, seed = folder.name.rpartition("_")[0].rpartition("_s")
+        made: dict[str, Path] = {}
+        for file in sorted(folder.glob("runs/*/results/estimate.nc"), key=lambda f: f.stat().st_mtime):
+            made[file.parts[-3].split("_")[0]] = file
+        content = np.load(folder / "truth.npz", allow_pickle=True)
+        truth = xr.Dataset(
+            {
+                name: (("time", "coordinate"), content[key])
+                for name, key in (("coordinates", "q"), ("speeds", "u"), ("moments", "tau"))
+            },
+            coords={"time": content["t"], "coordinate": [str(name) for name in content["names"]]},
+        )
+        for method, file in made.items():
+            with xr.open_dataset(file) as opened:
+                data = opened.load()
+            time = data["time"].values
+            start, end = WINDOWS_S[motion.split("_")[0]]
+            own = truth.sel(time=time, method="nearest")
+            yield _trial(f"truth3d {motion}", method, int(seed), data, own, (time >= start) & (time <= end))
+
+
+def _trial(motion: str, trouble: str, seed: int, data: xr.Dataset, truth: xr.Dataset, window: Array) -> Trial:
+    return Trial(
+        motion, trouble, seed, _statistics(data), {g: _truth(data, truth, window, b) for g, b in BLOCKS.items()}
+    )
+
+
+def _statistics(data: xr.Dataset) -> dict[str, float]:
+    """As a run computes them: over its own window (the whole of a short trial)."""
+    from dynakin.results.measures.metrics import evaluation_window
+
+    window = evaluation_window(data["time"].values)
+    axes = data["marker_axes_modelled"].values.astype(bool)
+    order = ("time", "marker", "axis")
+    off, sd = (data[f"markers_innovation{end}"].transpose(*order).values[window][:, :, axes] for end in ("", "_sd"))
+    refused = data["verdict"].transpose("time", "sensor").values[window, :-1] == REFUSED
+    sd = np.where(refused[:, :, None], np.nan, sd)
+    wrench = [data[f"wrench_innovation{e}"].transpose("time", "component").values[window] for e in ("", "_sd")]
+    flat = (len(off), -1)
+    return statistics_of(data["time"].values[window], (off.reshape(flat), sd.reshape(flat)), (wrench[0], wrench[1]))
+
+
+def _truth(data: xr.Dataset, truth: xr.Dataset, window: Array, blocks: Sequence[str]) -> Truth:
+    """Of rotations that both have; angles with their mean error taken out, moments where they are measured."""
+    turns = dict(zip(map(str, data["coordinate"].values), data["coordinate_type"].values, strict=True))
+    names = [name for name in map(str, truth["coordinate"].values) if turns.get(name) == "rotation"]
+    ratios, inside = [], []
+    for block in blocks:
+        own = [name for name in names if block != "moments" or not name.startswith("pelvis")]
+        order = ("time", "coordinate")
+        given, sd, true = (
+            source[name].sel(coordinate=own).transpose(*order).values[window]
+            for source, name in ((data, block), (data, f"{block}_sd"), (truth, block))
+        )
+        error = np.where(sd > 0.0, given - true, np.nan)
+        if block == "moments" and "moment_source" in data:
+            source = data["moment_source"].sel(coordinate=own).transpose(*order).values[window]
+            error = np.where(source == MEASURED, error, np.nan)
+        error = error[:, np.isfinite(error).sum(axis=0) > 10], sd[:, np.isfinite(error).sum(axis=0) > 10]
+        off, wide = error
+        if not off.shape[1]:
+            continue
+        if block == "coordinates":
+            off = off - np.nanmean(off, axis=0)
+        known = np.isfinite(off)
+        wide = np.where(known, wide, np.nan)
+        ratios.append(np.sqrt(np.nanmean(wide**2, axis=0) / np.nanmean(off**2, axis=0)))
+        inside.append(np.mean(np.abs(off[known]) <= Z_95 * wide[known]))
+    if not ratios:
+        return Truth(np.nan, np.nan)
+    return Truth(float(np.exp(np.mean(np.log(np.concatenate(ratios))))), float(np.mean(inside)))
+
+
+def chosen(trials: Sequence[Trial], group: str) -> Limits:
+    """Statistic and threshold of either word, by balanced accuracy on these trials."""
+    known = [t for t in trials if np.isfinite(t.truth[group].ratio)]
+    return Limits(_limit(known, group, "conservative", -1.0), _limit(known, group, "overconfident", 1.0))
+
+
+def _limit(trials: Sequence[Trial], group: str, word: Judgement, sign: float) -> Limit:
+    """The word is said where sign * (statistic - value) > 0."""
+    best: tuple[float, float, Limit] | None = None
+    for name in sorted({name for t in trials for name in t.statistics}):
+        own = [t for t in trials if name in t.statistics]
+        if len(own) < len(trials):
+            continue
+        values = np.log([t.statistics[name] for t in own])
+        is_so = np.array([t.truth[group].word == word for t in own])
+        order = np.unique(values)
+        for low, high in zip(order[:-1], order[1:], strict=True):
+            said = sign * (values - 0.5 * (low + high)) > 0.0
+            score = 0.5 * (np.mean(said[is_so]) + np.mean(~said[~is_so])) if is_so.any() and (~is_so).any() else 0.0
+            room = min(high - low, 1.0)
+            if best is None or score + PULL * room > best[0] + PULL * best[1]:
+                best = (score, room, Limit(name, float(np.exp(0.5 * (low + high)))))
+    assert best is not None
+    print(f"{group}, {word}: {best[2].statistic} {best[2].value:.3g}, balanced accuracy {best[0]:.2f}")
+    return best[2]
+
+
+def confusion(trials: Sequence[Trial], limits: Mapping[str, Limits]) -> list[str]:
+    """Rows: what a run is; columns: what it says of itself."""
+    lines = [
+        "| group | runs that are | " + " | ".join(f"said {word}" for word in WORDS) + " |",
+        "|---|---|---|---|---|",
+    ]
+    for group, own in limits.items():
+        count = Counter(
+            (t.truth[group].word, judge_group(t.statistics, own)) for t in trials if np.isfinite(t.truth[group].ratio)
+        )
+        for word in WORDS:
+            lines.append(f"| {group} | {word} | " + " | ".join(str(count[word, said]) for said in WORDS) + " |")
+    return lines
+
+
+def by_trouble(trials: Sequence[Trial], limits: Mapping[str, Limits]) -> list[str]:
+    """Each kind of trial: true deviation over error and coverage, and how often each word was said."""
+    lines = [
+        "| trial | trouble or method | runs | " + " | ".join(f"{g}: sd / error, in 95 %, said" for g in limits) + " |"
+    ]
+    lines.append("|---|---|---|" + "---|" * len(limits))
+    kinds = dict.fromkeys((t.motion, t.trouble) for t in trials)
+    for motion, trouble in kinds:
+        own = [t for t in trials if (t.motion, t.trouble) == (motion, trouble)]
+        cells = []
+        for group, limit in limits.items():
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", RuntimeWarning)
+                ratio = np.exp(np.nanmean(np.log([t.truth[group].ratio for t in own])))
+                inside = 100.0 * np.nanmean([t.truth[group].inside for t in own])
+            said = Counter(judge_group(t.statistics, limit) for t in own)
+            words = ", ".join(f"{word} {n}" if len(own) > 1 else str(word) for word, n in said.items())
+            cells.append(f"{ratio:.2g}, {inside:.0f}, {words}" if np.isfinite(ratio) else "–")
+        lines.append(f"| {motion} | {trouble} | {len(own)} | " + " | ".join(cells) + " |")
+    return lines
+
+
+def toml(limits: Mapping[str, Limits], trials: int, judged: int) -> str:
+    lines = [
+        "# When a run is called conservative or overconfident. Written by `benchmarks/verdicts.py --write`: chosen on",
+        f"# {trials} trials with known truth, judged on {judged} others (docs/validation.md).",
+        "# A statistic is one of `statistics_of`; conservative below its value, overconfident above.",
+    ]
+    for group, own in limits.items():
+        lines += ["", f"[limits.{group}]"]
+        for word, limit in zip(Limits._fields, own, strict=True):
+            lines.append(f'{word} = {{ statistic = "{limit.statistic}", value = {limit.value:.3g} }}')
+    return "\n".join(lines) + "\n"
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--write", action="store_true")
+    parser.add_argument("--again", action="store_true")
+    parser.add_argument("--kept", action="store_true")
+    parser.add_argument("--truth3d", type=Path, default=TRUTH3D)
+    asked = parser.parse_args()
+    trials = [*simulated(asked.again, asked.kept), *of_truth3d(asked.truth3d)]
+    choosing, judging = ([t for t in trials if t.chooses == half] for half in (True, False))
+    limits = {group: chosen(choosing, group) for group in BLOCKS}
+    said = "; ".join(
+        f"{group} {word} {'below' if word == 'conservative' else 'above'} {limit.value:.2g} of `{limit.statistic}`"
+        for group, own in limits.items()
+        for word, limit in zip(Limits._fields, own, strict=True)
+    )
+    text = [
+        f"Chosen on {len(choosing)} trials (own simulator: odd seeds; truth3d: 1, 2): {said}. On these:",
+        "",
+        *confusion(choosing, limits),
+        "",
+    ]
+    text += [f"On {len(judging)} others:", "", *confusion(judging, limits), ""]
+    text += ["The others by what was wrong:", "", *by_trouble(judging, limits)]
+    print("\n".join(text))
+    if asked.write:
+        TARGET.write_text(toml(limits, len(choosing), len(judging)), encoding="utf-8")
+        page = PAGE.read_text(encoding="utf-8")
+        before, _, rest = page.partition(MARKS[0])
+        _, mark, after = rest.partition(MARKS[1])
+        if not mark:
+            raise SystemExit(f"{PAGE} lacks {MARKS[0]} and {MARKS[1]}")
+        PAGE.write_text(before + "\n".join([MARKS[0], "", *text, "", MARKS[1]]) + after, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()
