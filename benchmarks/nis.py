@@ -3,8 +3,8 @@
     OMP_NUM_THREADS=1 .venv/bin/python benchmarks/nis.py [NAME...] [--model fullbody] [--write]
 
 Each recording of ``../shared/data`` is prepared as `benchmarks/recordings.py` runs it (its own .osim, else
-``fullbody``). Its noise is calibrated on every other stretch of the first 10 s (`filter.adapt`) and judged on all the
-other stretches, up to 20 s. A stretch is a second, or a tenth of a recording shorter than 10 s. ``--write`` puts the
+``fullbody``). Its noise is calibrated on every other stretch (`filter.adapt`) and judged on the others, of the first
+20 s. A stretch is a second, or a tenth of a recording shorter than 10 s. ``--write`` puts the
 table into ``docs/validation.md``; rows are kept in ``build/nis``.
 """
 

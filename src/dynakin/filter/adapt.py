@@ -26,7 +26,7 @@ Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
 CALIBRATED_S = 10.0
-"""Part of a recording that is looked at, from its start."""
+"""Part of a recording that is filtered again with other jerk densities, from its start."""
 SETTLING_S = 0.3
 """Left out of it: the first frames' covariances are the priors'."""
 LEAST_FRAMES = 25
@@ -55,28 +55,27 @@ def calibrated_noise(
 ) -> Noise | None:
     """The noise with the scales that a recording asks for; None where it is too short.
 
-    Two more passes over `CALIBRATED_S` for a floating model, none for one that is fixed in the ground.
+    One more pass, over `CALIBRATED_S`, for a floating model, none for one that is fixed in the ground.
 
     Args:
-        tracker: of the run. arrays: of that run, as `Tracker.run_arrays` gives them. frames: (T,) to look at; all of
-            the first seconds where not given.
+        tracker: of the run. arrays: of that run, as `Tracker.run_arrays` gives them. frames: (T,) to look at; all
+            where not given.
     """
-    end = int(np.searchsorted(trial.time, trial.time[0] + CALIBRATED_S, side="right"))
-    trial = trial.first(end)
     chosen: Flags = trial.time >= trial.time[0] + SETTLING_S
     if frames is not None:
-        chosen &= frames[:end]
+        chosen &= frames
     noise = tracker.noise
     ratio = nis_per_row(arrays, chosen)
     if ratio is None:
         return None
-    groups = joint_groups(tracker.calibrated)
-    if not groups:
+    end = int(np.searchsorted(trial.time, trial.time[0] + CALIBRATED_S, side="right"))
+    groups, before = joint_groups(tracker.calibrated), nis_per_row(arrays, chosen[:end])
+    if not groups or before is None:
         return _scaled(noise, ratio)
-    noise = _scaled(noise, ratio, jerk_ratios(tracker, arrays, trial.time, chosen, groups))
-    again = tracker.changed(noise).run_arrays(*trial[:3], None, trial.contacts)
-    ratio = nis_per_row(again, chosen)
-    return None if ratio is None else _scaled(noise, ratio)
+    scaled = _scaled(noise, ratio, jerk_ratios(tracker, arrays, trial.time, chosen, groups))
+    again = tracker.changed(scaled).run_arrays(*trial.first(end)[:3], None, trial.first(end).contacts)
+    after = nis_per_row(again, chosen[:end])
+    return _scaled(noise, ratio) if after is None else _scaled(scaled, after * ratio / before)
 
 
 def nis_per_row(arrays: dict[str, Array], chosen: Flags) -> float | None:
