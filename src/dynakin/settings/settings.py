@@ -39,7 +39,7 @@ RECORDED = ("ground", "held", "marker_places", "identified", "noise_used", "vers
 class Settings(Strict, use_attribute_docstrings=True):
     """What a run needs to know; the keys of a configuration file are the options of the command line."""
 
-    renamed: ClassVar = {"smooth": "lag_s"}
+    renamed: ClassVar = {"smooth": "lag_s (0 for false, inf for true)"}
 
     trial: Path = Field(default=Path(), examples=["squat.c3d"])
     """Recording to estimate: .c3d, .trc or .csv.
@@ -74,7 +74,7 @@ class Settings(Strict, use_attribute_docstrings=True):
 
     preset: str = "default"
     """Noise settings to start from (default, paper, or a .toml file that `tune` wrote); [noise] changes single ones."""
-    lag_s: float | None = Field(default=None, ge=0.0, allow_inf_nan=True, examples=[0.05])
+    lag_s: float | None = Field(default=None, ge=0.0, strict=True, allow_inf_nan=True, examples=[0.05])
     """Estimate each frame from the frames until so many seconds later, as it would be live with that lag (0: without
     any); inf: from all frames. Not given: inf wherever the noise settings have a smoother (preset paper has none)."""
     side: Literal["auto", "right", "left", "both"] = "auto"

@@ -62,7 +62,8 @@ class Strict(BaseModel):
     )
 
     renamed: ClassVar[Mapping[str, str]] = {}
-    """New names of keys that were called otherwise: the old ones are refused by naming the new."""
+    """New names of keys that were called otherwise, after a space with how its values are written now: the old ones are
+    refused by naming the new."""
 
     @model_validator(mode="before")
     @classmethod
@@ -70,7 +71,8 @@ class Strict(BaseModel):
         if isinstance(data, dict):
             for key in data:
                 if key in cls.renamed:
-                    raise ValueError(f"{key!r} is now called {cls.renamed[key]!r}")
+                    name, space, values = cls.renamed[key].partition(" ")
+                    raise ValueError(f"{key!r} is now called {name!r}{space}{values}")
                 if key not in cls.model_fields:
                     raise ValueError(
                         f"unknown key {key!r}{nearest(str(key), cls.model_fields)}; "
