@@ -94,6 +94,14 @@ def test_command_line_wins_over_the_file(tmp_path: Path) -> None:
     assert config.output == Path("elsewhere")
 
 
+def test_an_option_of_a_table_leaves_its_other_keys(tmp_path: Path) -> None:
+    path = tmp_path / "run.toml"
+    path.write_text('trial = "a.trc"\noutput = "out"\n[opensim]\nscale_masses = false\n')
+    config = configure(path, {"opensim": {"marker_places": "kept"}}, options=True)
+    assert (config.opensim.marker_places, config.opensim.scale_masses) == ("kept", False)
+    assert configure(path, {}).opensim.marker_places == "calibrated"
+
+
 def test_a_model_file_beside_the_configuration_is_found(tmp_path: Path) -> None:
     (tmp_path / "mine.toml").write_text("")
     path = tmp_path / "run.toml"
@@ -125,6 +133,10 @@ def test_configuration_as_used_can_be_read_again() -> None:
         (["tune", "fit", "--side", "middle"], "tune fit: --side: Input should be"),
         (["compare", "--sex", "other"], "compare: --sex: Input should be"),
         (["check", "--sex", "other"], "run: --sex: Input should be"),
+        (
+            ["run", "--marker-places", "kep"],
+            "run: --marker-places: Input should be 'calibrated' or 'kept', found 'kep'",
+        ),
     ],
 )
 def test_a_wrong_value_is_named_by_its_option(

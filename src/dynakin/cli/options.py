@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Annotated, Any, get_args
 
 import typer
+from pydantic import BaseModel
+from pydantic.fields import FieldInfo
 
 from dynakin.settings.lag import ALL_FRAMES
 from dynakin.settings.settings import Settings, option_names
@@ -26,7 +28,8 @@ Backend = Annotated[str, typer.Option(help="Who works: processes or threads of t
 Jobs = Annotated[int | None, typer.Option(help="Workers at a time on this machine; else one a core.")]
 Scheduler = Annotated[str | None, typer.Option(help="Address of the Dask cluster's scheduler, tcp://HOST:PORT.")]
 
-OF_A_MODEL = ("model", "markers", "static", "functional", "mass_kg", "height_m", "sex")
+OF_A_MODEL = ("model", "markers", "opensim.marker_places", "static", "functional", "mass_kg", "height_m", "sex")
+"""With a dot: a key of a table."""
 OF_THE_LABORATORY = ("side", "vertical", "forward")
 OF_THE_PLATES = ("contacts", "table", "plate_filter_hz", "force_threshold_n")
 
@@ -42,10 +45,14 @@ def with_settings(*keys: str, **meanings: str) -> Callable[[Command], Command]:
     def decorated(command: Command) -> Command:
         @wraps(command)
         def called(**arguments: Any) -> None:
-            values = {key: arguments.pop(key) for key in keys}
+            values = {key: arguments.pop(_argument(key)) for key in keys}
             if "lag_s" in keys:
                 values["lag_s"] = _lag(values["lag_s"], arguments.pop("smooth"))
-            given = {key: _READ.get(key, _same)(value) for key, value in values.items() if value is not None}
+            given: Given = {}
+            for key, value in values.items():
+                table, _, name = key.rpartition(".")
+                if value is not None:
+                    (given.setdefault(table, {}) if table else given)[name] = _READ.get(key, _same)(value)
             command(given=given, **arguments)
 
         parameters = []
@@ -62,14 +69,25 @@ def with_settings(*keys: str, **meanings: str) -> Callable[[Command], Command]:
     return decorated
 
 
+def _argument(key: str) -> str:
+    return key.replace(".", "_")
+
+
+def _field(key: str) -> FieldInfo:
+    table, _, name = key.rpartition(".")
+    owner = Settings.model_fields[table].annotation if table else Settings
+    assert isinstance(owner, type) and issubclass(owner, BaseModel)
+    return owner.model_fields[name]
+
+
 def _option(key: str, meanings: dict[str, str]) -> inspect.Parameter:
-    field = Settings.model_fields[key]
+    field = _field(key)
     kinds = {field.annotation, *get_args(field.annotation)} - {type(None)}
     kind = next((kind for kind in (Path, bool) if kind in kinds), float if float in kinds and str not in kinds else str)
     assert field.description is not None
     text = meanings.get(key) or " ".join(field.description.split("\n\n")[0].split())
     option = typer.Option(None, *option_names(key), help=text)
-    return inspect.Parameter(key, inspect.Parameter.KEYWORD_ONLY, default=option, annotation=kind | None)
+    return inspect.Parameter(_argument(key), inspect.Parameter.KEYWORD_ONLY, default=option, annotation=kind | None)
 
 
 _SMOOTH = inspect.Parameter(

@@ -295,6 +295,10 @@ def load_model(
                 f"functional is given, but {name} has joints of its own; expected a model such as fullbody"
             )
         return load_opensim(name, subject, opensim)
+    if opensim is not None and opensim.marker_places == "kept":
+        raise ModelError(
+            f"marker_places is 'kept', but {name} has no marker places of its own; expected an .osim model with it"
+        )
     definition = load_built_in_or_toml(name, subject, markers, table)
     if not functional:
         return definition

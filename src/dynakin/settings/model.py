@@ -97,5 +97,8 @@ class OpenSimOptions(Strict, use_attribute_docstrings=True):
     """Bodies of less than this part of the whole mass keep the file's mass and inertia: no trial identifies them."""
     lock_unseen: bool = True
     """Whether coordinates that move no measured marker (toes, often) are locked at the file's default value."""
+    marker_places: Literal["calibrated", "kept"] = "calibrated"
+    """Whether the .osim's marker places are calibrated by the recording, or kept as the file has them, as OpenSim's
+    inverse kinematics does: kept is better where they were fitted to this person and skeleton."""
     leave_out: tuple[str, ...] = ()
     """Markers of the file that are not measurements (regressed joint centres, say)."""

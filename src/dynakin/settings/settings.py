@@ -26,6 +26,7 @@ _OPTIONS = {
     "height_m": ("--height",),
     "lag_s": ("--lag",),
     "contacts": ("--contact",),
+    "opensim.marker_places": ("--marker-places",),
 }
 # Keys that name files: relative to the configuration file that they stand in.
 _PATHS = ("trial", "forces", "static", "parameters", "output")
@@ -155,12 +156,16 @@ class Settings(Strict, use_attribute_docstrings=True):
             ConfigError: a key that is unknown (the nearest is suggested) or missing, or a value that is wrong.
         """
         given = given or {}
+        table = content.get("opensim", {})
         content = {**content, **given}
+        if "opensim" in given and isinstance(table, Mapping):  # single keys of a table are given, the others stay
+            content["opensim"] = {**table, **given["opensim"]}
         for key in needed:
             if content.get(key) is None:
                 option = NEEDED[key]
                 raise ConfigError(f'{where}: {key} is missing, expected {option} or {key} = "..." in the configuration')
-        return validate(cls, content, where, ConfigError, {key: option_names(key)[0] for key in given})
+        keys = [key for key in given if key != "opensim"] + [f"opensim.{key}" for key in given.get("opensim", ())]
+        return validate(cls, content, where, ConfigError, {key: option_names(key)[0] for key in keys})
 
     @model_validator(mode="after")
     def _checked(self) -> Self:

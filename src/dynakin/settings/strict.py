@@ -126,7 +126,8 @@ def _place(location: tuple[int | str, ...], data: Any, names: Mapping[str, str])
         elif "[" in step or step[:1].isupper():
             continue  # pydantic's name of a branch of a union, no key of the file
         else:
-            text += f".{step}" if text else names.get(step, step)
+            text = f"{text}.{step}" if text else step
+            text = names.get(text, text)
             node = node.get(step) if isinstance(node, dict) else None
     return text
 

@@ -19,6 +19,7 @@ from dynakin.model.opensim.read import read_osim
 from dynakin.model.opensim.sites import skin_of
 from dynakin.recordings.recording import Recording
 from dynakin.settings import presets
+from dynakin.settings.model import OpenSimOptions
 from dynakin.settings.subject import Subject
 from support.osim.files import small_model, version_4
 
@@ -78,6 +79,25 @@ def test_what_is_estimated_is_a_choice(folder: Path, squats: Recording) -> None:
     assert shared.dimensionless == {"scale_femur"}
     bodies = {name.split("/")[1] for name in shared.names if name.startswith("inertia")}
     assert "femur_r" in bodies and "patella_r" not in bodies
+
+
+def test_marker_places_are_calibrated_or_kept(folder: Path, squats: Recording) -> None:
+    """Kept places are no states, and not doubted either: no noise is added for them."""
+    path = folder / FILE
+
+    def started(places: str) -> CalibratedModel:
+        return dynakin.Estimator(load_opensim(path, marker_places=places)).start(squats).calibrated
+
+    calibrated, kept = started("calibrated"), started("kept")
+    free = [name for name in calibrated.names if name.startswith("marker/")]
+    assert len(free) == 3 * 45 and [name for name in calibrated.names if name not in free] == list(kept.names)
+    np.testing.assert_array_equal(kept.unmodelled_m, calibrated.unmodelled_m)
+    for before, after in zip(calibrated.spec.markers, kept.spec.markers, strict=True):
+        np.testing.assert_array_equal(after.position, before.position)
+    assert "Marker places: kept as the OpenSim file has them." in kept.messages
+    assert "Marker places: the OpenSim file's, calibrated by the recording." in calibrated.messages
+    with pytest.raises(ModelError, match="marker_places is 'kept', but fullbody has no marker places"):
+        load_model("fullbody", opensim=OpenSimOptions(marker_places="kept"))
 
 
 def test_every_model_answers_to_the_same_questions(folder: Path, squats: Recording) -> None:

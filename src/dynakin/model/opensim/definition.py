@@ -124,7 +124,13 @@ class OpenSimDefinition:
             messages.append(f"Mass {source.mass:.2f} kg: the OpenSim file's.")
         messages += said
         if static is not None:
-            messages.append("The standing trial gives the mass only: marker places are those of the OpenSim file.")
+            messages.append("The standing trial gives the mass only.")
+        kept = options.marker_places == "kept"
+        messages.append(
+            "Marker places: kept as the OpenSim file has them."
+            if kept
+            else "Marker places: the OpenSim file's, calibrated by the recording."
+        )
         lock = unseen(source, {marker.body for marker, _ in chosen}) if options.lock_unseen else []
         if lock:
             messages.append(f"Coordinates that move no measured marker, locked at the file's value: {', '.join(lock)}.")
@@ -136,6 +142,7 @@ class OpenSimDefinition:
                 self.scales,
                 markers=[marker for marker, _ in chosen],
                 estimate_inertia=carried,
+                estimate_places=not kept,
                 values=values,
                 lock=lock,
             )

@@ -53,6 +53,7 @@ def to_spec(
     *,
     markers: Sequence[Marker] | None = None,
     estimate_inertia: Collection[str] = (),
+    estimate_places: bool = True,
     values: Mapping[str, float] | None = None,
     lock: Collection[str] = (),
 ) -> _core.ModelSpec:
@@ -61,7 +62,7 @@ def to_spec(
     Args:
         scales: scale parameter of each body that has one, as `scale_names` gives them.
         markers: those that are measured; all of the model's that sit on bodies where not given.
-        estimate_inertia: bodies whose ten numbers are estimated.
+        estimate_inertia: bodies whose ten numbers are estimated. estimate_places: whether the markers' places are.
         values: coordinates at the start, by name; the file's defaults where not given.
         lock: coordinates that are locked in addition to those of the file.
     """
@@ -91,7 +92,7 @@ def to_spec(
             )
             for name, segment in placed.items()
         ],
-        markers=[_core.MarkerSpec(m.name, m.body, np.array(m.location), AXES, AXES) for m in sites],
+        markers=[_core.MarkerSpec(m.name, m.body, np.array(m.location), AXES, [estimate_places] * 3) for m in sites],
         gravity=np.array(model.gravity),
     )
 
