@@ -257,7 +257,8 @@ class Estimator:
             on_feet = on_feet and on_feet.in_step(recording.time, shift)
             if smooth:
                 trial = Trial(recording.time, markers, wrench, on_feet)
-                found = calibrated_noise(tracker, arrays, trial) if tracker.noise.adapt else None
+                adapt = bool(calibrated.feet) if tracker.noise.adapt is None else tracker.noise.adapt
+                found = calibrated_noise(tracker, arrays, trial) if adapt else None
                 tracker = tracker.changed(found or tracker.noise)
                 arrays = tracker.run_smoothed_arrays(recording.time, markers, wrench, back, on_feet)
         except ValueError as error:  # a frame that the core refuses, named by it
