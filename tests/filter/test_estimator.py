@@ -140,8 +140,7 @@ def test_what_each_sensor_said_is_in_steps_run_and_file(trial: SimulatedTrial, t
         markers[50, knee] += 0.3
 
     recording = with_markers(trial.recording, broken)
-    declared = dynakin.presets.default().changed(adapt=False)  # as a tracker has it
-    result = estimator(noise=declared).run(recording)
+    result = estimator().run(recording)
     data = result.data
     axes = result.modelled_axes()
     for name in ("markers", "wrench"):

@@ -56,7 +56,7 @@ DEFAULT: dict[str, Any] = {
     "blind_s": 0.2,
     "unseen_sd": 0.5,
     "iterate_beyond_sd": 0.2,
-    "adapt": True,
+    "adapt": None,
     "variance_scale": 1.0,
     "jerk_scale": {},
     "constraint": "projection",

@@ -264,7 +264,8 @@ class Estimator:
             )
             wrench = in_step(recording.time, ready.wrench, shift) if shift else ready.wrench
             on_feet = on_feet and on_feet.in_step(recording.time, shift)
-            if lag_s == ALL_FRAMES and tracker.noise.adapt:
+            adapt = bool(calibrated.feet) if tracker.noise.adapt is None else tracker.noise.adapt
+            if lag_s == ALL_FRAMES and adapt:
                 trial = Trial(recording.time, markers, wrench, on_feet)
                 tracker = tracker.changed(calibrated_noise(tracker, arrays, trial) or tracker.noise)
             if lag_s:
