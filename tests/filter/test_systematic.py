@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from scipy.optimize import least_squares
+from scipy.spatial.transform import Rotation
 
 from dynakin.bindings import _core
 from dynakin.filter.systematic import _STEP_S, COMMON, KINDS, SKIN_ANGLE_RAD, Sizes, Systematic
@@ -17,16 +18,18 @@ from dynakin.settings.noise import Noise
 Array = npt.NDArray[np.float64]
 
 X, Y, Z = np.eye(3)
+NOT, AS_IT_IS = np.zeros(3), np.eye(3)
 REFERENCE = np.zeros(10)
 Q = np.array([0.1, 0.9, -0.2, 0.2, 0.1, 0.3, 0.6, -0.2, 0.25, -0.9])
 QD = np.array([0.4, -0.1, 0.2, 0.5, -0.3, 0.6, 1.2, 0.4, -0.7, -1.5])
 QDD = np.array([1.0, 0.5, -1.0, 2.0, 1.0, -2.0, 5.0, -3.0, 2.0, 6.0])
 CONTACT = np.array([40.0, 500.0, -60.0, 30.0, -20.0, 90.0])
 """N, N m about the ground's origin, on the shank."""
+SIZES = (0.01, 0.02, 0.05, 0.06, 0.07, 0.3)
 DECLARED = np.repeat([0.014, 0.018, 0.010], 4)
 
 
-def spec(hip: Array = np.zeros(3), knee: Array = np.zeros(3), turned: Array = np.eye(3)) -> _core.ModelSpec:
+def spec(hip: Array = NOT, knee: Array = NOT, turned: Array = AS_IT_IS) -> _core.ModelSpec:
     """Pelvis, thigh and shank; the hip and the knee misplaced on all their bones, the knee's axis turned on both."""
     names = ["tx", "ty", "tz", "tilt", "list", "rotation", "flexion", "adduction", "turn", "knee"]
     root = [_core.AxisSpec(n, "translation", e) for n, e in zip(names[:3], (X, Y, Z), strict=True)]
@@ -116,19 +119,18 @@ def effects(wrong: _core.Model) -> tuple[Array, Array, Array, Array]:
 
 
 def rotation(vector: Array) -> Array:
-    from scipy.spatial.transform import Rotation
-
     return np.asarray(Rotation.from_rotvec(vector).as_matrix())
 
 
-@pytest.mark.parametrize("kind", ["centre", "hinge"])
+@pytest.mark.parametrize("kind", ["hinge_centre", "ball_centre", "hinge_axes"])
 def test_effects_of_a_joint_are_those_of_a_model_that_is_changed(kind: str) -> None:
     external = np.zeros((3, 6))
     external[2] = CONTACT
     parts = systematic().parts(Q, QD, QDD, external)[kind]
     size = 1e-5
-    if kind == "centre":
-        wrong = [changed(**{joint: size * e}) for joint in ("hip", "knee") for e in (X, Y, Z)]
+    if kind != "hinge_axes":
+        joint = "knee" if kind == "hinge_centre" else "hip"
+        wrong = [changed(**{joint: size * e}) for e in (X, Y, Z)]
     else:
         wrong = [changed(turned=rotation(size * e)) for e in (X, Y, Z)]
     each = [effects(model) for model in wrong]
@@ -142,7 +144,7 @@ def test_in_the_reference_posture_a_wrong_joint_changes_lever_arms_and_no_angle(
     still = np.zeros(10)
     external = np.zeros((3, 6))
     external[2, 1] = 500.0
-    parts = systematic().parts(REFERENCE, still, still, external)["centre"]
+    parts = systematic().parts(REFERENCE, still, still, external)["hinge_centre"]
     np.testing.assert_allclose(parts["coordinates"], 0.0, atol=1e-12)
     np.testing.assert_allclose(parts["speeds"], 0.0, atol=1e-9)
     # the knee's moment: 500 N up less the shank's weight, which stays with the foot, times the place forward
@@ -153,7 +155,6 @@ def test_skin_that_follows_the_knee_is_that_of_displaced_markers() -> None:
     """One marker's own displacement and one segment's common one, drawn: the variances are those of the fits."""
     rng = np.random.default_rng(2)
     model, right = _core.Model(spec()), np.r_[Q, np.zeros(20)]
-    places = _core.marker_positions(model, right)
     sd = 0.5 * np.repeat([0.014, 0.018, 0.010], 4)
     weight = 1.0 / np.hypot(0.0007, sd)[:, None]
     J = (_core.marker_jacobian(model, right)[:, :10].reshape(12, 3, 10) * weight[..., None]).reshape(36, 10)
@@ -170,7 +171,6 @@ def test_skin_that_follows_the_knee_is_that_of_displaced_markers() -> None:
         draws.append(np.linalg.solve(J.T @ J + 4.0 * np.eye(10), J.T @ d.ravel()))
     parts = systematic().parts(Q, QD, QDD)["skin"]
     np.testing.assert_allclose(np.sqrt(parts["coordinates"]), np.std(draws, axis=0), rtol=0.06)
-    assert places.shape == (12, 3)
 
 
 def test_speeds_of_skin_are_the_rates_of_its_angles() -> None:
@@ -196,8 +196,6 @@ def test_a_pelvis_frame_that_is_turned_mixes_its_angles_and_leaves_the_moments_o
     expected = np.zeros(3)
     R = rotation(0.3 * Y)
     for e in (X, Y, Z):
-        from scipy.spatial.transform import Rotation
-
         turned = Rotation.from_matrix(R @ rotation(1e-6 * e)).as_euler("ZXY") - np.array([0.0, 0.0, 0.3])
         at_zero = np.array([e[2], e[0], e[1]]) * 1e-6
         expected += ((turned - at_zero) / 1e-6) ** 2
@@ -206,14 +204,14 @@ def test_a_pelvis_frame_that_is_turned_mixes_its_angles_and_leaves_the_moments_o
 
 
 def test_reported_deviations_hold_both_parts_and_a_scale_of_zero_leaves_the_filters_own() -> None:
-    subject = Systematic(calibrated(), Noise(), Sizes(0.01, 0.05, 0.05, 0.05, 0.3))
+    subject = Systematic(calibrated(), Noise(), Sizes(*SIZES))
     x = np.r_[Q, QD, QDD]
     own = {block: np.full(10, 0.02) for block in ("coordinates", "speeds", "accelerations", "moments")}
     both = subject.added(own, x, CONTACT[None], ["shank"])
     external = np.zeros((3, 6))
     external[2] = CONTACT
     parts = subject.parts(Q, QD, QDD, external)
-    sizes = dict(zip(KINDS, (0.01, 0.05, 0.05, 0.05, 0.3), strict=True))
+    sizes = dict(zip(KINDS, SIZES, strict=True))
     for block, sd in both.items():
         total = 0.02**2 + sum(sizes[kind] ** 2 * parts[kind][block] for kind in KINDS)
         np.testing.assert_allclose(sd, np.sqrt(total))

@@ -1,5 +1,5 @@
-"""A model whose joints may be misplaced and turned: each error is a coordinate that stands still, so that the core's own
-derivatives say what it does to markers and moments ([derivations](derivations.md), section 17)."""
+"""A model whose joints may be misplaced and turned: each error is a coordinate that stands still, so that the core's
+own derivatives say what it does to markers and moments ([derivations](derivations.md), section 17)."""
 
 from __future__ import annotations
 
@@ -14,9 +14,9 @@ import numpy.typing as npt
 from dynakin.bindings import _core
 
 Array = npt.NDArray[np.float64]
-Kind = Literal["centre", "hinge", "ball", "root"]
-"""A joint's centre beside where it is on the bones; the axes of a hinge (or of two) or of a ball joint turned on both of
-its bones; the root's frame turned in its bone."""
+Kind = Literal["hinge_centre", "ball_centre", "hinge_axes", "ball_axes", "root"]
+"""The centre of a joint with one or two axes (hinge) or three (ball) beside where it is on its bones; its axes turned on
+both of them; the root's frame turned in its bone."""
 Column = dict[str, float]
 
 _AXES = np.eye(3)
@@ -45,7 +45,8 @@ class JointErrors:
         """Those of a model.
 
         Args:
-            reference: (C,) posture in which the bones were found: there a misplaced joint displaces no bone but its own.
+            reference: (C,) posture in which the bones were found: there a misplaced joint displaces no bone but its
+                own.
         """
         spec = _without_parameters(spec)
         orientations = _orientations(spec, reference)
@@ -159,13 +160,14 @@ def _sources(spec: _core.ModelSpec, orientations: dict[str, Array]) -> list[tupl
                 ]
             continue
         R_J = orientations[segment.parent] @ segment.rotation
+        ball = len(joints[name]) >= 3
         for e in _AXES[: 2 if planar else 3]:
             column = _along(name, "moved", R_J, e)
             for child in children:
                 column |= _along(child.name, "moved", R_B @ child.rotation, -e)
-            found.append(("centre", column))
+            found.append(("ball_centre" if ball else "hinge_centre", column))
         if not planar:
-            kind: Kind = "ball" if len(joints[name]) >= 3 else "hinge"
+            kind: Kind = "ball_axes" if ball else "hinge_axes"
             found += [(kind, _along(name, "turned", R_J, e) | _along(name, "behind", R_B, -e)) for e in _AXES]
     return found
 

@@ -1,7 +1,8 @@
 """What the filter's covariance cannot know: joints beside where they are, and skin that follows them.
 
 A consider covariance (Schmidt 1966): these errors are no states, and nothing is learned of them; their effect on what
-is reported is worked out afterwards and added to the filter's own variances ([derivations](derivations.md), section 17).
+is reported is worked out afterwards and added to the filter's own variances ([derivations](derivations.md), section
+17).
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ from dynakin.settings.noise import Noise
 Array = npt.NDArray[np.float64]
 
 BLOCKS = ("coordinates", "speeds", "accelerations", "moments")
-KINDS = ("centre", "hinge", "ball", "root", "skin")
+KINDS = ("hinge_centre", "ball_centre", "hinge_axes", "ball_axes", "root", "skin")
 
 
 @dataclass(frozen=True)
@@ -31,14 +32,15 @@ class Sizes:
     """Standard deviations of the errors, of each component; where they come from is in docs/derivations.md.
 
     Attributes:
-        centre: m, of a joint's centre. hinge: rad, of the turn of the axes of a joint with one or two; ball: of one
-            with three. root: rad, of the turn of the pelvis' frame in the pelvis.
+        hinge_centre, ball_centre: m, of the centre of a joint with one or two axes (knee, ankle), with three (hip).
+        hinge_axes, ball_axes: rad, of the turn of its axes. root: rad, of the turn of the pelvis' frame in the pelvis.
         skin: of the displacement of a marker that follows a joint's angle, as a fraction of the declared size.
     """
 
-    centre: float
-    hinge: float
-    ball: float
+    hinge_centre: float
+    ball_centre: float
+    hinge_axes: float
+    ball_axes: float
     root: float
     skin: float
 
@@ -47,9 +49,9 @@ class Sizes:
         return Sizes(*(factor * value for value in astuple(self)))
 
 
-LANDMARKS = Sizes(centre=0.006, hinge=np.radians(4.0), ball=np.radians(1.5), root=np.radians(3.0), skin=0.3)
+LANDMARKS = Sizes(0.008, 0.003, np.radians(2.5), np.radians(0.8), np.radians(1.2), 0.2)
 """Joints that are found from markers on the skin."""
-SCALED = Sizes(centre=0.003, hinge=np.radians(1.5), ball=np.radians(1.0), root=np.radians(1.5), skin=0.3)
+SCALED = Sizes(0.003, 0.002, np.radians(1.2), np.radians(0.8), np.radians(1.0), 0.1)
 """Joints of a skeleton that was scaled to the person (.osim)."""
 
 

@@ -1,0 +1,269 @@
+"""Do the stated deviations hold the truth? Coverage and deviation over error by group, and a choice of their sizes.
+
+    OMP_NUM_THREADS=1 .venv/bin/python benchmarks/intervals.py [CASE...] [--trials DIR] [--seeds 1,2] [--live]
+        [--preset FILE] [--sizes landmarks:centre=0.008,hinge=0.1] [--choose landmarks] [--again]
+
+A case is squat or walk with fullbody or an .osim (``truth3d``'s trials, in DIR: folders ``squat_s1_*`` with trial.trc,
+grf.mot, static.trc, model.osim, trial.json, truth.npz), or one of our own simulator (``own_squat``, ``own_gait``,
+``sagittal7``, ``squat7``). Each is filtered once without systematic errors and kept (build/intervals); what each kind of
+error of size 1 would add is worked out beside it, so that sizes are tried without filtering again.
+
+Groups and figures are truth3d's: angles with their mean error taken off, means over coordinates and seeds; deviation
+over error is the median of a group's angles and speeds. --choose searches the sizes of one kind of model over all cases
+asked for; --sizes tries some. What is chosen goes into `filter/systematic.py` by hand.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import pickle
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from hashlib import sha256
+from pathlib import Path
+
+import numpy as np
+from scipy.optimize import minimize
+
+import dynakin
+from dynakin.filter.systematic import BLOCKS, KINDS, LANDMARKS, SCALED, Sizes
+from dynakin.model.definition import load_model
+from dynakin.settings import presets
+from dynakin.settings.noise import Noise
+from dynakin.simulation.trial import simulate
+
+KEPT = Path(__file__).resolve().parents[1] / "build" / "intervals"
+TRUTH3D = ("squat/fullbody", "squat/osim", "walk/fullbody", "walk/osim")
+OWN = {"own_squat": ("fullbody", 10.0, 3.0), "own_gait": ("fullbody", 4.0, 0.5)}
+PLANAR = {"sagittal7": ("opencap", 15.0, 5.0), "squat7": ("plug-in-gait", 15.0, 5.0)}
+CASES = (*TRUTH3D, *OWN, *PLANAR)
+WINDOW_S = {"squat": (2.0, 1e9), "walk": (0.3, 3.1)}
+FLEXION = ("pelvis_tilt", "hip_flexion", "knee_angle", "ankle_angle", "lumbar_extension")
+OTHER = ("pelvis_list", "pelvis_rotation", "hip_adduction", "hip_rotation", "subtalar_angle", "lumbar_bending",
+         "lumbar_rotation")  # fmt: skip
+MOMENTS = ("hip_flexion", "knee_angle", "ankle_angle", "hip_adduction", "lumbar_extension")
+HOLDS = (0.85, 0.99)
+RATIO = (0.5, 2.5)
+Array = np.ndarray
+
+
+@dataclass(frozen=True)
+class Run:
+    """One estimate against the truth: by block errors (T, C), the filter's own deviations, and variances by kind of
+    error at size 1. Frames that have no truth or no value are NaN."""
+
+    case: str
+    seed: int
+    sizes: str
+    names: tuple[str, ...]
+    error: dict[str, Array]
+    own: dict[str, Array]
+    parts: dict[str, dict[str, Array]]
+
+
+def runs_of(case: str, seed: int, folder: Path | None, noise: Noise, live: bool, again: bool) -> Run:
+    """As kept, else made."""
+    key = json.dumps([case, seed, live, noise.model_dump()], sort_keys=True)
+    kept = KEPT / f"{case.replace('/', '_')}_s{seed}_{sha256(key.encode()).hexdigest()[:10]}.pickle"
+    if kept.exists() and not again:
+        return pickle.loads(kept.read_bytes())
+    found = truth3d(case, seed, folder, noise, live) if case in TRUTH3D else own(case, seed, noise, live)
+    KEPT.mkdir(parents=True, exist_ok=True)
+    kept.write_bytes(pickle.dumps(found))
+    return found
+
+
+def truth3d(case: str, seed: int, folder: Path | None, noise: Noise, live: bool) -> Run:
+    """A trial of truth3d."""
+    motion, _, kind = case.partition("/")
+    if folder is None:
+        raise SystemExit(f"{case} needs --trials: the folder of truth3d's trials (CACHE/trials)")
+    trial = next(t for t in sorted(folder.glob(f"{motion}_s{seed}_*")) if plain(t))
+    subject = dynakin.Subject(mass_kg=json.loads((trial / "trial.json").read_text())["mass_kg"], height_m=1.7)
+    recording = dynakin.read(trial / "trial.trc", trial / "grf.mot")
+    if kind == "osim":
+        definition, static = load_model(trial / "model.osim", subject=subject), None
+    else:
+        definition = load_model("fullbody", subject=subject, markers="opencap")
+        static = dynakin.read(trial / "static.trc")
+    given = np.load(trial / "truth.npz", allow_pickle=True)
+    truth = {"coordinates": given["q"], "speeds": given["u"], "moments": given["tau"]}
+    window = (given["t"] >= WINDOW_S[motion][0]) & (given["t"] <= WINDOW_S[motion][1])
+    tracked = dynakin.Estimator(definition, noise).track(recording, static=static, smooth=not live)
+    return against(case, seed, tracked, [str(n) for n in given["names"]], truth, window)
+
+
+def plain(trial: Path) -> bool:
+    """A trial with all sources of error and nothing lost."""
+    if not (trial / "truth.npz").exists():
+        return False
+    made = json.loads((trial / "trial.json").read_text())["settings"]
+    return not (made["without"] or made["one_plate"] or made["dropouts"])
+
+
+def own(case: str, seed: int, noise: Noise, live: bool) -> Run:
+    """A trial of our own simulator."""
+    subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
+    if case in PLANAR:
+        markers, seconds, start = PLANAR[case]
+        model, motion = case, "squat"
+    else:
+        (model, seconds, start), markers, motion = OWN[case], "opencap", case.removeprefix("own_")
+    trial = simulate(model, motion, seed, seconds, markers=markers if model == "fullbody" else None)
+    static = None if motion == "squat" else simulate(model, "squat", seed, 5.0, markers=markers).recording
+    definition = load_model(model, subject=subject, markers=markers)
+    tracked = dynakin.Estimator(definition, noise).track(trial.recording, static=static, smooth=not live)
+    truth = {block: trial.truth.data[block].transpose("time", "coordinate").values for block in BLOCKS}
+    names = [str(n) for n in trial.truth.data["coordinate"].values]
+    return against(case, seed, tracked, names, truth, trial.recording.time >= start)
+
+
+def against(
+    case: str, seed: int, tracked: dynakin.filter.estimator.Tracked, names: list[str], truth: dict[str, Array],
+    window: Array,
+) -> Run:  # fmt: skip
+    """Errors, deviations and parts over the window, of the coordinates that both have and that move."""
+    data, tracker = tracked.estimate.data, tracked.tracker
+    systematic = dynakin.filter.systematic.Systematic(tracker.calibrated, tracker.noise)
+    parts = systematic.over_time(data)
+    all_names = [str(n) for n in data["coordinate"].values]
+    chosen = [n for n in all_names if n in names and n not in tracked.estimate.held]
+    mine, theirs = [all_names.index(n) for n in chosen], [names.index(n) for n in chosen]
+    blocks = [block for block in BLOCKS if block in truth]
+
+    def values(name: str) -> Array:
+        return np.asarray(data[name].transpose("time", "coordinate").values)[window][:, mine]
+
+    measured = np.ones((int(window.sum()), len(mine)), dtype=bool)
+    if "moment_source" in data:
+        measured = values("moment_source") == 0
+    error = {block: values(block) - truth[block][window][:, theirs] for block in blocks}
+    error["moments"] = np.where(measured, error["moments"], np.nan)
+    return Run(
+        case,
+        seed,
+        "scaled" if tracker.calibrated.plan is None else "landmarks",
+        tuple(chosen),
+        error,
+        {block: values(f"{block}_sd") for block in blocks},
+        {kind: {block: parts[kind][block][window][:, mine] for block in blocks} for kind in KINDS},
+    )
+
+
+def groups_of(run: Run) -> list[tuple[str, str, list[int]]]:
+    """(title, block, places) of the groups of a run."""
+
+    def places(stems: Sequence[str]) -> list[int]:
+        return [k for k, n in enumerate(run.names) if n in stems or n[:-2] in stems and n[-2:] in ("_r", "_l")]
+
+    if run.case in PLANAR:
+        every = list(range(len(run.names)))
+        return [(f"planar {block}", block, every) for block in ("coordinates", "speeds", "moments")]
+    found = [
+        (f"{what}{title}", block, places(stems))
+        for what, block in (("", "coordinates"), ("speeds, ", "speeds"))
+        for title, stems in (("flexion", FLEXION), ("other angles", OTHER))
+    ]
+    return found + [(f"moment {stem}", "moments", places((stem,))) for stem in MOMENTS]
+
+
+def figures(run: Run, sizes: Sizes | None) -> dict[str, tuple[float, float, float, float]]:
+    """By group: share inside 95 %, deviation over error, error and deviation (RMS; rad, rad/s, N m); None: the filter's
+    own deviations."""
+    found = {}
+    for title, block, places in groups_of(run):
+        e, variance = run.error[block][:, places], run.own[block][:, places] ** 2
+        if sizes is not None:
+            variance = variance + sum(getattr(sizes, k) ** 2 * run.parts[k][block][:, places] for k in KINDS)
+        sd = np.sqrt(variance)
+        if block == "coordinates":
+            e = e - np.nanmean(e, axis=0)
+        sd = np.where(np.isfinite(e), sd, np.nan)
+        inside = np.nanmean(np.where(np.isfinite(e), np.abs(e) < 1.96 * sd, np.nan), axis=0)
+        rms_e, rms_sd = (np.sqrt(np.nanmean(x**2, axis=0)) for x in (e, sd))
+        middle = np.nanmean if block == "moments" else np.nanmedian
+        found[title] = tuple(
+            float(x) for x in (np.nanmean(inside), middle(rms_sd / rms_e), rms_e.mean(), rms_sd.mean())
+        )
+    return found
+
+
+def means(runs: Sequence[Run], sizes: dict[str, Sizes] | None) -> dict[str, dict[str, Array]]:
+    """Case -> group -> mean figures over the seeds."""
+    found: dict[str, dict[str, Array]] = {}
+    for case in dict.fromkeys(run.case for run in runs):
+        each = [figures(run, sizes and sizes[run.sizes]) for run in runs if run.case == case]
+        found[case] = {title: np.mean([f[title] for f in each], axis=0) for title in each[0]}
+    return found
+
+
+def misses(inside: float, ratio: float) -> bool:
+    return not (HOLDS[0] <= inside <= HOLDS[1] and RATIO[0] <= ratio <= RATIO[1])
+
+
+def tell(runs: Sequence[Run], sizes: dict[str, Sizes]) -> None:
+    own, whole = means(runs, None), means(runs, sizes)
+    print("| case | group | error | filter's own: in 95 %, sd / error | with systematic errors: in 95 %, sd / error |")
+    print("|---|---|---|---|---|")
+    for case, rows in whole.items():
+        for title, (inside, ratio, error, _) in rows.items():
+            before = own[case][title]
+            unit = np.degrees(1.0) if title in ("flexion", "other angles", "planar coordinates") else 1.0
+            mark = "**" if misses(inside, ratio) else ""
+            print(f"| {case} | {title} | {unit * error:.2f} | {100 * before[0]:.0f}, {before[1]:.1f} | "
+                  f"{mark}{100 * inside:.0f}, {ratio:.1f}{mark} |")  # fmt: skip
+    every = [row for rows in whole.values() for row in rows.values()]
+    missed = sum(misses(row[0], row[1]) for row in every)
+    print(f"\n{len(every) - missed} of {len(every)} groups hold: {HOLDS[0]:.0%} to {HOLDS[1]:.0%}, {RATIO}.")
+
+
+def choose(runs: Sequence[Run], kind: str, start: dict[str, Sizes]) -> Sizes:
+    """Sizes of one kind of model for which groups lie nearest to 94 % and 1.3, and none is far off."""
+    first = np.log([getattr(start[kind], k) for k in KINDS])
+    mine = [run for run in runs if run.sizes == kind]
+
+    def loss(theta: Array) -> float:
+        rows = means(mine, start | {kind: Sizes(*np.exp(theta))})
+        cost = 0.1 * float(np.mean((theta - first) ** 2))  # what the trials do not tell stays
+        for groups in rows.values():
+            for inside, ratio, *_ in groups.values():
+                cost += float(np.log(ratio / 1.3) ** 2 + 40.0 * max(0.0, 0.92 - inside) ** 2) / len(groups)
+        return cost
+
+    best = minimize(loss, first, method="Nelder-Mead", options={"maxfev": 300, "xatol": 0.02, "fatol": 1e-3})
+    return Sizes(*np.exp(best.x).tolist())
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.split("\n")[0])
+    parser.add_argument("cases", nargs="*", metavar="CASE", help=", ".join(CASES) + "; all where none is given")
+    parser.add_argument("--trials", type=Path, help="folder of truth3d's trials")
+    parser.add_argument("--seeds", default="1,2")
+    parser.add_argument("--live", action="store_true")
+    parser.add_argument("--preset", default="default")
+    parser.add_argument("--sizes", action="append", default=[], metavar="MODEL:KEY=VALUE,...")
+    parser.add_argument("--choose", choices=("landmarks", "scaled"))
+    parser.add_argument("--again", action="store_true")
+    asked = parser.parse_args()
+    noise = presets.preset(asked.preset, {"systematic_scale": 0.0})
+    cases = asked.cases or [case for case in CASES if asked.trials or case not in TRUTH3D]
+    runs = [
+        runs_of(case, int(seed), asked.trials, noise, asked.live, asked.again)
+        for case in cases
+        for seed in asked.seeds.split(",")
+    ]
+    sizes = {"landmarks": LANDMARKS, "scaled": SCALED}
+    for text in asked.sizes:
+        kind, _, pairs = text.partition(":")
+        values = {key: float(value) for key, _, value in (pair.partition("=") for pair in pairs.split(","))}
+        sizes[kind] = replace(sizes[kind], **values)
+    if asked.choose:
+        sizes[asked.choose] = choose(runs, asked.choose, sizes)
+    tell(runs, sizes)
+    for kind, own in sizes.items():
+        print(f"{kind}: {', '.join(f'{k} {v:.4g}' for k, v in asdict(own).items())}")
+
+
+if __name__ == "__main__":
+    main()
