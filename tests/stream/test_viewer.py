@@ -60,8 +60,11 @@ def test_the_picture_holds_what_is_estimated_and_measured(squat: Recording) -> N
     live = session(squat, [Callback(frames.append)])
     live.run()
     picture = Picture(Started(live.tracker.calibrated, live.tracker.core_model, 100.0), plates=len(squat.plates))
-    part = split(picture.numbers(frames[-1], live.tracker.deviations()), picture.sizes)
-    np.testing.assert_allclose(part["angles"], frames[-1].estimate.coordinates)
+    part = split(picture.numbers(frames[-1], live.tracker.deviations(delayed=True)), picture.sizes)
+    late = frames[-1].published
+    assert late is not None and part["time"][0] == late.time_s < frames[-1].estimate.time_s
+    np.testing.assert_allclose(part["angles"], late.coordinates)
+    np.testing.assert_allclose(part["moments"], late.moments)
     measured, estimated = part["measured"].reshape(-1, 3), part["estimated"].reshape(-1, 3)
     assert np.nanmax(np.abs(measured - estimated)[:, :2]) < 0.05
     weight = part["arrows"].reshape(-1, 6)[-1, 4]
