@@ -117,7 +117,9 @@ def initial_covariance(initial: CalibratedModel, noise: Noise) -> Array:
         place = {name: k for k, name in enumerate(initial.names)}
         known = [k for k, name in enumerate(initial.joint_prior.names) if name in place]
         at = [place[initial.joint_prior.names[k]] for k in known]
-        covariance[np.ix_(at, at)] = initial.joint_prior.covariance[np.ix_(known, known)]
+        together = initial.joint_prior.covariance[np.ix_(known, known)]
+        own = initial.sd0[at] / np.sqrt(np.diag(together))  # elements may be known better meanwhile
+        covariance[np.ix_(at, at)] = own[:, None] * together * own
     if noise.total_mass_use == "frame":
         return covariance * scales
     masses = np.array([float(name.startswith("inertia/") and name.endswith("/mass")) for name in initial.names])

@@ -13,7 +13,7 @@ import numpy as np
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.files import is_file
-from dynakin.model.calibration.calibrated import CalibratedModel, first_centre_of_pressure
+from dynakin.model.calibration.calibrated import CalibratedModel, JointPrior, first_centre_of_pressure
 from dynakin.model.calibration.in_space import started
 from dynakin.model.calibration.measure import measure
 from dynakin.model.markers.draft.draft import GUESSED
@@ -205,7 +205,9 @@ class ModelDefinition:
         spec = to_core(plan)
         core = _core.Model(spec)
         names = list(core.layout.names)
-        limits = plan.bounds(bounds or Bounds())
+        priors = priors or Priors()
+        limits = plan.bounds(bounds or Bounds(), priors)
+        together = plan.joint_prior(priors)
         x0 = np.array(core.initial_state(), dtype=float)
         for at, name in enumerate(names):
             if name.endswith("/speed"):
@@ -222,7 +224,7 @@ class ModelDefinition:
             spec=spec,
             names=tuple(names),
             x0=np.clip(x0, lower, upper),
-            sd0=in_layout(names, plan.prior(priors or Priors()), np.nan),
+            sd0=in_layout(names, plan.prior(priors), np.nan),
             lower=lower,
             upper=upper,
             table=in_layout(names, plan.table_values(), np.nan),
@@ -241,6 +243,7 @@ class ModelDefinition:
             feet={s.side: s.name for s in plan.model.segments if s.side is not None and "foot" in s.parts},
             unmarked_kg=unmarked_kg,
             held=held,
+            joint_prior=None if together is None else JointPrior(*together),
             guessed_places=self.marker_set is None and rest.trial.match.marker_set.name == GUESSED,
         )
 

@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import block_diag
 
 from dynakin.model.inertia import INERTIA_NAMES, PLANAR_INERTIA, RigidBody
 from dynakin.model.schema import Interval, ModelFile, Segment
-from dynakin.model.state_priors import state_bounds, state_prior
+from dynakin.model.state_priors import inertia_covariance, state_bounds, state_prior
 from dynakin.settings.model import Bounds, Priors
 
 Array = npt.NDArray[np.float64]
@@ -85,14 +86,31 @@ class ModelPlan:
         """Standard deviation of every element that a state can have, by the core's name of it."""
         names = [site.name for site in self.sites]
         return state_prior(
-            self._kinds(), self.geometry.lengths, self._length_sd(), names, self.bodies, self.reach, priors
-        )
+            self._kinds(), self.geometry.lengths, self._length_sd(), names, self.bodies, self.reach, priors,
+            self.worn_kg(priors),
+        )  # fmt: skip
 
-    def bounds(self, bounds: Bounds) -> dict[str, Interval]:
+    def worn_kg(self, priors: Priors) -> float:
+        """Standard deviation of what a segment may weigh more or less than in the table, whatever its size."""
+        total = sum(body.mass for body in self.bodies.values())
+        return priors.worn_mass_sd_fraction * total if self.model.sided else 0.0
+
+    def joint_prior(self, priors: Priors) -> tuple[tuple[str, ...], Array] | None:
+        """Names and covariance of the inertia of all segments, where what a segment weighs more changes all of it."""
+        worn_kg = self.worn_kg(priors)
+        if worn_kg == 0.0:
+            return None
+        blocks = [inertia_covariance(body, self.reach[name], priors, worn_kg) for name, body in self.bodies.items()]
+        return tuple(f"inertia/{name}/{each}" for name in self.bodies for each in INERTIA_NAMES), block_diag(*blocks)
+
+    def bounds(self, bounds: Bounds, priors: Priors | None = None) -> dict[str, Interval]:
         """Bounds of (9) by the core's names; speeds and accelerations have none."""
         limits = {c.name: c.limits for c in self.model.coordinates}
         places = {site.name: site.position for site in self.sites}
-        return state_bounds(limits, self.geometry.lengths, self._length_sd(), places, self.bodies, self.reach, bounds)
+        return state_bounds(
+            limits, self.geometry.lengths, self._length_sd(), places, self.bodies, self.reach, bounds,
+            self.worn_kg(priors or Priors()),
+        )  # fmt: skip
 
     def table_values(self) -> dict[str, float]:
         """What the table gives, by the core's names."""

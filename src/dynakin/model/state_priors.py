@@ -13,9 +13,10 @@ from dynakin.settings.model import Bounds, Priors
 
 Array = npt.NDArray[np.float64]
 
-_LENGTH_SDS = 4.0
-"""Half width of the bounds of a length that has a standard deviation of its own: the +-20 % of the others are as much
-of theirs."""
+_SDS = 4.0
+"""Half width of the bounds of what has a standard deviation of its own: the +-20 % of a length are as much of its."""
+_POSITIVE = frozenset({"mass", "ixx", "iyy", "izz"})
+_LEAST_SHARE = 0.1  # of the table's value: a segment is not left without mass
 
 
 def state_prior(
@@ -26,6 +27,7 @@ def state_prior(
     bodies: Mapping[str, RigidBody],
     reach: Mapping[str, float],
     priors: Priors,
+    worn_kg: float = 0.0,
 ) -> dict[str, float]:
     """Standard deviations.
 
@@ -33,6 +35,7 @@ def state_prior(
         kinds: "rotation" or "translation" of each coordinate. lengths: values of the geometry parameters.
         length_sd: of those that are known otherwise than to a part of their value.
         reach: length (m) that a segment's first moments are compared with.
+        worn_kg: standard deviation of what a segment may weigh more or less, whatever its size.
     """
     sd: dict[str, float] = {}
     for name, kind in kinds.items():
@@ -47,8 +50,8 @@ def state_prior(
     for marker in markers:
         sd |= {f"marker/{marker}/{axis}": priors.marker_sd_m for axis in "xyz"}
     for segment, body in bodies.items():
-        entry = inertia_prior(body, reach[segment], priors)
-        sd |= {f"inertia/{segment}/{name}": value for name, value in entry.items()}
+        entry = np.sqrt(np.diag(inertia_covariance(body, reach[segment], priors, worn_kg)))
+        sd |= {f"inertia/{segment}/{name}": float(value) for name, value in zip(INERTIA_NAMES, entry, strict=True)}
     return sd
 
 
@@ -60,6 +63,7 @@ def state_bounds(
     bodies: Mapping[str, RigidBody],
     reach: Mapping[str, float],
     bounds: Bounds,
+    worn_kg: float = 0.0,
 ) -> dict[str, Interval]:
     """Bounds of (9); speeds and accelerations have none.
 
@@ -68,20 +72,27 @@ def state_bounds(
     """
     found: dict[str, Interval] = dict(limits)
     for name, value in lengths.items():
-        half = _LENGTH_SDS * length_sd[name] if name in length_sd else bounds.length_fraction * value
+        half = _SDS * length_sd[name] if name in length_sd else bounds.length_fraction * value
         found[f"length/{name}"] = (value - half, value + half)
     for name, place in places.items():
         for axis, at in zip("xyz", place, strict=True):
             half = bounds.marker_threshold_m
             found[f"marker/{name}/{axis}"] = (float(at) - half, float(at) + half)
     for segment, body in bodies.items():
-        entry = inertia_bounds(body, reach[segment], bounds)
+        entry = inertia_bounds(body, reach[segment], bounds, worn_kg)
         found |= {f"inertia/{segment}/{name}": interval for name, interval in entry.items()}
     return found
 
 
+def inertia_covariance(body: RigidBody, length: float, priors: Priors, worn_kg: float) -> Array:
+    """Prior covariance (10, 10) of a segment's inertia: each number by itself, and mass that has the body's shape."""
+    sd = np.array(list(inertia_prior(body, length, priors).values()))
+    per_kg = body.vector / body.mass if body.mass > 0.0 else np.zeros(len(sd))
+    return np.asarray(np.diag(sd**2) + worn_kg**2 * np.outer(per_kg, per_kg))
+
+
 def inertia_prior(body: RigidBody, length: float, priors: Priors) -> dict[str, float]:
-    """Standard deviation of each of the ten numbers."""
+    """Standard deviation of each of the ten numbers, each by itself."""
     moment = priors.inertia_sd_fraction * max(float(np.trace(body.inertia)) / 2.0, 1e-12)
     planar = priors.inertia_sd_fraction * max(float(body.inertia[2, 2]), 1e-12)
     sd = dict.fromkeys(INERTIA_NAMES, moment)
@@ -89,8 +100,9 @@ def inertia_prior(body: RigidBody, length: float, priors: Priors) -> dict[str, f
     return sd | {"mass": priors.mass_sd_fraction * body.mass, "izz": planar}
 
 
-def inertia_bounds(body: RigidBody, length: float, bounds: Bounds) -> dict[str, Interval]:
+def inertia_bounds(body: RigidBody, length: float, bounds: Bounds, worn_kg: float = 0.0) -> dict[str, Interval]:
     """(lower, upper) of each of the ten numbers."""
+    share = _SDS * worn_kg / body.mass if body.mass > 0.0 else 0.0
     values = dict(zip(INERTIA_NAMES, body.vector, strict=True))
     found: dict[str, Interval] = {}
     for name, value in values.items():
@@ -102,5 +114,7 @@ def inertia_bounds(body: RigidBody, length: float, bounds: Bounds) -> dict[str, 
             half = bounds.inertia_fraction * abs(value)
         else:  # products are bounded by the moments: |ixy| <= (ixx + iyy) / 2 for every real body
             half = bounds.inertia_fraction * float(np.trace(body.inertia)) / 2.0
-        found[name] = (value - half, value + half)
+        half += share * abs(value)
+        low = max(value - half, _LEAST_SHARE * value) if name in _POSITIVE else value - half
+        found[name] = (low, value + half)
     return found

@@ -61,6 +61,10 @@ class Priors(Strict, use_attribute_docstrings=True):
     mass_sd_fraction: Positive = 0.10
     """Segment masses, of the table's value: half of the +-20 % of (9), so that the bound lies at two
     sigma."""
+    worn_mass_sd_fraction: Annotated[float, Field(ge=0.0)] = 0.005
+    """Of models in space: mass that a segment may have more or less than the table's, of the body's mass; its first
+    moment and inertia grow with it. Tables give a foot 1.0 to 1.5 % of the body, a shoe adds 0.5 %, models for OpenSim
+    have 2.1 %; and a leg that swings shows it."""
     first_moment_sd_fraction: Positive = 0.05
     """First moments, of mass times length: the centre of mass known to 5 % of the length."""
     inertia_sd_fraction: Positive = 0.10

@@ -24,7 +24,8 @@ UNMARKED_SHARE = 0.09
 
 @dataclass(frozen=True, eq=False)
 class JointPrior:
-    """Prior covariance (k, k) of elements of the state that are known together, by name."""
+    """Prior covariance (k, k) of elements of the state that are known together, by name; how well each is known by
+    itself is ``CalibratedModel.sd0``."""
 
     names: tuple[str, ...]
     covariance: Array
@@ -62,7 +63,7 @@ class CalibratedModel:
         unmarked_kg: mass of the segments that no marker shows, and that hang still on their neighbours.
         held: coordinate -> why nothing shows it, where it is held at an angle for lack of markers: results have none.
         guessed_places: whether the places of the markers were guessed, because no marker set has their names.
-        joint_prior: prior covariance of elements that were identified before; the others are independent.
+        joint_prior: how elements hang together at first; the others are independent.
     """
 
     spec: _core.ModelSpec

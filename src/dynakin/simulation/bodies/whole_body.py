@@ -33,8 +33,8 @@ Direction = tuple[float, float, float]
 
 SIDES = (("r", 1.0), ("l", -1.0))
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-# Rajagopal et al. 2016, IEEE TBME 63:2068-2079: up and medial towards the toes.
-_ANKLE = np.array([-0.10501355, -0.17402245, 0.97912632])
+# The ankle's outer end lies 10 deg down (Inman 1976); subtalar axis: Rajagopal et al. 2016, IEEE TBME 63:2068-2079.
+_ANKLE = np.array([0.0, -0.17364818, 0.98480775])
 _SUBTALAR = np.array([0.78717961, 0.60474746, -0.12094949])
 # Middle of the ASIS from the middle of the hip centres, over the height: Harrington et al. (2007, J Biomech 40:595-602)
 # for the pelvis of the marker lists.
