@@ -17,7 +17,7 @@ from dynakin.cli.options import OF_A_MODEL, OF_THE_LABORATORY, OF_THE_PLATES, Fo
 from dynakin.identification.held_out import with_subject
 from dynakin.recordings.smoothing import CUTOFF_HZ
 from dynakin.report.comparison_page import render_comparison
-from dynakin.report.text_tables import angle_text, moment_text, table2_text, truth_text, unseen_text
+from dynakin.report.text_tables import angle_text, moment_text, table2_text, truth_text, unseen_texts
 from dynakin.results.measures.mean_curves import curve_points
 from dynakin.validation.case import Case
 from dynakin.validation.differences import angle_differences, moment_differences
@@ -158,7 +158,8 @@ def print_unseen(console: Console, cases: Sequence[Case], horizon_ms: float) -> 
                 )
             )
     rows = unseen(figures)
-    console.print(as_table(unseen_text(rows)))
+    for text in unseen_texts(rows):
+        console.print(as_table(text))
     return {"unseen": rows}
 
 

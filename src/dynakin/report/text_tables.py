@@ -74,6 +74,18 @@ def unseen_text(rows: Sequence[UnseenRow]) -> TextTable:
     return TextTable("What was not seen, RMS error", ("", "", *methods), _once(found), numbers)
 
 
+def unseen_texts(rows: Sequence[UnseenRow]) -> list[TextTable]:
+    """The same, a table each yardstick with the methods that it has: narrow enough for a terminal."""
+    found = []
+    for yardstick in dict.fromkeys(row.yardstick for row in rows):
+        whole = unseen_text([row for row in rows if row.yardstick == yardstick])
+        cells = [row[1:] for row in whole.rows]
+        title = f"{yardstick[:1].upper()}{yardstick[1:]}, RMS error"
+        headings = tuple(name.removesuffix(" extrapolation") for name in whole.headings[1:])
+        found.append(TextTable(title, headings, cells, tuple(k - 1 for k in whole.numbers)))
+    return found
+
+
 def truth_text(rows: Sequence[TruthRow]) -> TextTable:
     """Errors against a simulation's truth: methods side by side."""
     methods = list(dict.fromkeys(row.method for row in rows))

@@ -60,7 +60,8 @@ def save_comparison(
     An earlier comparison is replaced as a whole; a CSV without rows is not written.
 
     Args:
-        tables: rows, dataclasses, by the name of their file: table2, angles, moments, truth, held_out, unseen, repetitions.
+        tables: rows, dataclasses, by the name of their file: table2, angles, moments, truth, held_out, unseen,
+            repetitions.
         more: further plain data: settings, notes.
         page: the report as HTML (`dynakin.report.render_comparison`); none is written without it.
 

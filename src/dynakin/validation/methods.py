@@ -283,7 +283,7 @@ def _inverse(first: Estimate, initial: CalibratedModel, cutoff_hz: float, notes:
     found = []
     data = first.data
     markers = data["markers_measured"].transpose("time", "marker", "axis").values
-    for cutoff, motion in rigid_motions(initial, first.time, markers, usual_cutoffs(cutoff_hz)).items():
+    for cutoff, motion in rigid_motions(initial, first.time, markers, usual_cutoffs(cutoff_hz, first.time)).items():
         name = f"{INVERSE} ({cutoff:g} Hz)"
         judged, said = with_plates(motion, data)
         found.append(_method(name, INVERSE, facing(replace(first, data=judged)).data))

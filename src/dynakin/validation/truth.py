@@ -62,8 +62,14 @@ def truth_rows(trials: Sequence[Trial]) -> list[TruthRow]:
                 continue  # another recording's
             legs = legs_of(estimate.data)
             joints = [name for name, leg in zip(trial.coordinate_names, legs, strict=True) if leg]
+            turning = {str(name) for name in truth["coordinate"].values}
+            turning &= {n for n, turns in zip(trial.coordinate_names, trial.rotation, strict=True) if turns}
+            paths = truth["coordinates"].transpose("time", "coordinate")
+            moving = [
+                n for n in trial.coordinate_names if n in turning and np.ptp(paths.sel(coordinate=n).values) > 0.0
+            ]
             for method in trial.methods:
-                values = truth_errors(method.name, method.data, truth, trial.window, joints or LEG).values
+                values = truth_errors(method.name, method.data, truth, trial.window, joints or LEG, moving).values
                 for (quantity, unit), value in zip(FIGURES, values, strict=True):
                     found.setdefault((quantity, unit, method.name), []).append(value)
     return [TruthRow(*key, spread([v for v in values if np.isfinite(v)])) for key, values in found.items()]
@@ -82,19 +88,20 @@ class TruthErrors:
 
 
 def truth_errors(
-    method: str, data: xr.Dataset, truth: xr.Dataset, window: npt.NDArray[np.bool_], joints: Sequence[str]
+    method: str,
+    data: xr.Dataset,
+    truth: xr.Dataset,
+    window: npt.NDArray[np.bool_],
+    joints: Sequence[str],
+    coordinates: Sequence[str] | None = None,
 ) -> TruthErrors:
     """Errors of ``data`` (named as `Estimate.data`) against ``truth`` over the frames ``window`` (T,).
 
-    Of angles, speeds and accelerations those of the turns that both have and that move count, a root's too.
-
     Args:
         joints: coordinates whose moments count; a planar model's toe is the ground's.
+        coordinates: whose angles, speeds and accelerations count; all of the truth's where not given.
     """
-    turns = dict(zip(data["coordinate"].values, data["coordinate_type"].values == "rotation", strict=True))
-    moves = np.ptp(truth["coordinates"].transpose("time", "coordinate").values, axis=0) > 0.0
-    names = [str(name) for name, moving in zip(truth["coordinate"].values, moves, strict=True)
-             if moving and turns.get(name, False)]  # fmt: skip
+    names = list(coordinates or (str(name) for name in truth["coordinate"].values))
 
     def error(variable: str, coordinates: Sequence[str] = names) -> Array:
         both = (data[variable].sel(coordinate=list(coordinates)), truth[variable].sel(coordinate=list(coordinates)))

@@ -33,6 +33,7 @@ INVERSE = "IK + ID"
 _BLOCKS = ("coordinates", "speeds", "accelerations")
 _PAST_S = 0.5
 """Of the recording until now, from which the classical method looks ahead: the low-pass forgets in less."""
+_FEWEST_FRAMES = 8  # for a spline's second derivative, at a low rate
 _FADE_S = 0.05
 """In which accelerations fade as states are carried on: nobody keeps one for 100 ms. Chosen for the filter on
 `squats1` and `MH0222_BP06` of 0, 20, 30, 50, 80, 150 ms and for ever; the classical method's, which see one side only
@@ -76,7 +77,7 @@ def figures_in_space(
         if progress is not None:
             progress(done, total)
 
-    cutoffs = usual_cutoffs(setup.cutoff_hz)
+    cutoffs = usual_cutoffs(setup.cutoff_hz, trial.time)
     left_out: Figures = {}
     for group in groups:
         hidden = trial.ready.markers.copy()
@@ -204,7 +205,7 @@ def _classical_ahead(trial: _Judged, cutoffs: tuple[float, ...], horizon_s: floa
     """The rigid model as the angles of the half second until ``horizon_s`` before say it."""
     time, model = trial.time, fixed_model(trial.calibrated)
     coordinates = inverse_kinematics(trial.calibrated, filled(time, trial.ready.markers))
-    past, frames = span_frames(time, _PAST_S), span_frames(time, horizon_s)
+    past, frames = max(span_frames(time, _PAST_S), _FEWEST_FRAMES), span_frames(time, horizon_s)
     unknown = np.full((past - 1, coordinates.shape[1]), np.nan)
     found = {}
     for cutoff in cutoffs:

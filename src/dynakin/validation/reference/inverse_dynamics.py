@@ -21,6 +21,8 @@ Array = npt.NDArray[np.float64]
 
 FAST_CUTOFF_HZ = 12.0
 """The other usual cut-off, for walking and faster: at 6 Hz a heel strike is gone."""
+_OF_RATE = 0.4
+"""Of the frame rate, below half of which a low-pass makes sense."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,9 +83,10 @@ def filled(time: Array, markers: Array, max_gap_s: float = MAX_GAP_S) -> Array:
     return np.stack(columns, axis=1).reshape(markers.shape)
 
 
-def usual_cutoffs(cutoff_hz: float) -> tuple[float, ...]:
-    """The cut-off that was asked for, and the other usual one."""
-    return tuple(dict.fromkeys((cutoff_hz, FAST_CUTOFF_HZ)))
+def usual_cutoffs(cutoff_hz: float, time: Array) -> tuple[float, ...]:
+    """The cut-off that was asked for, and the other usual one where the rate of these times (T,) s allows it."""
+    other = (FAST_CUTOFF_HZ,) if _OF_RATE / even_step(time) > FAST_CUTOFF_HZ else ()
+    return tuple(dict.fromkeys((cutoff_hz, *other)))
 
 
 def rigid_motions(
