@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from scipy.signal import butter, filtfilt
 
 from dynakin.errors import DynakinError
 from dynakin.pipeline.stages import configure
@@ -213,6 +214,12 @@ def _off(recording: Recording, size_m: float) -> Recording:
     return replace(recording, markers=markers)
 
 
+def _low_passed(recording: Recording, cutoff_hz: float) -> Recording:
+    """Trajectories as capture software exports them: low-passed, so that their cameras' noise is gone."""
+    b, a = butter(2, cutoff_hz / (0.5 * recording.rate))
+    return replace(recording, markers=filtfilt(b, a, recording.markers, axis=0))
+
+
 ALTERATIONS: dict[str, Callable[[Recording, float], Recording]] = {
     "half": _half,
     "no plates": _no_plates,
@@ -220,6 +227,7 @@ ALTERATIONS: dict[str, Callable[[Recording, float], Recording]] = {
     "plate gain": _plate_gain,
     "exchanged": _exchanged,
     "off": _off,
+    "low-passed": _low_passed,
 }
 """What is done to a recording before it is run, by name, with a size."""
 

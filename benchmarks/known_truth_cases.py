@@ -17,6 +17,7 @@ TROUBLES: dict[str, dict[str, Any]] = {
     "soft tissue x2.5": {"sensors": {"soft_tissue": 2.5}},
     "soft tissue x0.2": {"sensors": {"soft_tissue": 0.2}},
     "cameras 3 mm": {"sensors": {"marker_sd_m": 0.003}},
+    "markers low-passed at 12 Hz": {"altered": {"low-passed": 12.0}},
     "markers misplaced 10 mm": {"sensors": {"misplacement_sd_m": 0.01, "hip_regression_sd_m": 0.01}},
     "a marker put on again 30 mm off": {"altered": {"off": 0.03}},
     "two markers exchange names": {"altered": {"exchanged": 0.0}},

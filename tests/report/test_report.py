@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import ast
+import inspect
 import re
 from collections import Counter
 from dataclasses import replace
@@ -9,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from dynakin.report import insights as insights_module
 from dynakin.report.insights import in_short, insights
 from dynakin.report.labels import moment_note, short_marker_names
 from dynakin.report.page import SECTIONS, render_report
@@ -185,6 +188,18 @@ def test_deviations_that_are_wrong_get_one_action(estimate: Estimate, size: floa
     metrics["markers"]["rms_mm"]["S1:RKNE"] = 60.0
     found = {insight.title: insight for insight in insights(kept, metrics)}["Uncertainty"]
     assert found.level == level and found.advice.startswith(advice) and bool(found.advice) == bool(advice)
+
+
+def test_every_warning_names_an_action() -> None:
+    """By the source, as no estimate has all of them."""
+    calls = [
+        node
+        for node in ast.walk(ast.parse(inspect.getsource(insights_module)))
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Insight"
+    ]
+    may_warn = [c for c in calls if not (isinstance(c.args[0], ast.Constant) and c.args[0].value in ("good", "note"))]
+    assert len(may_warn) >= 12
+    assert [ast.unparse(call) for call in may_warn if len(call.args) < 4] == []
 
 
 def test_one_sentence_says_what_to_look_at(estimate: Estimate) -> None:

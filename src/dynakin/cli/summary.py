@@ -11,6 +11,7 @@ from rich.table import Table
 
 from dynakin.cli.console import out, print_error, table
 from dynakin.pipeline.result import Result
+from dynakin.report.insights import Insight, in_short, insights
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.bounds import counts_in_words
 from dynakin.results.measures.sources import MEANINGS, UNKNOWN
@@ -37,13 +38,28 @@ def print_summary(result: Result, folder: Path) -> None:
     for message in estimate.messages:
         if message.startswith(NOT_SMOOTHED) or message.endswith("brought into step."):
             console.print(message)
-    blocks = (metrics[block] for block in ("tracking", "consistency", "adaptation", "soft_tissue"))
-    verdicts = [block["verdict"] for block in blocks if block]
-    console.print(f"Verdict: {' '.join(filter(None, verdicts))}", style="dim")
-    console.print()
+    _print_verdict(console, insights(estimate, metrics))
     console.print(f"Results  {folder}", soft_wrap=True)
     if (folder / "report.html").exists():
         console.print(f"Report   {folder / 'report.html'}", soft_wrap=True)
+
+
+SAID_BEFORE = ("Joint moments", "Mass")
+"""Titles of findings that stand above the figures."""
+ALWAYS = ("Uncertainty", "Adaptation")
+"""Those that are said where they are no warning too."""
+
+
+def _print_verdict(console: Console, found: list[Insight]) -> None:
+    """Whether anything speaks against using the run; each warning with what to do about it."""
+    said = [in_short(found), *(each.text for each in found if each.title in ALWAYS and each.level != "warning")]
+    warned = [each for each in found if each.level == "warning"]
+    console.print(f"Verdict: {' '.join(said)}", style="yellow" if warned else "green")
+    for each in warned:
+        if each.title not in SAID_BEFORE:
+            console.print(f"  {each.title}: {each.text}", style="dim")
+        console.print(f"  {each.title}, what to do: {each.advice}", style="dim")
+    console.print()
 
 
 def end(result: Result) -> None:

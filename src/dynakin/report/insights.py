@@ -17,6 +17,8 @@ from dynakin.results.measures.tracking import why_lost
 from dynakin.results.naming import listed, number, plural, sentence, words
 from dynakin.results.records import doubts_mass
 
+# RMS distance of the model's markers, mm, below which they fit: the paper's own figure.
+FITTING_MM = 15.0
 # Expected one frame ahead against seen: further apart than this, the estimate follows the measurements.
 FOLLOWING = 4.0
 
@@ -35,6 +37,13 @@ ADVICE = {
     "overconfident": "Look at the film whether {worst}, which fits worst, is loose, swapped or shifted, and leave it "
     "out if so. If none is, fit the noise to your laboratory with dynakin tune, and give what it writes as --preset.",
     "speeds": "Run it without --live-like or --lag: a live estimate steps where a measurement corrects it.",
+    "speeds, smoothed": "Use angles and moments only; before you use speeds, fit the noise to your laboratory with "
+    "dynakin tune.",
+    "plates": "Look with dynakin check which plates are read, where they lie, and what bears on them.",
+    "markers": "Check that the standing trial is this person's, with the same markers in the same places.",
+    "limits": "Look at the film at that joint: where it does not go so far, a marker is swapped or off its place.",
+    "left out": "Look at the film at these times: correct labels that are swapped, delete what is no marker.",
+    "adaptation": "Look at the film near the end: a marker that has moved, or a person who leaves the plates.",
 }
 
 
@@ -130,15 +139,15 @@ def _markers(estimate: Estimate, metrics: Metrics) -> Insight | None:
     middle = sorted(rms.values())[len(rms) // 2]
     apart = [names[name] for name, value in rms.items() if value > max(10.0, 2.5 * middle)]
     stand = "stands" if len(apart) == 1 else "stand"
-    advice = ""
+    good = mean < FITTING_MM
+    advice = "" if good else ADVICE["markers"]
     if apart:
         advice = (
-            f"{listed(apart)} {stand} out: look at the film whether swapped, on another segment than the marker set "
-            "says, or moving with the skin; a larger variance under noise.marker_variance_m2 makes the filter trust "
-            "it less."
+            f"{listed(apart)} {stand} out: look at the film whether swapped, loose, or on another segment than the "
+            "marker set says."
         )
     return Insight(
-        "good" if mean < 15.0 else "warning",  # the paper's own figure: below 15 mm
+        "good" if good else "warning",
         "Markers",
         f"The model’s markers lie {number(mean, 'mm')} from the measured ones (RMS, mean of "
         f"{plural(len(rms), 'marker')}); worst is {names[worst]} with {number(rms[worst], 'mm')}. "
@@ -152,7 +161,9 @@ def _wrench(estimate: Estimate, metrics: Metrics) -> Insight | None:
     about_plates = [text for text in estimate.messages if text.startswith(PLATE_WORDS) and not doubts_mass(text)]
     if not rms:
         why = " ".join(about_plates) or "No wrench was compared: none was measured, or none is modelled."
-        return Insight("warning" if about_plates else "note", "Force plates", why.removeprefix("Warning: "))
+        if about_plates:
+            return Insight("warning", "Force plates", why.removeprefix("Warning: "), ADVICE["plates"])
+        return Insight("note", "Force plates", why)
     text = [
         f"{COMPONENT_LABELS[name][0].lower()} {number(value, COMPONENT_LABELS[name][1])}"
         + (f" ({number(share, digits=2)} %)" if (share := metrics["wrench"]["nrms_percent"][name]) is not None else "")
@@ -214,7 +225,8 @@ def _worst_marker(estimate: Estimate, metrics: Metrics) -> str:
 
 def _speeds(estimate: Estimate, metrics: Metrics) -> Insight | None:
     _, verdict = speed_consistency(estimate, evaluation_window(estimate.time))
-    return Insight("warning", "Speeds", verdict, ADVICE["speeds"]) if verdict else None
+    advice = ADVICE["speeds, smoothed" if estimate.smoothed else "speeds"]
+    return Insight("warning", "Speeds", verdict, advice) if verdict else None
 
 
 def _constants(estimate: Estimate, metrics: Metrics) -> list[Insight]:
@@ -236,7 +248,7 @@ def _constants(estimate: Estimate, metrics: Metrics) -> list[Insight]:
                 f"These are the values {source}, not identified ones: none of {group.count} changed by more than "
                 f"{change} %, and {shrunk}."
             )
-            advice = "" if group.title == "lengths" else "A livelier movement, with the arms too; then smaller noise."
+            advice = "" if group.title == "lengths" else "A livelier movement, with the arms too."
             found.append(Insight("note", title, text, advice))
         else:
             how = "Estimated from all frames" if estimate.smoothed else "Settled"
@@ -265,8 +277,8 @@ def _bounds(estimate: Estimate, metrics: Metrics) -> Insight | None:
         "warning",
         "Bounds",
         f"{len(stuck)} of {len(free)} estimated parameters end on a bound ({counts}): {listed(stuck)}. The data ask "
-        f"for a value that the person cannot have, so the model or the noise settings do not fit there.{for_a_time}",
-        "Check the mass, the height and the markers of those segments; then the film for a marker off its place.",
+        f"for a value that the person cannot have, so the model does not fit there.{for_a_time}",
+        "Check the mass and the height, then the film for a marker of those segments off its place.",
     )
 
 
@@ -277,7 +289,7 @@ def _adaptation(estimate: Estimate, metrics: Metrics) -> Insight | None:
         return None
     if found["after_s"] is None:
         lost = any(misfit["after_s"] is None for misfit in found["misfits"].values())
-        return Insight("warning" if lost else "note", "Adaptation", found["verdict"])
+        return Insight("warning" if lost else "note", "Adaptation", found["verdict"], ADVICE["adaptation"] * lost)
     if found["after_s"] <= ADAPTATION_S:
         return Insight("good", "Adaptation", found["verdict"])
     return Insight(
@@ -301,8 +313,8 @@ def _soft_tissue(estimate: Estimate, metrics: Metrics) -> Insight | None:
             "warning",
             "Soft tissue",
             text,
-            "Look whether each sits on the segment that the marker set says. If so, the segment is not as rigid as the "
-            "model’s (a trunk that bends), or its angle is estimated wrongly and the marker’s place makes up for it.",
+            "Look at the film whether each sits on the segment that the marker set says, and is not loose. If so, the "
+            "segment bends (a trunk) and the angles of its joints are the less certain.",
         )
     most = max(moved, key=lambda name: moved[name])
     declared = markers[most]["declared_mm"]
@@ -320,7 +332,8 @@ def _joint_limits(estimate: Estimate, metrics: Metrics) -> Insight | None:
     stuck = sorted({words(e.subject) for e in estimate.events if e.kind == "at_bound" and e.subject in names})
     if not stuck:
         return None
-    return Insight("warning", "Joint limits", f"Held at its limit for part of the time: {listed(stuck)}.")
+    text = f"Held at its limit for part of the time: {listed(stuck)}."
+    return Insight("warning", "Joint limits", text, ADVICE["limits"])
 
 
 def _missing(estimate: Estimate, metrics: Metrics) -> Insight | None:
@@ -340,7 +353,7 @@ def _gated(estimate: Estimate, metrics: Metrics) -> Insight | None:
     if not gated:
         return None
     shown = [e.message if not e.subject or e.subject in e.message else f"{e.subject} {e.message}" for e in gated]
-    return Insight("warning", "Left out or reset", f"{listed(shown, 4)}.")
+    return Insight("warning", "Left out or reset", f"{listed(shown, 4)}.", ADVICE["left out"])
 
 
 def _locked(estimate: Estimate, metrics: Metrics) -> Insight | None:
