@@ -12,7 +12,7 @@ from dynakin.cli.app import main
 from dynakin.errors import LostError, ModelError
 from dynakin.filter.augment import initial_covariance
 from dynakin.identification.change import change_between, change_in_words
-from dynakin.identification.decision import Decision, parts_of
+from dynakin.identification.decision import Decision, decide, parts_of
 from dynakin.identification.subject import Identification, identify_subject
 from dynakin.identification.trials import measure_all
 from dynakin.model.identified import read_identified, with_identified
@@ -90,6 +90,10 @@ def test_another_model_or_another_person_is_refused(identified: Identification, 
 def test_few_trials_are_halved_and_many_are_not(case: Case) -> None:
     assert len(parts_of(case.trials)) == 4
     assert len(parts_of([*case.trials, case.trials[0]])) == 3
+    brief = [trial.part(slice(0, 40)) for trial in case.trials]  # 1.6 s at 25 Hz: no half has a second
+    assert [len(part.movement.time) for part in parts_of(brief)] == [40, 40]
+    decided = decide(case.common, brief)
+    assert decided.folds == tuple(trial.movement.recording.name for trial in brief)
 
 
 def test_change_between_two_sessions(identified: Identification) -> None:

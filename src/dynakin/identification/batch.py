@@ -22,6 +22,7 @@ from dynakin.identification.unknowns import Unknowns
 
 Array = npt.NDArray[np.float64]
 
+SHORTEST_S = 1.0  # of frames with the wrench, in one trial at least
 PASSES = 4  # linearised anew, and weights measured anew, at each
 FIRST_SIGMA = np.array([10.0, 20.0, 10.0, 10.0, 10.0, 10.0])
 """N, N m (fx ... mz): size of a model's error before anything is known of it (DESIGN section 3)."""
@@ -81,7 +82,7 @@ def identify_batch(common: Common, trials: Sequence[MeasuredTrial], unknowns: Un
     rows, own_count = common.rows, len(unknowns.nuisance_sd)
     chosen = [_known(trial, rows) for trial in trials]
     step = [float(np.median(np.diff(trial.movement.time))) for trial in trials]
-    if not any(len(frames) * dt >= 1.0 for frames, dt in zip(chosen, step, strict=True)):
+    if not any(known_s(trial) >= SHORTEST_S for trial in trials):
         raise RecordingError("identification: no trial has a second of frames with the plates' wrench, expected one")
     sigma = np.tile(FIRST_SIGMA[rows], (len(trials), 1))
     least = [max(1.0, LEAST_TAU_S / dt) for dt in step]
@@ -122,6 +123,12 @@ def identify_batch(common: Common, trials: Sequence[MeasuredTrial], unknowns: Un
     covariance[np.ix_(free, free)] = spread[:count, :count]
     seconds = tau * np.array(step)[:, None]
     return Posterior(unknowns, theta, covariance, sigma, seconds, x[count:].reshape(-1, own_count))
+
+
+def known_s(trial: MeasuredTrial) -> float:
+    """Seconds of frames with the plates' wrench."""
+    known = np.isfinite(trial.wrench).all(axis=1).sum()
+    return float(known * np.median(np.diff(trial.movement.time))) if len(trial.wrench) > 1 else 0.0
 
 
 def _known(trial: MeasuredTrial, rows: npt.NDArray[np.intp]) -> npt.NDArray[np.intp]:

@@ -1,8 +1,8 @@
 """Whether identified parameters earn their place: each trial predicted from its markers by the others.
 
 Of fewer than three trials halves are left out instead: with two, a standing trial would have to predict a squat all by
-itself. A fold leaves out a whole trial or half, never single frames: the model's error is alike from frame to frame, so
-single frames would judge themselves.
+itself. Two walks that are too short to be halved predict each other. A fold leaves out a whole trial or half, never
+single frames: the model's error is alike from frame to frame, so single frames would judge themselves.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.identification.batch import Posterior, at_start, identify_batch
+from dynakin.identification.batch import SHORTEST_S, Posterior, at_start, identify_batch, known_s
 from dynakin.identification.trials import Common, MeasuredTrial, Movement, about, middle_of
 from dynakin.identification.unknowns import Unknowns
 from dynakin.results.estimate import COMPONENTS
@@ -88,15 +88,17 @@ class Decision:
 
 
 def parts_of(trials: Sequence[MeasuredTrial]) -> list[MeasuredTrial]:
-    """What is left out in turn: the trials, or the halves of fewer than three."""
+    """What is left out in turn: the trials, or the halves of fewer than three if these can be identified on."""
     if len(trials) > 2:
         return list(trials)
     middles = [middle_of(len(trial.movement.time)) for trial in trials]
-    return [
+    parts = [
         trial.part(half)
         for trial, middle in zip(trials, middles, strict=True)
         for half in (slice(None, middle), slice(middle, None))
     ]
+    long = sum(known_s(part) >= SHORTEST_S for part in parts)
+    return list(trials) if len(trials) == 2 and long < 2 else parts  # each is left out, and one must be left
 
 
 def estimate(common: Common, trials: Sequence[MeasuredTrial], use: Use) -> Posterior:
@@ -145,8 +147,8 @@ def decide(common: Common, trials: Sequence[MeasuredTrial], progress: Progress |
     Raises:
         RecordingError: too few frames with the plates' wrench.
     """
-    halves = (", first half", ", second half") * len(trials) if len(trials) <= 2 else ("",) * len(trials)
     parts = parts_of(trials)
+    halves = (", first half", ", second half") * len(trials) if len(parts) > len(trials) else ("",) * len(trials)
     names: list[str] = []
     low_passed: list[dict[Use, Array]] = []
     full_band: list[dict[Use, Array]] = []
