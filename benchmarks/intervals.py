@@ -5,8 +5,8 @@
 
 A case is squat or walk with fullbody or an .osim (``truth3d``'s trials, in DIR: folders ``squat_s1_*`` with trial.trc,
 grf.mot, static.trc, model.osim, trial.json, truth.npz), or one of our own simulator (``own_squat``, ``own_gait``,
-``sagittal7``, ``squat7``). Each is filtered once without systematic errors and kept (build/intervals); what each kind of
-error of size 1 would add is worked out beside it, so that sizes are tried without filtering again.
+``sagittal7``, ``squat7``). Each is filtered once without systematic errors and kept (build/intervals); what each kind
+of error of size 1 would add is worked out beside it, so that sizes are tried without filtering again.
 
 Groups and figures are truth3d's: angles with their mean error taken off, means over coordinates and seeds; deviation
 over error is the median of a group's angles and speeds. --choose searches the sizes of one kind of model over all cases
@@ -155,7 +155,7 @@ def groups_of(run: Run) -> list[tuple[str, str, list[int]]]:
     """(title, block, places) of the groups of a run."""
 
     def places(stems: Sequence[str]) -> list[int]:
-        return [k for k, n in enumerate(run.names) if n in stems or n[:-2] in stems and n[-2:] in ("_r", "_l")]
+        return [k for k, n in enumerate(run.names) if n in stems or (n[:-2] in stems and n[-2:] in ("_r", "_l"))]
 
     if run.case in PLANAR:
         every = list(range(len(run.names)))

@@ -30,7 +30,7 @@ def walk() -> SimulatedTrial:
 @pytest.fixture(scope="module")
 def setup() -> Setup:
     subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
-    return Setup(dynakin.load_model("fullbody", subject), smooth=False)
+    return Setup(dynakin.load_model("fullbody", subject), lag_s=0.0)
 
 
 @pytest.fixture(scope="module")
