@@ -118,13 +118,13 @@ def initial_covariance(initial: CalibratedModel, noise: Noise) -> Array:
         at = [place[initial.joint_prior.names[k]] for k in known]
         covariance[np.ix_(at, at)] = initial.joint_prior.covariance[np.ix_(known, known)]
     if noise.total_mass_use == "frame":
-        return covariance * scales
+        return np.asarray(covariance * scales)
     masses = np.array([float(name.startswith("inertia/") and name.endswith("/mass")) for name in initial.names])
     spread = covariance @ masses
     variance = float(masses @ spread)
     if variance > 0.0:
         covariance -= np.outer(spread, spread) / (variance + noise.total_mass_variance_kg2)
-    return covariance * scales
+    return np.asarray(covariance * scales)
 
 
 def continuous_noise(initial: CalibratedModel, noise: Noise, layout: _core.StateLayout) -> tuple[Array, Array]:
