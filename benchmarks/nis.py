@@ -13,6 +13,7 @@ from __future__ import annotations
 import argparse
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -65,7 +66,7 @@ def row(trial: Known, wanted: str) -> str:
     return f"| `{trial.name}` | {' | '.join(cells)} | {jerk} |"
 
 
-def figures(trial: Known, wanted: str) -> dict[str, object]:
+def figures(trial: Known, wanted: str) -> dict[str, Any]:
     """NIS a row before and after, and the scales between them."""
     given: dict[str, str | None] = {"forces": trial.forces, "static": trial.static}
     keys: dict[str, object] = {key: DATA / value for key, value in given.items() if value}

@@ -1,7 +1,7 @@
 """Noise that calibrates itself: the scales of the declared noise that a recording's own innovations ask for.
 
 Two things are found. The jerk's density by group of joints, from how much accelerations change between frames beside
-what the filter expects of that (covariance matching). Then one factor on all variances but those of plates, contacts
+what the filter expects of that (covariance matching). Then one factor on all variances but those of plates
 and residual, so that the normalised innovation squared is one a row: it leaves the movement as it is weighed, because
 the gain depends on the ratio of the variances only, and makes deviations and innovations agree (the variance of unit
 weight of adjustment theory). Priors are in it as well: what is wrong with a place, a length or a mass does not average

@@ -20,10 +20,11 @@ from dynakin.filter.parameters import parameters_of
 from dynakin.filter.sources import with_sources
 from dynakin.filter.systematic import Systematic
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.recordings.feet.contact import ON_PLATE
+from dynakin.recordings.feet.contact import ON_PLATE, UNMEASURED
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.facing import nearly_singular
+from dynakin.results.measures.sources import MEASURED
 from dynakin.results.records import Timing
 from dynakin.settings.noise import Noise
 
@@ -68,6 +69,7 @@ def assemble(
         initial.unmarked_feet.values(),
     )
     if feet is not None:
+        _widen_priors(data, used.variance_scale**-0.5)
         data = data.isel(foot=[name != RESIDUAL for name in feet.names])
     for name, covariance in zip(("initial_covariance", "final_covariance"), covariances, strict=True):
         data[name] = (("element", "element_"), covariance)
@@ -109,6 +111,15 @@ def assemble(
     )
     estimate.messages.extend([*_without_infinities(data), *nearly_singular(estimate)])
     return estimate
+
+
+def _widen_priors(data: xr.Dataset, factor: float) -> None:
+    """In place: deviations by the declared variances of what rests on a contact that no plate measures. What is
+    expected of it is a prior, whose errors the innovations do not show."""
+    unmeasured = data["foot_contact"] == UNMEASURED
+    data["foot_wrench_sd"] = data["foot_wrench_sd"].where(~unmeasured, factor * data["foot_wrench_sd"])
+    resting = (data["moment_source"] != MEASURED) & unmeasured.any("foot")
+    data["moments_sd"] = data["moments_sd"].where(~resting, factor * data["moments_sd"])
 
 
 def _without_infinities(data: xr.Dataset) -> list[str]:

@@ -104,8 +104,7 @@ def _added_sd(spec: _core.ModelSpec, noise: Noise, soft_tissue: Array) -> dict[s
 
 def variance_scales(names: Collection[str], noise: Noise) -> Array:
     """(n,) factor that these settings have put on the variance of each element of the state, by its name."""
-    of_plates = ("plates/", "contact/")
-    return np.array([1.0 if name.startswith(of_plates) else noise.variance_scale for name in names])
+    return np.array([1.0 if name.startswith("plates/") else noise.variance_scale for name in names])
 
 
 def initial_covariance(initial: CalibratedModel, noise: Noise) -> Array:
@@ -121,13 +120,13 @@ def initial_covariance(initial: CalibratedModel, noise: Noise) -> Array:
         own = initial.sd0[at] / np.sqrt(np.diag(together))  # elements may be known better meanwhile
         covariance[np.ix_(at, at)] = own[:, None] * together * own
     if noise.total_mass_use == "frame":
-        return covariance * scales
+        return np.asarray(covariance * scales)
     masses = np.array([float(name.startswith("inertia/") and name.endswith("/mass")) for name in initial.names])
     spread = covariance @ masses
     variance = float(masses @ spread)
     if variance > 0.0:
         covariance -= np.outer(spread, spread) / (variance + noise.total_mass_variance_kg2)
-    return covariance * scales
+    return np.asarray(covariance * scales)
 
 
 def continuous_noise(initial: CalibratedModel, noise: Noise, layout: _core.StateLayout) -> tuple[Array, Array]:
@@ -147,7 +146,7 @@ def continuous_noise(initial: CalibratedModel, noise: Noise, layout: _core.State
     if initial.feet and noise.floating_soft_tissue_time_s is not None:
         skin_s = noise.floating_soft_tissue_time_s
     offset, size = layout.blocks["contacts"]
-    decay[offset : offset + size], density[offset : offset + size] = 1.0 / CONTACT_TIME_S, 2.0 / CONTACT_TIME_S
+    decay[offset : offset + size], density[offset : offset + size] = 1.0 / CONTACT_TIME_S, whole * 2.0 / CONTACT_TIME_S
     for block, time in (("soft_tissue", skin_s), ("plates", noise.plate_time_s)):
         offset, size = layout.blocks[block]
         for k in range(offset, offset + size):
