@@ -5,8 +5,8 @@
 
 A case is squat or walk with fullbody or an .osim (``truth3d``'s trials, in DIR: folders ``squat_s1_*`` with trial.trc,
 grf.mot, static.trc, model.osim, trial.json, truth.npz), or one of our own simulator (``own_squat``, ``own_gait``,
-``sagittal7``, ``squat7``). Each is filtered once without systematic errors and kept (build/intervals); what each kind of
-error of size 1 would add is worked out beside it, so that sizes are tried without filtering again.
+``sagittal7``, ``squat7``). Each is filtered once without systematic errors and kept (build/intervals); what each kind
+of error of size 1 would add is worked out beside it, so that sizes are tried without filtering again.
 
 Groups and figures are truth3d's: angles with their mean error taken off, means over coordinates and seeds; deviation
 over error is the median of a group's angles and speeds. --choose searches the sizes of one kind of model over all cases
@@ -67,7 +67,8 @@ def runs_of(case: str, seed: int, folder: Path | None, noise: Noise, live: bool,
     key = json.dumps([case, seed, live, noise.model_dump()], sort_keys=True)
     kept = KEPT / f"{case.replace('/', '_')}_s{seed}_{sha256(key.encode()).hexdigest()[:10]}.pickle"
     if kept.exists() and not again:
-        return pickle.loads(kept.read_bytes())
+        loaded: Run = pickle.loads(kept.read_bytes())
+        return loaded
     found = truth3d(case, seed, folder, noise, live) if case in TRUTH3D else own(case, seed, noise, live)
     KEPT.mkdir(parents=True, exist_ok=True)
     kept.write_bytes(pickle.dumps(found))
@@ -133,7 +134,8 @@ def against(
     blocks = [block for block in BLOCKS if block in truth]
 
     def values(name: str) -> Array:
-        return np.asarray(data[name].transpose("time", "coordinate").values)[window][:, mine]
+        found: Array = data[name].transpose("time", "coordinate").values[window][:, mine]
+        return found
 
     measured = np.ones((int(window.sum()), len(mine)), dtype=bool)
     if "moment_source" in data:
@@ -155,7 +157,7 @@ def groups_of(run: Run) -> list[tuple[str, str, list[int]]]:
     """(title, block, places) of the groups of a run."""
 
     def places(stems: Sequence[str]) -> list[int]:
-        return [k for k, n in enumerate(run.names) if n in stems or n[:-2] in stems and n[-2:] in ("_r", "_l")]
+        return [k for k, n in enumerate(run.names) if n in stems or (n[:-2] in stems and n[-2:] in ("_r", "_l"))]
 
     if run.case in PLANAR:
         every = list(range(len(run.names)))
@@ -168,7 +170,7 @@ def groups_of(run: Run) -> list[tuple[str, str, list[int]]]:
     return found + [(f"moment {stem}", "moments", places((stem,))) for stem in MOMENTS]
 
 
-def figures(run: Run, sizes: Sizes | None) -> dict[str, tuple[float, float, float, float]]:
+def figures(run: Run, sizes: Sizes | None) -> dict[str, tuple[float, ...]]:
     """By group: share inside 95 %, deviation over error, error and deviation (RMS; rad, rad/s, N m); None: the filter's
     own deviations."""
     found = {}
@@ -193,7 +195,7 @@ def means(runs: Sequence[Run], sizes: dict[str, Sizes] | None) -> dict[str, dict
     """Case -> group -> mean figures over the seeds."""
     found: dict[str, dict[str, Array]] = {}
     for case in dict.fromkeys(run.case for run in runs):
-        each = [figures(run, sizes and sizes[run.sizes]) for run in runs if run.case == case]
+        each = [figures(run, None if sizes is None else sizes[run.sizes]) for run in runs if run.case == case]
         found[case] = {title: np.mean([f[title] for f in each], axis=0) for title in each[0]}
     return found
 

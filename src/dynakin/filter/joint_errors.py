@@ -15,8 +15,8 @@ from dynakin.bindings import _core
 
 Array = npt.NDArray[np.float64]
 Kind = Literal["hinge_centre", "ball_centre", "hinge_axes", "ball_axes", "root"]
-"""The centre of a joint with one or two axes (hinge) or three (ball) beside where it is on its bones; its axes turned on
-both of them; the root's frame turned in its bone."""
+"""The centre of a joint with one or two axes (hinge) or three (ball) beside where it is on its bones; its axes turned
+on both of them; the root's frame turned in its bone."""
 Column = dict[str, float]
 
 _AXES = np.eye(3)
