@@ -145,7 +145,7 @@ def against(
     return Run(
         case,
         seed,
-        "scaled" if tracker.calibrated.plan is None else "landmarks",
+        "none" if case in PLANAR else "scaled" if tracker.calibrated.plan is None else "landmarks",
         tuple(chosen),
         error,
         {block: values(f"{block}_sd") for block in blocks},
@@ -195,7 +195,7 @@ def means(runs: Sequence[Run], sizes: dict[str, Sizes] | None) -> dict[str, dict
     """Case -> group -> mean figures over the seeds."""
     found: dict[str, dict[str, Array]] = {}
     for case in dict.fromkeys(run.case for run in runs):
-        each = [figures(run, None if sizes is None else sizes[run.sizes]) for run in runs if run.case == case]
+        each = [figures(run, None if sizes is None else sizes.get(run.sizes)) for run in runs if run.case == case]
         found[case] = {title: np.mean([f[title] for f in each], axis=0) for title in each[0]}
     return found
 
