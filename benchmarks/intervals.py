@@ -67,7 +67,8 @@ def runs_of(case: str, seed: int, folder: Path | None, noise: Noise, live: bool,
     key = json.dumps([case, seed, live, noise.model_dump()], sort_keys=True)
     kept = KEPT / f"{case.replace('/', '_')}_s{seed}_{sha256(key.encode()).hexdigest()[:10]}.pickle"
     if kept.exists() and not again:
-        return pickle.loads(kept.read_bytes())
+        loaded: Run = pickle.loads(kept.read_bytes())
+        return loaded
     found = truth3d(case, seed, folder, noise, live) if case in TRUTH3D else own(case, seed, noise, live)
     KEPT.mkdir(parents=True, exist_ok=True)
     kept.write_bytes(pickle.dumps(found))
@@ -133,7 +134,8 @@ def against(
     blocks = [block for block in BLOCKS if block in truth]
 
     def values(name: str) -> Array:
-        return np.asarray(data[name].transpose("time", "coordinate").values)[window][:, mine]
+        found: Array = data[name].transpose("time", "coordinate").values[window][:, mine]
+        return found
 
     measured = np.ones((int(window.sum()), len(mine)), dtype=bool)
     if "moment_source" in data:
@@ -143,7 +145,7 @@ def against(
     return Run(
         case,
         seed,
-        "scaled" if tracker.calibrated.plan is None else "landmarks",
+        "none" if case in PLANAR else "scaled" if tracker.calibrated.plan is None else "landmarks",
         tuple(chosen),
         error,
         {block: values(f"{block}_sd") for block in blocks},
@@ -168,7 +170,7 @@ def groups_of(run: Run) -> list[tuple[str, str, list[int]]]:
     return found + [(f"moment {stem}", "moments", places((stem,))) for stem in MOMENTS]
 
 
-def figures(run: Run, sizes: Sizes | None) -> dict[str, tuple[float, float, float, float]]:
+def figures(run: Run, sizes: Sizes | None) -> dict[str, tuple[float, ...]]:
     """By group: share inside 95 %, deviation over error, error and deviation (RMS; rad, rad/s, N m); None: the filter's
     own deviations."""
     found = {}
@@ -193,7 +195,7 @@ def means(runs: Sequence[Run], sizes: dict[str, Sizes] | None) -> dict[str, dict
     """Case -> group -> mean figures over the seeds."""
     found: dict[str, dict[str, Array]] = {}
     for case in dict.fromkeys(run.case for run in runs):
-        each = [figures(run, sizes and sizes[run.sizes]) for run in runs if run.case == case]
+        each = [figures(run, None if sizes is None else sizes.get(run.sizes)) for run in runs if run.case == case]
         found[case] = {title: np.mean([f[title] for f in each], axis=0) for title in each[0]}
     return found
 

@@ -93,8 +93,10 @@ class Tracker:
 
     @cached_property
     def systematic(self) -> Systematic | None:
-        """What is added to the filter's own deviations when they are reported; None where the noise asks for none."""
-        return Systematic(self.calibrated, self.noise) if self.noise.systematic_scale else None
+        """What is added to the filter's own deviations when they are reported; None where the noise asks for none, and
+        for a model that is fixed in the ground: its lengths are states that drift, and its own deviations hold."""
+        wanted = self.noise.systematic_scale and self.calibrated.feet
+        return Systematic(self.calibrated, self.noise) if wanted else None
 
     @property
     def latest(self) -> StepEstimate:
