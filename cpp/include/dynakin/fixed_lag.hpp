@@ -9,10 +9,10 @@
 
 namespace dynakin {
 
-// Keeps what a filter did in the last frames. Its result equals that of a Smoother run over all frames until now, except
-// that inequalities are kept in the metric of the filtered covariance. Nothing is allocated after construction. A state
-// costs some products of matrix and vector for each frame of the lag; its covariance, which is worked out where it is
-// asked for, as many products of matrices.
+// Keeps what a filter did in the last frames. Its result equals that of a Smoother run over all frames until now,
+// except that inequalities are kept in the metric of the filtered covariance. Nothing is allocated after construction.
+// A state costs some products of matrix and vector for each frame of the lag; its covariance, which is worked out where
+// it is asked for, as many products of matrices.
 class FixedLag {
  public:
   // The filter must outlive it, stands before the first frame and is stepped by nobody else. Throws
@@ -22,8 +22,8 @@ class FixedLag {
   FixedLag(const FixedLag&) = delete;
   FixedLag& operator=(const FixedLag&) = delete;
 
-  // One step of the filter, then look_back(lag()) as soon as there is such a frame. dt since the frame before; the first
-  // frame is an update only. A frame that is refused counts as one in which nothing was measured.
+  // One step of the filter, then look_back(lag()) as soon as there is such a frame. dt since the frame before; the
+  // first frame is an update only. A frame that is refused counts as one in which nothing was measured.
   StepReport step(double dt, const MarkerRef& markers, const Vector6& wrench, const WrenchModel* how = nullptr);
   // The same by somebody else, in three parts: open, one predict (but for the first frame) and update of the filter,
   // close.

@@ -16,8 +16,8 @@ class LaggedRun {
 
   // Frames first to end - 1, in as many calls as one likes, the last of which ends the trial. record: as of run_frames;
   // lagged: of the frames as they are seen later. contacts: as in run_frames, of either.
-  void run(std::size_t first, std::size_t end, RunRecord& record, StateRecord& lagged, ContactRecord* contacts = nullptr,
-           ContactRecord* lagged_contacts = nullptr);
+  void run(std::size_t first, std::size_t end, RunRecord& record, StateRecord& lagged,
+           ContactRecord* contacts = nullptr, ContactRecord* lagged_contacts = nullptr);
 
  private:
   void report(std::size_t k, StateRecord& lagged, ContactRecord* contacts);
