@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from pydantic import ValidationError
+from scipy.spatial.transform import Rotation
 
 from dynakin.bindings import _core
 from dynakin.filter.estimator import Estimator
@@ -76,3 +77,18 @@ def test_the_movement_finds_hips_that_the_pelvis_markers_misplace() -> None:
     found = Estimator(definition(), vertical="+Y", estimate=["lengths"]).run(trial, static=standing())
     values = {parameter.name: parameter.value for parameter in found.parameters}
     np.testing.assert_allclose([values[f"length/{name}"] for name in HIPS], true, atol=0.004)
+
+
+def test_the_ankle_turns_about_an_axis_whose_outer_end_is_lower() -> None:
+    """10 deg, on both sides alike (Inman 1976)."""
+    initial = measured()
+    core = _core.Model(initial.spec)
+    x, segments = core.initial_state(), list(core.segment_names)
+    before = _core.segment_poses(core, x)[0]
+    for side, out in (("r", 1.0), ("l", -1.0)):
+        moved = x.copy()
+        moved[list(core.layout.names).index(f"ankle_angle_{side}")] += 0.1
+        foot, shank = segments.index(f"foot_{side}"), segments.index(f"shank_{side}")
+        turn = Rotation.from_matrix(_core.segment_poses(core, moved)[0][foot] @ before[foot].T).as_rotvec() / 0.1
+        axis = before[shank].T @ turn * out  # towards the outer side
+        assert np.rad2deg(np.arcsin(axis[1])) == pytest.approx(-10.0, abs=1e-6)

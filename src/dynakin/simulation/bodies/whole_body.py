@@ -127,8 +127,8 @@ def build_tree(subject: SimulatedSubject) -> tuple[Segment, ...]:
         part = _sided(subject, sign)
         hip = _hinges(side, sign, ("hip_flexion", Z), ("hip_adduction", X), ("hip_rotation", Y))
         knee = _hinges(side, sign, ("knee_angle", (0.0, 0.0, -1.0)), ("knee_adduction", X))
-        foot = ("tibial_torsion", Y), ("ankle_angle", _unit(_ANKLE)), ("subtalar_angle", _unit(_SUBTALAR))
-        ankle = _hinges(side, sign, *foot)
+        turns = ("ankle_angle", _unit(_ANKLE)), ("subtalar_angle", _unit(_SUBTALAR))
+        ankle = _hinges(side, sign, ("tibial_torsion", Y), *turns)
         tree += [
             segment(f"thigh_{side}", "pelvis", hip_in_pelvis(subject, sign), hip, part["thigh"]),
             segment(f"shank_{side}", f"thigh_{side}", -L["thigh"] * np.array(Y), knee, part["shank"]),
