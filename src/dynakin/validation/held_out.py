@@ -23,6 +23,7 @@ from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.measures.tracking import why_lost, without_lost
 from dynakin.settings.model import Bounds, Priors
 from dynakin.validation.freeze import final_values, freeze, initial_values
+from dynakin.validation.reference.inverse_dynamics import rigid_motions, usual_cutoffs
 from dynakin.validation.reference.least_squares import identify, predicted_wrench
 from dynakin.validation.reference.methods import reference_methods
 from dynakin.validation.setup import Setup
@@ -109,7 +110,8 @@ def predict_blind(identified: IdentifyingTrial, recording: Recording) -> Blind:
     Filters: `EKF (preset), identified` and `EKF (preset), table`, lengths and inertia frozen at what the identifying
     trial ended with, or at what was measured standing and the table. Reference: the table's inertia on classical
     kinematics, then the same kinematics with least squares (in the bounds of (9), and free) and with each filter's
-    inertia. Persistence: the identifying trial's last wrench, and its mean.
+    inertia; in space inverse kinematics with the table's inertia. Persistence: the identifying trial's last wrench, and
+    its mean.
 
     Raises:
         ModelError, RecordingError: the trial's markers do not fit the model. DivergenceError: from a filter. LostError:
@@ -137,7 +139,8 @@ def predict_blind(identified: IdentifyingTrial, recording: Recording) -> Blind:
                 found[f"EKF ({preset}), smoothed"] = arrays["wrench_estimated"]
     notes: list[str] = []
     try:
-        found |= _referred(identified, recording, start)
+        planar = setup.definition.planar
+        found |= _referred(identified, recording, start) if planar else _inverse(setup, start, recording, markers)
     except ModelError as error:
         notes.append(f"AT, the classical method and least squares are left out: {error.message}")
     known = identified.wrench[np.isfinite(identified.wrench).all(axis=1)]
@@ -256,6 +259,12 @@ def _start(identified: IdentifyingTrial, recording: Recording) -> CalibratedMode
         priors=setup.priors,
         bounds=setup.bounds,
     )
+
+
+def _inverse(setup: Setup, start: CalibratedModel, recording: Recording, markers: Array) -> dict[str, Array]:
+    cutoffs = usual_cutoffs(setup.cutoff_hz, recording.time)
+    motions = rigid_motions(start, recording.time, markers, cutoffs)
+    return {f"IK + ID ({cutoff:g} Hz), table": motion.wrench() for cutoff, motion in motions.items()}
 
 
 def _referred(identified: IdentifyingTrial, recording: Recording, start: CalibratedModel) -> dict[str, Array]:
