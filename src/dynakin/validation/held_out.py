@@ -140,7 +140,7 @@ def predict_blind(identified: IdentifyingTrial, recording: Recording) -> Blind:
     notes: list[str] = []
     try:
         planar = setup.definition.planar
-        found |= _referred(identified, recording, start) if planar else _inverse(setup, start, recording, markers)
+        found |= _referred(identified, recording, start) if planar else _inverse(setup, start, recording)
     except ModelError as error:
         notes.append(f"AT, the classical method and least squares are left out: {error.message}")
     known = identified.wrench[np.isfinite(identified.wrench).all(axis=1)]
@@ -261,7 +261,8 @@ def _start(identified: IdentifyingTrial, recording: Recording) -> CalibratedMode
     )
 
 
-def _inverse(setup: Setup, start: CalibratedModel, recording: Recording, markers: Array) -> dict[str, Array]:
+def _inverse(setup: Setup, start: CalibratedModel, recording: Recording) -> dict[str, Array]:
+    markers = marker_paths(recording, start, start.ground)
     cutoffs = usual_cutoffs(setup.cutoff_hz, recording.time)
     motions = rigid_motions(start, recording.time, markers, cutoffs)
     return {f"IK + ID ({cutoff:g} Hz), table": motion.wrench() for cutoff, motion in motions.items()}
