@@ -49,10 +49,10 @@ class Part:
 PARTS = (
     Part("opencap_subject4/walking1", None, 63.3),
     Part("opencap_subject4/squats1", (2.0, 6.0)),
-    Part("c3d_parser/FMC/MH0222_BP06"),
+    Part("c3d_parser/FMC/MH0222_BP06", None, 78.0),
     Part("c3d_parser/RBWH/bfnd w1"),
     Part("c3d_parser/MH/MH_Dynamic_BF08"),
-    Part("c3d_parser/FMC/MH0222_BP15"),
+    Part("c3d_parser/FMC/MH0222_BP15", None, 78.0),
     Part("opencap_subject4/STS1", (5.4, 8.4)),
 )
 

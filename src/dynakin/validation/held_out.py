@@ -24,6 +24,7 @@ from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.measures.tracking import why_lost, without_lost
 from dynakin.settings.model import Bounds, Priors
 from dynakin.validation.freeze import final_values, freeze, initial_values
+from dynakin.validation.reference.inverse_dynamics import rigid_motions, usual_cutoffs
 from dynakin.validation.reference.least_squares import identify, predicted_wrench
 from dynakin.validation.reference.methods import reference_methods
 from dynakin.validation.setup import Setup
@@ -124,8 +125,8 @@ def predict_blind(identified: IdentifyingTrial, recording: Recording) -> Blind:
     trial, or at what was measured standing and the table. Where a subject was identified, `EKF (preset), batch inertia`
     has its inertia instead of the table's, and `EKF (preset), chosen` is this or the table, as was decided on the
     identifying trial. Reference: the table's inertia on classical kinematics, then the same kinematics with least
-    squares (in the bounds of (9), and free) and with each filter's inertia. Persistence: the identifying trial's last
-    wrench, and its mean.
+    squares (in the bounds of (9), and free) and with each filter's inertia; in space inverse kinematics with the
+    table's inertia. Persistence: the identifying trial's last wrench, and its mean.
 
     Raises:
         ModelError, RecordingError: the trial's markers do not fit the model. DivergenceError: from a filter. LostError:
@@ -151,7 +152,8 @@ def predict_blind(identified: IdentifyingTrial, recording: Recording) -> Blind:
             found[f"EKF ({preset}), {CHOSEN}"] = found[f"EKF ({preset}), {label}"]
     notes: list[str] = []
     try:
-        found |= _referred(identified, recording, start)
+        planar = setup.definition.planar
+        found |= _referred(identified, recording, start) if planar else _inverse(setup, start, recording)
     except ModelError as error:
         notes.append(f"AT, the classical method and least squares are left out: {error.message}")
     known = identified.wrench[np.isfinite(identified.wrench).all(axis=1)]
@@ -278,6 +280,13 @@ def _start(identified: IdentifyingTrial, recording: Recording) -> CalibratedMode
         priors=setup.priors,
         bounds=setup.bounds,
     )
+
+
+def _inverse(setup: Setup, start: CalibratedModel, recording: Recording) -> dict[str, Array]:
+    markers = marker_paths(recording, start, start.ground)
+    cutoffs = usual_cutoffs(setup.cutoff_hz, recording.time)
+    motions = rigid_motions(start, recording.time, markers, cutoffs)
+    return {f"IK + ID ({cutoff:g} Hz), table": motion.wrench() for cutoff, motion in motions.items()}
 
 
 def _referred(identified: IdentifyingTrial, recording: Recording, start: CalibratedModel) -> dict[str, Array]:
