@@ -3,8 +3,8 @@
     OMP_NUM_THREADS=1 .venv/bin/python benchmarks/given.py --write [--again] [--seeds 1,2,3]
 
 Walks (2.5 s) and squats (2.7 s) of the whole body at 60 Hz, smoothed; one factor at a time is changed from a base case
-(`known_truth_cases.GIVEN`), and all of them at once. A cell is the mean over seeds (each another person, skin and way of
-moving) and sides, and the standard deviation over seeds. Runs are kept (`known_truth`); ``--again`` makes them anew.
+(`known_truth_cases.GIVEN`), and all of them at once. A cell is the mean over seeds (each another person, skin and way
+of moving) and sides, and the standard deviation over seeds. Runs are kept (`known_truth`); ``--again`` makes them anew.
 """
 
 from __future__ import annotations
