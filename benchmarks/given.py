@@ -153,9 +153,9 @@ def draw(found: dict[str, dict[str, list[Errors]]]) -> None:
         ax.set_yticks(
             range(len(names)), [f"{GIVEN[n].factor}: {n}" if n not in ("base", "worst") else n for n in names]
         )
-        ax.set_xlabel("RMS error of the moments, mean of hip, knee, ankle, N m")
         ax.set_title(MOTIONS[motion])
-    axes[0].legend(frameon=False)
+    axes[1].legend(frameon=False)
+    figure.supxlabel("RMS error of the moments, mean of hip, knee and ankle, N m", fontsize="medium")
     figure.savefig(FIGURE, dpi=110)
 
 

@@ -138,6 +138,8 @@ def _made(spec: Spec) -> Run:
     if spec.static and spec.motion != "sagittal":
         stood = trial_of("squat", spec.seed, sensors, spec.markers).recording
         static = stood.window(0.0, STANDING_S)
+    recording = replace(recording, subject={})  # the simulator writes the mass into it: only what is told is known
+    static = None if static is None else replace(static, subject={})
     for name, size in spec.altered.items():
         recording = ALTERATIONS[name](recording, size)
     told = {"mass_kg": MASS_KG, "height_m": HEIGHT_M, "sex": SEX, "markers": spec.markers} | dict(spec.told)
