@@ -256,7 +256,7 @@ class Estimator:
         if 0.0 < lag_s < ALL_FRAMES:
             lag_s = lag_frames(lag_s, recording.rate) / recording.rate
         try:
-            ways = 0 if not lag_s else 2 if lag_s == ALL_FRAMES else 1  # over the frames, after the first run
+            ways = 2 if lag_s == ALL_FRAMES else 1  # over the frames, after the first run
             there, back = _shares(progress, recording.n_frames, ways)
             passes = 0 if ready.doubt else PASSES
             tracker, arrays, shift, clock = run_in_step(
@@ -265,12 +265,11 @@ class Estimator:
             wrench = in_step(recording.time, ready.wrench, shift) if shift else ready.wrench
             on_feet = on_feet and on_feet.in_step(recording.time, shift)
             adapt = bool(calibrated.feet) if tracker.noise.adapt is None else tracker.noise.adapt
-            if lag_s == ALL_FRAMES and adapt:
-                trial = Trial(recording.time, markers, wrench, on_feet)
-                tracker = tracker.changed(calibrated_noise(tracker, arrays, trial) or tracker.noise)
-            if lag_s:
-                tracker = tracker.fresh()
-                arrays = tracker.run_late_arrays(lag_s, recording.time, markers, wrench, back, on_feet)
+            given = (recording.time, markers, wrench)
+            found = calibrated_noise(tracker, arrays, Trial(*given, on_feet)) if adapt else None
+            if lag_s or found:
+                tracker = tracker.changed(found or tracker.noise)
+                arrays = tracker.run_late_arrays(lag_s, *given, back, on_feet)
         except ValueError as error:  # a frame that the core refuses, named by it
             raise RecordingError(f"{recording.path or recording.name}: {error}") from None
         config = self.settings() | {"lag_s": lag_s, "ground_reasons": list(ground.reasons)}
