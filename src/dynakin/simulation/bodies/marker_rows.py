@@ -86,6 +86,7 @@ PLUG_IN_GAIT = MarkerList(
 
 PAIRED = ("thigh", "shank", "foot", "upper_arm", "forearm", "hand")
 ON_KNEE, ON_ANKLE, ON_ELBOW = 0.0320, 0.0236, 0.0230  # sideways of the joint centre, over the height
+MALLEOLI = -0.246 / 1.027  # below the knee; the ankle lies 2.7 % of that further down (Bruening et al. 2008)
 # The length along which a segment's markers are spread, and its part of the height on which the rows rest.
 _SPREAD = {"shank": 0.246, "thigh": 0.245, "torso": 0.260, "upper_arm": 0.186, "forearm": 0.146}
 # Coordinate that moves a region's skin; those of limbs on the marker's own side, on the midline the right one.
@@ -107,8 +108,8 @@ SETS: Mapping[str, MarkerList] = {
         OPENCAP.name,
         (
             *(Row(stem, *rest) for stem, rest in zip(("toe", "5meta", "calc"), _FEET, strict=True)),
-            Row("ankle", "shank", "ankle", 0.000, -0.246, ON_ANKLE, True),
-            Row("mankle", "shank", "ankle", 0.000, -0.246, -ON_ANKLE, True),
+            Row("ankle", "shank", "ankle", 0.000, MALLEOLI, ON_ANKLE, True),
+            Row("mankle", "shank", "ankle", 0.000, MALLEOLI, -ON_ANKLE, True),
             Row("sh2", "shank", "shank", -0.020, -0.056, 0.020),
             Row("sh3", "shank", "shank", -0.012, -0.136, 0.022),
             Row("shank_antsup", "shank", "shank", 0.026, -0.046, 0.004),
@@ -135,7 +136,7 @@ SETS: Mapping[str, MarkerList] = {
         PLUG_IN_GAIT.name,
         (
             *(Row(stem, *rest) for stem, rest in zip(("TOE", "MT5", "HEE"), _FEET, strict=True)),
-            Row("ANK", "shank", "ankle", 0.000, -0.246, ON_ANKLE, True),
+            Row("ANK", "shank", "ankle", 0.000, MALLEOLI, ON_ANKLE, True),
             Row("TIB", "shank", "shank", -0.008, -0.116, 0.024),
             Row("KNE", "thigh", "knee", 0.000, -0.245, ON_KNEE, True),
             Row("THI", "thigh", "thigh", 0.005, -0.130, 0.060),

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynakin.model.markers.schema import Marker, MarkerSetFile
-from dynakin.simulation.bodies.marker_rows import ON_ANKLE, ON_ELBOW, ON_KNEE, PAIRED, draw_sites
+from dynakin.simulation.bodies.marker_rows import MALLEOLI, ON_ANKLE, ON_ELBOW, ON_KNEE, PAIRED, draw_sites
 from dynakin.simulation.bodies.markers import MarkerList, Row, Site
 from dynakin.simulation.bodies.subject import SimulatedSubject
 
@@ -39,8 +39,8 @@ _PLACES: Mapping[str, tuple[str, str, float, float, float, bool]] = {
     "HFB": ("shank", "shank", -0.012, -0.030, 0.030, False),
     "TTC": ("shank", "shank", 0.026, -0.036, 0.000, False),
     "TIB": ("shank", "shank", -0.008, -0.116, 0.024, False),
-    "ANK": ("shank", "ankle", 0.000, -0.246, ON_ANKLE, True),
-    "ANM": ("shank", "ankle", 0.000, -0.246, -ON_ANKLE, True),
+    "ANK": ("shank", "ankle", 0.000, MALLEOLI, ON_ANKLE, True),
+    "ANM": ("shank", "ankle", 0.000, MALLEOLI, -ON_ANKLE, True),
     "AJ": ("shank", "ankle", 0.000, -0.246, 0.000, True),
     "AJC": ("shank", "ankle", 0.000, -0.246, 0.000, True),
     "HEE": ("foot", "heel", -0.037, -0.020, 0.000, True),
