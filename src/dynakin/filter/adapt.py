@@ -34,6 +34,9 @@ LEAST_FRAMES = 25
 JERK_SHARE = 0.5
 """Part of a jerk scale's logarithm that is believed: jerk is not white, and what fits the next frame best is too little
 for a step."""
+LATE_SHARE = 0.8
+"""Part of the factor's logarithm that is believed of estimates without any lag: they are late where accelerations
+change, which the next frame hardly shows."""
 
 
 class Trial(NamedTuple):
@@ -51,7 +54,7 @@ class Trial(NamedTuple):
 
 
 def calibrated_noise(
-    tracker: Tracker, arrays: dict[str, Array], trial: Trial, frames: Flags | None = None
+    tracker: Tracker, arrays: dict[str, Array], trial: Trial, frames: Flags | None = None, *, late: bool = False
 ) -> Noise | None:
     """The noise with the scales that a recording asks for; None where it is too short.
 
@@ -59,7 +62,7 @@ def calibrated_noise(
 
     Args:
         tracker: of the run. arrays: of that run, as `Tracker.run_arrays` gives them. frames: (T,) to look at; all
-            where not given.
+            where not given. late: for estimates without any lag.
     """
     chosen: Flags = trial.time >= trial.time[0] + SETTLING_S
     if frames is not None:
@@ -71,11 +74,12 @@ def calibrated_noise(
     end = int(np.searchsorted(trial.time, trial.time[0] + CALIBRATED_S, side="right"))
     groups, before = joint_groups(tracker.calibrated), nis_per_row(arrays, chosen[:end])
     if not groups or before is None:
-        return _scaled(noise, ratio)
+        return _believed(_scaled(noise, ratio), noise, late)
     scaled = _scaled(noise, ratio, jerk_ratios(tracker, arrays, trial.time, chosen, groups))
     again = tracker.changed(scaled).run_arrays(*trial.first(end)[:3], None, trial.first(end).contacts)
     after = nis_per_row(again, chosen[:end])
-    return _scaled(noise, ratio) if after is None else _scaled(scaled, after * ratio / before)
+    found = _scaled(noise, ratio) if after is None else _scaled(scaled, after * ratio / before)
+    return _believed(found, noise, late)
 
 
 def nis_per_row(arrays: dict[str, Array], chosen: Flags) -> float | None:
@@ -121,3 +125,11 @@ def _scaled(noise: Noise, ratio: float, jerk: dict[JointGroup, float] | None = N
     for group, wanted in (jerk or {}).items():
         scales[group] = scales.get(group, 1.0) * (wanted / ratio) ** JERK_SHARE
     return noise.changed(variance_scale=ratio * noise.variance_scale, jerk_scale=scales)
+
+
+def _believed(found: Noise, declared: Noise, late: bool) -> Noise:
+    """What is believed of the factor that was found."""
+    if not late:
+        return found
+    factor = (found.variance_scale / declared.variance_scale) ** LATE_SHARE
+    return found.changed(variance_scale=factor * declared.variance_scale)

@@ -255,8 +255,9 @@ class Estimator:
         lag_s, ground, on_feet = ready.lag_s, ready.ground, ready.contacts
         if 0.0 < lag_s < ALL_FRAMES:
             lag_s = lag_frames(lag_s, recording.rate) / recording.rate
+        adapt = bool(calibrated.feet) if ready.tracker.noise.adapt is None else ready.tracker.noise.adapt
         try:
-            ways = 2 if lag_s == ALL_FRAMES else 1  # over the frames, after the first run
+            ways = 2 if lag_s == ALL_FRAMES else int(adapt or lag_s > 0.0)  # over the frames, after the first run
             there, back = _shares(progress, recording.n_frames, ways)
             passes = 0 if ready.doubt else PASSES
             tracker, arrays, shift, clock = run_in_step(
@@ -264,9 +265,9 @@ class Estimator:
             )
             wrench = in_step(recording.time, ready.wrench, shift) if shift else ready.wrench
             on_feet = on_feet and on_feet.in_step(recording.time, shift)
-            adapt = bool(calibrated.feet) if tracker.noise.adapt is None else tracker.noise.adapt
             given = (recording.time, markers, wrench)
-            found = calibrated_noise(tracker, arrays, Trial(*given, on_feet)) if adapt else None
+            trial = Trial(*given, on_feet)
+            found = calibrated_noise(tracker, arrays, trial, late=not lag_s) if adapt else None
             if lag_s or found:
                 tracker = tracker.changed(found or tracker.noise)
                 arrays = tracker.run_late_arrays(lag_s, *given, back, on_feet)
