@@ -166,10 +166,11 @@ def _made(spec: Spec) -> Run:
 LARGE = ("joint_orientations", "joint_loads", "initial_covariance", "final_covariance", "joint_centres")
 
 
-def scaled_noise(factor: float) -> dict[str, float]:
-    """The default noise settings with their standard deviations times ``factor``."""
+def scaled_noise(factor: float) -> dict[str, float | bool]:
+    """The default noise settings with their standard deviations times ``factor``, as a preset fixes them."""
     default = Noise().model_dump()
-    return {key: factor * default[key] for key in NOISE} | {key: factor**2 * default[key] for key in VARIANCES}
+    scaled = {key: factor * default[key] for key in NOISE} | {key: factor**2 * default[key] for key in VARIANCES}
+    return {"adapt": False} | scaled
 
 
 def _half(recording: Recording, _: float) -> Recording:

@@ -93,11 +93,15 @@ def title(name: str) -> str:
 def read_preset(path: Path) -> Noise:
     """The settings of a file: ``base``, the built-in preset from which it starts ("default" where not given), and the
     table ``noise`` with what is different. It fixes the noise: nothing is calibrated, unless it says ``adapt = true``.
+    The ``config.toml`` of a run is such a file, too: its preset, with the scales that were found in its recording.
 
     Raises:
         ConfigError: the file cannot be read, or a key or value is wrong; the message names it.
     """
     content = read_toml(path, ConfigError)
+    if "noise_used" in content:
+        run = {"base": content.get("preset", "default"), "noise": content.get("noise", {})}
+        content = run | {"noise": run["noise"] | {"adapt": False} | content["noise_used"]}
     for key in content:
         if key not in _KEYS:
             raise ConfigError(f"{path}: unknown key {key!r}{nearest(key, _KEYS)}; expected keys: {', '.join(_KEYS)}")
