@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.errors import DivergenceError
 from dynakin.filter.augment import continuous_noise
 from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.noise import joint_groups
@@ -76,7 +77,10 @@ def calibrated_noise(
     if not groups or before is None:
         return _believed(_scaled(noise, ratio), noise, late)
     scaled = _scaled(noise, ratio, jerk_ratios(tracker, arrays, trial.time, chosen, groups))
-    again = tracker.changed(scaled).run_arrays(*trial.first(end)[:3], None, trial.first(end).contacts)
+    try:
+        again = tracker.changed(scaled).run_arrays(*trial.first(end)[:3], None, trial.first(end).contacts)
+    except DivergenceError:  # with other jerk: the factor alone leaves the movement as it is
+        return _believed(_scaled(noise, ratio), noise, late)
     after = nis_per_row(again, chosen[:end])
     found = _scaled(noise, ratio) if after is None else _scaled(scaled, after * ratio / before)
     return _believed(found, noise, late)

@@ -15,7 +15,7 @@ from dynakin.filter.augment import variance_scales
 from dynakin.filter.contacts import RESIDUAL, ContactLoads
 from dynakin.filter.events import events_of
 from dynakin.filter.labels import labels
-from dynakin.filter.noise import limit_sd
+from dynakin.filter.noise import limit_sd, prior_factor
 from dynakin.filter.parameters import parameters_of
 from dynakin.filter.sources import with_sources
 from dynakin.filter.systematic import Systematic
@@ -69,7 +69,7 @@ def assemble(
         initial.unmarked_feet.values(),
     )
     if feet is not None:
-        _widen_priors(data, used.variance_scale**-0.5)
+        _widen_priors(data, prior_factor(used))
         data = data.isel(foot=[name != RESIDUAL for name in feet.names])
     for name, covariance in zip(("initial_covariance", "final_covariance"), covariances, strict=True):
         data[name] = (("element", "element_"), covariance)
@@ -82,6 +82,8 @@ def assemble(
         declared * np.sqrt(np.diag(covariances[0])),
         noise.get("length_skin_fraction", 0.0),
     )
+    constants = [initial.names.index(p.name) for p in parameters if p.estimated]
+    data["state_sd"][:, constants] *= declared[constants]  # one deviation of a constant, wherever it is read
     config = {key: value for key, value in config.items() if key != "ground_reasons"} | {
         "mass_kg": initial.mass_kg,
         "height_m": initial.height_m,
@@ -114,8 +116,7 @@ def assemble(
 
 
 def _widen_priors(data: xr.Dataset, factor: float) -> None:
-    """In place: deviations by the declared variances of what rests on a contact that no plate measures. What is
-    expected of it is a prior, whose errors the innovations do not show."""
+    """In place, by `prior_factor`: deviations of what rests on a contact that no plate measures."""
     unmeasured = data["foot_contact"] == UNMEASURED
     data["foot_wrench_sd"] = data["foot_wrench_sd"].where(~unmeasured, factor * data["foot_wrench_sd"])
     resting = (data["moment_source"] != MEASURED) & unmeasured.any("foot")

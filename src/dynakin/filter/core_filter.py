@@ -18,6 +18,10 @@ from dynakin.settings.noise import Noise
 Array = npt.NDArray[np.float64]
 
 
+_FOUND_SD = {"coordinate_sd": 0.5, "speed_sd": 2.0, "acceleration_sd": 20.0}
+"""Of a motion that is begun again: rad or m, a second, a second squared, by the declared variances."""
+
+
 def core_filter(
     initial: CalibratedModel, noise: Noise, estimate: Collection[Quantity] = QUANTITIES
 ) -> tuple[CalibratedModel, _core.Model, _core.Filter]:
@@ -51,7 +55,8 @@ def filter_settings(
         )
     point = noise.reference_point_m
     unseen = limit_sd(noise, noise.unseen_sd)
-    recovery = _core.RecoverySettings(blind_s=noise.blind_s, unseen_sd=unseen) if noise.recover else None
+    found = {name: limit_sd(noise, sd) for name, sd in _FOUND_SD.items()}
+    recovery = _core.RecoverySettings(blind_s=noise.blind_s, unseen_sd=unseen, **found) if noise.recover else None
     density, decay = continuous_noise(initial, noise, layout)
     return _core.FilterSettings(
         process_variance=process_variance(noise, layout),

@@ -255,7 +255,7 @@ class Estimator:
         lag_s, ground, on_feet = ready.lag_s, ready.ground, ready.contacts
         if 0.0 < lag_s < ALL_FRAMES:
             lag_s = lag_frames(lag_s, recording.rate) / recording.rate
-        adapt = bool(calibrated.feet) if ready.tracker.noise.adapt is None else ready.tracker.noise.adapt
+        adapt, notes = ready.tracker.noise.calibrates(bool(calibrated.feet)), list(ground.notes)
         try:
             ways = 2 if lag_s == ALL_FRAMES else int(adapt or lag_s > 0.0)  # over the frames, after the first run
             there, back = _shares(progress, recording.n_frames, ways)
@@ -268,6 +268,8 @@ class Estimator:
             given = (recording.time, markers, wrench)
             trial = Trial(*given, on_feet)
             found = calibrated_noise(tracker, arrays, trial, late=not lag_s) if adapt else None
+            if adapt and found is None:
+                notes.append("Too few frames are followed to calibrate the noise on them: it is as declared.")
             if lag_s or found:
                 tracker = tracker.changed(found or tracker.noise)
                 arrays = tracker.run_late_arrays(lag_s, *given, back, on_feet)
@@ -276,7 +278,7 @@ class Estimator:
         config = self.settings() | {"lag_s": lag_s, "ground_reasons": list(ground.reasons)}
         doubt = [ready.doubt] if ready.doubt else clock if ground.usable else []
         config["noise_used"] = tracker.noise.scales()
-        notes = [*ground.notes, *doubt, *ready.unsmoothed]
+        notes += [*doubt, *ready.unsmoothed]
         covariances = (initial_covariance(calibrated, tracker.noise), tracker.covariance)
         estimate = assemble(
             arrays, tracker.core_model, calibrated, recording, (markers, wrench), config, notes, covariances,

@@ -72,9 +72,9 @@ def marker_variance(initial: CalibratedModel, noise: Noise, estimate: Collection
         if "soft_tissue" not in estimate:
             unmodelled = np.maximum(noise.soft_tissue_sd_fraction * declared, noise.soft_tissue_least_sd_m)
         variance = noise.marker_sd_m**2 + unmodelled**2 + initial.unmodelled_m**2
-    variance = noise.variance_scale * variance
     names = initial.recorded_markers
-    return np.array([noise.marker_variance_m2.get(name, value) for name, value in zip(names, variance, strict=True)])
+    by_name = [noise.marker_variance_m2.get(name, value) for name, value in zip(names, variance, strict=True)]
+    return noise.variance_scale * np.array(by_name)
 
 
 def gate_limits(probability: float, scale: float = 1.0) -> list[float] | None:
@@ -92,6 +92,12 @@ def limit_sd(noise: Noise, declared: float | None) -> float:
     """A limit on the deviation of a coordinate (rad or m) that goes by the declared variances, in those that the filter
     has; infinite where there is none."""
     return np.inf if declared is None else float(declared * np.sqrt(noise.variance_scale))
+
+
+def prior_factor(noise: Noise) -> float:
+    """By which deviations of what rests on a contact that no plate measures are widened when they are reported: what is
+    expected of it is a prior, whose errors small innovations do not show."""
+    return max(1.0, float(noise.variance_scale**-0.5))
 
 
 def joint_groups(initial: CalibratedModel) -> dict[str, JointGroup]:

@@ -34,7 +34,8 @@ def parameters_of(
         if word not in _KINDS:
             continue  # a coordinate, speed or acceleration
         kind = _KINDS[word]
-        unseen = skin.get(owner, 0.0) if kind == "length" else 0.0
+        # the prior of a correction to a measured place is what skin hides of that place
+        unseen = skin.get(owner, 0.0) if kind == "length" and initial.x0[k] != 0.0 else 0.0
         found.append(
             Parameter(
                 name=name,

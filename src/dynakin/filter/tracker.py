@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Callable, Collection
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -14,13 +14,15 @@ from dynakin.bindings import _core
 from dynakin.errors import ConfigError, DivergenceError, RecordingError
 from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.core_filter import core_filter
+from dynakin.filter.noise import prior_factor
 from dynakin.filter.samples import Sample, sample_arrays
 from dynakin.filter.sources import ContactSources
 from dynakin.filter.step import Codes, Labelled, Labels, StepEstimate, deviations_of, step_estimate
 from dynakin.filter.systematic import Systematic
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.recordings.feet.contact import UNMEASURED
 from dynakin.recordings.recording import rate_of
-from dynakin.results.measures.sources import ABSENT
+from dynakin.results.measures.sources import ABSENT, MEASURED
 from dynakin.results.records import NOT_SMOOTHED
 from dynakin.settings.lag import ALL_FRAMES, LIVE_LAG_S, check_lag, lag_frames
 from dynakin.settings.model import QUANTITIES, Quantity
@@ -28,6 +30,16 @@ from dynakin.settings.noise import Noise
 
 Array = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]
+
+
+class _Stepped(NamedTuple):
+    """Of a step: its feet, whose moments are measured, their segments, whether no plate measures one of them."""
+
+    time_s: float
+    loads: _core.ContactLoads | None
+    sources: Codes
+    segments: tuple[str, ...]
+    unmeasured: bool
 
 
 class Tracker:
@@ -58,9 +70,8 @@ class Tracker:
         self._labels = Labels.of(self.core_model)
         self._sources = ContactSources.of(self.calibrated)
         self._time: float | None = None
-        self._contacts: tuple[str, ...] = ()
         self._latest: StepEstimate | None = None
-        self._stepped: deque[tuple[float, _core.ContactLoads | None, Codes]] = deque(maxlen=lag + 1)
+        self._stepped: deque[_Stepped] = deque(maxlen=lag + 1)
 
     def fresh(self) -> Tracker:
         """Another one, at the start of the same model."""
@@ -143,8 +154,9 @@ class Tracker:
             raise DivergenceError(f"the filter diverged at {sample.time_s} s: {report.status}")
         self._time = sample.time_s
         sources = self._sources.moments(feet)[0]
-        self._contacts = () if feet is None else feet.segments
-        self._stepped.append((sample.time_s, loads, sources))
+        unmeasured = feet is not None and bool((feet.contact == UNMEASURED).any())
+        segments = () if feet is None else feet.segments
+        self._stepped.append(_Stepped(sample.time_s, loads, sources, segments, unmeasured))
         self._latest = step_estimate(self.core_model, self._labels, sample.time_s, self.state, report, sources, loads)
         return self._latest
 
@@ -160,8 +172,9 @@ class Tracker:
         lag = self._with_lag()
         if self._time is None or not lag.ready:
             return None
-        time, loads, sources = self._delayed_step(lag)
-        return step_estimate(self.core_model, self._labels, time, lag.state, None, sources, loads)
+        step = self._delayed_step(lag)
+        time = self._time - lag.delay_s
+        return step_estimate(self.core_model, self._labels, time, lag.state, None, step.sources, step.loads)
 
     def deviations(self, *, delayed: bool = False) -> dict[str, Labelled]:
         """Standard deviations of the present estimate, as it was last stepped: propagated now, not in every step. They
@@ -178,20 +191,22 @@ class Tracker:
         Raises:
             ConfigError: ``delayed``, and the tracker was started without a lag.
         """
-        state, covariance, loads, absent = self.state, self.covariance, None, np.bool_(False)
+        state, covariance = self.state, self.covariance
+        step = self._stepped[-1] if self._stepped else None
         if delayed and self._with_lag().ready:
             lag = self._with_lag()
-            _, loads, sources = self._delayed_step(lag)
-            state, covariance, absent = lag.state, lag.covariance, sources == ABSENT
-        elif self._stepped:
-            loads, absent = self._stepped[-1][1], self._stepped[-1][2] == ABSENT
+            step, state, covariance = self._delayed_step(lag), lag.state, lag.covariance
+        loads = step and step.loads
         found = deviations_of(self.core_model, state, covariance, loads)
+        if step is not None and step.unmeasured:
+            found["moments"] = np.where(step.sources != MEASURED, prior_factor(self.noise), 1.0) * found["moments"]
         if self.systematic is not None:
             wrench = np.zeros((0, 6))
             if loads is not None:
                 wrench = _core.contact_moments(self.core_model, state, loads)["foot_wrench"]
-            found |= self.systematic.added(found, state, wrench, self._contacts)
-        found["moments"] = np.where(absent, np.nan, found["moments"])
+            found |= self.systematic.added(found, state, wrench, () if step is None else step.segments)
+        if step is not None:
+            found["moments"] = np.where(step.sources == ABSENT, np.nan, found["moments"])
         return {name: Labelled(values, self._labels.on(name)) for name, values in found.items()}
 
     def _with_lag(self) -> _core.FixedLag:
@@ -199,12 +214,11 @@ class Tracker:
             raise ConfigError("delayed: the tracker has no lag, expected Estimator.start(..., lag_s=SECONDS)")
         return self._lag
 
-    def _delayed_step(self, lag: _core.FixedLag) -> tuple[float, _core.ContactLoads | None, Codes]:
-        """Time, feet and sources of the frame at the lag."""
+    def _delayed_step(self, lag: _core.FixedLag) -> _Stepped:
+        """What is known of the frame at the lag."""
         assert self._time is not None
         time = self._time - lag.delay_s
-        _, loads, sources = min(self._stepped, key=lambda stepped: abs(stepped[0] - time))
-        return time, loads, sources
+        return min(self._stepped, key=lambda step: abs(step.time_s - time))
 
     def run_arrays(
         self,
@@ -380,5 +394,5 @@ def check_can_smooth(noise: Noise) -> None:
     if not can_smooth(noise):
         raise ConfigError(
             f"lag_s: bounds are kept by constraint {noise.constraint!r}, which has no smoother; expected 0 "
-            "(--live-like), or 'projection' or 'none' (preset default)"
+            "(--lag 0), or 'projection' or 'none' (preset default)"
         )

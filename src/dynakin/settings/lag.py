@@ -30,8 +30,8 @@ def check_lag(lag_s: float, what: str = "lag_s") -> float:
 
 
 def lag_frames(lag_s: float, rate_hz: float) -> int:
-    """How many frames a lag (s, not `ALL_FRAMES`) is: the nearest number, one at least but for 0."""
-    return max(1, round(lag_s * rate_hz)) if lag_s > 0.0 else 0
+    """How many frames a lag (s, not `ALL_FRAMES`) is: the nearest number within `LONGEST_LAG_S`, one at least but for 0."""
+    return max(1, min(round(lag_s * rate_hz), int(LONGEST_LAG_S * rate_hz))) if lag_s > 0.0 else 0
 
 
 def in_words(lag_s: float) -> str:

@@ -174,6 +174,12 @@ class Noise(Strict, use_attribute_docstrings=True):
     """How bounds are kept: by projection in the metric of P^-1, by restricting the gain (7), by a smooth map, or not
     at all."""
 
+    def calibrates(self, floating: bool) -> bool:
+        """Whether the scales are found in the recording, of a model that is fixed nowhere or in the ground: as `adapt`
+        says, else of floating models where none is given."""
+        declared = self.variance_scale == 1.0 and not self.jerk_scale
+        return floating and declared if self.adapt is None else self.adapt
+
     def scales(self) -> dict[str, Any]:
         """The scales that `adapt` finds, as plain data: a preset's table [noise] fixes them."""
         return self.model_dump(mode="json", include={"variance_scale", "jerk_scale"})

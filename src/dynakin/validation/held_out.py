@@ -54,6 +54,11 @@ class IdentifyingTrial:
     ground: GroundFrame | None = None
     subject: IdentifiedSubject | None = None
 
+    def estimator(self, preset: str) -> Estimator:
+        """Of this preset, with the scales of its noise that were found on the identifying trial."""
+        asked = self.setup.estimator(preset)
+        return replace(asked, noise=asked.noise.changed(**self.estimates[preset].config["noise_used"]))
+
     def constants(self, preset: str) -> dict[str, dict[str, float]]:
         """Lengths (m), marker places (m) and inertia (SI) that the judging trial may be predicted with, by label."""
         table = initial_values(self.initial)
@@ -108,7 +113,7 @@ def identify_on(
     estimates = {}
     for preset in setup.noise:
         estimator = setup.estimator(preset)
-        # only what it ends with is used, which smoothing does not change
+        # only what it ends with is used
         estimates[preset], tracker = estimator.track(recording, static=static, lag_s=0.0)
         _refuse_lost(estimates[preset], f"EKF ({preset})")
     initial = tracker.calibrated
@@ -142,7 +147,7 @@ def predict_blind(identified: IdentifyingTrial, recording: Recording) -> Blind:
     for preset in identified.estimates:
         lag_s, _ = known_lag(setup.lag_s, setup.noise[preset])
         for label, values in identified.constants(preset).items():
-            method, estimator = f"EKF ({preset}), {label}", setup.estimator(preset)
+            method, estimator = f"EKF ({preset}), {label}", identified.estimator(preset)
             tracker = estimator.start(freeze(measured, values, coordinates))
             arrays = tracker.run_late_arrays(lag_s, recording.time, markers, blank)
             _refuse_lost(as_estimate(estimator, tracker, arrays, recording, markers), method)

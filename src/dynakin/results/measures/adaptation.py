@@ -223,12 +223,12 @@ def _judge(estimate: Estimate, title: str, group: list[Parameter]) -> Convergenc
     moving, left, largest = [], [], 0.0
     for p in group:
         path = estimate.data["state"].sel(element=p.name).values
-        sd = estimate.data["state_sd"].sel(element=p.name).values
         late = path[3 * len(path) // 4 :]
         # smoothed, a constant that moves does so by the drift it was given
         if not estimate.smoothed and np.ptp(late) > MOVING * abs(p.initial) and not p.at_bound:
             moving.append(p)
-        first = p.prior_sd or float(sd[0])  # a smoothed estimate has at its first frame the posterior of all
+        sd = estimate.data["state_sd"].sel(element=p.name).values  # smoothed, its first is the posterior of all
+        first = p.prior_sd or float(sd[0])
         left.append(float(sd[-1]) / first if first > 0.0 else 1.0)
         largest = max(largest, abs(p.change_percent() or 0.0))
     sd_left = float(np.median(left))

@@ -29,8 +29,8 @@ def facing(estimate: Estimate) -> Estimate:
     """The same estimate along the way the person faces; itself where its ground has X forward already.
 
     Positions, vectors, orientations and wrenches are turned about the ground's origin, and the pelvis' three turns
-    where they have OpenSim's names and order. Deviations of vectors are turned as if their components were independent.
-    Translations of the root, what is derived from coordinates by time and by force, and the filter's own state stay.
+    where they have OpenSim's names and order, with their speeds. Deviations of vectors are turned as if their components
+    were independent. Translations of the root, accelerations, moments and the filter's own state stay.
     """
     ground = estimate.ground.facing()
     turn = ground.rotation @ estimate.ground.rotation.T  # R_FG
@@ -48,9 +48,16 @@ def facing(estimate: Estimate) -> Estimate:
     data = estimate.data.assign(found)
     angles = _pelvis(estimate, turn)
     if angles is not None:
-        data["coordinates"] = data["coordinates"].copy()
-        for name, values in zip(PELVIS, angles.T, strict=True):
-            data["coordinates"].loc[{"coordinate": name}] = values
+        own, rates = (
+            estimate.data[block].sel(coordinate=list(PELVIS)).transpose("time", "coordinate").values
+            for block in ("coordinates", "speeds")
+        )
+        velocity = np.einsum("tij,tj->ti", _turns_about(own), rates) @ turn.T
+        speeds = np.linalg.solve(_turns_about(angles), velocity[..., None])[..., 0]
+        for block, turned in (("coordinates", angles), ("speeds", speeds)):
+            data[block] = data[block].copy()
+            for name, values in zip(PELVIS, turned.T, strict=True):
+                data[block].loc[{"coordinate": name}] = values
     return replace(estimate, data=data, ground=ground)
 
 
@@ -78,6 +85,17 @@ def _pelvis(estimate: Estimate, turn: Array) -> Array | None:
     angles = np.full(own.shape, np.nan)
     angles[known] = np.unwrap(Rotation.from_matrix(turn @ R_GB[known]).as_euler("ZXY"), axis=0)
     return angles
+
+
+def _turns_about(angles: Array) -> Array:
+    """Axes (T, 3, 3), as columns, about which tilt, list and rotation (T, 3) turn: R = Rz(tilt) Rx(list) Ry."""
+    tilt, lean = (np.cos(angles[:, k]) + 1j * np.sin(angles[:, k]) for k in (0, 1))
+    axes = np.zeros((len(angles), 3, 3))
+    axes[:, 2, 0] = 1.0
+    axes[:, 0, 1], axes[:, 1, 1] = tilt.real, tilt.imag
+    axes[:, 0, 2], axes[:, 1, 2], axes[:, 2, 2] = -lean.real * tilt.imag, lean.real * tilt.real, lean.imag
+    axes[np.isnan(angles).any(axis=1)] = np.nan
+    return axes
 
 
 def nearly_singular(estimate: Estimate) -> list[str]:
