@@ -54,6 +54,14 @@ def of(estimate: Estimate, variable: str, names: list[str]) -> Array:
     return np.asarray(estimate.data[variable].sel(coordinate=names).transpose("time", "coordinate").values)
 
 
+@pytest.mark.parametrize("turn", ["left", pytest.param("back", marks=pytest.mark.nightly)])
+def test_the_speeds_of_the_pelvis_turn_with_it(data_dir: Path, turn: str) -> None:
+    seen = facing(estimated(data_dir, turn))
+    angles, speeds = (of(seen, block, list(PELVIS)) for block in ("coordinates", "speeds"))
+    difference = np.gradient(angles, seen.time, axis=0)[1:-1] - speeds[1:-1]
+    assert np.sqrt(np.mean(difference**2)) < 0.1 * np.sqrt(np.mean(speeds**2))
+
+
 @pytest.mark.parametrize("turn", ["left", "Z up", pytest.param("back", marks=pytest.mark.nightly)])
 def test_joints_and_figures_do_not_depend_on_the_laboratory(data_dir: Path, turn: str) -> None:
     one, other = estimated(data_dir, "none"), estimated(data_dir, turn)
