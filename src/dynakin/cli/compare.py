@@ -64,20 +64,19 @@ def compare(
     more: dict[str, Any] = {"settings": settings_of(cases)}
     compared: list[Trial] = []
     notes: list[str] = []  # of what was held out; each trial keeps its own
-    failed: list[DynakinError] = []  # what is computed already is kept
+    failed: DynakinError | None = None  # what is computed by then is kept
     if identify_trial is not None:
         tables |= print_held_out(console, [(cases[0], cases[1], False)], notes)
     else:
         compared = compare_cases(cases)
         tables |= print_comparison(console, compared)
-        for asked, print_more in (
-            (halved, lambda: print_held_out(console, [(*halves_of(case), True) for case in cases], notes)),
-            (not_seen, lambda: print_unseen(console, cases, horizon)),
-        ):
-            try:
-                tables |= print_more() if asked else {}
-            except DynakinError as error:
-                failed.append(error)
+        try:
+            if halved:
+                tables |= print_held_out(console, [(*halves_of(case), True) for case in cases], notes)
+            if not_seen:
+                tables |= print_unseen(console, cases, horizon)
+        except DynakinError as error:
+            failed = error
         tables |= print_repetitions(console, compared)
         more["trials"] = [_described(trial) for trial in compared]
     if output is not None:
@@ -87,10 +86,8 @@ def compare(
             save_comparison(output, tables, more, page)
         console.print(f"Tables  {output}", soft_wrap=True)
         console.print(f"Report  {output / 'report.html'}", soft_wrap=True)
-    for error in failed:
-        print_error(error.message)
-    if failed:
-        raise typer.Exit(failed[0].exit_code)
+    if failed is not None:
+        raise failed
     lost = [f"{trial.name}, EKF ({preset}): {why}" for trial in compared for preset, why in trial.lost.items()]
     for reason in lost:
         print_error(reason)
