@@ -4,8 +4,8 @@
 
 Each recording of ``../shared/data`` is prepared as `benchmarks/recordings.py` runs it (its own .osim, else
 ``fullbody``). Its noise is calibrated on every other stretch (`filter.adapt`) and judged on the others, of the first
-20 s. A stretch is a second, or a tenth of a recording shorter than 10 s. ``--write`` puts the
-table into ``docs/validation.md``; rows are kept in ``build/nis``.
+20 s. A stretch is a second, or a tenth of a recording shorter than 10 s. Figures are kept in ``build/nis``, one file a
+recording; ``--write`` puts the table of all that are kept into ``docs/validation.md``.
 """
 
 from __future__ import annotations
@@ -39,28 +39,45 @@ HEAD = (
 
 def main() -> None:
     """One row a recording."""
-    parser = argparse.ArgumentParser()
-    parser.add_argument("names", nargs="*")
-    parser.add_argument("--model", default="own")
-    parser.add_argument("--write", action="store_true")
-    options = parser.parse_args()
-    rows = []
-    for trial in TRIALS:
-        if not options.names or any(name in trial.name for name in options.names):
-            rows.append(row(trial, options.model))
-            print(rows[-1], flush=True)
-    if options.write:
-        put_between(MARKS, [HEAD, *rows])
-
-
-def row(trial: Known, wanted: str) -> str:
-    """A line of the table, or why there is none."""
-    try:
-        found = figures(trial, wanted)
-    except DynakinError as error:
-        return f"| `{trial.name}` | {error.message.replace(str(DATA), '')[:120]} | – | – | – | – | – |"
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("names", nargs="*", help="parts of recordings' names; none: all")
+    parser.add_argument("--model", default="own", choices=["own", "fullbody"], help="own: a recording's .osim")
+    parser.add_argument("--write", action="store_true", help="put the table into docs/validation.md")
+    asked = parser.parse_args()
     KEPT.mkdir(parents=True, exist_ok=True)
-    (KEPT / f"{trial.name.replace('/', '_')}_{wanted}.json").write_text(json.dumps(found, indent=1), encoding="utf-8")
+    for trial in TRIALS:
+        if not asked.names or any(name in trial.name for name in asked.names):
+            found = figures_or_why(trial, asked.model)
+            kept(trial, asked.model).write_text(json.dumps(found, indent=1), encoding="utf-8")
+            print(row(trial, found), flush=True)
+    if asked.write:
+        put_between(MARKS, table(asked.model))
+
+
+def kept(trial: Known, wanted: str) -> Path:
+    """Where the figures are kept."""
+    return KEPT / f"{trial.name.replace('/', '_')}_{wanted}.json"
+
+
+def table(wanted: str) -> list[str]:
+    """Markdown of all that is kept."""
+    files = [(trial, kept(trial, wanted)) for trial in TRIALS]
+    rows = [row(trial, json.loads(file.read_text(encoding="utf-8"))) for trial, file in files if file.exists()]
+    return [HEAD, *rows]
+
+
+def figures_or_why(trial: Known, wanted: str) -> dict[str, Any]:
+    """As `figures`; why there are none by the key ``refused``."""
+    try:
+        return figures(trial, wanted)
+    except DynakinError as error:
+        return {"refused": error.message.replace(str(DATA), "")[:120]}
+
+
+def row(trial: Known, found: dict[str, Any]) -> str:
+    """A line of the table, or why there is none."""
+    if "refused" in found:
+        return f"| `{trial.name}` | {found['refused']} | – | – | – | – | – |"
     jerk = ", ".join(f"{found['jerk_scale'].get(group, 1.0):.2g}" for group in GROUPS)
     cells = [_cell(found[key]) for key in ("declared", "calibrated", "markers", "plates", "variance_scale")]
     return f"| `{trial.name}` | {' | '.join(cells)} | {jerk} |"

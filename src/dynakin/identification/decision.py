@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.identification.batch import SHORTEST_S, Posterior, at_start, identify_batch, known_s
-from dynakin.identification.trials import Common, MeasuredTrial, Movement, about, middle_of
+from dynakin.identification.trials import Common, MeasuredTrial, about, middle_of
 from dynakin.identification.unknowns import Unknowns
 from dynakin.results.estimate import COMPONENTS
 
@@ -112,24 +112,13 @@ def estimate(common: Common, trials: Sequence[MeasuredTrial], use: Use) -> Poste
 
 
 def posteriors(common: Common, others: Sequence[MeasuredTrial], uses: Sequence[Use] = USES) -> dict[Use, Posterior]:
-    """What trials say, by candidate.
+    """What trials say, by candidate; of another trial's plates nothing, whose movement they are then given
+    (`Posterior.wrench` of its states).
 
     Raises:
         RecordingError: they have too few frames with the plates' wrench.
     """
     return {use: estimate(common, others, use) for use in uses}
-
-
-def predict_wrench(
-    common: Common, others: Sequence[MeasuredTrial], left_out: Movement, uses: Sequence[Use] = USES
-) -> dict[Use, Array]:
-    """(T, 6) by candidate: the wrench of a held-out movement by the other trials' posterior, without its plates: a
-    `Movement` has none.
-
-    Raises:
-        RecordingError: as `posteriors`.
-    """
-    return {use: found.wrench(common, left_out.states) for use, found in posteriors(common, others, uses).items()}
 
 
 def rms_of(common: Common, trial: MeasuredTrial, predicted: Array) -> Array:

@@ -94,7 +94,7 @@ def truth_text(rows: Sequence[TruthRow]) -> TextTable:
         (f"{quantity}, {unit}", *(shown(figures[quantity, method], 2) for method in methods))
         for quantity, unit in dict.fromkeys((row.quantity, row.unit) for row in rows)
     ]
-    title = "Against the simulation's truth, RMS error (moments: of the legs)"
+    title = "Against the simulation's truth, RMS error (moments: of the legs, where every method has them measured)"
     return TextTable(title, ("", *methods), found, tuple(range(1, 1 + len(methods))))
 
 

@@ -10,7 +10,8 @@ import numpy as np
 
 from dynakin.results.measures.fit import SignalFit, TruthError, signal_fit, truth_error
 from dynakin.results.measures.power import root_coordinates
-from dynakin.validation.methods import AT, CLASSICAL, INVERSE, Method, Trial
+from dynakin.validation.methods import AT, CLASSICAL, Method, Trial
+from dynakin.validation.reference.inverse_dynamics import INVERSE
 from dynakin.validation.table2 import Spread, spread
 
 

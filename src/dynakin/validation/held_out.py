@@ -24,7 +24,7 @@ from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.measures.tracking import why_lost, without_lost
 from dynakin.settings.model import Bounds, Priors
 from dynakin.validation.freeze import final_values, freeze, initial_values
-from dynakin.validation.reference.inverse_dynamics import rigid_motions, usual_cutoffs
+from dynakin.validation.reference.inverse_dynamics import inverse_name, rigid_motions, usual_cutoffs
 from dynakin.validation.reference.least_squares import identify, predicted_wrench
 from dynakin.validation.reference.methods import reference_methods
 from dynakin.validation.setup import Setup
@@ -291,7 +291,7 @@ def _inverse(setup: Setup, start: CalibratedModel, recording: Recording) -> dict
     markers = marker_paths(recording, start, start.ground)
     cutoffs = usual_cutoffs(setup.cutoff_hz, recording.time)
     motions = rigid_motions(start, recording.time, markers, cutoffs)
-    return {f"IK + ID ({cutoff:g} Hz), table": motion.wrench() for cutoff, motion in motions.items()}
+    return {f"{inverse_name(cutoff)}, table": motion.wrench() for cutoff, motion in motions.items()}
 
 
 def _referred(identified: IdentifyingTrial, recording: Recording, start: CalibratedModel) -> dict[str, Array]:

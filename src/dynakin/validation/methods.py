@@ -28,7 +28,13 @@ from dynakin.results.measures.repetitions import Found, repetitions_of
 from dynakin.results.measures.sources import measured_only, moment_sources, wrench_sources
 from dynakin.results.measures.tracking import why_lost
 from dynakin.settings.lag import in_words
-from dynakin.validation.reference.inverse_dynamics import rigid_motions, usual_cutoffs, with_plates
+from dynakin.validation.reference.inverse_dynamics import (
+    INVERSE,
+    inverse_name,
+    rigid_motions,
+    usual_cutoffs,
+    with_plates,
+)
 from dynakin.validation.reference.methods import Lengths, Reference, reference_methods
 from dynakin.validation.setup import Setup
 
@@ -38,7 +44,6 @@ Progress = Callable[[int, int], None]
 
 AT = "AT"
 CLASSICAL = "classical"
-INVERSE = "IK + ID"
 
 
 @dataclass(frozen=True, eq=False)
@@ -284,7 +289,7 @@ def _inverse(first: Estimate, initial: CalibratedModel, cutoff_hz: float, notes:
     data = first.data
     markers = data["markers_measured"].transpose("time", "marker", "axis").values
     for cutoff, motion in rigid_motions(initial, first.time, markers, usual_cutoffs(cutoff_hz, first.time)).items():
-        name = f"{INVERSE} ({cutoff:g} Hz)"
+        name = inverse_name(cutoff)
         judged, said = with_plates(motion, data)
         found.append(_method(name, INVERSE, facing(replace(first, data=judged)).data))
         notes += [f"{name}: {note}" for note in said]

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 import xarray as xr
 
+from dynakin.results.estimate import COMPONENTS
 from dynakin.results.measures.adaptation import constant_groups
 from dynakin.results.measures.sources import legs_of
 from dynakin.results.records import Parameter
@@ -50,7 +51,11 @@ class TruthRow:
 
 
 def truth_rows(trials: Sequence[Trial]) -> list[TruthRow]:
-    """Every method's errors on the trials that were simulated by dynakin; empty where none was."""
+    """Every method's errors on the trials that were simulated by dynakin; empty where none was.
+
+    All methods over the same frames of each quantity: those that each of them has, moments only where they are
+    measured for all. A filter has derived and prior moments too, which are harder, inverse dynamics none.
+    """
     found: dict[tuple[str, str, str], list[float]] = {}
     for trial in trials:
         estimate = next(iter(trial.estimates.values()))
@@ -68,11 +73,31 @@ def truth_rows(trials: Sequence[Trial]) -> list[TruthRow]:
             moving = [
                 n for n in trial.coordinate_names if n in turning and np.ptp(paths.sel(coordinate=n).values) > 0.0
             ]
-            for method in trial.methods:
-                values = truth_errors(method.name, method.data, truth, trial.window, joints or LEG, moving).values
+            for method, data in zip(trial.methods, _where_all_say(trial), strict=True):
+                values = truth_errors(method.name, data, truth, trial.window, joints or LEG, moving).values
                 for (quantity, unit), value in zip(FIGURES, values, strict=True):
                     found.setdefault((quantity, unit, method.name), []).append(value)
     return [TruthRow(*key, spread([v for v in values if np.isfinite(v)])) for key, values in found.items()]
+
+
+def _where_all_say(trial: Trial) -> list[xr.Dataset]:
+    """Data of each method, NaN where another method has nothing; one that nowhere has the quantity does not count."""
+    found = [
+        {
+            name: m.data[name].transpose("time", "coordinate").values
+            for name in ("coordinates", "speeds", "accelerations")
+        }
+        | {"moments": m.measured_moments(), "wrench_estimated": m.wrench}
+        for m in trial.methods
+    ]
+    for name in found[0]:
+        known = [np.isfinite(arrays[name]) for arrays in found]
+        by_all = np.logical_and.reduce([each for each in known if each.any()])
+        for arrays in found:
+            arrays[name] = np.where(by_all, arrays[name], np.nan)
+    labels = {"coordinate": list(trial.coordinate_names), "component": list(COMPONENTS)}
+    dims = dict.fromkeys(found[0], ("time", "coordinate")) | {"wrench_estimated": ("time", "component")}
+    return [xr.Dataset({name: (dims[name], each[name]) for name in each}, coords=labels) for each in found]
 
 
 @dataclass(frozen=True)
@@ -80,7 +105,7 @@ class TruthErrors:
     """RMS errors of one method in the order of `FIGURES`; NaN where it does not give the quantity.
 
     Angles as they are, and after removing each coordinate's mean offset; these, speeds and accelerations are averaged
-    over all coordinates, moments over those that `truth_errors` was asked for.
+    over all coordinates, moments over those that `truth_errors` was asked for; what has no frame does not count.
     """
 
     method: str
@@ -150,5 +175,6 @@ def parameter_errors(parameters: Sequence[Parameter], truth: Mapping[str, float]
 
 
 def _mean_rms(errors: Array) -> float:
-    """Mean over the columns of their RMS."""
-    return float(np.mean(np.sqrt(np.nanmean(errors**2, axis=0))))
+    """Mean of the columns' RMS, of those that are known in some frame; NaN where none is."""
+    known = errors[:, np.isfinite(errors).any(axis=0)]
+    return float(np.mean(np.sqrt(np.nanmean(known**2, axis=0)))) if known.size else float("nan")

@@ -21,7 +21,13 @@ from dynakin.results.estimate import COMPONENTS, Estimate
 from dynakin.results.measures.fit import marker_rms_mm, signal_fit
 from dynakin.results.measures.metrics import evaluation_window
 from dynakin.validation.extrapolation import extrapolated, persisted, span_frames
-from dynakin.validation.reference.inverse_dynamics import RigidMotion, filled, rigid_motions, usual_cutoffs
+from dynakin.validation.reference.inverse_dynamics import (
+    RigidMotion,
+    filled,
+    inverse_name,
+    rigid_motions,
+    usual_cutoffs,
+)
 from dynakin.validation.reference.inverse_kinematics import fixed_model, inverse_kinematics
 from dynakin.validation.setup import Setup
 from dynakin.validation.yardsticks import LEFT_OUT, LINEAR, PERSISTENCE, WITHHELD, Figures, ahead, with_mean
@@ -29,7 +35,6 @@ from dynakin.validation.yardsticks import LEFT_OUT, LINEAR, PERSISTENCE, WITHHEL
 Array = npt.NDArray[np.float64]
 Progress = Callable[[int, int], None]
 
-INVERSE = "IK + ID"
 _BLOCKS = ("coordinates", "speeds", "accelerations")
 _PAST_S = 0.5
 """Of the recording until now, from which the classical method looks ahead: the low-pass forgets in less."""
@@ -87,7 +92,7 @@ def figures_in_space(
             left_out |= trial.markers(LEFT_OUT, name, _of(estimate, "markers_estimated", trial.window), group)
             stepped()
         for cutoff, motion in rigid_motions(trial.calibrated, trial.time, hidden, cutoffs).items():
-            left_out |= trial.markers(LEFT_OUT, _inverse(cutoff), motion.markers(), group)
+            left_out |= trial.markers(LEFT_OUT, inverse_name(cutoff), motion.markers(), group)
     withheld: Figures = {}
     ahead_of: dict[str, tuple[Array, Array]] = {}
     for name, each in ready.items():
@@ -97,10 +102,10 @@ def figures_in_space(
         stepped()
     markers = trial.ready.markers
     for cutoff, motion in rigid_motions(trial.calibrated, trial.time, markers, cutoffs).items():
-        withheld |= trial.wrench(WITHHELD, {_inverse(cutoff): motion.wrench()})
+        withheld |= trial.wrench(WITHHELD, {inverse_name(cutoff): motion.wrench()})
     frames = span_frames(trial.time, horizon_s)
     for cutoff, motion in _classical_ahead(trial, cutoffs, horizon_s).items():
-        ahead_of[_inverse(cutoff)] = motion.markers(), motion.wrench()
+        ahead_of[inverse_name(cutoff)] = motion.markers(), motion.wrench()
     for name, guess in ((PERSISTENCE, persisted), (LINEAR, lambda a, n: extrapolated(trial.time, a, n))):
         ahead_of[name] = guess(markers, frames), guess(trial.ready.wrench, frames)
     return with_mean(LEFT_OUT, left_out) | withheld | _ahead_figures(trial, ahead(horizon_s), ahead_of)
@@ -157,10 +162,6 @@ class _Judged:
     def _seen(self, wrench: Array) -> Array:
         force, moment = wrench[:, :3], wrench[:, 3:] - np.cross(self.below, wrench[:, :3])
         return np.hstack([force @ self.turn.T, moment @ self.turn.T])
-
-
-def _inverse(cutoff_hz: float) -> str:
-    return f"{INVERSE} ({cutoff_hz:g} Hz)"
 
 
 def _of(estimate: Estimate, name: str, window: npt.NDArray[np.bool_]) -> Array:

@@ -14,8 +14,8 @@ from dynakin.filter.prepared import Prepared
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.trial import simulate
-from dynakin.validation.methods import INVERSE, Trial, compare_trial
-from dynakin.validation.reference.inverse_dynamics import RigidMotion, rigid_motions
+from dynakin.validation.methods import Trial, compare_trial
+from dynakin.validation.reference.inverse_dynamics import INVERSE, RigidMotion, inverse_name, rigid_motions
 from dynakin.validation.reference.inverse_kinematics import fixed_model, free_coordinates, inverse_kinematics
 from dynakin.validation.setup import Setup
 
@@ -108,7 +108,8 @@ def test_beside_the_filter_it_has_the_same_labels_and_says_what_it_leaves(
     simulated: SimulatedTrial, setup: Setup
 ) -> None:
     trial: Trial = compare_trial(simulated.recording, setup)
-    assert [method.name for method in trial.methods] == ["EKF (default)", f"{INVERSE} (6 Hz)", f"{INVERSE} (12 Hz)"]
+    assert [method.name for method in trial.methods] == ["EKF (default)", "IK + ID (6 Hz)", "IK + ID (12 Hz)"]
+    assert trial.methods[1].kind == INVERSE and trial.methods[1].name == inverse_name(6.0)
     assert any("What it leaves at the pelvis" in note for note in trial.notes)
     filtered, classical = trial.methods[0], trial.methods[1]
     assert trial.reference("AT") is trial.reference("classical") is classical

@@ -17,7 +17,8 @@ from dynakin.results.measures.mean_curves import MEASURED
 from dynakin.results.measures.sources import moment_sources, wrench_sources
 from dynakin.results.naming import number, sentence, words
 from dynakin.validation.differences import AngleDifference, MomentDifference, angle_differences, moment_differences
-from dynakin.validation.methods import AT, CLASSICAL, INVERSE, Trial
+from dynakin.validation.methods import AT, CLASSICAL, Trial
+from dynakin.validation.reference.inverse_dynamics import INVERSE
 from dynakin.validation.table2 import Spread, table2
 
 _Difference = TypeVar("_Difference", AngleDifference, MomentDifference)

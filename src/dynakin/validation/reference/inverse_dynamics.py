@@ -19,6 +19,9 @@ from dynakin.validation.reference.inverse_kinematics import fixed_model, inverse
 
 Array = npt.NDArray[np.float64]
 
+INVERSE = "IK + ID"
+"""Its kind; with the cut-off its name (`inverse_name`)."""
+
 FAST_CUTOFF_HZ = 12.0
 """The other usual cut-off, for walking and faster: at 6 Hz a heel strike is gone."""
 _OF_RATE = 0.4
@@ -81,6 +84,11 @@ def filled(time: Array, markers: Array, max_gap_s: float = MAX_GAP_S) -> Array:
     frames = round(max_gap_s / even_step(time))
     columns = [fill_gaps(column, frames)[0] for column in markers.reshape(len(markers), -1).T]
     return np.stack(columns, axis=1).reshape(markers.shape)
+
+
+def inverse_name(cutoff_hz: float) -> str:
+    """What the method is called, with a cut-off."""
+    return f"{INVERSE} ({cutoff_hz:g} Hz)"
 
 
 def usual_cutoffs(cutoff_hz: float, time: Array) -> tuple[float, ...]:
