@@ -91,7 +91,7 @@ def truth3d(case: str, seed: int, folder: Path | None, noise: Noise, live: bool)
     given = np.load(trial / "truth.npz", allow_pickle=True)
     truth = {"coordinates": given["q"], "speeds": given["u"], "moments": given["tau"]}
     window = (given["t"] >= WINDOW_S[motion][0]) & (given["t"] <= WINDOW_S[motion][1])
-    tracked = dynakin.Estimator(definition, noise).track(recording, static=static, smooth=not live)
+    tracked = dynakin.Estimator(definition, noise).track(recording, static=static, lag_s=0.0 if live else None)
     return against(case, seed, tracked, [str(n) for n in given["names"]], truth, window)
 
 
@@ -114,7 +114,7 @@ def own(case: str, seed: int, noise: Noise, live: bool) -> Run:
     trial = simulate(model, motion, seed, seconds, markers=markers if model == "fullbody" else None)
     static = None if motion == "squat" else simulate(model, "squat", seed, 5.0, markers=markers).recording
     definition = load_model(model, subject=subject, markers=markers)
-    tracked = dynakin.Estimator(definition, noise).track(trial.recording, static=static, smooth=not live)
+    tracked = dynakin.Estimator(definition, noise).track(trial.recording, static=static, lag_s=0.0 if live else None)
     truth = {block: trial.truth.data[block].transpose("time", "coordinate").values for block in BLOCKS}
     names = [str(n) for n in trial.truth.data["coordinate"].values]
     return against(case, seed, tracked, names, truth, trial.recording.time >= start)

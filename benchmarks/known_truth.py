@@ -103,7 +103,7 @@ class Run:
 
 
 def run(spec: Spec, again: bool = False) -> Run:
-    """The run, or what was kept of it."""
+    """The run, or what was kept of it; one that was refused is not kept."""
     file = KEPT / f"{spec.key()}.pickle"
     if file.exists() and not again:
         kept = pickle.loads(file.read_bytes())
@@ -111,6 +111,9 @@ def run(spec: Spec, again: bool = False) -> Run:
         return kept
     start = time.perf_counter()
     made = replace(_made(spec), seconds=time.perf_counter() - start)
+    if made.data is None:
+        file.unlink(missing_ok=True)  # else what an older program made of it would stand for this one
+        return made
     KEPT.mkdir(parents=True, exist_ok=True)
     part = file.with_suffix(".part")
     part.write_bytes(pickle.dumps(made))
@@ -143,7 +146,7 @@ def _made(spec: Spec) -> Run:
     for name, size in spec.altered.items():
         recording = ALTERATIONS[name](recording, size)
     told = {"mass_kg": MASS_KG, "height_m": HEIGHT_M, "sex": SEX, "markers": spec.markers} | dict(spec.told)
-    told |= {"model": "sagittal7" if spec.motion == "sagittal" else "fullbody", "smooth": spec.smooth}
+    told |= {"model": "sagittal7" if spec.motion == "sagittal" else "fullbody", "lag_s": np.inf if spec.smooth else 0.0}
     if spec.noise != 1.0:
         told["noise"] = scaled_noise(spec.noise)
     truth = trial.truth.data[["coordinates", "speeds", "moments"]]

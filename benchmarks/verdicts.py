@@ -1,13 +1,14 @@
 """Thresholds of the verdicts, chosen on trials with known truth and judged on others.
 
-    OMP_NUM_THREADS=1 .venv/bin/python benchmarks/verdicts.py [--write] [--again] [--truth3d FOLDER]
+    OMP_NUM_THREADS=1 .venv/bin/python benchmarks/verdicts.py [--write] [--again] [--truth3d FOLDER --since TIME]
 
 Simulated planar squats, and squats and walks of the whole body, good ones and with one trouble each
-(`known_truth_cases.TROUBLES`), and whatever dynakin made of truth3d's trials in FOLDER (its cache; the newest results
-of each method). Of each run: what it can compute itself (`statistics_of`), and its true deviation over error and
+(`known_truth_cases.TROUBLES`), and what dynakin made after TIME, with no option but --lag and --live-like, of truth3d's
+whole trials in FOLDER (its cache; the newest results of each method and options). Of each run: what it can compute itself (`statistics_of`), and its true deviation over error and
 coverage by group. A group *is* overconfident where deviations are below half of the errors or hold the truth in less
-than 85 %, conservative where they are above 2.5 times. For each group and word the statistic and threshold with the
-best balanced accuracy on one half of the seeds are taken; the tables are of the other.
+than 85 %, conservative where they are above 2.5 times. For each group and word, of runs with declared noise and with
+calibrated noise apart, the statistic and threshold with the best balanced accuracy on one half of the seeds are taken;
+the tables are of the other. Where no threshold reaches `LEAST_ACCURACY`, the limit lies beyond all runs of that half.
 
 ``--write`` puts thresholds into ``results/measures/verdicts.toml`` and the tables into ``docs/validation.md``;
 ``--again`` runs everything anew (else what was kept); ``--kept`` takes only what was kept.
@@ -16,13 +17,15 @@ best balanced accuracy on one half of the seeds are taken; the tables are of the
 from __future__ import annotations
 
 import argparse
+import json
 import warnings
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import datetime
 from itertools import pairwise
 from pathlib import Path
-from typing import NamedTuple
+from typing import NamedTuple, get_args
 
 import numpy as np
 import xarray as xr
@@ -35,7 +38,9 @@ from dynakin.results.measures.consistency import (
     Judgement,
     Limit,
     Limits,
+    NoiseFrom,
     judge_group,
+    noise_from,
     statistics_of,
 )
 from dynakin.results.measures.sources import MEASURED
@@ -54,6 +59,19 @@ WORDS: tuple[Judgement, ...] = ("conservative", "consistent", "overconfident")
 CANDIDATES = ("markers_larger", "wrench_larger")
 """Statistics that may judge. Either part alone did worse: that of single frames misses soft tissue, the averaged one
 noise of the cameras."""
+LEAST_ACCURACY = 0.75
+"""Balanced accuracy below which a threshold tells nothing (0.5: as good as chance)."""
+BEYOND = {
+    ("motion", "conservative"): "markers_larger",
+    ("motion", "overconfident"): "markers_larger",
+    ("moments", "conservative"): "markers_larger",
+    ("moments", "overconfident"): "wrench_larger",
+}
+"""What a limit beyond all runs is of: nearly all of a moment's deviation is the motion's."""
+LEAST_RUNS = 3
+"""Fewer runs of a word are no ground for a threshold."""
+ROOM = 2.0
+"""How far beyond all runs the limit of a word lies that cannot be told."""
 PULL = 0.03
 """Of two thresholds whose balanced accuracies differ by less, that with more room to the nearest trials is taken."""
 
@@ -71,6 +89,9 @@ class Truth(NamedTuple):
         return "conservative" if self.ratio > SD_OVER_ERROR[1] else "consistent"
 
 
+AllLimits = Mapping[NoiseFrom, Mapping[str, Limits]]
+
+
 @dataclass(frozen=True)
 class Trial:
     motion: str
@@ -78,6 +99,7 @@ class Trial:
     seed: int
     statistics: Mapping[str, float]
     truth: Mapping[str, Truth]
+    noise: NoiseFrom
     warned: tuple[str, ...] = ()
     """Titles of its other warnings."""
 
@@ -103,13 +125,21 @@ def simulated(again: bool, kept: bool) -> Iterator[Trial]:
                 yield replace(made, warned=tuple(dict.fromkeys(t for t in warned if t != "Uncertainty")))
 
 
-def of_truth3d(cache: Path) -> Iterator[Trial]:
-    """What was made of truth3d's trials: of each method and trial the newest."""
+def of_truth3d(cache: Path, since: datetime) -> Iterator[Trial]:
+    """What was made of truth3d's trials: of each trial, method and options the newest, none older than ``since``."""
     for folder in sorted(cache.glob("trials/*_s[0-9]*")):
         motion, _, seed = folder.name.rpartition("_")[0].rpartition("_s")
+        if json.loads((folder / "trial.json").read_text())["settings"]["without"]:
+            continue
         made: dict[str, Path] = {}
         for file in sorted(folder.glob("runs/*/results/estimate.nc"), key=lambda f: f.stat().st_mtime):
-            made[file.parts[-3].split("_")[0]] = file
+            run_folder = file.parents[1]
+            unfinished = run_folder.suffix == ".part" or not (run_folder / "run.json").exists()
+            if unfinished or file.stat().st_mtime < since.timestamp():
+                continue
+            options = json.loads((run_folder / "run.json").read_text())["options"]
+            if options.startswith(("--lag", "--live-like")) or not options:
+                made[f"{run_folder.name.split('_')[0].removesuffix('s')} {options or 'smoothed'}"] = file
         content = np.load(folder / "truth.npz", allow_pickle=True)
         truth = xr.Dataset(
             {
@@ -128,9 +158,9 @@ def of_truth3d(cache: Path) -> Iterator[Trial]:
 
 
 def _trial(motion: str, trouble: str, seed: int, data: xr.Dataset, truth: xr.Dataset, window: Array) -> Trial:
-    return Trial(
-        motion, trouble, seed, _statistics(data), {g: _truth(data, truth, window, b) for g, b in BLOCKS.items()}
-    )
+    noise = noise_from(json.loads(data.attrs["configuration"]))
+    judged = {group: _truth(data, truth, window, blocks) for group, blocks in BLOCKS.items()}
+    return Trial(motion, trouble, seed, _statistics(data), judged, noise)
 
 
 def _statistics(data: xr.Dataset) -> dict[str, float]:
@@ -179,58 +209,60 @@ def _truth(data: xr.Dataset, truth: xr.Dataset, window: Array, blocks: Sequence[
     return Truth(float(np.exp(np.mean(np.log(np.concatenate(ratios))))), float(np.mean(inside)))
 
 
-def chosen(trials: Sequence[Trial], group: str) -> Limits:
+def chosen(trials: Sequence[Trial], noise: NoiseFrom, group: str) -> Limits:
     """Statistic and threshold of either word, by balanced accuracy on these trials."""
-    known = [t for t in trials if np.isfinite(t.truth[group].ratio)]
+    known = [t for t in trials if t.noise == noise and np.isfinite(t.truth[group].ratio)]
+    print(f"{noise}, {group}: {dict(Counter(t.truth[group].word for t in known))}")
     return Limits(_limit(known, group, "conservative", -1.0), _limit(known, group, "overconfident", 1.0))
 
 
 def _limit(trials: Sequence[Trial], group: str, word: Judgement, sign: float) -> Limit:
     """The word is said where sign * (statistic - value) > 0."""
+    is_so = np.array([t.truth[group].word == word for t in trials])
     best: tuple[float, float, Limit] | None = None
-    for name in CANDIDATES:
-        own = [t for t in trials if name in t.statistics]
-        if len(own) < len(trials):
-            continue
-        values = np.log([t.statistics[name] for t in own])
-        is_so = np.array([t.truth[group].word == word for t in own])
-        order = np.unique(values)
-        for low, high in pairwise(order):
+    for name in CANDIDATES if min(is_so.sum(), (~is_so).sum()) >= LEAST_RUNS else ():
+        values = np.log([t.statistics[name] for t in trials])
+        for low, high in pairwise(np.unique(values)):
             said = sign * (values - 0.5 * (low + high)) > 0.0
-            score = 0.5 * (np.mean(said[is_so]) + np.mean(~said[~is_so])) if is_so.any() and (~is_so).any() else 0.0
+            score = 0.5 * (np.mean(said[is_so]) + np.mean(~said[~is_so]))
             room = min(high - low, 1.0)
             if best is None or score + PULL * room > best[0] + PULL * best[1]:
                 best = (score, room, Limit(name, float(np.exp(0.5 * (low + high)))))
-    assert best is not None
-    print(f"{group}, {word}: {best[2].statistic} {best[2].value:.3g}, balanced accuracy {best[0]:.2f}")
-    return best[2]
+    if best is not None and best[0] >= LEAST_ACCURACY:
+        print(f"{group}, {word}: {best[2].statistic} {best[2].value:.3g}, balanced accuracy {best[0]:.2f}")
+        return best[2]
+    name = BEYOND[group, word]
+    outermost = sign * max(sign * np.log(t.statistics[name]) for t in trials)
+    print(f"{group}, {word}: beyond all runs ({best})")
+    return Limit(name, float(np.exp(outermost + sign * np.log(ROOM))))
 
 
-def confusion(trials: Sequence[Trial], limits: Mapping[str, Limits]) -> list[str]:
+def confusion(trials: Sequence[Trial], limits: AllLimits) -> list[str]:
     """Rows: what a run is; columns: what it says of itself."""
     lines = [
-        "| group | runs that are | " + " | ".join(f"said {word}" for word in WORDS) + " |",
-        "|---|---|---|---|---|",
+        "| noise | group | runs that are | " + " | ".join(f"said {word}" for word in WORDS) + " |",
+        "|---|---|---|---|---|---|",
     ]
-    for group, own in limits.items():
-        count = Counter(
-            (t.truth[group].word, judge_group(t.statistics, own)) for t in trials if np.isfinite(t.truth[group].ratio)
-        )
-        for word in WORDS:
-            lines.append(f"| {group} | {word} | " + " | ".join(str(count[word, said]) for said in WORDS) + " |")
+    for noise, groups in limits.items():
+        for group, own in groups.items():
+            known = [t for t in trials if t.noise == noise and np.isfinite(t.truth[group].ratio)]
+            count = Counter((t.truth[group].word, judge_group(t.statistics, own)) for t in known)
+            for word in WORDS:
+                cells = " | ".join(str(count[word, said]) for said in WORDS)
+                lines.append(f"| {noise} | {group} | {word} | {cells} |")
     return lines
 
 
-def by_trouble(trials: Sequence[Trial], limits: Mapping[str, Limits]) -> list[str]:
+def by_trouble(trials: Sequence[Trial], limits: AllLimits) -> list[str]:
     """Each kind of trial: true deviation over error and coverage, and how often each word was said."""
-    heads = " | ".join(f"{group}: sd / error, in 95 %, said" for group in limits)
-    lines = [f"| trial | trouble or method | runs | {heads} | other warnings |"]
-    lines.append("|---|---|---|---|" + "---|" * len(limits))
-    kinds = dict.fromkeys((t.motion, t.trouble) for t in trials)
-    for motion, trouble in kinds:
-        own = [t for t in trials if (t.motion, t.trouble) == (motion, trouble)]
+    heads = " | ".join(f"{group}: sd / error, in 95 %, said" for group in BLOCKS)
+    lines = [f"| trial | trouble or method | noise | runs | {heads} | other warnings |"]
+    lines.append("|---|---|---|---|---|" + "---|" * len(BLOCKS))
+    kinds = dict.fromkeys((t.motion, t.trouble, t.noise) for t in trials)
+    for motion, trouble, noise in kinds:
+        own = [t for t in trials if (t.motion, t.trouble, t.noise) == (motion, trouble, noise)]
         cells = []
-        for group, limit in limits.items():
+        for group, limit in limits[noise].items():
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", RuntimeWarning)
                 ratio = np.exp(np.nanmean(np.log([t.truth[group].ratio for t in own])))
@@ -240,20 +272,21 @@ def by_trouble(trials: Sequence[Trial], limits: Mapping[str, Limits]) -> list[st
             cells.append(f"{ratio:.2g}, {inside:.0f}, {words}" if np.isfinite(ratio) else "–")
         others = Counter(title for t in own for title in t.warned)
         cells.append(", ".join(f"{title} {n}" if len(own) > 1 else title for title, n in others.items()) or "–")
-        lines.append(f"| {motion} | {trouble} | {len(own)} | " + " | ".join(cells) + " |")
+        lines.append(f"| {motion} | {trouble} | {noise} | {len(own)} | " + " | ".join(cells) + " |")
     return lines
 
 
-def toml(limits: Mapping[str, Limits], trials: int, judged: int) -> str:
+def toml(limits: AllLimits, trials: int, judged: int) -> str:
     lines = [
         "# When a run is called conservative or overconfident. Written by `benchmarks/verdicts.py --write`: chosen on",
         f"# {trials} trials with known truth, judged on {judged} others (docs/validation.md).",
         "# A statistic is one of `statistics_of`; conservative below its value, overconfident above.",
     ]
-    for group, own in limits.items():
-        lines += ["", f"[limits.{group}]"]
-        for word, limit in zip(Limits._fields, own, strict=True):
-            lines.append(f'{word} = {{ statistic = "{limit.statistic}", value = {limit.value:.3g} }}')
+    for noise, groups in limits.items():
+        for group, own in groups.items():
+            lines += ["", f"[limits.{noise}.{group}]"]
+            for word, limit in zip(Limits._fields, own, strict=True):
+                lines.append(f'{word} = {{ statistic = "{limit.statistic}", value = {limit.value:.3g} }}')
     return "\n".join(lines) + "\n"
 
 
@@ -263,13 +296,16 @@ def main() -> None:
     parser.add_argument("--again", action="store_true")
     parser.add_argument("--kept", action="store_true")
     parser.add_argument("--truth3d", type=Path, default=TRUTH3D)
+    parser.add_argument("--since", type=datetime.fromisoformat, default=datetime.min.replace(year=1970))
     asked = parser.parse_args()
-    trials = [*simulated(asked.again, asked.kept), *of_truth3d(asked.truth3d)]
+    trials = [*simulated(asked.again, asked.kept), *of_truth3d(asked.truth3d, asked.since)]
     choosing, judging = ([t for t in trials if t.chooses == half] for half in (True, False))
-    limits = {group: chosen(choosing, group) for group in BLOCKS}
+    limits: AllLimits = {n: {group: chosen(choosing, n, group) for group in BLOCKS} for n in get_args(NoiseFrom)}
     said = "; ".join(
-        f"{group} {word} {'below' if word == 'conservative' else 'above'} {limit.value:.2g} of `{limit.statistic}`"
-        for group, own in limits.items()
+        f"{noise} noise, {group} {word} {'below' if word == 'conservative' else 'above'} {limit.value:.2g} of "
+        f"`{limit.statistic}`"
+        for noise, groups in limits.items()
+        for group, own in groups.items()
         for word, limit in zip(Limits._fields, own, strict=True)
     )
     text = [

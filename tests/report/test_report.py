@@ -12,15 +12,17 @@ import numpy as np
 import pytest
 
 from dynakin.report import insights as insights_module
-from dynakin.report.insights import in_short, insights
+from dynakin.report.insights import Insight, in_short, insights
 from dynakin.report.labels import moment_note, short_marker_names
 from dynakin.report.page import SECTIONS, render_report
 from dynakin.report.plot import new_axes, thin, to_svg
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import Estimate
+from dynakin.results.measures.consistency import Consistency
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.naming import listed, number
+from dynakin.results.records import REFUSED, Event, EventKind
 from support.estimates.synthetic import make_estimate
 from support.page import Structure
 
@@ -188,6 +190,35 @@ def test_deviations_that_are_wrong_get_one_action(estimate: Estimate, size: floa
     metrics["markers"]["rms_mm"]["S1:RKNE"] = 60.0
     found = {insight.title: insight for insight in insights(kept, metrics)}["Uncertainty"]
     assert found.level == level and found.advice.startswith(advice) and bool(found.advice) == bool(advice)
+
+
+def refusing(estimate: Estimate, frames: int, kind: EventKind = "gated") -> Insight:
+    """What is said where one marker is refused for a while."""
+    verdict = np.ones((len(estimate.time), len(estimate.marker_names) + 1), dtype=int)
+    verdict[50 : 50 + frames, 2] = REFUSED
+    event = Event(0.5, 50, kind, estimate.marker_names[2], f"not used for {frames} frames")
+    data = estimate.data.drop_vars("verdict", errors="ignore").assign(verdict=(("time", "sensor"), verdict))
+    made = replace(estimate, data=data, events=[event])
+    return {insight.title: insight for insight in insights(made, compute_metrics(made))}["Left out or reset"]
+
+
+def test_a_frame_of_one_marker_is_a_note_and_a_tenth_of_a_second_or_a_reset_a_warning(estimate: Estimate) -> None:
+    assert refusing(estimate, 1).level == "note"
+    assert refusing(estimate, 30).level == "warning"
+    assert refusing(estimate, 1, "reset").level == "warning"
+
+
+def test_advice_can_be_followed(estimate: Estimate) -> None:
+    """No smoothing is advised where the settings have none, and no marker where the plates speak."""
+    metrics = compute_metrics(estimate)
+    metrics["prediction"]["wrench"]["rms"]["fx"] = 16.0 * metrics["wrench"]["rms"]["fx"]
+    gain = replace(estimate, config=estimate.config | {"noise": {"constraint": "gain"}})
+    said = {i.title: i.advice for i in insights(gain, metrics)}["One frame ahead"]
+    assert "--preset default" in said and "live-like" not in said
+    said = {i.title: i.advice for i in insights(estimate, metrics)}["One frame ahead"]
+    assert "live-like" in said
+    plates = Consistency(1.0, None, 1, None, None, judgements={"motion": "consistent", "moments": "overconfident"})
+    assert insights_module._case(plates) == "overconfident, plates"
 
 
 def test_every_warning_names_an_action() -> None:

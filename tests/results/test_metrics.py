@@ -17,6 +17,7 @@ from dynakin.results.measures.consistency import (
     judge_group,
     lag_one,
     limits,
+    noise_from,
     statistics_of,
 )
 from dynakin.results.measures.fit import marker_rms_mm, wrench_fit
@@ -104,10 +105,27 @@ def test_of_all_groups_the_word_that_matters_most() -> None:
 
 def test_the_thresholds_are_of_statistics_that_exist_and_in_order() -> None:
     names = set(statistics_of(TIME, drawn(7), drawn(8)))
-    assert set(limits()) == set(GROUPS)
-    for own in limits().values():
-        assert {own.conservative.statistic, own.overconfident.statistic} <= names
-        assert 0.0 < own.conservative.value < own.overconfident.value
+    assert set(limits()) == {"declared", "calibrated"}
+    for groups in limits().values():
+        assert set(groups) == set(GROUPS)
+        for own in groups.values():
+            assert {own.conservative.statistic, own.overconfident.statistic} <= names
+            assert 0.0 < own.conservative.value < own.overconfident.value
+
+
+def test_noise_is_calibrated_where_its_scales_were_found_here_or_elsewhere() -> None:
+    assert noise_from({}) == noise_from({"noise_used": {"variance_scale": 1.0, "jerk_scale": {}}}) == "declared"
+    assert noise_from({"noise_used": {"variance_scale": 0.2, "jerk_scale": {}}}) == "calibrated"
+    assert noise_from({"noise_used": {"variance_scale": 1.0, "jerk_scale": {"feet": 2.0}}}) == "calibrated"
+
+
+def test_what_lasts_is_borne_further_where_the_noise_was_calibrated() -> None:
+    innovations, sd = drawn(9)
+    slow = innovations + 0.28 * sd * np.sign(np.sin(2.0 * np.pi * TIME / 3.0))[:, None]
+    given = TIME, np.full(len(TIME), 6.0), np.full(len(TIME), 6), (slow, sd), drawn(10)
+    assert consistency(*given).judgements["motion"] == "overconfident"
+    found = consistency(*given, noise="calibrated")
+    assert found.judgement == "consistent" and found.verdict.endswith("to which the noise was calibrated.")
 
 
 def test_true_covariances_give_a_mean_within_the_95_percent_interval() -> None:

@@ -54,6 +54,17 @@ def test_wrong_standard_deviations_are_told_with_their_size(factor: float, judge
     assert found.verdict().startswith(f"Speeds: {judgement}.") and text in found.verdict()
 
 
+def test_what_holds_the_truth_too_seldom_is_overconfident_whatever_the_mean_is() -> None:
+    rng = np.random.default_rng(3)
+    error = rng.normal(size=(2000, 2))
+    part = np.where(np.arange(2000)[:, None] < 700, 0.4, 3.0)  # a third of it 2.5 times too sure
+    found = coverage("speeds", NAMES, error, np.broadcast_to(part, error.shape))
+    assert found.mean_square < 4.0 and found.pooled < 0.85
+    assert found.judgement == "overconfident" and "too small for part of it" in found.verdict()
+    few = coverage("lengths", ["a", "b", "c"], np.array([[2.2, 0.1, 0.2]]), np.ones((1, 3)))
+    assert few.pooled < 0.85 and few.judgement == "consistent"  # one of three: by chance
+
+
 def test_a_little_too_sure_is_wrong_for_own_data_only() -> None:
     error, sd = draws()
     assert coverage("speeds", NAMES, error, 0.9 * sd).judgement == "consistent"

@@ -128,7 +128,7 @@ def own_uncertainty(estimate: Estimate, truth: Truth) -> Table:
             f"{100.0 * block.pooled:.0f} %",
             "" if about_mean is None else f"{100.0 * about_mean:.0f} %",
             f"{block.mean_square:.2g}",
-            block.judgement if block.judgement == "consistent" else f"{block.judgement}, {block.factor:.2g} times",
+            block.judgement if block.judgement == "consistent" else f"{block.judgement}, {block.sizes()}",
         )
     return rows
 

@@ -348,9 +348,13 @@ def smoothed(arrays: dict[str, Array]) -> dict[str, Array]:
     return kept | {name: arrays[source] for name, source in _PLACES.items() if source in arrays}
 
 
+SMOOTHED_WITH = ("projection", "none")
+"""Ways to keep bounds that have a smoother."""
+
+
 def can_smooth(noise: Noise) -> bool:
     """Whether bounds are kept in a way that has a smoother."""
-    return noise.constraint in ("projection", "none")
+    return noise.constraint in SMOOTHED_WITH
 
 
 def known_lag(asked_s: float | None, noise: Noise) -> tuple[float, list[str]]:

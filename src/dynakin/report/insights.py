@@ -6,21 +6,28 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, Literal
 
+import numpy as np
+
+from dynakin.filter.tracker import SMOOTHED_WITH
 from dynakin.report.labels import COMPONENT_LABELS, parameter_label, short_marker_names
 from dynakin.results.estimate import Estimate
 from dynakin.results.failures import FAILED, LOG
 from dynakin.results.measures.adaptation import convergence
 from dynakin.results.measures.bounds import counts_in_words
+from dynakin.results.measures.consistency import Consistency, limits
 from dynakin.results.measures.metrics import ADAPTATION_S, evaluation_window, speed_consistency, window_consistency
 from dynakin.results.measures.soft_tissue import excess_in_words
 from dynakin.results.measures.tracking import why_lost
 from dynakin.results.naming import listed, number, plural, sentence, words
-from dynakin.results.records import doubts_mass
+from dynakin.results.records import REFUSED, doubts_mass
 
 # RMS distance of the model's markers, mm, below which they fit: the paper's own figure.
 FITTING_MM = 15.0
 # Expected one frame ahead against seen: further apart than this, the estimate follows the measurements.
 FOLLOWING = 4.0
+
+# A sensor that is refused for less than this, s, is a note.
+BRIEF_S = 0.1
 
 Level = Literal["good", "note", "warning"]
 Metrics = dict[str, Any]
@@ -32,11 +39,18 @@ PLATE_WORDS = ("The plates are ", "Warning: the plates carry ")
 # What to do, in the words of a laboratory.
 ADVICE = {
     "follows": "Look at --live-like estimates with care; smoothed ones (the default) do not follow single frames.",
+    "follows, no smoother": "Take --preset default, which is smoothed: these settings follow single frames.",
     "conservative": "Nothing need be done. For narrower intervals fit the noise to your laboratory with dynakin tune, "
     "and give what it writes as --preset.",
     "overconfident": "Look at the film whether {worst}, which fits worst, is loose, swapped or shifted, and leave it "
     "out if so. If none is, fit the noise to your laboratory with dynakin tune, and give what it writes as --preset.",
+    "overconfident, calibrated": "Look at the film whether {worst}, which fits worst, is loose, swapped or shifted, and "
+    "leave it out if so.",
+    "overconfident, plates": "Look with dynakin check whether the plates lie where they should, what bears on them, "
+    "and whether the mass is right.",
     "speeds": "Run it without --live-like or --lag: a live estimate steps where a measurement corrects it.",
+    "speeds, no smoother": "Take --preset default, which is smoothed: with these settings an estimate steps where a "
+    "measurement corrects it.",
     "speeds, smoothed": "Use angles and moments only; before you use speeds, fit the noise to your laboratory with "
     "dynakin tune.",
     "plates": "Look with dynakin check which plates are read, where they lie, and what bears on them.",
@@ -203,7 +217,7 @@ def _prediction(estimate: Estimate, metrics: Metrics) -> Insight | None:
         "One frame ahead",
         f"{text} That is {ratio[worst]:.0f} times as far as after it is seen ({COMPONENT_LABELS[worst][0].lower()}): "
         "the good fit above comes from following each measurement, less from a model that explains the movement.",
-        ADVICE["follows"],
+        _advice("follows", estimate),
     )
 
 
@@ -214,8 +228,24 @@ def _consistency(estimate: Estimate, metrics: Metrics) -> Insight | None:
     if found.judgement is None:
         return Insight("note", "Uncertainty", found.verdict)
     levels: dict[str, Level] = {"consistent": "good", "conservative": "note", "overconfident": "warning"}
-    advice = ADVICE.get(found.judgement, "").format(worst=_worst_marker(estimate, metrics))
+    advice = ADVICE[_case(found)].format(worst=_worst_marker(estimate, metrics)) if _case(found) else ""
     return Insight(levels[found.judgement], "Uncertainty", found.verdict, advice)
+
+
+def _case(found: Consistency) -> str:
+    """Which of `ADVICE` helps; empty where none is needed."""
+    if found.judgement != "overconfident":
+        return "conservative" if found.judgement == "conservative" and found.noise == "declared" else ""
+    by_plates = limits()[found.noise]["moments"].overconfident.statistic.startswith("wrench")
+    if by_plates and found.judgements.get("motion") != "overconfident":
+        return "overconfident, plates"
+    return "overconfident" if found.noise == "declared" else "overconfident, calibrated"
+
+
+def _advice(name: str, estimate: Estimate) -> str:
+    """Of an estimate that is not smoothed: what can be done with the settings that it has."""
+    constraint = estimate.config.get("noise", {}).get("constraint")
+    return ADVICE[name if constraint in (None, *SMOOTHED_WITH) else f"{name}, no smoother"]
 
 
 def _worst_marker(estimate: Estimate, metrics: Metrics) -> str:
@@ -225,7 +255,7 @@ def _worst_marker(estimate: Estimate, metrics: Metrics) -> str:
 
 def _speeds(estimate: Estimate, metrics: Metrics) -> Insight | None:
     _, verdict = speed_consistency(estimate, evaluation_window(estimate.time))
-    advice = ADVICE["speeds, smoothed" if estimate.smoothed else "speeds"]
+    advice = ADVICE["speeds, smoothed"] if estimate.smoothed else _advice("speeds", estimate)
     return Insight("warning", "Speeds", verdict, advice) if verdict else None
 
 
@@ -353,7 +383,18 @@ def _gated(estimate: Estimate, metrics: Metrics) -> Insight | None:
     if not gated:
         return None
     shown = [e.message if not e.subject or e.subject in e.message else f"{e.subject} {e.message}" for e in gated]
-    return Insight("warning", "Left out or reset", f"{listed(shown, 4)}.", ADVICE["left out"])
+    sensors = all(event.kind == "gated" and event.subject != "motion" for event in gated)
+    level: Level = "note" if sensors and _briefly(estimate) else "warning"
+    return Insight(level, "Left out or reset", f"{listed(shown, 4)}.", ADVICE["left out"])
+
+
+def _briefly(estimate: Estimate) -> bool:
+    """Whether no sensor was refused for `BRIEF_S` or more, all its stretches together."""
+    if "verdict" not in estimate.data:
+        return False
+    frame_s = float(np.median(np.diff(estimate.time)))
+    refused = (estimate.data["verdict"].transpose("time", "sensor").values == REFUSED).sum(axis=0)
+    return bool(refused.max() * frame_s < BRIEF_S)
 
 
 def _locked(estimate: Estimate, metrics: Metrics) -> Insight | None:

@@ -13,8 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 import xarray as xr
+from scipy import stats
 
-from dynakin.results.measures.consistency import CONSISTENT, Judgement, judge, mean_interval_95
+from dynakin.results.measures.consistency import CONSISTENT, INSIDE, Judgement, judge, mean_interval_95
 from dynakin.results.records import Parameter
 
 Array = npt.NDArray[np.float64]
@@ -74,6 +75,8 @@ class Coverage:
         """What the judgement says of the standard deviations: `20 times too large`, `right`."""
         if self.judgement == "consistent":
             return "right"
+        if self.judgement == "overconfident" and self.mean_square <= CONSISTENT[1]:
+            return "too small for part of it"
         return f"{self.factor:.2g} times too {'small' if self.judgement == 'overconfident' else 'large'}"
 
     def verdict(self) -> str:
@@ -135,7 +138,8 @@ def coverage(block: str, names: Sequence[str], error: Array, sd: Array, *, own_m
     Args:
         error, sd: (T, C) estimate less truth, and one standard deviation (above 0), in the same unit.
         own_model: the data were drawn from the filter's own model, so the chi-square interval is strict; otherwise the
-            verdict allows the practical band (0.5 to 2) besides, as for innovations.
+            verdict allows `CONSISTENT` besides (standard deviations of 0.5 to 2.5 times the errors), and is
+            overconfident as well where less than `INSIDE` of the truth is in the 95 % interval, by more than chance.
     """
     z = error / sd
     about_mean = (error - error.mean(axis=0)) / sd
@@ -143,6 +147,10 @@ def coverage(block: str, names: Sequence[str], error: Array, sd: Array, *, own_m
     mean_square, dof = float(square.mean()), float(sum(independent(z[:, k]) for k in range(z.shape[1])))
     low, high = mean_interval_95(dof)
     band = (low, high) if own_model else (min(low, CONSISTENT[0]), max(high, CONSISTENT[1]))
+    inside = np.mean(np.abs(z) <= Z_95, axis=0)
+    judgement = judge(mean_square, band)
+    if not own_model and _too_seldom(float(inside.mean()), dof):
+        judgement = "overconfident"
     rms_error, rms_sd = np.sqrt(np.mean(error**2, axis=0)), np.sqrt(np.mean(sd**2, axis=0))
     with np.errstate(divide="ignore"):
         sd_over_error = rms_sd / rms_error
@@ -153,11 +161,17 @@ def coverage(block: str, names: Sequence[str], error: Array, sd: Array, *, own_m
         mean_square,
         dof,
         (low, high),
-        np.mean(np.abs(z) <= Z_95, axis=0),
+        inside,
         np.mean(np.abs(about_mean) <= Z_95, axis=0) if len(z) > 1 else None,
         sd_over_error,
-        judge(mean_square, band),
+        judgement,
     )
+
+
+def _too_seldom(inside: float, dof: float) -> bool:
+    """Whether the truth is in less than `INSIDE` of the 95 % intervals, and 97.5 % of runs of ``dof`` independent
+    values would have more."""
+    return inside < INSIDE and float(stats.binom.cdf(np.floor(inside * dof), np.floor(dof), 0.95)) < 0.025
 
 
 def independent(z: Array) -> float:

@@ -3,7 +3,8 @@
 Innovations of single frames are mostly the cameras' noise, which hardly moves an angle; what does, skin and geometry,
 lasts longer. Averaged over `AVERAGED_S`, the noise falls and the rest stays. Which statistic speaks for which word, and
 from where on, was found on trials with known truth: ``verdicts.toml``, chosen and judged by
-``benchmarks/verdicts.py``.
+``benchmarks/verdicts.py``. Noise that was calibrated (`dynakin.filter.adapt`) has limits of its own: it makes the
+innovations of single frames right whatever the recording is like.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cache
 from importlib import resources
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
 from scipy import stats
@@ -21,6 +22,7 @@ from scipy import stats
 from dynakin.results.naming import listed
 
 Judgement = Literal["overconfident", "consistent", "conservative"]
+NoiseFrom = Literal["declared", "calibrated"]
 
 SD_OVER_ERROR = (0.5, 2.5)
 """Standard deviations over errors that are called consistent: what a laboratory can plan with. Below, overconfident."""
@@ -63,6 +65,7 @@ class Consistency:
         measured_dof: number of measured rows.
         whiteness_markers, whiteness_wrench: lag-1 autocorrelation of the innovations (see `lag_one`); None if there
             are too few frames.
+        noise: whether its scales are as declared, or were found by innovations.
         statistics: what is judged by (see `statistics_of`); empty where the run kept no covariance of innovations.
         judgements: of each group of `GROUPS`; empty likewise.
         verdict: the same in words.
@@ -73,6 +76,7 @@ class Consistency:
     measured_dof: int
     whiteness_markers: float | None
     whiteness_wrench: float | None
+    noise: NoiseFrom = "declared"
     statistics: Mapping[str, float] = field(default_factory=dict)
     judgements: Mapping[str, Judgement] = field(default_factory=dict)
     verdict: str = ""
@@ -90,6 +94,7 @@ def consistency(
     n_rows: np.ndarray,
     markers: Innovations,
     wrench: Innovations,
+    noise: NoiseFrom = "declared",
 ) -> Consistency:
     """Judge a run.
 
@@ -100,6 +105,7 @@ def consistency(
         markers: (T, N) m, measured less predicted, one column a marker and axis, NaN where missing; and their standard
             deviations, None where they were not kept.
         wrench: (T, K) N or N m, likewise.
+        noise: whose limits hold (`noise_from`).
     """
     used = np.isfinite(nis) & (n_rows > 0)
     dof = int(np.sum(n_rows[used]))
@@ -109,11 +115,21 @@ def consistency(
         dof,
         lag_one(markers[0]),
         lag_one(wrench[0]),
+        noise,
         statistics_of(time, markers, wrench),
     )
-    judgements = {group: judged for group in GROUPS if (judged := judge_group(found.statistics, limits()[group]))}
-    verdict = "Nothing was measured in this window, so nothing can be said." if not dof else _verdict(judgements)
+    judgements = {
+        group: judged for group in GROUPS if (judged := judge_group(found.statistics, limits()[noise][group]))
+    }
+    verdict = "Nothing was measured in this window, so nothing can be said." if not dof else _verdict(judgements, noise)
     return Consistency(**(vars(found) | {"judgements": judgements, "verdict": verdict}))
+
+
+def noise_from(config: Mapping[str, Any]) -> NoiseFrom:
+    """Of a run's settings: calibrated where the scales used were found, by this recording or by that of its preset."""
+    scales = config.get("noise_used") or {}
+    neutral = scales.get("variance_scale", 1.0) == 1.0 and not scales.get("jerk_scale")
+    return "declared" if neutral else "calibrated"
 
 
 def statistics_of(
@@ -156,12 +172,16 @@ def averaged_square(z: np.ndarray, frames: int) -> float | None:
 
 
 @cache
-def limits() -> dict[str, Limits]:
-    """Of each group of `GROUPS`, from ``verdicts.toml``."""
+def limits() -> dict[NoiseFrom, dict[str, Limits]]:
+    """By where the noise is from, of each group of `GROUPS`, from ``verdicts.toml``."""
     text = (resources.files("dynakin.results.measures") / "verdicts.toml").read_text(encoding="utf-8")
+    content = tomllib.loads(text)["limits"]
     return {
-        group: Limits(*(Limit(row[word]["statistic"], row[word]["value"]) for word in Limits._fields))
-        for group, row in tomllib.loads(text)["limits"].items()
+        noise: {
+            group: Limits(*(Limit(row[word]["statistic"], row[word]["value"]) for word in Limits._fields))
+            for group, row in content[noise].items()
+        }
+        for noise in get_args(NoiseFrom)
     }
 
 
@@ -203,7 +223,7 @@ def lag_one(innovations: np.ndarray) -> float | None:
     return float(np.mean(np.sum(first * second, axis=0)[kept] / power[kept]))
 
 
-def _verdict(judgements: Mapping[str, Judgement]) -> str:
+def _verdict(judgements: Mapping[str, Judgement], noise: NoiseFrom) -> str:
     said = {word: [GROUPS[g] for g, j in judgements.items() if j == word] for word in judgements.values()}
     parts = []
     if over := said.get("overconfident"):
@@ -217,7 +237,8 @@ def _verdict(judgements: Mapping[str, Judgement]) -> str:
             "are not the worse for it."
         )
     if not parts and said:
-        parts.append("The standard deviations fit this recording.")
+        to_it = ", to which the noise was calibrated" if noise == "calibrated" else ""
+        parts.append(f"The standard deviations fit this recording{to_it}.")
     return " ".join(parts) or "Innovations were kept without their covariances, so the deviations are not judged."
 
 

@@ -14,7 +14,14 @@ from dynakin.results.estimate import COMPONENTS, Estimate
 from dynakin.results.failures import Failures
 from dynakin.results.measures.adaptation import adaptation
 from dynakin.results.measures.bounds import parameter_bounds
-from dynakin.results.measures.consistency import AVERAGED_S, Consistency, consistency, mismatch_in_words, speed_mismatch
+from dynakin.results.measures.consistency import (
+    AVERAGED_S,
+    Consistency,
+    consistency,
+    mismatch_in_words,
+    noise_from,
+    speed_mismatch,
+)
 from dynakin.results.measures.facing import facing
 from dynakin.results.measures.feet import contact_figures, foot_figures
 from dynakin.results.measures.fit import WrenchFit, marker_rms_mm, wrench_fit
@@ -164,6 +171,7 @@ def window_consistency(estimate: Estimate, window: np.ndarray) -> Consistency:
         estimate.data["n_rows"].values[window],
         (markers[:, :, axes].reshape(len(markers), -1), sd),
         pairs["wrench"],
+        noise_from(estimate.config),
     )
 
 
@@ -188,6 +196,7 @@ def _consistency(estimate: Estimate, window: np.ndarray) -> dict[str, Any]:
         "mean_nis_per_dof": found.mean_nis_per_dof,
         "interval_95": list(found.interval_95) if found.interval_95 else None,
         "measured_dof": found.measured_dof,
+        "noise": found.noise,
         "judgement": found.judgement,
         "judgements": dict(found.judgements),
         "statistics": {
