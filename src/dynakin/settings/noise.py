@@ -160,8 +160,8 @@ class Noise(Strict, use_attribute_docstrings=True):
     """Standard deviation of a coordinate (rad or m) beyond which an update is linearised anew; not given: never."""
 
     adapt: bool | None = Field(default=None, examples=[True])
-    """Whether the two scales below are found in the recording, by its innovations, where it is smoothed. Not given: of
-    a model that is fixed nowhere. A preset of one's own (a file) fixes them, unless it says true."""
+    """Whether the two scales below are found in the recording, by its innovations; never in a live session. Not given:
+    of a model that is fixed nowhere. A preset of one's own (a file) fixes them, unless it says true."""
     variance_scale: Positive = scale(1.0, "1", "all noise but that of the plates")
     """Factor on every variance, prior ones too, but those of plates and residual. The movement is weighed as
     before: what changes is how sure of it the filter is, and how much it weighs beside the plates. A factor below 1
