@@ -280,7 +280,8 @@ def toml(limits: AllLimits, trials: int, judged: int) -> str:
     lines = [
         "# When a run is called conservative or overconfident. Written by `benchmarks/verdicts.py --write`: chosen on",
         f"# {trials} trials with known truth, judged on {judged} others (docs/validation.md).",
-        "# A statistic is one of `statistics_of`; conservative below its value, overconfident above.",
+        "# A statistic is one of `statistics_of`; conservative below its value, overconfident above. Where no threshold",
+        f"# told a word's runs from others, its value lies beyond all of the first by a factor of {ROOM:g}.",
     ]
     for noise, groups in limits.items():
         for group, own in groups.items():

@@ -19,7 +19,7 @@ from dynakin.report.plot import new_axes, thin, to_svg
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import Estimate
-from dynakin.results.measures.consistency import Consistency
+from dynakin.results.measures.consistency import Consistency, Judgement
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.naming import listed, number
 from dynakin.results.records import REFUSED, Event, EventKind
@@ -178,18 +178,31 @@ def test_a_marker_that_stands_out_gets_advice(estimate: Estimate) -> None:
     [(0.7, "good", ""), (0.05, "note", "Nothing need be done"), (4.0, "warning", "Look at the film whether RKNE")],
 )
 def test_deviations_that_are_wrong_get_one_action(estimate: Estimate, size: float, level: str, advice: str) -> None:
-    rng = np.random.default_rng(5)
+    kept = with_innovations(estimate, size, np.random.default_rng(5))
+    metrics = compute_metrics(kept)
+    metrics["markers"]["rms_mm"]["S1:RKNE"] = 60.0
+    found = {insight.title: insight for insight in insights(kept, metrics)}["Uncertainty"]
+    assert found.level == level and found.advice.startswith(advice) and bool(found.advice) == bool(advice)
+
+
+def test_noise_far_above_the_declared_is_no_clean_word(estimate: Estimate) -> None:
+    for scale, level in ((0.2, "good"), (5.0, "note")):
+        rng = np.random.default_rng(5)
+        made = with_innovations(estimate, 1.0, rng)
+        made = replace(made, config=made.config | {"noise_used": {"variance_scale": scale, "jerk_scale": {}}})
+        said = {insight.title: insight for insight in insights(made, compute_metrics(made))}["Uncertainty"]
+        assert said.level == level and ("2.2 times as large as declared" in said.text) == (level == "note")
+
+
+def with_innovations(estimate: Estimate, size: float, rng: np.random.Generator) -> Estimate:
+    """White ones, ``size`` times as large as their deviations."""
     data = estimate.data
     sizes = {name: data[f"{name}_measured"] for name in ("markers", "wrench")}
     white = {f"{name}_innovation": like.copy(data=size * rng.normal(size=like.shape)) for name, like in sizes.items()}
     white |= {f"{name}_innovation_sd": like.copy(data=np.ones(like.shape)) for name, like in sizes.items()}
     sensors = len(estimate.marker_names) + 1
     verdict = ("time", "sensor"), np.ones((len(estimate.time), sensors), dtype=int)
-    kept = replace(estimate, data=data.drop_vars("verdict", errors="ignore").assign(white | {"verdict": verdict}))
-    metrics = compute_metrics(kept)
-    metrics["markers"]["rms_mm"]["S1:RKNE"] = 60.0
-    found = {insight.title: insight for insight in insights(kept, metrics)}["Uncertainty"]
-    assert found.level == level and found.advice.startswith(advice) and bool(found.advice) == bool(advice)
+    return replace(estimate, data=data.drop_vars("verdict", errors="ignore").assign(white | {"verdict": verdict}))
 
 
 def refusing(estimate: Estimate, frames: int, kind: EventKind = "gated") -> Insight:
@@ -217,8 +230,11 @@ def test_advice_can_be_followed(estimate: Estimate) -> None:
     assert "--preset default" in said and "live-like" not in said
     said = {i.title: i.advice for i in insights(estimate, metrics)}["One frame ahead"]
     assert "live-like" in said
-    plates = Consistency(1.0, None, 1, None, None, judgements={"motion": "consistent", "moments": "overconfident"})
-    assert insights_module._case(plates) == "overconfident, plates"
+    words: dict[str, Judgement] = {"motion": "consistent", "moments": "overconfident"}
+    plates = Consistency(1.0, None, 1, None, None, "calibrated", judgements=words)
+    assert insights_module._case(plates, fixed=False) == "overconfident, plates"
+    both = replace(plates, judgements=dict.fromkeys(words, "overconfident"))
+    assert insights_module._case(both, fixed=True) == "overconfident, fixed scales"
 
 
 def test_every_warning_names_an_action() -> None:
