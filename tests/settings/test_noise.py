@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import tomli_w
 
 import dynakin
 from dynakin.errors import ConfigError
@@ -169,3 +170,24 @@ def test_an_old_name_is_refused_in_files_and_by_tune(tmp_path: Path) -> None:
         presets.preset(str(tmp_path / "old.toml"))
     with pytest.raises(ConfigError, match="setting 'plate_force' is now called 'plate_force_sd_n'"):
         check_setting("plate_force")
+
+
+@pytest.mark.parametrize("preset", ["default", "own.toml"])
+def test_the_configuration_of_a_run_is_a_preset_with_the_scales_it_found(
+    preset: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("own.toml").write_text("[noise]\nmarker_sd_m = 0.002\nadapt = true\n")
+    used = {"variance_scale": 0.2, "jerk_scale": {"knees": 1.5}}
+    content = {"preset": preset, "noise": {"unseen_sd": 0.4}, "noise_used": used}
+    Path("config.toml").write_text(tomli_w.dumps(content))
+    found = presets.preset("config.toml")
+    assert (found.variance_scale, found.jerk_scale, found.unseen_sd) == (0.2, {"knees": 1.5}, 0.4)
+    assert found.marker_sd_m == (0.002 if preset == "own.toml" else Noise().marker_sd_m)
+    assert not found.calibrates(True)
+
+
+def test_scales_that_are_given_are_not_calibrated_again() -> None:
+    assert Noise().calibrates(True) and not Noise().calibrates(False)
+    assert not Noise(variance_scale=0.2).calibrates(True) and not Noise(jerk_scale={"knees": 2.0}).calibrates(True)
+    assert Noise(variance_scale=0.2, adapt=True).calibrates(False)

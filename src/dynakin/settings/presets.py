@@ -100,8 +100,8 @@ def read_preset(path: Path) -> Noise:
     """
     content = read_toml(path, ConfigError)
     if "noise_used" in content:
-        run = {"base": content.get("preset", "default"), "noise": content.get("noise", {})}
-        content = run | {"noise": run["noise"] | {"adapt": False} | content["noise_used"]}
+        own = content.get("noise", {}) | {"adapt": False} | content["noise_used"]
+        return preset(content.get("preset", "default"), own)
     for key in content:
         if key not in _KEYS:
             raise ConfigError(f"{path}: unknown key {key!r}{nearest(key, _KEYS)}; expected keys: {', '.join(_KEYS)}")
