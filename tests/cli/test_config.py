@@ -40,7 +40,7 @@ def test_every_key_is_printed_with_its_default_and_a_comment() -> None:
     content = tomllib.loads(everything)
     assert set(content) == set(Settings.model_fields) - set(RECORDED)
     config = Settings.of(content, "template")
-    assert config.noise == presets.default().model_dump(mode="json")
+    assert config.noise == presets.default().model_dump(mode="json", exclude_none=True)
     assert config.priors == Priors() and config.bounds == Bounds()
     for key in ("markers", "table", "side", "vertical", "forward", "preset"):
         assert content[key] == Settings.model_fields[key].default

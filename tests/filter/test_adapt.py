@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynakin.filter.adapt import LEAST_FRAMES, Trial, calibrated_noise, nis_per_row
+from dynakin.filter.adapt import LATE_SHARE, LEAST_FRAMES, Trial, calibrated_noise, nis_per_row
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.noise import joint_groups
 from dynakin.filter.prepared import Prepared
@@ -105,9 +105,10 @@ def test_what_was_found_is_written_and_a_preset_fixes_it(tmp_path: Path) -> None
     assert json.loads((tmp_path / "parameters.json").read_text())["noise"]["variance_scale"] == scale
     fixed = planar(Noise(adapt=False, variance_scale=0.5)).run(recording)
     assert fixed.config["noise_used"]["variance_scale"] == 0.5
-    # a model that is fixed in the ground keeps the declared noise unless asked, and nothing is known of what comes live
+    # a model that is fixed in the ground keeps the declared noise unless asked; without a lag less is believed
     assert planar(Noise()).run(recording).config["noise_used"]["variance_scale"] == 1.0
-    assert planar(Noise(adapt=True)).run(recording, lag_s=0.0).config["noise_used"]["variance_scale"] == 1.0
+    at_once = planar(Noise(adapt=True)).run(recording, lag_s=0.0).config["noise_used"]["variance_scale"]
+    assert at_once == pytest.approx(scale**LATE_SHARE)
 
 
 def test_too_few_frames_leave_the_noise_as_declared() -> None:

@@ -158,9 +158,8 @@ def test_fullbody_measured_on_exact_markers_is_the_true_body() -> None:
     estimator = dynakin.Estimator(dynakin.load_model("fullbody", subject=subject, markers="opencap"))
     initial = estimator.start(recording).calibrated
     for name in ("pelvis", "thigh", "shank"):
-        assert initial.x0[initial.names.index(f"length/{name}")] == pytest.approx(
-            trial.truth.parameters[f"length/{name}"], abs=1e-4
-        )
+        (length,) = (parameter for parameter in initial.spec.parameters if parameter.name == name)
+        assert length.value == pytest.approx(trial.truth.parameters[f"length/{name}"], abs=1e-4)
     model, x = _core.Model(initial.spec), np.array(initial.x0)
     lowest = int(np.argmax(data["coordinates"].sel(coordinate="knee_angle_r").values))
     known = ("pelvis", "hip", "knee")

@@ -106,7 +106,8 @@ def angles_figure(estimate: Estimate, comparison: Trial | None = None) -> Figure
             own, half, colour = factor * values[:, k], 2.0 * factor * sd[:, k], styles[side].colour
             if classical is not None:
                 _draw(axes, estimate.time, factor * classical.coordinates[:, k], classical, zorder=3)
-                notes.append(f"RMS difference {number(differences[joint.stem].rms.mean, unit)}")
+                if found := differences.get(joint.stem):  # none where both hold it still
+                    notes.append(f"RMS difference {number(found.rms.mean, unit)}")
             axes.plot(estimate.time, own, color=colour, linewidth=1.2)
             wide = band_is_too_wide(own, 0.5 * half)  # it would press the line flat
             if not wide:
