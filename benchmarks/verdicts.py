@@ -4,11 +4,12 @@
 
 Simulated planar squats, and squats and walks of the whole body, good ones and with one trouble each
 (`known_truth_cases.TROUBLES`), and what dynakin made after TIME, with no option but --lag and --live-like, of truth3d's
-whole trials in FOLDER (its cache; the newest results of each method and options). Of each run: what it can compute itself (`statistics_of`), and its true deviation over error and
-coverage by group. A group *is* overconfident where deviations are below half of the errors or hold the truth in less
-than 85 %, conservative where they are above 2.5 times. For each group and word, of runs with declared noise and with
-calibrated noise apart, the statistic and threshold with the best balanced accuracy on one half of the seeds are taken;
-the tables are of the other. Where no threshold reaches `LEAST_ACCURACY`, the limit lies beyond all runs of that half.
+whole trials in FOLDER (its cache; the newest results of each method and options). Of each run: what it can compute
+itself (`statistics_of`), and its true deviation over error and coverage by group. A group *is* overconfident where
+deviations are below half of the errors or hold the truth in less than 85 %, conservative where they are above 2.5
+times. For each group and word, of runs with declared noise and with calibrated noise apart, the statistic and threshold
+with the best balanced accuracy on one half of the seeds are taken; the tables are of the other. Where no threshold
+reaches `LEAST_ACCURACY`, the limit lies beyond all runs of that half.
 
 ``--write`` puts thresholds into ``results/measures/verdicts.toml`` and the tables into ``docs/validation.md``;
 ``--again`` runs everything anew (else what was kept); ``--kept`` takes only what was kept.
@@ -281,8 +282,8 @@ def toml(limits: AllLimits, trials: int, judged: int) -> str:
     lines = [
         "# When a run is called conservative or overconfident. Written by `benchmarks/verdicts.py --write`: chosen on",
         f"# {trials} trials with known truth, judged on {judged} others (docs/validation.md).",
-        "# A statistic is one of `statistics_of`; conservative below its value, overconfident above. Where no threshold",
-        f"# told a word's runs from others, its value lies beyond all of the first by a factor of {ROOM:g}.",
+        "# A statistic is one of `statistics_of`; conservative below its value, overconfident above. Where no",
+        f"# threshold told a word's runs from others, its value lies beyond all of the first by a factor of {ROOM:g}.",
     ]
     for noise, groups in limits.items():
         for group, own in groups.items():

@@ -30,7 +30,7 @@ def check_lag(lag_s: float, what: str = "lag_s") -> float:
 
 
 def lag_frames(lag_s: float, rate_hz: float) -> int:
-    """How many frames a lag (s, not `ALL_FRAMES`) is: the nearest number within `LONGEST_LAG_S`, one at least but for 0."""
+    """Frames of a lag (s, not `ALL_FRAMES`): the nearest number within `LONGEST_LAG_S`, at least 1 but for 0."""
     return max(1, min(round(lag_s * rate_hz), int(LONGEST_LAG_S * rate_hz))) if lag_s > 0.0 else 0
 
 

@@ -29,8 +29,8 @@ def facing(estimate: Estimate) -> Estimate:
     """The same estimate along the way the person faces; itself where its ground has X forward already.
 
     Positions, vectors, orientations and wrenches are turned about the ground's origin, and the pelvis' three turns
-    where they have OpenSim's names and order, with their speeds. Deviations of vectors are turned as if their components
-    were independent. Translations of the root, accelerations, moments and the filter's own state stay.
+    where they have OpenSim's names and order, with their speeds. Deviations of vectors are turned as if their
+    components were independent. Translations of the root, accelerations, moments and the filter's own state stay.
     """
     ground = estimate.ground.facing()
     turn = ground.rotation @ estimate.ground.rotation.T  # R_FG
