@@ -127,7 +127,7 @@ def test_markers_and_plates_come_in_and_estimates_go_out() -> None:
     director.join(5.0)
     assert live.fusion.clock_offset_s == pytest.approx(-OFFSET_S, abs=0.03)
     assert len(frames) > 200 and len(received) > 50
-    sent = {round(float(f.estimate.coordinates[3]), 9) for f in frames}
+    sent = {round(float(f.published.coordinates[3]), 9) for f in frames if f.published is not None}
     assert all(round(value, 9) in sent for value in received)
     used = [f for f in frames[50:] if f.status.plates == "used"]
     assert len(used) > 0.8 * len(frames[50:])
