@@ -77,8 +77,9 @@ def calibrated_noise(
     if not groups or before is None:
         return _believed(_scaled(noise, ratio), noise, late)
     scaled = _scaled(noise, ratio, jerk_ratios(tracker, arrays, trial.time, chosen, groups))
+    time, markers, wrench, contacts = trial.first(end)
     try:
-        again = tracker.changed(scaled).run_arrays(*trial.first(end)[:3], None, trial.first(end).contacts)
+        again = tracker.changed(scaled).run_arrays(time, markers, wrench, None, contacts)
     except DivergenceError:  # with other jerk: the factor alone leaves the movement as it is
         return _believed(_scaled(noise, ratio), noise, late)
     after = nis_per_row(again, chosen[:end])

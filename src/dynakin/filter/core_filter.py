@@ -17,7 +17,6 @@ from dynakin.settings.noise import Noise
 
 Array = npt.NDArray[np.float64]
 
-
 _FOUND_SD = {"coordinate_sd": 0.5, "speed_sd": 2.0, "acceleration_sd": 20.0}
 """Of a motion that is begun again: rad or m, a second, a second squared, by the declared variances."""
 

@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.bindings import _core
+from dynakin.model.calibration.pose_start import bare
 
 Array = npt.NDArray[np.float64]
 Kind = Literal["hinge_centre", "ball_centre", "hinge_axes", "ball_axes", "root"]
@@ -48,7 +49,7 @@ class JointErrors:
             reference: (C,) posture in which the bones were found: there a misplaced joint displaces no bone but its
                 own.
         """
-        spec = _without_parameters(spec)
+        spec = bare(copy(spec))
         orientations = _orientations(spec, reference)
         larger, added = _with_errors(spec)
         found = _sources(spec, orientations)
@@ -76,20 +77,6 @@ class JointErrors:
 def floats(segment: _core.SegmentSpec) -> bool:
     """Whether a segment moves freely in the laboratory."""
     return bool(segment.parent == "ground" and len({axis.coordinate for axis in segment.axes}) == 6)
-
-
-def _without_parameters(spec: _core.ModelSpec) -> _core.ModelSpec:
-    spec = copy(spec)
-    parameters, segments, markers = spec.parameters, spec.segments, spec.markers
-    for parameter in parameters:
-        parameter.estimated = False
-    for segment in segments:
-        segment.inertia_estimated = [False] * 10
-    for marker in markers:
-        marker.estimated = marker.soft_tissue = [False] * 3
-    spec.parameters, spec.segments, spec.markers = parameters, segments, markers
-    spec.wrench_offset, spec.wrench_delay, spec.contacts = [False] * 6, False, []
-    return spec
 
 
 def _orientations(spec: _core.ModelSpec, reference: Array) -> dict[str, Array]:

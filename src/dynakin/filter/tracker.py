@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Collection
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -241,11 +241,7 @@ class Tracker:
         Raises:
             DivergenceError: the filter lost its estimate; the message names the frame.
         """
-        time, markers, wrench = (np.ascontiguousarray(values) for values in (time, markers, wrench))
-        wrench, given = self._given(wrench, feet)
-        arrays = self._filter.run(time, markers, wrench, progress, output_sd=True, **given)
-        self._time, self._latest = float(time[-1]), None
-        return arrays
+        return self._run(partial(self._filter.run, output_sd=True), (time, markers, wrench), (progress,), feet)
 
     def run_smoothed_arrays(
         self,
@@ -261,11 +257,7 @@ class Tracker:
             ConfigError: the bounds are kept in a way that has no smoother. DivergenceError: as `run_arrays`.
         """
         check_can_smooth(self.noise)
-        time, markers, wrench = (np.ascontiguousarray(values) for values in (time, markers, wrench))
-        wrench, given = self._given(wrench, feet)
-        arrays = self._filter.run_smoothed(time, markers, wrench, progress, **given)
-        self._time, self._latest = float(time[-1]), None
-        return smoothed(arrays)
+        return smoothed(self._run(self._filter.run_smoothed, (time, markers, wrench), (progress,), feet))
 
     def run_lagged_arrays(
         self,
@@ -283,11 +275,7 @@ class Tracker:
             ConfigError, DivergenceError: as `run_smoothed_arrays`.
         """
         check_can_smooth(self.noise)
-        time, markers, wrench = (np.ascontiguousarray(values) for values in (time, markers, wrench))
-        wrench, given = self._given(wrench, feet)
-        arrays = self._filter.run_lagged(time, markers, wrench, lag, progress, **given)
-        self._time, self._latest = float(time[-1]), None
-        return smoothed(arrays)
+        return smoothed(self._run(self._filter.run_lagged, (time, markers, wrench), (lag, progress), feet))
 
     def run_late_arrays(
         self,
@@ -309,6 +297,20 @@ class Tracker:
         if not frames:
             return self.run_arrays(time, markers, wrench, progress, feet)
         return self.run_lagged_arrays(time, markers, wrench, frames, progress, feet)
+
+    def _run(
+        self,
+        run: Callable[..., dict[str, Array]],
+        measured: tuple[Array, Array, Array],
+        how: tuple[Any, ...],
+        feet: ContactLoads | None,
+    ) -> dict[str, Array]:
+        """One of the core's runs over time, markers and wrench, from the present state."""
+        time, markers, wrench = (np.ascontiguousarray(values) for values in measured)
+        wrench, given = self._given(wrench, feet)
+        arrays = run(time, markers, wrench, *how, **given)
+        self._time, self._latest = float(time[-1]), None
+        return arrays
 
     def _given(self, wrench: Array, feet: ContactLoads | None) -> tuple[Array, dict[str, Any]]:
         """The total wrench, and how it and the contacts are known: what these sum up to where there are any."""
