@@ -408,6 +408,11 @@ def moment_jacobian(model: Model, x: Annotated[NDArray[numpy.float64], dict(shap
     d joint_moments / dx (C, n), N m or N per unit of x; the external wrenches (S, 6) stay while x varies.
     """
 
+def fit_posture(model: Model, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], targets: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')], lower: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], upper: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], scale: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], pull: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], rest: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]) -> tuple:
+    """
+    Free coordinates (F,) that bring the markers nearest to targets (M, 3), m, ground frame (NaN: not measured), within bounds (F,), from those of x (n,), of which all else stays; half the sum of squares, of distances and of pull * (q - rest) (F,); whether that is a minimum.
+    """
+
 def marker_jacobian(model: Model, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)]) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C')]:
     """d p_GM / dx (3 M, n), dense: for tests and study."""
 

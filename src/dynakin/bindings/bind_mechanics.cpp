@@ -9,6 +9,7 @@
 #include "arrays.hpp"
 #include "dynakin/measurement.hpp"
 #include "dynakin/moment_derivatives.hpp"
+#include "dynakin/posture_fit.hpp"
 #include "module.hpp"
 
 using namespace dynakin;
@@ -146,6 +147,16 @@ nb::tuple coordinates(const Model& model, const StateRef& x) {
   return nb::make_tuple(q, qd, qdd);
 }
 
+nb::tuple fitted(const Model& model, const Eigen::VectorXd& x, const RowMatrix& targets, const Eigen::VectorXd& lower,
+                 const Eigen::VectorXd& upper, const Eigen::VectorXd& scale, const Eigen::VectorXd& pull,
+                 const Eigen::VectorXd& rest) {
+  check_size(model, x);
+  if (targets.cols() != 3) throw std::invalid_argument("targets: expected three columns");
+  const PostureProblem problem{targets.transpose(), lower, upper, scale, pull, rest};
+  const PostureFit fit = fit_posture(model, x, problem, x.head(model.n_free()));
+  return nb::make_tuple(fit.q, fit.cost, fit.converged);
+}
+
 }  // namespace
 
 void bind_mechanics(nb::module_& m) {
@@ -163,6 +174,11 @@ void bind_mechanics(nb::module_& m) {
         "Joint moments (1), (C,), N m or N, less the external wrenches (S, 6) that act on the segments, if given.");
   m.def("moment_jacobian", &dense_moment_jacobian, model, x, nb::arg("external") = nb::none(),
         "d joint_moments / dx (C, n), N m or N per unit of x; the external wrenches (S, 6) stay while x varies.");
+  m.def("fit_posture", &fitted, model, x, nb::arg("targets"), nb::arg("lower"), nb::arg("upper"), nb::arg("scale"),
+        nb::arg("pull"), nb::arg("rest"),
+        "Free coordinates (F,) that bring the markers nearest to targets (M, 3), m, ground frame (NaN: not measured), "
+        "within bounds (F,), from those of x (n,), of which all else stays; half the sum of squares, of distances and "
+        "of pull * (q - rest) (F,); whether that is a minimum.");
   m.def("marker_jacobian", &dense_marker_jacobian, model, x, "d p_GM / dx (3 M, n), dense: for tests and study.");
   m.def("wrench_jacobian", &dense_wrench_jacobian, model, x, "d wrench / dx (6, n), dense: for tests and study.");
   m.def("plates", &plates, model, x,

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from dynakin.bindings import _core
 from dynakin.model.plan import ModelPlan
+from dynakin.model.schema import Segment
 
 Array = npt.NDArray[np.float64]
 
@@ -38,16 +39,7 @@ def to_core(plan: ModelPlan) -> _core.ModelSpec:
                 _core.LengthTerm(parameter=term.length, direction=direction)
                 for term, direction in zip(s.placement, geometry.directions[s.name], strict=True)
             ],
-            axes=[
-                _core.AxisSpec(
-                    coordinate=axis.coordinate,
-                    kind=axis.kind,
-                    direction=np.array(axis.direction) / np.linalg.norm(axis.direction),
-                    coefficients=list(axis.coefficients),
-                    scale=axis.scale,
-                )
-                for axis in s.axes
-            ],
+            axes=axes_to_core(s),
             inertia=plan.bodies[s.name].vector,
             inertia_estimated=list(plan.estimated_inertia(s.name)),
         )
@@ -68,6 +60,20 @@ def to_core(plan: ModelPlan) -> _core.ModelSpec:
         gravity=np.array(model.gravity),
         wrench_measured=planar if model.planar else [True] * 6,
     )
+
+
+def axes_to_core(segment: Segment) -> list[_core.AxisSpec]:
+    """Of the joint by which a segment hangs."""
+    return [
+        _core.AxisSpec(
+            coordinate=axis.coordinate,
+            kind=axis.kind,
+            direction=np.array(axis.direction) / np.linalg.norm(axis.direction),
+            coefficients=list(axis.coefficients),
+            scale=axis.scale,
+        )
+        for axis in segment.axes
+    ]
 
 
 def in_layout(names: list[str], values: Mapping[str, float], otherwise: float) -> Array:

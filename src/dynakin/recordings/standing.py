@@ -45,8 +45,18 @@ def standing_window(recording: Recording) -> slice | None:
     speeds = marker_speeds(recording)
     still = np.zeros(recording.n_frames, dtype=bool)
     seen = np.isfinite(speeds).any(axis=1)
-    still[seen] = np.nanpercentile(speeds[seen], 90, axis=1) < STILL_SPEED_M_S
+    still[seen] = _percentile_90(speeds[seen]) < STILL_SPEED_M_S
     for start, stop in runs(still):
         if recording.time[stop - 1] - recording.time[start] >= MIN_STILL_S - 1.5 / recording.rate:
             return slice(start, stop)
     return None
+
+
+def _percentile_90(values: Array) -> Array:
+    """(T,) of the finite ones of each row (T, M); `np.nanpercentile` takes a hundred times as long."""
+    ordered = np.sort(values, axis=1)  # NaN last
+    place = 0.9 * (np.count_nonzero(np.isfinite(values), axis=1) - 1)
+    below = np.floor(place).astype(int)
+    rows = np.arange(len(values))
+    low, high = ordered[rows, below], ordered[rows, np.ceil(place).astype(int)]
+    return np.asarray(low + (place - below) * (high - low))

@@ -1,7 +1,7 @@
 """Coordinates of a spatial model that fit measured marker places: a start from any pose and heading.
 
 The body is laid on the markers as a whole (Kabsch 1976, Acta Cryst A32:922-923), then all free coordinates are fitted
-by bounded least squares with the core's analytic derivatives; limbs that do not fit are started again elsewhere.
+by the core's bounded least squares; limbs that do not fit are started again elsewhere.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
+from dynakin.model.calibration.joint_fit import joint_coordinates, wrapped
 from dynakin.model.schema import Interval
 
 Array = npt.NDArray[np.float64]
@@ -150,6 +150,8 @@ class _Body:
         self.segment_of = [[s.name for s in spec.segments].index(m.segment) for m in spec.markers]
         self.pull = np.where(self.turns, _REST, 0.0)
         self.pull[self.base] = 0.0
+        self.scale = np.where(self.turns, 1.0, _ARM)
+        self.targets = np.where(self.rows, measured, np.nan)
 
     @property
     def floating(self) -> bool:
@@ -165,34 +167,13 @@ class _Body:
         gap = _core.marker_positions(self.model, self.state(q)) - self.measured
         return np.where(self.seen, np.sqrt((np.where(self.rows, gap, 0.0) ** 2).sum(axis=1)), np.nan)
 
-    def residual(self, q: Array) -> Array:
-        gap = (_core.marker_positions(self.model, self.state(q)) - self.measured)[self.rows]
-        return np.concatenate([np.asarray(gap), self.pull * (q - self.rest)])
-
-    def jacobian(self, q: Array) -> Array:
-        rows = _core.marker_jacobian(self.model, self.state(q))[self.rows.ravel(), : self.n_free]
-        return np.vstack([rows, np.diag(self.pull)])
-
     def solve(self, start: Array, wrap: bool = True) -> _Fit:
         """Bounded least squares over all free coordinates."""
-        free = self.lower < self.upper
-        q = np.clip(start, self.lower, self.upper)
-
-        def full(part: Array) -> Array:
-            q[free] = part
-            return q
-
-        found = least_squares(
-            lambda part: self.residual(full(part)),
-            q[free],
-            jac=lambda part: self.jacobian(full(part))[:, free],
-            bounds=(self.lower[free], self.upper[free]),
-            x_scale=np.where(self.turns[free], 1.0, _ARM),
-            max_nfev=200,
+        end, _, _ = _core.fit_posture(
+            self.model, self.state(start), self.targets, self.lower, self.upper, self.scale, self.pull, self.rest
         )
-        end = full(found.x).copy()
         endless = self.turns & np.isinf(self.lower) & np.isinf(self.upper) & wrap
-        end[endless] = (end[endless] + np.pi) % (2.0 * np.pi) - np.pi
+        end[endless] = wrapped(end[endless])
         return _Fit(end, float(np.sqrt(np.nanmean(self.distances(end) ** 2))))
 
     def fit(self, guess: Array | None = None) -> _Fit:
@@ -232,31 +213,12 @@ class _Body:
     def moved(self, turn: Array, shift: Array) -> Array:
         """The rest posture carried along by a rigid motion: the root's coordinates for p -> turn p + shift."""
         R, p = (part[self.roots[0]] for part in _core.segment_poses(self.model, self.state(self.rest)))
-        R_to, p_to = turn @ R, turn @ p + shift
-
-        def gap(part: Array) -> Array:
-            q = self.rest.copy()
-            q[self.base] = part
-            R_now, p_now = (a[self.roots[0]] for a in _core.segment_poses(self.model, self.state(q)))
-            return np.concatenate([p_now - p_to, _ARM * (R_now - R_to).ravel()])
-
-        angles = self.turns[self.base]
-        best, least = self.rest.copy(), (np.inf, np.inf)
-        for k in range(-1, 3 * int(angles.sum())):  # half a turn off is a saddle: quarter turns of each angle too
-            start = self.rest[self.base].copy()
-            if k >= 0:
-                start[np.flatnonzero(angles)[k // 3]] += 0.5 * np.pi * (k % 3 + 1)
-            found = least_squares(gap, start)
-            # Three angles have two readings of every pose; the one with the smaller turns is meant.
-            for end in (found.x, _other_reading(found.x, angles)):
-                end = np.where(angles, (end + np.pi) % (2.0 * np.pi) - np.pi, end)
-                cost = 0.5 * float((gap(end) ** 2).sum())
-                rank = (round(cost, 9), float(np.abs(end - self.rest[self.base])[angles].sum()))
-                if rank < least:
-                    least, best[self.base] = rank, end
-            if least[0] == 0.0:
-                break
-        return np.asarray(best)
+        spec, free = self.model.spec, _free(self)
+        target = (turn @ R, turn @ p + shift)
+        found = joint_coordinates(spec.segments[self.roots[0]], free, target, spec.parameters)
+        q: Array = self.rest.copy()
+        q[self.base] = [found[free[k].name] for k in self.base]
+        return q
 
     def mended(self, fit: _Fit) -> _Fit:
         """Starts the joints above the segment that fits worst again, elsewhere within their limits."""
@@ -276,16 +238,6 @@ class _Body:
             found = self.solve(start)
             fit = found if found.rms < fit.rms else fit
         return fit
-
-
-def _other_reading(values: Array, angles: npt.NDArray[np.bool_]) -> Array:
-    """The same pose by three turns about axes at right angles to each other: half a turn more, the middle one's
-    supplement, half a turn more."""
-    found = values.copy()
-    turns = np.flatnonzero(angles)
-    if len(turns) == 3:
-        found[turns] = [values[turns[0]] + np.pi, np.pi - values[turns[1]], values[turns[2]] + np.pi]
-    return found
 
 
 def laid(points: Array, targets: Array) -> tuple[Array, Array] | None:

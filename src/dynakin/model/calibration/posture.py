@@ -8,21 +8,19 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
+from dynakin.bindings import _core
 from dynakin.errors import ModelError
+from dynakin.model.calibration.joint_fit import joint_coordinates
 from dynakin.model.plan import Geometry
 from dynakin.model.schema import Axis, Frame, ModelFile, Segment
+from dynakin.model.spec import axes_to_core
 
 Array = npt.NDArray[np.float64]
 
 
 _LEAST_M, _LEAST_SINE = 1e-3, 1e-3
-
-
-_EXACT = 1e-20
-"""Cost of a joint's fit that meets its target: rotations to 1e-10."""
 
 
 def axes_from(main: str, direction: Array, second: str = "", second_direction: Array | None = None) -> Array:
@@ -97,29 +95,13 @@ def solve_joint(
 ) -> dict[str, float]:
     """Coordinates of a joint that come nearest to a rotation (3, 3) and translation (3,) of the child in the
     joint frame."""
-    free = list(dict.fromkeys(axis.coordinate for axis in segment.axes if axis.coordinate not in fixed))
-    if not free:
-        return {}
-    kinds = {axis.coordinate: axis.kind for axis in segment.axes}
-
-    def residual(q: Array) -> Array:
-        rotation, translation = joint_motion(segment.axes, {**fixed, **dict(zip(free, q, strict=True))}, lengths)
-        return np.concatenate([(rotation - target[0]).ravel(), translation - target[1]])
-
-    starts = [np.zeros(len(free))]
-    for k, name in enumerate(free):  # from a third of a turn either way too: half a turn off is a saddle
-        if kinds[name] == "rotation":
-            starts += [np.eye(len(free))[k] * angle for angle in (2.1, -2.1)]
-    fits = []
-    for start in starts:
-        fits.append(least_squares(residual, start, xtol=1e-14, ftol=1e-14, gtol=1e-14))
-        if fits[0].cost < _EXACT and np.abs(fits[0].x).max() < 0.5 * np.pi:
-            break  # no other reading has smaller turns
-    best = min(fits, key=lambda fit: (round(float(fit.cost), 12), float(np.abs(fit.x).sum())))
-    wrapped = [
-        (v + np.pi) % (2 * np.pi) - np.pi if kinds[n] == "rotation" else v for n, v in zip(free, best.x, strict=True)
-    ]
-    return dict(zip(free, map(float, wrapped), strict=True))
+    names = dict.fromkeys(axis.coordinate for axis in segment.axes)
+    coordinates = [_core.CoordinateSpec(name, fixed.get(name, 0.0), name in fixed) for name in names]
+    used = dict.fromkeys(axis.scale for axis in segment.axes if axis.scale)
+    parameters = [_core.ParameterSpec(name, lengths[name]) for name in used]
+    return joint_coordinates(
+        _core.SegmentSpec(segment.name, axes=axes_to_core(segment)), coordinates, target, parameters
+    )
 
 
 @dataclass

@@ -149,16 +149,16 @@ def _patterns(given: str | Iterable[str] | Mapping[str, Any]) -> tuple[str, ...]
 
 def _possible(landmarks: Mapping[str, Any], markers: set[str], own: Mapping[str, Any]) -> dict[str, Any]:
     """Recipes without those of the shared ones that need a place or landmark which the set does not have."""
-    kept = dict(landmarks)
+    kept = {
+        name: [(recipe, set() if name in own else _needs(recipe)) for recipe in recipes]
+        for name, recipes in landmarks.items()
+    }
     while True:
         known = markers | set(kept)
-        next_kept = {
-            name: fits
-            for name, recipes in kept.items()
-            if (fits := recipes if name in own else [r for r in recipes if _needs(r) <= known])
-        }
-        if next_kept == kept:
-            return kept
+        fits = {name: [each for each in recipes if each[1] <= known] for name, recipes in kept.items()}
+        next_kept = {name: recipes for name, recipes in fits.items() if recipes}
+        if sum(map(len, next_kept.values())) == sum(map(len, kept.values())):
+            return {name: [recipe for recipe, _ in recipes] for name, recipes in next_kept.items()}
         kept = next_kept
 
 

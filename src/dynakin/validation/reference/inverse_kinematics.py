@@ -1,15 +1,14 @@
 """Inverse kinematics as it is commonly run: each frame by itself, least squares of all markers with equal weights.
 
 The problem is that of OpenSim's tool (Delp et al. 2007, IEEE Trans Biomed Eng 54:1940-1950; Lu and O'Connor 1999,
-J Biomech 32:129-134): markers fixed in rigid segments, joints within their ranges, no time. It is solved here by
-Gauss-Newton on the core's derivatives, from the frame before.
+J Biomech 32:129-134): markers fixed in rigid segments, joints within their ranges, no time. The core's least squares
+solves it, from the frame before.
 """
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy.linalg import cho_factor, cho_solve
 
 from dynakin.bindings import _core
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -20,9 +19,6 @@ Array = npt.NDArray[np.float64]
 FEWEST_MARKERS = 3
 _HOLD_M = 1e-4
 """m a radian: what no marker shows stays as it was the frame before; of what one shows it takes a millionth."""
-_STEP = 1e-8  # rad or m: a smaller step ends a frame
-_MOST_STEPS = 60
-_DAMPED, _MOST_DAMPED = 1e-4, 1e8  # share of the diagonal that is added where a full step does not descend
 
 
 def fixed_model(calibrated: CalibratedModel) -> _core.Model:
@@ -63,41 +59,16 @@ class _FrameFit:
         at = [calibrated.names.index(coordinate.name) for coordinate in coordinates]
         self.lower, self.upper, self.start = calibrated.lower[at], calibrated.upper[at], calibrated.x0[at]
         turns = {a.coordinate for s in self.model.spec.segments for a in s.axes if a.kind == "rotation"}
-        self.hold = np.array([_HOLD_M**2 if coordinate.name in turns else 0.0 for coordinate in coordinates])
+        self.hold = np.array([_HOLD_M if coordinate.name in turns else 0.0 for coordinate in coordinates])
+        self.scale = np.ones(len(at))
         self.state = np.zeros(self.model.layout.size)
 
     def solve(self, before: Array, measured: Array) -> Array:
         """Coordinates (F,) of one frame (M, 3), from those of the frame before."""
-        seen = np.isfinite(measured).all(axis=1)
-        rows = np.repeat(seen, 3)
-
-        def gap(q: Array) -> tuple[Array, float]:
-            self.state[: len(q)] = q
-            away = (_core.marker_positions(self.model, self.state) - measured)[seen].ravel()
-            return away, float(away @ away + self.hold @ (q - before) ** 2)
-
-        q = np.clip(before, self.lower, self.upper)
-        away, cost = gap(q)
-        damping = 0.0
-        for _ in range(_MOST_STEPS):
-            self.state[: len(q)] = q
-            J = _core.marker_jacobian(self.model, self.state)[rows, : len(q)]
-            gradient = J.T @ away + self.hold * (q - before)
-            free = ~(((q <= self.lower) & (gradient > 0.0)) | ((q >= self.upper) & (gradient < 0.0)))
-            H = J[:, free].T @ J[:, free] + np.diag(self.hold[free])
-            while True:
-                step = np.zeros(len(q))
-                factor = cho_factor(H + damping * np.diag(np.diag(H)))
-                step[free] = -cho_solve(factor, gradient[free])
-                trial = np.clip(q + step, self.lower, self.upper)
-                trial_away, trial_cost = gap(trial)
-                if trial_cost <= cost or damping > _MOST_DAMPED:
-                    break
-                damping = max(10.0 * damping, _DAMPED)
-            moved = float(np.abs(trial - q).max())
-            if trial_cost <= cost:
-                q, away, cost = trial, trial_away, trial_cost
-                damping = 0.0 if damping < _DAMPED else 0.1 * damping
-            if moved < _STEP or trial_cost > cost:
-                break
-        return q
+        self.state[: len(before)] = before
+        seen = np.isfinite(measured).all(axis=1, keepdims=True)
+        q, _, _ = _core.fit_posture(
+            self.model, self.state, np.where(seen, measured, np.nan), self.lower, self.upper, self.scale, self.hold,
+            before,
+        )  # fmt: skip
+        return np.asarray(q)
