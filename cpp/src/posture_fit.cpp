@@ -13,7 +13,7 @@ namespace {
 constexpr int k_most_steps = 200;
 constexpr double k_first_damping = 1e-3;  // of the largest diagonal element
 constexpr double k_small_step = 1e-11;    // scaled: rad, or 3e-12 m
-constexpr double k_small_gain = 1e-13;    // of the cost
+constexpr double k_small_cosine = 1e-9;   // between what is left and what a coordinate could take off it
 constexpr double k_rounding = 1e-26;      // m^2: markers that are met to rounding
 
 class Problem {
@@ -101,7 +101,10 @@ PostureFit fit_posture(const Model& model, const Eigen::VectorXd& x0, const Post
                         (fit.q(i) >= problem.upper(i) && gradient(i) < 0.0);
       if (!held) free.push_back(i);
     }
-    if (free.empty() || fit.cost < k_rounding) {
+    double cosine = 0.0;
+    for (const Eigen::Index i : free)
+      if (H(i, i) > 0.0) cosine = std::max(cosine, std::abs(gradient(i)) / std::sqrt(2.0 * fit.cost * H(i, i)));
+    if (free.empty() || fit.cost < k_rounding || cosine < k_small_cosine) {
       fit.converged = true;
       break;
     }
@@ -118,7 +121,7 @@ PostureFit fit_posture(const Model& model, const Eigen::VectorXd& x0, const Post
     const double cost = residual.cost(next);
     const double gain = fit.cost - cost;
     if (gain >= 0.0) {
-      fit.converged = step.cwiseAbs().maxCoeff() < k_small_step || expected <= k_small_gain * fit.cost;
+      fit.converged = step.cwiseAbs().maxCoeff() < k_small_step;
       fit.q = next;
       fit.cost = cost;
       residual.linearise(fit.q, gradient, H);
