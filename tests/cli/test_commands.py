@@ -152,7 +152,7 @@ def test_run_smooths_unless_told_otherwise_and_says_where_it_cannot(
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        (["--lag", "20"], "lag_s is 20.0, expected seconds (no longer frames), 0 to 1, such as 0.05"),
+        (["--lag", "20"], "the lag is 20.0, expected seconds (no longer frames), 0 to 1, such as 0.05"),
         (["--lag", "-1"], "--lag"),
         (["--lag", "nan"], "--lag"),
         (["--lag", "0.05", "--live-like"], "--lag and --live-like: expected one of them"),

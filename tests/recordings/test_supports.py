@@ -9,6 +9,7 @@ import pytest
 
 from dynakin.arrays import runs
 from dynakin.recordings.feet.assignment import foot_loads
+from dynakin.recordings.feet.belt import one_velocity
 from dynakin.recordings.feet.loads import MEASURED, OFF_PLATE, SHARED, SWING, UNKNOWN, FootLoads
 from dynakin.recordings.feet.soles import PASSING_S
 from dynakin.recordings.plates.ground_plate import GroundPlate
@@ -248,3 +249,11 @@ def test_stance_rises_from_touch_down_and_falls_to_toe_off() -> None:
     assert np.abs(np.diff(own)).max() < 1.6 / (PASSING_S * RATE_HZ)
     for (first, end), stance in zip(runs(own > 0.0)[:2], walk(6, 0.6)["right"][:2], strict=True):
         assert abs(first / RATE_HZ - stance.start) < 0.06 and abs(end / RATE_HZ - stance.end) < 0.12
+
+
+def test_a_swing_alone_is_no_belt() -> None:
+    """At 4 m/s a foot passes low over the floor for 0.1 s; what goes on for longer than a swing takes is carried."""
+    low, body = np.ones((100, 2), dtype=bool), np.tile([1.3, 0.0, 0.0], (100, 1))
+    velocity, time = np.tile([4.0, 0.0, 0.0], (100, 2, 1)), np.arange(100) / 100.0
+    assert one_velocity(velocity[:20], low[:20], body[:20], time[:20]) is None
+    np.testing.assert_allclose(one_velocity(velocity, low, body, time), [4.0, 0.0])

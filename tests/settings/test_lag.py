@@ -30,7 +30,7 @@ def test_lags_that_can_be(lag_s: float | None) -> None:
 @pytest.mark.parametrize(
     ("content", "said"),
     [
-        ({"lag_s": 20.0}, r"lag_s is 20.0, expected seconds \(no longer frames\), 0 to 1"),
+        ({"lag_s": 20.0}, r"the lag is 20.0, expected seconds \(no longer frames\), 0 to 1"),
         ({"lag_s": -0.05}, "lag_s: .*greater than or equal to 0"),
         ({"lag_s": math.nan}, "lag_s"),
         ({"lag": 5}, r"unknown key 'lag' \(did you mean 'lag_s'\?\)"),

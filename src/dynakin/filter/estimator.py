@@ -253,8 +253,8 @@ class Estimator:
         """
         recording, calibrated, markers = ready.recording, ready.calibrated, ready.markers
         lag_s, ground, on_feet = ready.lag_s, ready.ground, ready.contacts
-        if 0.0 < lag_s < ALL_FRAMES:
-            lag_s = lag_frames(lag_s, recording.rate) / recording.rate
+        late = None if lag_s == ALL_FRAMES else lag_frames(lag_s, recording.rate)
+        lag_s = ALL_FRAMES if late is None else late / recording.rate
         adapt, notes = ready.tracker.noise.calibrates(bool(calibrated.feet)), list(ground.notes)
         try:
             ways = 2 if lag_s == ALL_FRAMES else int(adapt or lag_s > 0.0)  # over the frames, after the first run
@@ -272,7 +272,7 @@ class Estimator:
                 notes.append("Too few frames are followed to calibrate the noise on them: it is as declared.")
             if lag_s or found:
                 tracker = tracker.changed(found or tracker.noise)
-                arrays = tracker.run_late_arrays(lag_s, *given, back, on_feet)
+                arrays = tracker.run_late_arrays(late, *given, back, on_feet)
         except ValueError as error:  # a frame that the core refuses, named by it
             raise RecordingError(f"{recording.path or recording.name}: {error}") from None
         config = self.settings() | {"lag_s": lag_s, "ground_reasons": list(ground.reasons)}

@@ -21,10 +21,9 @@ from dynakin.filter.step import Codes, Labelled, Labels, StepEstimate, deviation
 from dynakin.filter.systematic import Systematic
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.contact import UNMEASURED
-from dynakin.recordings.recording import rate_of
 from dynakin.results.measures.sources import ABSENT, MEASURED
 from dynakin.results.records import NOT_SMOOTHED
-from dynakin.settings.lag import ALL_FRAMES, LIVE_LAG_S, check_lag, lag_frames
+from dynakin.settings.lag import ALL_FRAMES, LIVE_LAG_S, check_lag
 from dynakin.settings.model import QUANTITIES, Quantity
 from dynakin.settings.noise import Noise
 
@@ -279,24 +278,23 @@ class Tracker:
 
     def run_late_arrays(
         self,
-        lag_s: float,
+        lag: int | None,
         time: Array,
         markers: Array,
         wrench: Array,
         progress: Progress | None = None,
         feet: ContactLoads | None = None,
     ) -> dict[str, Array]:
-        """Each frame estimated with this lag (s; `ALL_FRAMES`: smoothed; 0: as `run_arrays`), to the nearest frame.
+        """Each frame estimated with this lag (frames; None: smoothed; 0: as `run_arrays`).
 
         Raises:
             ConfigError, DivergenceError: as `run_smoothed_arrays`.
         """
-        if lag_s == ALL_FRAMES:
+        if lag is None:
             return self.run_smoothed_arrays(time, markers, wrench, progress, feet)
-        frames = lag_frames(lag_s, rate_of(time)) if lag_s else 0
-        if not frames:
+        if not lag:
             return self.run_arrays(time, markers, wrench, progress, feet)
-        return self.run_lagged_arrays(time, markers, wrench, frames, progress, feet)
+        return self.run_lagged_arrays(time, markers, wrench, lag, progress, feet)
 
     def _run(
         self,

@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from dynakin.errors import OutputError
+from dynakin.errors import ConfigError, OutputError
 from dynakin.identification.observability.trial import Identifiability
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.report.page import write_report
@@ -28,6 +28,7 @@ from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.tracking import refuse_lost
 from dynakin.results.records import Event
 from dynakin.settings.settings import Settings
+from dynakin.settings.strict import nearest
 from dynakin.validation.methods import Trial
 
 if TYPE_CHECKING:
@@ -68,8 +69,13 @@ class Result:
         each with ``_sd``, ``state``, ``wrench_estimated``, ...
 
         Raises:
-            KeyError: no such quantity. ValueError: it has more dimensions than a table.
+            ConfigError: no such quantity. ValueError: it has more dimensions than a table.
         """
+        known = [str(name) for name in self.estimate.data]
+        if quantity not in known:
+            raise ConfigError(
+                f"to_dataframe: no quantity {quantity!r}{nearest(quantity, known)}, expected one of {', '.join(known)}"
+            )
         data = self.estimate.data[quantity]
         if len(data.dims) != 2:
             raise ValueError(

@@ -24,9 +24,14 @@ def check_lag(lag_s: float, what: str = "lag_s") -> float:
     if number and (0.0 <= lag_s <= LONGEST_LAG_S or lag_s == ALL_FRAMES):
         return float(lag_s)
     raise ConfigError(
-        f"{what} is {lag_s!r}, expected seconds (no longer frames), 0 to {LONGEST_LAG_S:g}, such as {LIVE_LAG_S:g}; "
-        "or inf: all frames of a recording"
+        f"{what} is {lag_s!r}, expected seconds (no longer frames), 0 to {LONGEST_LAG_S:g}, such as {LIVE_LAG_S:g}"
+        f"{_meant(lag_s) if number else ''}; or inf: all frames of a recording"
     )
+
+
+def _meant(lag_s: float) -> str:
+    """What a number that is too large for seconds is as milliseconds."""
+    return f" ({lag_s:g} ms are {lag_s / 1e3:g})" if 1.0 < lag_s <= 1e3 * LONGEST_LAG_S else ""
 
 
 def lag_frames(lag_s: float, rate_hz: float) -> int:

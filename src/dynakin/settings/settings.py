@@ -6,7 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field, field_validator, model_validator
 
 from dynakin.errors import ConfigError, DynakinError
 from dynakin.files import is_file
@@ -156,24 +156,30 @@ class Settings(Strict, use_attribute_docstrings=True):
             ConfigError: a key that is unknown (the nearest is suggested) or missing, or a value that is wrong.
         """
         given = given or {}
-        table = content.get("opensim", {})
-        content = {**content, **given}
-        if "opensim" in given and isinstance(table, Mapping):  # single keys of a table are given, the others stay
-            content["opensim"] = {**table, **given["opensim"]}
+        tables = {key.partition(".")[0] for key in _OPTIONS if "." in key}  # whose single keys are options
+        own = {key: content[key] for key in tables & given.keys() if isinstance(content.get(key), Mapping)}
+        content = {**content, **given, **{key: {**table, **given[key]} for key, table in own.items()}}
         for key in needed:
             if content.get(key) is None:
                 option = NEEDED[key]
                 raise ConfigError(f'{where}: {key} is missing, expected {option} or {key} = "..." in the configuration')
-        keys = [key for key in given if key != "opensim"] + [f"opensim.{key}" for key in given.get("opensim", ())]
+        keys = [key for key in given if key not in tables]
+        keys += [f"{table}.{key}" for table in sorted(tables & given.keys()) for key in given[table]]
         return validate(cls, content, where, ConfigError, {key: option_names(key)[0] for key in keys})
+
+    @field_validator("lag_s")
+    @classmethod
+    def _seconds(cls, lag_s: float | None) -> float | None:
+        try:
+            return None if lag_s is None else check_lag(lag_s, "the lag")
+        except ConfigError as error:
+            raise ValueError(error.message) from None
 
     @model_validator(mode="after")
     def _checked(self) -> Self:
         try:
             self.subject()
             self.noise_settings()
-            if self.lag_s is not None:
-                check_lag(self.lag_s)
             check_names(self.contacts)
             if self.loads and self.mass_kg is None:
                 raise ConfigError("loads: the plates carry them too, expected mass_kg, the person's own")

@@ -69,10 +69,12 @@ class Strict(BaseModel):
     @classmethod
     def _refuse_unknown_keys(cls, data: Any) -> Any:
         if isinstance(data, dict):
+            if old := [key for key in data if key in cls.renamed]:
+                called = [(key, *cls.renamed[key].partition(" ")) for key in old]
+                raise ValueError(
+                    "; ".join(f"{key!r} is now called {name!r}{space}{values}" for key, name, space, values in called)
+                )
             for key in data:
-                if key in cls.renamed:
-                    name, space, values = cls.renamed[key].partition(" ")
-                    raise ValueError(f"{key!r} is now called {name!r}{space}{values}")
                 if key not in cls.model_fields:
                     raise ValueError(
                         f"unknown key {key!r}{nearest(str(key), cls.model_fields)}; "

@@ -137,7 +137,8 @@ def compare_trial(
     estimates, lost, trackers = estimate_each(recording, setup, static=static, progress=progress)
     initial = list(trackers.values())[-1].calibrated
     trial = trial_of(estimates, initial, setup.definition, setup.cutoff_hz, inverse=True)
-    return with_lost(trial, lost)
+    mass = [text for text in initial.messages if text.startswith(("Mass ", "Warning: mass "))]
+    return with_lost(replace(trial, notes=(*mass, *trial.notes)), lost)
 
 
 def with_lost(trial: Trial, lost: Mapping[str, str]) -> Trial:

@@ -12,6 +12,9 @@ Flags = npt.NDArray[np.bool_]
 
 WINDOW_S = 4.0
 """Stretch over which a belt's speed is taken for one: some strides. It may change from one to the next."""
+SEEN_S = 0.6
+"""Shorter stretches tell no belt: in them a foot may do nothing but swing, which takes up to 0.5 s, low over the floor
+and at one speed for a tenth of a second."""
 STILL_M_S = 0.3
 """Slower than this no belt is looked for: a foot on it is slow enough to stand."""
 ALIKE_M_S, ALIKE = 0.15, 0.1
@@ -60,6 +63,8 @@ def one_velocity(velocity: Array, low: Flags, body: Array, time: Array) -> Array
     size = float(np.linalg.norm(mode))
     if size < STILL_M_S or still > 0.5 * alike[best]:
         return np.zeros(2)
+    if time[-1] - time[0] < SEEN_S:
+        return None
     seen = np.isfinite(body).all(axis=1)
     moves = np.linalg.norm(body[seen].mean(axis=0)[[0, 2]]) if seen.any() else np.inf
     return np.asarray(mode) if moves < BODY * size and _carries(level, known, mode, time) else None
