@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,6 +14,7 @@ from dynakin.filter.estimator import Estimator
 from dynakin.filter.noise import joint_groups
 from dynakin.filter.prepared import Prepared
 from dynakin.model.definition import load_model
+from dynakin.recordings.feet.contact import UNMEASURED
 from dynakin.recordings.recording import Recording
 from dynakin.results.files.config import write_parameters
 from dynakin.settings.noise import Noise
@@ -84,6 +86,22 @@ def test_it_holds_on_frames_that_it_has_not_seen(walk: Prepared) -> None:
     assert before is not None and after is not None
     assert before < 0.5 and 0.7 < after < 1.3
     assert set(noise.jerk_scale) == {"pelvis", "upper_body", "hips", "knees", "feet"}
+
+
+def test_without_plates_the_scale_leaves_priors_their_weight_beside_the_markers(walk: Prepared) -> None:
+    # What is expected of the feet, what the model does not explain and the markers are all there is, and are scaled.
+    blind = replace(walk.recording.window(0.0, 0.5), plates=())
+    model = load_model("fullbody", Subject(mass_kg=walk.calibrated.mass_kg, height_m=1.75, sex="male"))
+    noise = Noise(adapt=False)
+    first, second = (Estimator(model, noise.changed(variance_scale=s)).run(blind) for s in (1.0, 0.1))
+    assert (first.data["foot_contact"] == UNMEASURED).any(dim="foot").all()
+    # unscaled errors of the contacts: 2.9e-3 rad, 1.5 rad/s2, 12 N apart
+    for name, apart in (("coordinates", 1e-3), ("accelerations", 0.4), ("wrench_estimated", 5.0)):
+        np.testing.assert_allclose(second.data[name].values, first.data[name].values, rtol=0.0, atol=apart)
+    # and deviations of what rests on the feet stay those by the declared variances
+    for name in ("foot_wrench_sd", "wrench_sd"):
+        sds = [run.data[name].median().item() for run in (first, second)]
+        assert sds[1] == pytest.approx(sds[0], rel=0.05)
 
 
 def test_joints_are_grouped_by_where_they_are(walk: Prepared) -> None:

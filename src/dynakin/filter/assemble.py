@@ -69,7 +69,7 @@ def assemble(
         initial.unmarked_feet.values(),
     )
     if feet is not None:
-        _widen_priors(data, prior_factor(used))
+        _widen_priors(data, prior_factor(used), feet.blind)
         data = data.isel(foot=[name != RESIDUAL for name in feet.names])
     for name, covariance in zip(("initial_covariance", "final_covariance"), covariances, strict=True):
         data[name] = (("element", "element_"), covariance)
@@ -115,12 +115,14 @@ def assemble(
     return estimate
 
 
-def _widen_priors(data: xr.Dataset, factor: float) -> None:
-    """In place, by `prior_factor`: deviations of what rests on a contact that no plate measures."""
+def _widen_priors(data: xr.Dataset, factor: float, blind: npt.NDArray[np.bool_]) -> None:
+    """In place, by `prior_factor`: deviations of what rests on a contact that no plate measures; of the total wrench in
+    frames (T,) in which no plate measures anything."""
     unmeasured = data["foot_contact"] == UNMEASURED
     data["foot_wrench_sd"] = data["foot_wrench_sd"].where(~unmeasured, factor * data["foot_wrench_sd"])
     resting = (data["moment_source"] != MEASURED) & unmeasured.any("foot")
     data["moments_sd"] = data["moments_sd"].where(~resting, factor * data["moments_sd"])
+    data["wrench_sd"] = data["wrench_sd"].where(xr.DataArray(~blind, dims="time"), factor * data["wrench_sd"])
 
 
 def _without_infinities(data: xr.Dataset) -> list[str]:

@@ -11,7 +11,7 @@ import numpy.typing as npt
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.filter.samples import in_step
-from dynakin.recordings.feet.contact import NO_CONTACT, UNMEASURED
+from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
 
 Array = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.uint8]
@@ -128,6 +128,22 @@ class ContactLoads:
         if self.names[-1] != RESIDUAL:
             return ~self.known
         return np.asarray(self.contact[:, -1] == UNMEASURED)
+
+    @property
+    def blind(self) -> Flags:
+        """(T,) frames in which a contact bears, no plate measures any, and these contacts are all that acts."""
+        own = self.contact[:, :-1] if self.names[-1] == RESIDUAL else self.contact  # the residual is none
+        measured = ((own == ON_PLATE) | (own == SHARED_PLATE)).any(axis=1)
+        return np.asarray(self.known & ~measured & (own == UNMEASURED).any(axis=1))
+
+    def weighed(self, variance_scale: float) -> ContactLoads:
+        """With the errors of frames in which feet bear and no plate measures anything on the scale of all other noise
+        (`Noise.variance_scale`): what is left there, priors and what the model does not explain, is weighed against the
+        markers alone, and keeps its weight."""
+        if variance_scale == 1.0:
+            return self
+        scale = np.where(self.blind, variance_scale, 1.0)
+        return replace(self, covariance=scale[:, None, None] * self.covariance)
 
     def first(self, frames: int) -> ContactLoads:
         """Those of the first frames."""

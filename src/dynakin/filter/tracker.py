@@ -32,13 +32,14 @@ Progress = Callable[[int, int], None]
 
 
 class _Stepped(NamedTuple):
-    """Of a step: its feet, whose moments are measured, their segments, whether no plate measures one of them."""
+    """Of a step: its feet, whose moments are measured, their segments, whether plates miss one of them, or all."""
 
     time_s: float
     loads: _core.ContactLoads | None
     sources: Codes
     segments: tuple[str, ...]
     unmeasured: bool
+    blind: bool
 
 
 class Tracker:
@@ -139,6 +140,7 @@ class Tracker:
         dt = 0.0 if self._time is None else sample.time_s - self._time
         if dt < 0.0:
             raise RecordingError(f"sample at {sample.time_s} s: older than the one before, at {self._time} s")
+        feet = feet and feet.weighed(self.noise.variance_scale)
         loads = self._loads(feet)
         covariance = effects = None
         if feet is not None:
@@ -154,8 +156,9 @@ class Tracker:
         self._time = sample.time_s
         sources = self._sources.moments(feet)[0]
         unmeasured = feet is not None and bool((feet.contact == UNMEASURED).any())
+        blind = feet is not None and bool(feet.blind.any())
         segments = () if feet is None else feet.segments
-        self._stepped.append(_Stepped(sample.time_s, loads, sources, segments, unmeasured))
+        self._stepped.append(_Stepped(sample.time_s, loads, sources, segments, unmeasured, blind))
         self._latest = step_estimate(self.core_model, self._labels, sample.time_s, self.state, report, sources, loads)
         return self._latest
 
@@ -199,6 +202,7 @@ class Tracker:
         found = deviations_of(self.core_model, state, covariance, loads)
         if step is not None and step.unmeasured:
             found["moments"] = np.where(step.sources != MEASURED, prior_factor(self.noise), 1.0) * found["moments"]
+            found["wrench"] = (prior_factor(self.noise) if step.blind else 1.0) * found["wrench"]
         if self.systematic is not None:
             wrench = np.zeros((0, 6))
             if loads is not None:
@@ -314,6 +318,7 @@ class Tracker:
         """The total wrench, and how it and the contacts are known: what these sum up to where there are any."""
         if feet is None:
             return wrench, {}
+        feet = feet.weighed(self.noise.variance_scale)
         total, covariance, effects = feet.total()
         return total, {"feet": self._loads(feet), "wrench_covariance": covariance, "wrench_effects": effects}
 
