@@ -51,7 +51,7 @@ class Sizes:
 
 LANDMARKS = Sizes(0.006, 0.003, np.radians(2.0), np.radians(0.8), np.radians(1.2), 0.15)
 """Joints that are found from markers on the skin."""
-SCALED = Sizes(0.003, 0.002, np.radians(1.2), np.radians(0.8), np.radians(1.0), 0.1)
+SCALED = Sizes(0.002, 0.0016, np.radians(1.2), np.radians(0.8), np.radians(1.0), 0.095)
 """Joints of a skeleton that was scaled to the person (.osim)."""
 
 
