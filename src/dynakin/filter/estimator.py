@@ -271,7 +271,9 @@ class Estimator:
             if adapt and found is None:
                 notes.append("Too few frames are followed to calibrate the noise on them: it is as declared.")
             if lag_s or found:
-                skin = following_skin(tracker, arrays, recording.time) if lag_s == ALL_FRAMES else None
+                # joints found from markers are off by what follows angles as skin does
+                scaled = lag_s == ALL_FRAMES and calibrated.plan is None
+                skin = following_skin(tracker, arrays, recording.time) if scaled else None
                 seen = markers if skin is None else markers - skin.shift_m
                 tracker = tracker.changed(found or tracker.noise)
                 arrays = tracker.run_late_arrays(lag_s, recording.time, seen, wrench, back, on_feet)

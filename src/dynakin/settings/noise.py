@@ -112,7 +112,7 @@ class Noise(Strict, use_attribute_docstrings=True):
 
     following_skin_fraction: NotNegative = 1.0
     """Prior standard deviation of the displacement of skin that follows one joint to its end, of the declared size: it
-    is found in a recording that is estimated from all frames, by a model that is fixed nowhere, and taken off its
+    is found in a recording that is estimated from all frames, by an .osim that is fixed nowhere, and taken off its
     markers. 0: none is."""
 
     marker_sd_m: Positive | None = scale(0.0007, "m", "noise of the cameras")
