@@ -93,4 +93,4 @@ def following_skin(tracker: Tracker, arrays: dict[str, Array], time: Array) -> F
 def _turned(model: _core.Model, state: Array, segment: npt.NDArray[np.intp], local: Array) -> Array:
     """(T, M, 3) of the markers' segments' axes to the ground's."""
     R = np.asarray(_core.whole_body(model, np.ascontiguousarray(state))["orientations"])[:, segment]
-    return np.einsum("tmij,tmj->tmi", R, local)
+    return np.asarray(np.einsum("tmij,tmj->tmi", R, local))

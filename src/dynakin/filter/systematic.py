@@ -258,7 +258,7 @@ def _between(time: Array, known: Array, values: Array) -> Array:
 def followed(q: Array, calibrated: CalibratedModel) -> Array:
     """What skin follows of the free coordinates (..., K): it saturates, and is 0 upright."""
     free = [k for k, c in enumerate(calibrated.spec.coordinates) if not c.locked]
-    return np.tanh((q - neutral(calibrated)[free]) / SKIN_ANGLE_RAD)
+    return np.asarray(np.tanh((q - neutral(calibrated)[free]) / SKIN_ANGLE_RAD))
 
 
 def neutral(calibrated: CalibratedModel) -> Array:
