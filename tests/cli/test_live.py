@@ -43,7 +43,7 @@ def test_live_estimates_records_and_finishes(tmp_path: Path, capsys: Said) -> No
     said = capsys.readouterr().out
     assert "go on from" in said and "Estimates come 100 ms late" in said
     assert main(["live", "--source", source, *PERSON, "--lag", "20"]) == 2
-    assert "the lag is 20.0, expected seconds (no longer frames)" in " ".join(capsys.readouterr().err.split())
+    assert "lag_s is 20.0, expected seconds (no longer frames)" in " ".join(capsys.readouterr().err.split())
 
 
 @pytest.mark.skipif(os.name != "posix", reason="limits of processes are set by POSIX calls")

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.bindings import _core
-from dynakin.filter.noise import jerk_densities, joint_groups, plate_sd, soft_tissue_sd
+from dynakin.filter.noise import jerk_densities, joint_groups, plate_sd, soft_tissue_sd, soft_tissue_time_s
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.settings.model import QUANTITIES, Quantity
 from dynakin.settings.noise import Noise
@@ -142,9 +142,7 @@ def continuous_noise(initial: CalibratedModel, noise: Noise, layout: _core.State
         density[k] = whole * jerk[kinds[coordinate]] * (1.0 if group is None else noise.jerk_scale.get(group, 1.0))
     offset, size = layout.blocks["lengths"]
     density[offset : offset + size] = whole * noise.length_drift_density_m2_s
-    skin_s = noise.soft_tissue_time_s
-    if initial.feet and noise.floating_soft_tissue_time_s is not None:
-        skin_s = noise.floating_soft_tissue_time_s
+    skin_s = soft_tissue_time_s(noise, floating=bool(initial.feet))
     offset, size = layout.blocks["contacts"]
     decay[offset : offset + size], density[offset : offset + size] = 1.0 / CONTACT_TIME_S, whole * 2.0 / CONTACT_TIME_S
     for block, time in (("soft_tissue", skin_s), ("plates", noise.plate_time_s)):

@@ -18,6 +18,7 @@ from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.expected import ContactPaths, expected_loads
 from dynakin.filter.prepared import Prepared
 from dynakin.filter.samples import in_step, recording_arrays
+from dynakin.filter.skin import following_skin
 from dynakin.filter.total_wrench import Ground, doubtful_mass, known_ground
 from dynakin.filter.tracker import Progress, Tracker, known_lag
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -265,14 +266,18 @@ class Estimator:
             )
             wrench = in_step(recording.time, ready.wrench, shift) if shift else ready.wrench
             on_feet = on_feet and on_feet.in_step(recording.time, shift)
-            given = (recording.time, markers, wrench)
-            trial = Trial(*given, on_feet)
+            trial = Trial(recording.time, markers, wrench, on_feet)
             found = calibrated_noise(tracker, arrays, trial, late=not lag_s) if adapt else None
             if adapt and found is None:
                 notes.append("Too few frames are followed to calibrate the noise on them: it is as declared.")
             if lag_s or found:
+                # joints found from markers are off by what follows angles as skin does
+                scaled = lag_s == ALL_FRAMES and calibrated.plan is None
+                skin = following_skin(tracker, arrays, recording.time) if scaled else None
+                seen = markers if skin is None else markers - skin.shift_m
                 tracker = tracker.changed(found or tracker.noise)
-                arrays = tracker.run_late_arrays(late, *given, back, on_feet)
+                arrays = tracker.run_late_arrays(late, recording.time, seen, wrench, back, on_feet)
+                arrays = arrays if skin is None else skin.put_back(arrays)
         except ValueError as error:  # a frame that the core refuses, named by it
             raise RecordingError(f"{recording.path or recording.name}: {error}") from None
         config = self.settings() | {"lag_s": lag_s, "ground_reasons": list(ground.reasons)}

@@ -62,6 +62,13 @@ def soft_tissue_sd(noise: Noise, declared_m: Array) -> Array:
     return np.where(sd < noise.soft_tissue_least_sd_m, 0.0, sd)
 
 
+def soft_tissue_time_s(noise: Noise, *, floating: bool) -> float:
+    """Time constant of that displacement, of a model that is fixed in the ground or of a floating one."""
+    if floating and noise.floating_soft_tissue_time_s is not None:
+        return noise.floating_soft_tissue_time_s
+    return noise.soft_tissue_time_s
+
+
 def marker_variance(initial: CalibratedModel, noise: Noise, estimate: Collection[Quantity] = QUANTITIES) -> Array:
     """R (M,) m^2 of the markers of a model that has the states these settings ask for; without soft tissue among them,
     all of its displacement is noise."""

@@ -51,7 +51,7 @@ class Sizes:
 
 LANDMARKS = Sizes(0.006, 0.003, np.radians(2.0), np.radians(0.8), np.radians(1.2), 0.15)
 """Joints that are found from markers on the skin."""
-SCALED = Sizes(0.003, 0.002, np.radians(1.2), np.radians(0.8), np.radians(1.0), 0.1)
+SCALED = Sizes(0.002, 0.0016, np.radians(1.2), np.radians(0.8), np.radians(1.0), 0.095)
 """Joints of a skeleton that was scaled to the person (.osim)."""
 
 
@@ -87,7 +87,7 @@ class Systematic:
         self.sizes = sizes or usual_sizes(calibrated).scaled(noise.systematic_scale)
         self._free = np.array([k for k, c in enumerate(spec.coordinates) if not c.locked])
         self._count = len(spec.coordinates)
-        reference = _neutral(calibrated)
+        reference = neutral(calibrated)
         self._errors = JointErrors.of(spec, reference)
         self._reference = reference[self._free]
         self._measured = np.array([marker.measured for marker in spec.markers]).ravel()
@@ -98,7 +98,7 @@ class Systematic:
         self._declared = np.repeat(calibrated.soft_tissue_m, 3)
         members = np.equal.outer(self._segment, np.arange(len(segments))).astype(float)
         self._members = np.kron(members, np.eye(3))
-        self._drives = _drives(spec, self._free)
+        self._drives = drives(spec, self._free)
         still = np.zeros_like(self._reference)
         x = self._errors.state(self._reference, still, still)
         self._R0 = _core.segment_poses(self._errors.model, x)[0]
@@ -255,7 +255,13 @@ def _between(time: Array, known: Array, values: Array) -> Array:
     return np.array([np.interp(time, known, column) for column in values.T]).T
 
 
-def _neutral(calibrated: CalibratedModel) -> Array:
+def followed(q: Array, calibrated: CalibratedModel) -> Array:
+    """What skin follows of the free coordinates (..., K): it saturates, and is 0 upright."""
+    free = [k for k, c in enumerate(calibrated.spec.coordinates) if not c.locked]
+    return np.asarray(np.tanh((q - neutral(calibrated)[free]) / SKIN_ANGLE_RAD))
+
+
+def neutral(calibrated: CalibratedModel) -> Array:
     """(C,) upright posture: all free coordinates 0, or as near to it as their bounds allow."""
     q = np.array([c.value for c in calibrated.spec.coordinates], dtype=float)
     free = [k for k, c in enumerate(calibrated.spec.coordinates) if not c.locked]
@@ -264,7 +270,7 @@ def _neutral(calibrated: CalibratedModel) -> Array:
     return q
 
 
-def _drives(spec: _core.ModelSpec, free: npt.NDArray[np.intp]) -> Array:
+def drives(spec: _core.ModelSpec, free: npt.NDArray[np.intp]) -> Array:
     """(S, K) 1 where a free rotation moves a segment's skin: those of its own joint and of the joints that hang on it,
     but for the root's, which turn the whole body."""
     place = {spec.coordinates[k].name: i for i, k in enumerate(free)}

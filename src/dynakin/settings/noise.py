@@ -110,6 +110,11 @@ class Noise(Strict, use_attribute_docstrings=True):
     """The same for a model that is fixed nowhere; not given: as ``soft_tissue_time_s``. A step lasts half a second, and
     skin that takes longer to come back looks like longer bones."""
 
+    following_skin_fraction: NotNegative = 1.0
+    """Prior standard deviation of the displacement of skin that follows one joint to its end, of the declared size: it
+    is found in a recording that is estimated from all frames, by an .osim that is fixed nowhere, and taken off its
+    markers. 0: none is."""
+
     marker_sd_m: Positive | None = scale(0.0007, "m", "noise of the cameras")
     """Noise of the cameras, m, for all markers; not given: R of the marker set, which holds soft tissue too."""
     marker_variance_scale: Positive = scale(1.0, "1", "noise of the markers")

@@ -38,6 +38,7 @@ def paper() -> Noise:
         soft_tissue_least_sd_m=0.0,
         soft_tissue_time_s=1.0,
         floating_soft_tissue_time_s=None,
+        following_skin_fraction=0.0,
         marker_sd_m=None,
         force_variance_n2=0.1,
         moment_variance_n2_m2=0.1,
