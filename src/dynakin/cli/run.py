@@ -9,13 +9,6 @@ import typer
 
 from dynakin.cli.console import busy, out, progress_bar
 from dynakin.cli.options import OF_A_MODEL, OF_THE_LABORATORY, OF_THE_PLATES, Given, with_settings
-from dynakin.cli.prepared import assumed, print_rows
-from dynakin.cli.summary import end, print_summary
-from dynakin.pipeline.stages import configure, prepare_case, run_case
-from dynakin.recordings.read import extensions
-from dynakin.report.paper_figures.sensitivity import read_sensitivity
-from dynakin.results.files.folder import check_folder_writable, check_output_writable
-from dynakin.validation.case import case_of
 
 
 @with_settings(
@@ -32,7 +25,7 @@ from dynakin.validation.case import case_of
     "output",
 )
 def run(
-    trial: Annotated[Path, typer.Argument(help=f"Recording ({extensions()}), or a configuration (.toml).")],
+    trial: Annotated[Path, typer.Argument(help="Recording (.c3d, .trc, .csv), or a configuration (.toml).")],
     *,
     given: Given,
     figures: Annotated[
@@ -46,6 +39,13 @@ def run(
     ] = None,
 ) -> None:
     """Estimate coordinates, moments, lengths and masses from a recording, and write a report."""
+    from dynakin.cli.prepared import assumed, print_rows
+    from dynakin.cli.summary import end, print_summary
+    from dynakin.pipeline.stages import configure, prepare_case, run_case
+    from dynakin.report.paper_figures.sensitivity import read_sensitivity
+    from dynakin.results.files.folder import check_folder_writable, check_output_writable
+    from dynakin.validation.case import case_of
+
     config = configure(trial, given, options=True)
     check_output_writable(config.output)
     if sensitivity is not None and figures is None:

@@ -16,8 +16,9 @@ from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.recordings.recording import Recording
-from dynakin.recordings.smoothing import CUTOFF_HZ, smooth
+from dynakin.recordings.smoothing import smooth
 from dynakin.results.measures.tracking import why_lost
+from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.units import GRAVITY_M_S2
 from dynakin.validation.freeze import freeze, initial_values
 from dynakin.validation.held_out import as_estimate, marker_paths, measured_wrench, start_as

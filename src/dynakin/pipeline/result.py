@@ -12,9 +12,6 @@ from typing import TYPE_CHECKING, Any
 from dynakin.errors import OutputError
 from dynakin.identification.observability.trial import Identifiability
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.report.page import write_report
-from dynakin.report.paper_figures.figures import FORMATS, save_figures
-from dynakin.report.paper_figures.sensitivity import Sensitivity
 from dynakin.results.estimate import Estimate
 from dynakin.results.failures import LOG, Failures
 from dynakin.results.files import body as body_files
@@ -32,6 +29,8 @@ from dynakin.validation.methods import Trial
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from dynakin.report.paper_figures.sensitivity import Sensitivity
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -137,10 +136,14 @@ class Result:
         return folder
 
     def save_figures(
-        self, folder: str | Path, formats: Sequence[str] = FORMATS, *, sensitivity: Sensitivity | None = None
+        self, folder: str | Path, formats: Sequence[str] | None = None, *, sensitivity: Sensitivity | None = None
     ) -> list[Path]:
         """Write the paper's figures of this run into ``folder`` (see `dynakin.report.save_figures`);
         one that fails stands in ``failures``.
+
+        Args:
+            formats: some of svg, pdf, png; None: all.
+            sensitivity: a criterion over the gains, the paper's Figure 3.
 
         Returns:
             The files written.
@@ -148,16 +151,20 @@ class Result:
         Raises:
             ConfigError: an unknown format. OutputError: the folder cannot be written.
         """
+        from dynakin.report.paper_figures.figures import FORMATS, save_figures  # Matplotlib: only who draws waits
+
         return save_figures(
             self.estimate,
             folder,
-            formats,
+            FORMATS if formats is None else formats,
             comparison=self.comparison,
             sensitivity=sensitivity,
             failures=self.failures,
         )
 
     def _write(self, folder: Path, overwrite: bool) -> None:
+        from dynakin.report.page import write_report  # as above
+
         estimate, failed, metrics = self.estimate, self.failures, self.metrics()
         if self.settings is not None:
             estimate = replace(estimate, config=estimate.config | {"output": str(folder.absolute())})

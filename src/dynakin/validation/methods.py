@@ -18,7 +18,6 @@ from dynakin.filter.zero import asked_angles
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition
 from dynakin.recordings.recording import Recording
-from dynakin.recordings.smoothing import CUTOFF_HZ
 from dynakin.results.estimate import COMPONENTS, Estimate
 from dynakin.results.failures import Failures
 from dynakin.results.measures.facing import facing
@@ -27,6 +26,7 @@ from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.measures.repetitions import Found, repetitions_of
 from dynakin.results.measures.sources import measured_only, moment_sources, wrench_sources
 from dynakin.results.measures.tracking import why_lost
+from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.settings.lag import in_words
 from dynakin.validation.reference.inverse_dynamics import (
     INVERSE,

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import least_squares
+import scipy
 from scipy.spatial.transform import Rotation
 
 from dynakin.bindings import _core
@@ -182,7 +182,7 @@ class _Body:
             q[free] = part
             return q
 
-        found = least_squares(
+        found = scipy.optimize.least_squares(
             lambda part: self.residual(full(part)),
             q[free],
             jac=lambda part: self.jacobian(full(part))[:, free],
@@ -246,7 +246,7 @@ class _Body:
             start = self.rest[self.base].copy()
             if k >= 0:
                 start[np.flatnonzero(angles)[k // 3]] += 0.5 * np.pi * (k % 3 + 1)
-            found = least_squares(gap, start)
+            found = scipy.optimize.least_squares(gap, start)
             # Three angles have two readings of every pose; the one with the smaller turns is meant.
             for end in (found.x, _other_reading(found.x, angles)):
                 end = np.where(angles, (end + np.pi) % (2.0 * np.pi) - np.pi, end)

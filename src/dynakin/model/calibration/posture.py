@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import least_squares
+import scipy
 from scipy.spatial.transform import Rotation
 
 from dynakin.errors import ModelError
@@ -112,7 +112,7 @@ def solve_joint(
             starts += [np.eye(len(free))[k] * angle for angle in (2.1, -2.1)]
     fits = []
     for start in starts:
-        fits.append(least_squares(residual, start, xtol=1e-14, ftol=1e-14, gtol=1e-14))
+        fits.append(scipy.optimize.least_squares(residual, start, xtol=1e-14, ftol=1e-14, gtol=1e-14))
         if fits[0].cost < _EXACT and np.abs(fits[0].x).max() < 0.5 * np.pi:
             break  # no other reading has smaller turns
     best = min(fits, key=lambda fit: (round(float(fit.cost), 12), float(np.abs(fit.x).sum())))

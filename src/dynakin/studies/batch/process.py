@@ -9,12 +9,12 @@ from typing import Any
 
 from dynakin.errors import DynakinError
 from dynakin.pipeline.stages import judged
-from dynakin.recordings.smoothing import CUTOFF_HZ
 from dynakin.results.estimate import COMPONENTS
 from dynakin.results.failures import Failures
 from dynakin.results.files.config import versions
 from dynakin.results.measures.fit import SignalFit
 from dynakin.results.measures.metrics import compute_metrics
+from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.settings.settings import Settings
 from dynakin.studies.batch.dataset import Dataset, Session
 from dynakin.studies.engine.folder import write_csv, write_json
