@@ -8,8 +8,8 @@ import numpy as np
 
 from dynakin.results.estimate import Estimate
 
-# 1e-9 m: far below what cameras see, so that figures recomputed from the file equal the ones in metrics.json.
-_DECIMALS = {"m": 9, "mm": 6}
+# 1e-7 m: a thousandth of what cameras see.
+_DECIMALS = {"m": 7, "mm": 4}
 _PER_METRE = {"m": 1.0, "mm": 1000.0}
 
 
@@ -58,10 +58,9 @@ def write_trc(path: Path, time: np.ndarray, names: list[str], points: np.ndarray
     ]
     scaled = np.asarray(points, dtype=float).reshape(frames, 3 * count) * _PER_METRE[unit]
     missing = ~np.isfinite(scaled)
-    for index in range(frames):
-        cells = [
-            "" if blank else f"{value:.{decimals}f}" for value, blank in zip(scaled[index], missing[index], strict=True)
-        ]
+    number = f"%.{decimals}f"
+    for index, row in enumerate(scaled.tolist()):
+        cells = ["" if blank else number % value for value, blank in zip(row, missing[index].tolist(), strict=True)]
         if missing[index, -1]:
             cells.append("")  # OpenSim takes a tab as the end of a cell and would miss an empty one at the end of a row
         lines.append("\t".join([str(index + 1), f"{time[index]:.12g}", *cells]))

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from dynakin.results.estimate import AXES, COMPONENTS, Estimate
-from dynakin.results.files.storage import write_storage
+from dynakin.results.files.storage import DIGITS_OF_SD, write_storage
 from dynakin.results.measures.feet import foot_sources
 from dynakin.results.measures.sources import ABSENT, NOTES, moment_sources
 
@@ -133,6 +133,7 @@ def write_deviations(estimate: Estimate, path: Path) -> None:
             "Of moments and feet's forces that are derived or a prior too (moments_source.sto, feet_source.sto); nan "
             "where absent.",
         ],
+        digits=DIGITS_OF_SD,
     )
 
 
