@@ -7,9 +7,10 @@ from typing import Annotated
 
 import typer
 
-from dynakin.cli.console import as_table, busy, out, progress_bar
+from dynakin.cli.console import as_table, out
 from dynakin.cli.options import Backend, Jobs, Scheduler
 from dynakin.errors import ConfigError, DynakinError
+from dynakin.progress import stage
 from dynakin.settings.defaults import CUTOFF_HZ
 
 
@@ -54,9 +55,9 @@ def batch(
     identified = {}
     with open_pool(backend, jobs, scheduler) as pool:
         if identify:
-            with progress_bar("identifying") as progress:
+            with stage("identifying") as progress:
                 identified = identify_subjects(found, pool, journal=journal, progress=progress)
-        with progress_bar("batch") as progress:
+        with stage("batch") as progress:
             result = run_batch(with_parameters(found, identified), options, pool, journal=journal, progress=progress)
     console = out()
     if result.rows:
@@ -65,7 +66,7 @@ def batch(
             f"{plural(len(result.rows), 'trial')} of {plural(people, 'subject')}, mean ± standard deviation over trials"
         )
         console.print(as_table(table2_text(result.table2(), title)))
-    with busy("writing tables"):
+    with stage("writing tables"):
         write_batch(folder, result, identified)
     console.print(f"Tables  {folder}/table2.csv, table2_subjects.csv, trials.csv, batch.json", soft_wrap=True)
     for subject, row in identified.items():

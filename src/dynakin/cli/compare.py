@@ -8,9 +8,10 @@ from typing import Annotated, Any
 
 import typer
 
-from dynakin.cli.console import busy, out, print_error
+from dynakin.cli.console import out, print_error
 from dynakin.cli.options import OF_A_MODEL, OF_THE_LABORATORY, OF_THE_PLATES, ForceEach, Given, Trials, with_settings
 from dynakin.errors import DynakinError
+from dynakin.progress import stage
 from dynakin.settings.defaults import CUTOFF_HZ, HORIZON_S
 
 HORIZON_MS = 1000.0 * HORIZON_S
@@ -77,7 +78,7 @@ def compare(
         tables |= print_repetitions(console, compared)
         more["trials"] = [described(trial) for trial in compared]
     if output is not None:
-        with busy("writing tables and report"):
+        with stage("writing tables and report"):
             names = [case.recording.name for case in cases]
             page = render_comparison(compared, tables, more["settings"], names, notes)
             save_comparison(output, tables, more, page)

@@ -9,8 +9,9 @@ from typing import Any
 from rich.console import Console
 from rich.padding import Padding
 
-from dynakin.cli.console import as_table, busy, progress_bar
+from dynakin.cli.console import as_table
 from dynakin.identification.held_out import with_subject
+from dynakin.progress import stage
 from dynakin.report.text_tables import angle_text, moment_text, table2_text, truth_text, unseen_texts
 from dynakin.results.measures.mean_curves import curve_points
 from dynakin.validation.case import Case
@@ -26,7 +27,7 @@ def compare_cases(cases: Sequence[Case]) -> list[Trial]:
     """All methods on all trials."""
     compared = []
     for case in cases:
-        with progress_bar(case.recording.name) as progress:
+        with stage(case.recording.name) as progress:
             compared.append(compare_trial(case.recording, case.setup, static=case.static, progress=progress))
     return compared
 
@@ -61,7 +62,7 @@ def print_held_out(
     """Identified on one, judged on the other; (identifying, judging, of one recording) each. Adds to ``notes``."""
     tables = []
     for fitted, judging, same in pairs:
-        with busy(f"{judging.recording.name}: judging what was identified"):
+        with stage(f"{judging.recording.name}: judging what was identified"):
             identified = identify_on(fitted.recording, fitted.setup, static=fitted.static, same_recording=same)
             identified, decided = with_subject(identified)
             blind = predict_blind(identified, judging.recording)
@@ -81,7 +82,7 @@ def print_unseen(console: Console, cases: Sequence[Case], horizon_ms: float) -> 
     """What no filter could follow, because it was not given."""
     figures = []
     for case in cases:
-        with progress_bar(f"{case.recording.name}: leaving markers out") as progress:
+        with stage(f"{case.recording.name}: leaving markers out") as progress:
             figures.append(
                 unseen_figures(
                     case.recording,

@@ -8,7 +8,8 @@ from typing import Annotated
 
 import typer
 
-from dynakin.cli.console import busy, out, progress_bar
+from dynakin.cli.console import out
+from dynakin.progress import stage
 from dynakin.settings.settings import Settings
 
 
@@ -35,16 +36,14 @@ def demo(
     # with the paper's settings too, for comparison
     case = case_of(Settings.of(keys, "demo"), ("default", "paper"), recording=trial.recording)
     failures = Failures()
-    with progress_bar("estimating") as progress:
+    with stage("estimating") as progress:
         estimates, lost, trackers = estimate_each(case.recording, case.setup, progress=progress, failures=failures)
-    with busy("comparing with the truth and the reference methods"):
-        result = judged(case, estimates, lost, trackers, failures)
+    result = judged(case, estimates, lost, trackers, failures)
     drawn = {"seed": seed, "duration_s": duration}
     result = replace(result, estimate=replace(result.estimate, config=drawn | result.estimate.config))
     estimate, comparison = result.estimate, result.comparison
     methods = {method.name: method.data for method in comparison.methods} if comparison else {}
-    with busy("writing results and report"):
-        folder = result.save(output, check=False)
+    folder = result.save(output, check=False)
     console = out()
     console.print(methods_by_error(methods, estimate, trial.truth))
     console.print(compared_with_truth(estimate, trial.truth))

@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dynakin.cli.console import out, progress_bar, table
+from dynakin.cli.console import out, table
 from dynakin.cli.options import OF_A_MODEL, OF_THE_LABORATORY, Given, with_settings
 from dynakin.errors import ConfigError
+from dynakin.progress import stage
 from dynakin.settings.settings import Settings
 
 if TYPE_CHECKING:
@@ -49,7 +50,7 @@ def identify(
     settings = Settings.of({}, "identify", (), given)
     recordings, standing = _read(paths, forces or [], settings.static)
     estimator = estimator_of(settings)
-    with progress_bar("identifying") as progress:
+    with stage("identifying") as progress:
         found = identify_subject(estimator, recordings, static=standing, progress=progress)
     found.subject.write(output)
     _print(found)

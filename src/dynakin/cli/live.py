@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dynakin.cli.console import busy, out
+from dynakin.cli.console import out
 from dynakin.cli.options import (
     OF_A_MODEL,
     OF_THE_LABORATORY,
@@ -17,6 +17,7 @@ from dynakin.cli.options import (
     with_settings,
 )
 from dynakin.errors import ConfigError
+from dynakin.progress import stage
 from dynakin.settings.defaults import DELAY_S
 from dynakin.settings.lag import LIVE_LAG_S
 from dynakin.settings.settings import Settings
@@ -90,8 +91,7 @@ def live(
     if finish_folder is not None:
         if output is None:
             raise typer.BadParameter("--finish needs -o OUT, the folder for the results")
-        with busy("estimating"):
-            result = finish(finish_folder, output)
+        result = finish(finish_folder, output)
         with result.failures.stage("summary"):
             print_summary(result, output)
         end(result)
@@ -110,19 +110,20 @@ def live(
         standing, wait = _for_replay(sources[0], source, view and record is None)
     sinks = _sinks(settings, record, publish, view, host, port)
     try:
-        session = Live(
-            estimator_of(Settings.of({}, "live", (), settings)),
-            sources,
-            sinks,
-            lag_s=lag,
-            delay_s=delay,
-            standing_s=standing,
-            standing_wait_s=wait if standing_wait is None else standing_wait,
-            static=None if static is None else read(static),
-            known=None if parameters is None else read_known(parameters),
-            record=lambda: Recorder(Path(f"live-{datetime.now():%Y%m%d-%H%M%S}"), settings),
-            say=lambda text: out().print(text, soft_wrap=True),
-        )
+        with stage("starting"):
+            session = Live(
+                estimator_of(Settings.of({}, "live", (), settings)),
+                sources,
+                sinks,
+                lag_s=lag,
+                delay_s=delay,
+                standing_s=standing,
+                standing_wait_s=wait if standing_wait is None else standing_wait,
+                static=None if static is None else read(static),
+                known=None if parameters is None else read_known(parameters),
+                record=lambda: Recorder(Path(f"live-{datetime.now():%Y%m%d-%H%M%S}"), settings),
+                say=lambda text: out().print(text, soft_wrap=True),
+            )
     except BaseException:
         for sink in sinks:
             sink.close()

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.tree import Tree
 
-from dynakin.cli.console import out, progress_bar, table
+from dynakin.cli.console import out, table
 from dynakin.filter.estimator import Estimator
 from dynakin.identification.observability.measured import tracker_of
 from dynakin.identification.observability.structure import Structure, structure_of
@@ -24,6 +24,7 @@ from dynakin.model.opensim.spec import free_coordinates, placements, used_scales
 from dynakin.model.opensim.write import write_osim
 from dynakin.model.schema import ModelFile
 from dynakin.model.schema import Segment as ModelSegment
+from dynakin.progress import stage
 from dynakin.recordings.read import read
 from dynakin.results.measures.posterior import JUDGEMENT_WORDS, judged
 from dynakin.results.naming import number, sentence
@@ -146,9 +147,9 @@ def print_identifiability(definition: ModelDefinition, trial: Path | None, force
     if trial is None:
         _print_structure(structure_of(tracker_of(definition)))
         return
-    with progress_bar("estimating") as progress:
+    with stage("estimating") as progress:
         estimate, tracker = Estimator(definition).track(read(trial, forces), progress=progress)
-    with progress_bar("trying motions") as progress:
+    with stage("trying motions") as progress:
         found = identifiability(tracker, estimate, progress)
     _print_structure(found.structure, found)
     console = out()

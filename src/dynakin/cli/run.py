@@ -7,8 +7,9 @@ from typing import Annotated
 
 import typer
 
-from dynakin.cli.console import busy, out, progress_bar
+from dynakin.cli.console import out
 from dynakin.cli.options import OF_A_MODEL, OF_THE_LABORATORY, OF_THE_PLATES, Given, with_settings
+from dynakin.progress import stage
 
 
 @with_settings(
@@ -54,21 +55,18 @@ def run(
         check_folder_writable(figures)
     grid = None if sensitivity is None else read_sensitivity(sensitivity)
     case = case_of(config)
-    with busy("measuring the person"):
+    with stage("measuring the person"):
         ready = prepare_case(case)
     print_rows(out(), assumed(next(iter(ready.values())), config))
-    with progress_bar("estimating") as progress:
-        result = run_case(case, ready=ready, keep_lost=keep_lost, keep="--keep-lost", progress=progress)
-    with busy("writing results and report"):
-        folder = result.save(config.output, keep_lost=keep_lost, check=False)
+    result = run_case(case, ready=ready, keep_lost=keep_lost, keep="--keep-lost")
+    folder = result.save(config.output, keep_lost=keep_lost, check=False)
     failures = result.failures
     saved = len(failures.found)
     with failures.stage("summary"):
         print_summary(result, folder)
     if figures is not None:
         with failures.stage("figures"):
-            with busy("drawing figures"):
-                written = result.save_figures(figures, sensitivity=grid)
+            written = result.save_figures(figures, sensitivity=grid)
             out().print(f"Figures  {figures} ({len(written)} files)", soft_wrap=True)
     if len(failures.found) > saved:  # what failed since then is to stand in the files too
         with failures.stage("what failed, in the files"):  # these stay as they were saved

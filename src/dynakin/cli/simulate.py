@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.table import Table
 
-from dynakin.cli.console import busy, out, table
+from dynakin.cli.console import out, table
 from dynakin.errors import ConfigError
+from dynakin.progress import stage
 from dynakin.settings.defaults import CUTOFF_HZ
 
 if TYPE_CHECKING:
@@ -54,7 +55,7 @@ def simulate(
 
     check_trial_folder(output)
     noise = load_sensors(sensors).changed(_pairs(sensor or []))
-    with busy("simulating"):
+    with stage("simulating"):
         trial = simulate_trial(
             model,
             motion,

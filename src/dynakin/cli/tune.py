@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.padding import Padding
 
-from dynakin.cli.console import as_table, busy, out, progress_bar
+from dynakin.cli.console import as_table, out
 from dynakin.cli.options import (
     OF_A_MODEL,
     OF_THE_LABORATORY,
@@ -24,6 +24,7 @@ from dynakin.cli.options import (
     with_settings,
 )
 from dynakin.errors import ConfigError
+from dynakin.progress import stage
 from dynakin.settings import presets
 from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.settings.noise import SCALES
@@ -81,9 +82,9 @@ def grid(
     shared = shared_of(cases, base, left_out)
     folder = open_folder(output, ("grid.", "preset_", "figure3_"))
     journal = Journal(folder / ROWS, belongs_to(shared, axes))
-    with progress_bar("grid") as progress, open_pool(backend, jobs, scheduler) as pool:
+    with stage("grid") as progress, open_pool(backend, jobs, scheduler) as pool:
         found = run_grid(shared, axes, pool, journal=journal, progress=progress)
-    with busy("drawing figures"):
+    with stage("drawing figures"):
         write_grid(folder, found, presets.title(base))
         save_sensitivity_figures(figures_of(found), folder, ("svg", "png"))
     console = out()
@@ -134,7 +135,7 @@ def fit(
     folder = open_folder(output, ("fit.", "preset_"))
     journal = Journal(folder / ROWS, belongs_to_fit(shared))
     others = {name: make() for name, make in presets.PRESETS.items() if make() != shared.base}
-    with progress_bar("fitting") as progress, open_pool(backend, jobs, scheduler) as pool:
+    with stage("fitting") as progress, open_pool(backend, jobs, scheduler) as pool:
         found = Fitter(shared, names, pool, journal, criterion, others, progress).run()
     advice = recommendation(found)
     write_fit(folder, found, presets.title(base), advice)
@@ -178,7 +179,7 @@ def shared_of(cases: Sequence[Case], base: str, left_out: bool = False) -> Share
     noise = presets.preset(base, cases[0].config.noise)
     ready = []
     for case in cases:
-        with busy(f"reading {case.recording.name}"):
+        with stage(f"reading {case.recording.name}"):
             estimator = replace(case.setup, noise={base: noise}).estimator(base)
             ready.append(prepare(case.recording, estimator, static=case.static))
     return Shared(tuple(ready), noise, left_out)

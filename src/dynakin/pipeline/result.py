@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 from dynakin.errors import OutputError
 from dynakin.identification.observability.trial import Identifiability
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.progress import stage
 from dynakin.results.estimate import Estimate
 from dynakin.results.failures import LOG, Failures
 from dynakin.results.files import body as body_files
@@ -151,7 +152,8 @@ class Result:
         Raises:
             ConfigError: an unknown format. OutputError: the folder cannot be written.
         """
-        from dynakin.report.paper_figures.figures import FORMATS, save_figures  # Matplotlib: only who draws waits
+        from dynakin.report.paper_figures.figures import save_figures  # Matplotlib: only who draws waits
+        from dynakin.report.paper_figures.saving import FORMATS
 
         return save_figures(
             self.estimate,
@@ -180,14 +182,18 @@ class Result:
             "parameters.json": write_parameters,
             "estimate.nc": write_netcdf,
         }
-        with replacing(folder, overwrite=overwrite) as made:
-            for name, write in files.items():
+        with stage("writing results and report") as report, replacing(folder, overwrite=overwrite) as made:
+            in_all = len(files) + 2  # the page takes longest
+            for done, (name, write) in enumerate(files.items()):
+                report(done, in_all)
                 _written(made / name, failed, lambda path, write=write: write(estimate, path))  # type: ignore[misc]
             with failed.stage("files of the body", writes=True):
                 body_files.write_body_files(estimate, made)
+            report(len(files), in_all)
             _written(made / "repetitions.csv", failed, self._write_repetitions)
             write_config(estimate.config, made / "config.toml")
             whole = replace(estimate, messages=[*estimate.messages, *failed.messages()])
+            report(len(files) + 1, in_all)
             _written(
                 made / "report.html",
                 failed,

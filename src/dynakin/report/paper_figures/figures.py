@@ -11,6 +11,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from dynakin.errors import ConfigError, OutputError
+from dynakin.progress import stage
 from dynakin.report.paper_figures.movement import (
     angles_figure,
     knee_moment_figure,
@@ -117,15 +118,16 @@ def _write(
         return nullcontext() if failures is None else failures.stage(f"figure {name}", writes=True)
 
     figures: dict[str, Figure] = {}
-    for name, draw in draws.items():
-        with guarded(name), mpl.rc_context(FILE_STYLE):
-            figure = draw()
-            if figure is not None:
-                figures[name] = figure
     written: list[Path] = []
+    with stage("drawing figures"):
+        for name, draw in draws.items():
+            with guarded(name), mpl.rc_context(FILE_STYLE):
+                figure = draw()
+                if figure is not None:
+                    figures[name] = figure
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for name, made in save_each(figures, folder, formats):
+        for name, made in save_each(figures, folder, formats).items():
             with guarded(name):
                 if isinstance(made, Exception):
                     raise made

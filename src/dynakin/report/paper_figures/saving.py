@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
@@ -13,6 +13,7 @@ from matplotlib.backends.backend_pdf import FigureCanvasPdf
 from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
+from dynakin.progress import stage
 from dynakin.report.plot import FILE_STYLE
 
 FORMATS = ("svg", "pdf", "png")
@@ -21,22 +22,22 @@ _CANVASES: dict[str, type[FigureCanvasBase]] = {"svg": FigureCanvasSVG, "pdf": F
 _DATES: dict[str, dict[str, None]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {}}
 
 
-def save_each(
-    figures: Mapping[str, Figure], folder: Path, formats: Sequence[str]
-) -> Iterator[tuple[str, list[Path] | Exception]]:
+def save_each(figures: Mapping[str, Figure], folder: Path, formats: Sequence[str]) -> dict[str, list[Path] | Exception]:
     """Write each figure by its name; gives in their order the files of each, or what went wrong with it."""
     import joblib  # here, because it takes a quarter of a second
 
     jobs = min(joblib.cpu_count() - 1, len(figures))  # a worker takes seconds to start: two cores gain nothing
     save = partial(_save, folder=folder, formats=formats)
-    if jobs < 2:
-        yield from ((name, save(name, figure)) for name, figure in figures.items())
-        return
     # The largest first: it takes half of all, and the others find room beside it.
     order = sorted(figures, key=lambda name: -len(figures[name].axes))
-    made = joblib.Parallel(n_jobs=jobs)(joblib.delayed(save)(name, figures[name]) for name in order)
-    found = dict(zip(order, made, strict=True))
-    yield from ((name, found[name]) for name in figures)
+    tasks = (joblib.delayed(save)(name, figures[name]) for name in order)
+    found: dict[str, list[Path] | Exception] = {}
+    with stage("saving figures") as report:
+        sizes = {name: len(figures[name].axes) for name in order}
+        for name, made in zip(order, joblib.Parallel(n_jobs=max(jobs, 1), return_as="generator")(tasks), strict=True):
+            found[name] = made
+            report(sum(sizes[name] for name in found), sum(sizes.values()))
+    return {name: found[name] for name in figures}
 
 
 def _save(name: str, figure: Figure, folder: Path, formats: Sequence[str]) -> list[Path] | Exception:
