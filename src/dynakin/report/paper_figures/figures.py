@@ -119,14 +119,14 @@ def _write(
 
     figures: dict[str, Figure] = {}
     written: list[Path] = []
-    with stage("drawing figures"):
-        for name, draw in draws.items():
-            with guarded(name), mpl.rc_context(FILE_STYLE):
-                figure = draw()
-                if figure is not None:
-                    figures[name] = figure
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        with stage("drawing figures"):
+            for name, draw in draws.items():
+                with guarded(name), mpl.rc_context(FILE_STYLE):
+                    figure = draw()
+                    if figure is not None:
+                        figures[name] = figure
         for name, made in save_each(figures, folder, formats).items():
             with guarded(name):
                 if isinstance(made, Exception):
