@@ -10,8 +10,10 @@ import numpy as np
 from dynakin.arrays import finite
 from dynakin.errors import OutputError
 
+EXACT = 15
+"""Significant digits that hold a double: of truth and recordings, which others compute from."""
 DIGITS = 8
-"""Significant digits of a value: no coarser than the single precision of ``estimate.nc``, far below any deviation."""
+"""Of an estimate: no coarser than the single precision of ``estimate.nc``, far below any deviation."""
 DIGITS_OF_SD = 5
 """Of a standard deviation, which itself is not known to two."""
 _TIME = "%.12g"
@@ -26,7 +28,7 @@ def write_storage(
     *,
     in_degrees: bool,
     notes: Sequence[str] = (),
-    digits: int = DIGITS,
+    digits: int = EXACT,
 ) -> None:
     """Write one table.
 
