@@ -16,11 +16,12 @@ from pathlib import Path
 
 from dynakin.model.definition import load_model
 from dynakin.recordings.read import read
+from dynakin.settings.defaults import HORIZON_S
 from dynakin.settings.subject import Subject
 from dynakin.validation.setup import Setup
 from dynakin.validation.table2 import MARKERS
 from dynakin.validation.unseen import unseen_figures
-from dynakin.validation.yardsticks import HORIZON_S, LEFT_OUT, LINEAR, PERSISTENCE, WITHHELD, Figures, ahead
+from dynakin.validation.yardsticks import LEFT_OUT, LINEAR, PERSISTENCE, WITHHELD, Figures, ahead
 from recordings import DATA, ROOT, TRIALS, put_between
 
 KEPT = ROOT / "build" / "held_out"

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynakin.cli import run as run_module
+from dynakin.cli import summary
 from dynakin.cli.app import main
 from dynakin.pipeline import stages
 from dynakin.recordings.recording import Recording
@@ -39,7 +39,7 @@ def test_what_fails_after_the_estimate_is_named_and_the_rest_saved(
     squat.save(tmp_path / "trial")
     monkeypatch.setattr(stages, "trial_of", broken)
     monkeypatch.setattr(stages, "identifiability", broken)
-    monkeypatch.setattr(run_module, "print_summary", broken)
+    monkeypatch.setattr(summary, "print_summary", broken)
     monkeypatch.setitem(figures.FIGURES, "figure5_angles", broken)
     trial = [str(tmp_path / "trial" / "markers.trc"), "--forces", str(tmp_path / "trial" / "forces.mot")]
     out, drawn = tmp_path / "out", tmp_path / "figures"

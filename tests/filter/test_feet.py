@@ -223,18 +223,18 @@ def test_files(estimate: Estimate, tmp_path: Path) -> None:
         )
         moment = np.cross(point, force) + torque
         expected = values(estimate, "foot_wrench")[:, foot]
-        np.testing.assert_allclose(np.hstack([force, moment]), expected, atol=1e-9)
+        np.testing.assert_allclose(np.hstack([force, moment]), expected, rtol=1e-6, atol=1e-4)
     mass_centre = read_table(folder / "centre_of_mass.sto")
     assert list(mass_centre.names) == ["com_x", "com_y", "com_z", "com_vx", "com_vy", "com_vz"]
-    np.testing.assert_allclose(mass_centre.values[:, :3], values(estimate, "mass_centre"), rtol=1e-12)
+    np.testing.assert_allclose(mass_centre.values[:, :3], values(estimate, "mass_centre"), rtol=5e-8)
     loads = read_table(folder / "joint_reactions.sto")
     joint = [str(name) for name in estimate.data["joint"].values][3]
     here = list(loads.names).index(f"{joint}_on_left_2_in_ground_fy")
-    np.testing.assert_allclose(loads.values[:, here], values(estimate, "joint_loads")[:, 3, 1], rtol=1e-12)
+    np.testing.assert_allclose(loads.values[:, here], values(estimate, "joint_loads")[:, 3, 1], rtol=5e-8)
     powers = read_table(folder / "powers.sto")
     assert powers.names[0] == f"{estimate.coordinate_names[0]}_power"
     with xr.open_dataset(folder / "estimate.nc") as stored:
-        np.testing.assert_array_equal(stored["foot_wrench"].values, values(estimate, "foot_wrench"))
+        np.testing.assert_allclose(stored["foot_wrench"].values, values(estimate, "foot_wrench"), rtol=2.0**-24)
         assert stored["foot_contact"].attrs["flag_meanings"] == "none plate unmeasured shared_plate"
 
 

@@ -6,6 +6,7 @@ import re
 from dataclasses import replace
 from pathlib import Path
 
+import joblib
 import numpy as np
 import pytest
 
@@ -79,6 +80,18 @@ def test_same_estimate_same_files(jointed: Estimate, saved: Path, tmp_path: Path
     save_figures(jointed, tmp_path, ("svg",), comparison=comparison)
     for name in ("figure4_markers.svg", "figure8_lengths_and_masses.svg"):
         assert (tmp_path / name).read_bytes() == (saved / name).read_bytes()
+
+
+def test_several_processes_write_the_same_files(
+    jointed: Estimate, comparison: Trial, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folders = {cores: tmp_path / str(cores) for cores in (1, 3)}
+    for cores, folder in folders.items():
+        monkeypatch.setattr(joblib, "cpu_count", lambda cores=cores: cores)
+        written = save_figures(jointed, folder, ("svg", "png"), comparison=comparison)
+        assert [path.name for path in written] == [f"{name}.{form}" for name in FIGURES for form in ("svg", "png")]
+    for path in folders[1].iterdir():
+        assert path.read_bytes() == (folders[3] / path.name).read_bytes(), path.name
 
 
 def test_cycle_is_the_middle_repetition_or_everything(jointed: Estimate) -> None:

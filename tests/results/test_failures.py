@@ -15,6 +15,7 @@ from dynakin.cli import summary
 from dynakin.errors import OutputError
 from dynakin.pipeline import result
 from dynakin.pipeline.result import Result
+from dynakin.report import page
 from dynakin.results.estimate import Estimate
 from dynakin.results.failures import Failures
 from dynakin.results.files.folder import OUTPUT_FILES, check_folder_writable, check_output_writable
@@ -33,7 +34,7 @@ def short() -> Estimate:
 
 
 def test_a_page_that_fails_loses_no_file(short: Estimate, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(result, "write_report", broken)
+    monkeypatch.setattr(page, "write_report", broken)
     made = Result(short)
     out, failures = made.save(tmp_path / "out", check=False), made.failures
     assert {file.name for file in out.iterdir()} >= {*OUTPUT_FILES, "failures.log"} - {"report.html"}

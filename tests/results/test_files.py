@@ -19,6 +19,10 @@ from dynakin.results.files.markers import write_trc
 from dynakin.results.measures.fit import marker_rms_mm, wrench_fit
 from support.estimates.synthetic import make_estimate
 
+DIGITS = 5e-8
+"""Relative: tables have eight significant digits."""
+TENTH_OF_A_MICROMETRE = 1e-7
+
 
 @pytest.fixture(scope="module")
 def folder(estimate: Estimate, tmp_path_factory: pytest.TempPathFactory) -> Path:
@@ -40,8 +44,8 @@ def test_motion_tables_are_in_degrees_for_rotations_only(folder: Path, estimate:
     assert columns == ["time", *estimate.coordinate_names]
     assert f"nRows={len(values)}" in text and f"nColumns={len(columns)}" in text
     expected = estimate.data[Path(name).stem].values
-    np.testing.assert_allclose(values[:, 3], np.degrees(expected[:, 2]), rtol=1e-13, atol=1e-13)
-    np.testing.assert_allclose(values[:, 8], expected[:, 7], rtol=1e-13, atol=1e-13)  # the translation
+    np.testing.assert_allclose(values[:, 3], np.degrees(expected[:, 2]), rtol=DIGITS)
+    np.testing.assert_allclose(values[:, 8], expected[:, 7], rtol=DIGITS)  # the translation
 
 
 def test_our_own_reader_gets_the_coordinates_back(folder: Path, estimate: Estimate) -> None:
@@ -54,7 +58,7 @@ def test_moments_are_named_as_inverse_dynamics_names_them(folder: Path, estimate
     table = read_table(folder / "moments.sto")
     assert not table.in_degrees
     assert table.names[2] == "knee_moment" and table.names[-1] == "slide_force"
-    np.testing.assert_allclose(table.values, estimate.data["moments"].values, rtol=1e-13)
+    np.testing.assert_allclose(table.values, estimate.data["moments"].values, rtol=DIGITS)
 
 
 def test_wrench_has_columns_for_what_is_measured_and_modelled_only(folder: Path) -> None:
@@ -71,12 +75,12 @@ def test_figures_recomputed_from_the_files_equal_metrics_json(folder: Path, esti
     )  # out of the plane nothing differs, so the laboratory distance is the planar one
     for name, told in metrics["markers"]["rms_mm"].items():
         measured = estimate.recording.marker(name)[window]
-        assert marker_rms_mm(measured, markers.marker(name)[window], every_axis) == pytest.approx(told, abs=1e-5)
+        assert marker_rms_mm(measured, markers.marker(name)[window], every_axis) == pytest.approx(told, abs=1e-4)
     table = read_table(folder / "wrench.sto")
     columns = dict(zip(table.names, table.values.T, strict=True))
     for component, told in metrics["wrench"]["rms"].items():
         fit = wrench_fit(columns[f"{component}_measured"][window], columns[f"{component}_estimated"][window])
-        assert fit.rms == pytest.approx(told, rel=1e-12)
+        assert fit.rms == pytest.approx(told, rel=1e-5)
 
 
 @pytest.mark.parametrize("unit", ["m", "mm"])
@@ -87,10 +91,12 @@ def test_markers_are_written_in_the_unit_and_frame_of_the_recording(tmp_path: Pa
     assert list(back.marker_names) == made.marker_names
     measured = made.recording.markers[:, : len(made.marker_names)]
     difference = made.ground.vectors_to_ground(back.markers - measured)
-    assert np.abs(difference[..., 2]).max() < 1e-9  # as measured
+    assert np.abs(difference[..., 2]).max() < TENTH_OF_A_MICROMETRE  # as measured
     assert 0.001 < np.std(difference[..., :2]) < 0.005
     expected = made.data["markers_estimated"].values[..., :2]
-    np.testing.assert_allclose(made.ground.points_to_ground(back.markers)[..., :2], expected, atol=2e-9)
+    np.testing.assert_allclose(
+        made.ground.points_to_ground(back.markers)[..., :2], expected, atol=TENTH_OF_A_MICROMETRE
+    )
 
 
 def test_missing_markers_are_blank_cells(folder: Path) -> None:
@@ -121,13 +127,27 @@ def test_netcdf_gives_everything_back_with_labels(folder: Path, estimate: Estima
     with xr.open_dataset(folder / "estimate.nc", engine="h5netcdf") as data:
         assert data.attrs["schema_version"] == 2
         for name, variable in estimate.data.data_vars.items():
-            np.testing.assert_array_equal(data[name].values, variable.values)
+            over_time = variable.dtype.kind == "f" and variable.ndim > 1 and variable.dims[0] == "time"
+            bits = 0 if not over_time else 13 if str(name).endswith("_sd") else 24
+            np.testing.assert_allclose(data[name].values, variable.values, rtol=2.0**-bits if bits else 0.0, atol=0.0)
+        np.testing.assert_array_equal(data["time"].values, estimate.time)
         knee = data["coordinates"].sel(coordinate="knee")
-        np.testing.assert_array_equal(knee.values, estimate.data["coordinates"].sel(coordinate="knee").values)
+        expected = estimate.data["coordinates"].sel(coordinate="knee")
+        np.testing.assert_allclose(knee.values, expected.values, rtol=2.0**-24)
         assert float(data["parameter_value"].sel(parameter="length/thigh")) == pytest.approx(1.2 * 0.43)
         assert list(data["event_kind"].values) == [event.kind for event in estimate.events]
         np.testing.assert_allclose(data["ground_rotation"].values, estimate.ground.rotation)
         assert data["markers_estimated"].attrs["units"] == "m"
+
+
+def test_what_is_rounded_away_is_far_below_its_deviation(folder: Path, estimate: Estimate) -> None:
+    with xr.open_dataset(folder / "estimate.nc", engine="h5netcdf") as data:
+        pairs = [name for name in map(str, estimate.data.data_vars) if f"{name}_sd" in estimate.data]
+        assert {"coordinates", "speeds", "accelerations", "state"} <= set(pairs)
+        for name in pairs:
+            sd = estimate.data[f"{name}_sd"].values
+            lost = np.abs(data[name].values - estimate.data[name].values)
+            assert (lost[sd > 0.0] <= 1e-3 * sd[sd > 0.0]).all(), name
 
 
 def test_config_toml_holds_what_was_used_and_versions(folder: Path, estimate: Estimate) -> None:

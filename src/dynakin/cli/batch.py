@@ -7,18 +7,11 @@ from typing import Annotated
 
 import typer
 
-from dynakin.cli.console import as_table, busy, out, progress_bar
+from dynakin.cli.console import as_table, out
 from dynakin.cli.options import Backend, Jobs, Scheduler
 from dynakin.errors import ConfigError, DynakinError
-from dynakin.recordings.smoothing import CUTOFF_HZ
-from dynakin.report.text_tables import table2_text
-from dynakin.results.naming import plural
-from dynakin.studies.batch.dataset import read_dataset
-from dynakin.studies.batch.process import Options, belongs_to, run_batch, write_batch
-from dynakin.studies.batch.subjects import identify_subjects, with_parameters
-from dynakin.studies.engine.folder import ROWS, open_folder
-from dynakin.studies.engine.journal import Journal
-from dynakin.studies.engine.pools import open_pool
+from dynakin.progress import stage
+from dynakin.settings.defaults import CUTOFF_HZ
 
 
 def batch(
@@ -43,6 +36,15 @@ def batch(
     The exit code is 1 where some failed, or a filter lost the person. A batch that was stopped goes on where it was;
     those that failed are tried again.
     """
+    from dynakin.report.text_tables import table2_text
+    from dynakin.results.naming import plural
+    from dynakin.studies.batch.dataset import read_dataset
+    from dynakin.studies.batch.process import Options, belongs_to, run_batch, write_batch
+    from dynakin.studies.batch.subjects import identify_subjects, with_parameters
+    from dynakin.studies.engine.folder import ROWS, open_folder
+    from dynakin.studies.engine.journal import Journal
+    from dynakin.studies.engine.pools import open_pool
+
     if backend == "threads":
         raise ConfigError("batch: --backend threads, expected processes or dask: a crash would take all trials with it")
     found = read_dataset(dataset, output)
@@ -53,9 +55,9 @@ def batch(
     identified = {}
     with open_pool(backend, jobs, scheduler) as pool:
         if identify:
-            with progress_bar("identifying") as progress:
+            with stage("identifying") as progress:
                 identified = identify_subjects(found, pool, journal=journal, progress=progress)
-        with progress_bar("batch") as progress:
+        with stage("batch") as progress:
             result = run_batch(with_parameters(found, identified), options, pool, journal=journal, progress=progress)
     console = out()
     if result.rows:
@@ -64,7 +66,7 @@ def batch(
             f"{plural(len(result.rows), 'trial')} of {plural(people, 'subject')}, mean ± standard deviation over trials"
         )
         console.print(as_table(table2_text(result.table2(), title)))
-    with busy("writing tables"):
+    with stage("writing tables"):
         write_batch(folder, result, identified)
     console.print(f"Tables  {folder}/table2.csv, table2_subjects.csv, trials.csv, batch.json", soft_wrap=True)
     for subject, row in identified.items():

@@ -2,32 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
 import typer
 
 from dynakin.cli.console import out
 from dynakin.cli.options import OF_A_MODEL, OF_THE_LABORATORY, OF_THE_PLATES, Given, with_settings
-from dynakin.cli.prepared import GROUND, MARKERS, SUBJECT, Rows, assumed, contacts, print_rows, short, starting
 from dynakin.errors import DynakinError, ModelError, RecordingError
 from dynakin.files import is_file
-from dynakin.filter.prepared import Prepared
-from dynakin.model.markers.recognise import fits
-from dynakin.pipeline.stages import configure, prepare_case
-from dynakin.recordings.beside import forces_beside, static_beside
-from dynakin.recordings.recording import Recording
-from dynakin.results.naming import sentence, words
-from dynakin.settings.settings import Settings
-from dynakin.validation.case import Case, case_of
-
-_LISTED, _SETS = 6, 3
-_SOME_KG = 70.0
-"""To see what else there is where a mass is all that is missing; nothing that depends on it is said then."""
-_DETAILS = ("Lengths", "Masses", "Length of", "Start", "Marker places")
-"""Sentences of a calibration that a run's report has, and a rehearsal leaves out."""
 
 
 @with_settings("forces", *OF_A_MODEL, "parameters", *OF_THE_LABORATORY, *OF_THE_PLATES, "preset")
@@ -40,6 +23,11 @@ def check(
 
     Exit code 0 where `run` would run; 1 where it would refuse, with the line that it would refuse with.
     """
+    from dynakin.cli.check_rows import model_rows, nearest_sets, recording_rows, rehearsed, to_add
+    from dynakin.cli.prepared import print_rows
+    from dynakin.pipeline.stages import configure
+    from dynakin.validation.case import case_of
+
     console = out()
     settings = configure(trial, given, {"output": Path()}, options=True)
     try:
@@ -49,13 +37,13 @@ def check(
             raise
         raise _refused(error) from None
     console.print(f"{case.recording.path or case.recording.name}", style="bold", soft_wrap=True)
-    print_rows(console, _recording(case.recording))
-    ready, refusal = _rehearsed(case)
+    print_rows(console, recording_rows(case.recording))
+    ready, refusal = rehearsed(case)
     if ready is not None:
-        print_rows(console, _model(ready, settings, refusal))
+        print_rows(console, model_rows(ready, settings, refusal))
     else:
-        print_rows(console, [("Markers", text) for text in _nearest_sets(case.recording)])
-    print_rows(console, [("Add", text) for text in _to_add(case, ready, refusal)])
+        print_rows(console, [("Markers", text) for text in nearest_sets(case.recording)])
+    print_rows(console, [("Add", text) for text in to_add(case, ready, refusal)])
     if refusal is not None:
         raise _refused(refusal)
     console.print("`dynakin run` would run it.", style="dim")
@@ -65,140 +53,3 @@ def _refused(error: DynakinError) -> DynakinError:
     """A refusal is what was asked for: it ends the command with 1, not as wrong input does."""
     error.exit_code = 1
     return error
-
-
-def _rehearsed(case: Case) -> tuple[Prepared | None, DynakinError | None]:
-    """The trial as a run prepares it, or what it would refuse it with; both where only the mass is missing."""
-    try:
-        return next(iter(prepare_case(case).values())), None
-    except DynakinError as error:
-        refusal = error
-    if case.config.mass_kg is None and isinstance(refusal, ModelError) and refusal.message.startswith("mass_kg"):
-        somebody = case.config.changed(mass_kg=_SOME_KG).subject()
-        setup = replace(case.setup, definition=case.setup.definition.with_subject(somebody))
-        try:
-            return next(iter(prepare_case(replace(case, setup=setup)).values())), refusal
-        except DynakinError:
-            pass
-    return None, refusal
-
-
-def _recording(recording: Recording) -> Rows:
-    seconds = recording.time[-1] - recording.time[0]
-    plates = f"{len(recording.plates)} force plates" if len(recording.plates) != 1 else "1 force plate"
-    rows = [
-        (
-            "Recording",
-            f"{recording.n_frames} frames at {recording.rate:.6g} Hz, {seconds:.4g} s from {recording.time[0]:g} s; "
-            f"{len(recording.marker_names)} markers in {recording.length_unit}; {plates}.",
-        ),
-        ("Gaps", _gaps(recording)),
-    ]
-    subject = [_measure(key, value) for key, value in recording.subject.items()]
-    rows += [("In the file", f"{', '.join(subject)}.")] if subject else []
-    if recording.events:
-        kinds = list(dict.fromkeys(f"{event.side} {event.label}".strip().casefold() for event in recording.events))
-        rows.append(("In the file", f"{len(recording.events)} events ({', '.join(kinds)})."))
-    for plate in recording.plates:
-        size = np.linalg.norm(plate.force, axis=1)
-        if not np.isfinite(size).any():
-            rows.append(("Plates", f"{plate.name}: not measured."))
-            continue
-        loaded = 100.0 * float(np.mean(np.isfinite(plate.cop).all(axis=1)))
-        text = f"{plate.name}: up to {np.nanmax(size):.0f} N, mean {np.nanmean(size):.1f} N, loaded {loaded:.0f} %."
-        rows.append(("Plates", text))
-    return [*rows, *(("Note", short(text)) for text in recording.notes)]
-
-
-def _gaps(recording: Recording) -> str:
-    """Markers with gaps, the worst first."""
-    seen = np.isfinite(recording.markers).all(axis=2)
-    share = {name: float(part) for name, part in zip(recording.marker_names, seen.mean(axis=0), strict=True)}
-    gappy = sorted((part, name) for name, part in share.items() if part < 1.0)
-    if not gappy:
-        return "none: every marker is seen in every frame."
-    told = [f"{name} {'never' if part == 0.0 else f'{np.floor(1000 * part) / 10:.1f} %'}" for part, name in gappy]
-    rest = f" and {len(told) - _LISTED} more" if len(told) > _LISTED else ""
-    return f"{len(gappy)} of {len(share)} markers are not always seen: {', '.join(told[:_LISTED])}{rest}."
-
-
-def _model(ready: Prepared, settings: Settings, refusal: DynakinError | None) -> Rows:
-    """What `run` says first, with what it rests on, and what will come out."""
-    calibrated = ready.calibrated
-    sentences = calibrated.messages
-    told = {*starting(sentences, (*MARKERS, *GROUND, *SUBJECT, *_DETAILS))}
-    more = {
-        "Model": _held(ready),
-        "Markers": [
-            f"{len(calibrated.spec.markers)} of {len(ready.recording.marker_names)} are used.",
-            *(short(text) for text in sentences if text not in told),
-        ],
-        "Ground": starting(sentences, GROUND),
-    }
-    rows: Rows = []
-    for topic, text in assumed(ready, settings):
-        if topic == "Subject" and refusal is not None:
-            text = " ".join(["The mass is missing.", *starting(sentences, SUBJECT[2:])])
-        rows += [(topic, said) for said in (text, *more.get(topic, []))]
-    rows += contacts(ready)
-    if refusal is not None:
-        return rows
-    figures = ready.moment_figures()
-    rows += [("Results", text) for text in (figures["verdict"], *figures["reasons"])]
-    known = {*figures["reasons"], *told, *(sentence(text.removeprefix("Warning: ")) for text in sentences)}
-    warnings = [text for text in ready.messages if text.startswith("Warning: ")]
-    return rows + [("Doubts", text) for text in warnings if sentence(text.removeprefix("Warning: ")) not in known]
-
-
-def _held(ready: Prepared) -> list[str]:
-    """A sentence on the coordinates that are not estimated; those of both sides once."""
-    locked = [coordinate.name for coordinate in ready.calibrated.spec.coordinates if coordinate.locked]
-    stems = [name.removesuffix("_r").removesuffix("_l") for name in locked]
-    told = {
-        stem: f"{words(stem)} (both sides)" if stems.count(stem) == 2 else words(name)
-        for stem, name in zip(stems, locked, strict=True)
-    }
-    return [f"Held: {', '.join(told.values())}."] if told else []
-
-
-def _nearest_sets(recording: Recording) -> list[str]:
-    """The marker sets that the recording's names fit best, and what each lacks at least."""
-    told = []
-    for fit in fits(recording.seen_names)[:_SETS]:
-        lacks = f"; lacks markers {', '.join(fit.lacking)}" if fit.lacking else ""
-        told.append(f"{fit.marker_set.name}: {fit.explained_n} of its {fit.expected_n} markers by name{lacks}.")
-    return told
-
-
-def _to_add(case: Case, ready: Prepared | None, refusal: DynakinError | None) -> list[str]:
-    """What would give more, with what lies beside the recording."""
-    recording, settings = case.recording, case.config
-    path, found = recording.path, list[str]()
-    forces = None if path is None or settings.forces is not None else forces_beside(path)
-    if forces is not None:
-        found.append(f"--forces {forces.name} (found beside the recording): the plates' forces.")
-    elif not recording.plates:
-        found.append("--forces FILE.mot: nothing measures the ground's reaction.")
-    if settings.static is None and path is not None and (static := static_beside(path, recording)) is not None:
-        found.append(f"--static {static.name} (found beside the recording): lengths and marker places of standing.")
-    if refusal is not None and ready is not None and settings.mass_kg is None:
-        found.append("--mass KG: neither plates nor file show it.")
-    if ready is None:
-        return found
-    messages = ready.calibrated.messages
-    if refusal is None and starting(messages, ("Warning: mass",)):
-        found.append("--mass KG: it is only estimated (Subject, above).")
-    if any("estimated from" in text for text in starting(messages, ("Height",))):
-        found.append("--height M: estimated from the markers.")
-    if starting(messages, ("Sex not given",)):
-        found.append("--sex female or male: else the table's mean of both.")
-    if refusal is None and ready.ground.undeclared.any() and not settings.contacts:
-        found.append("--contact seat (hand_right, ...): if that is what bears the person where no plate does.")
-    return found
-
-
-def _measure(key: str, value: float) -> str:
-    """ "mass_kg" -> "mass 85 kg", "knee_width_m_r" -> "right knee width 0.139 m"."""
-    side = {"_r": "_r", "_l": "_l"}.get(key[-2:], "")
-    stem, _, unit = key.removesuffix(side).rpartition("_")
-    return f"{words(stem + side)} {value:g} {unit}"

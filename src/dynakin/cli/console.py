@@ -1,17 +1,16 @@
-"""What all commands print with: results on stdout, progress and errors on stderr."""
+"""What all commands print with: results on stdout, errors on stderr."""
 
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from typing import TYPE_CHECKING
 
 from rich import box
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from dynakin.report.text_tables import TextTable
+if TYPE_CHECKING:
+    from dynakin.report.text_tables import TextTable
 
 
 def out() -> Console:
@@ -38,28 +37,3 @@ def as_table(text: TextTable) -> Table:
     for row in text.rows:
         made.add_row(*row)
     return made
-
-
-@contextmanager
-def progress_bar(what: str) -> Iterator[Callable[[int, int], None]]:
-    """A progress bar on stderr, where somebody looks at it; gives the callback (done, total)."""
-    console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
-        task = bar.add_task(what, total=None)
-
-        def advance(done: int, total: int) -> None:
-            bar.update(task, completed=done, total=total)
-
-        yield advance
-
-
-@contextmanager
-def busy(what: str) -> Iterator[None]:
-    """Says on stderr what takes a moment, where somebody looks at it."""
-    console = Console(stderr=True)
-    if not console.is_terminal:
-        yield
-        return
-    with console.status(what):
-        yield

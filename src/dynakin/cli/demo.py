@@ -4,29 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
-import numpy as np
 import typer
-import xarray as xr
-from rich.table import Table
 
-from dynakin.cli.console import busy, out, progress_bar, table
-from dynakin.cli.summary import end, print_summary
-from dynakin.pipeline.stages import judged
-from dynakin.results.estimate import Estimate
-from dynakin.results.failures import Failures
-from dynakin.results.files.folder import check_output_writable
-from dynakin.results.measures.fit import truth_error
-from dynakin.results.measures.metrics import evaluation_window
+from dynakin.cli.console import out
+from dynakin.progress import stage
 from dynakin.settings.settings import Settings
-from dynakin.validation.case import case_of
-from dynakin.validation.coverage import block_coverage, parameter_coverage
-from dynakin.validation.methods import estimate_each
-from dynakin.validation.truth import FIGURES, LEG, parameter_errors, truth_errors
-
-if TYPE_CHECKING:
-    from dynakin.simulation.truth import Truth
 
 
 def demo(
@@ -35,7 +19,14 @@ def demo(
     duration: Annotated[float, typer.Option(help="Length of the simulated trial, s.")] = 20.0,
 ) -> None:
     """Simulate a squat, estimate it, and compare the estimate and the reference methods with the truth."""
+    from dynakin.cli.demo_tables import compared_with_truth, constants_in_words, methods_by_error, own_uncertainty
+    from dynakin.cli.summary import end, print_summary
+    from dynakin.pipeline.stages import judged
+    from dynakin.results.failures import Failures
+    from dynakin.results.files.folder import check_output_writable
     from dynakin.simulation.trial import simulate_squat
+    from dynakin.validation.case import case_of
+    from dynakin.validation.methods import estimate_each
 
     check_output_writable(output)
     trial = simulate_squat(seed=seed, duration_s=duration)
@@ -45,16 +36,14 @@ def demo(
     # with the paper's settings too, for comparison
     case = case_of(Settings.of(keys, "demo"), ("default", "paper"), recording=trial.recording)
     failures = Failures()
-    with progress_bar("estimating") as progress:
+    with stage("estimating") as progress:
         estimates, lost, trackers = estimate_each(case.recording, case.setup, progress=progress, failures=failures)
-    with busy("comparing with the truth and the reference methods"):
-        result = judged(case, estimates, lost, trackers, failures)
+    result = judged(case, estimates, lost, trackers, failures)
     drawn = {"seed": seed, "duration_s": duration}
     result = replace(result, estimate=replace(result.estimate, config=drawn | result.estimate.config))
     estimate, comparison = result.estimate, result.comparison
     methods = {method.name: method.data for method in comparison.methods} if comparison else {}
-    with busy("writing results and report"):
-        folder = result.save(output, check=False)
+    folder = result.save(output, check=False)
     console = out()
     console.print(methods_by_error(methods, estimate, trial.truth))
     console.print(compared_with_truth(estimate, trial.truth))
@@ -72,69 +61,3 @@ def demo(
     with failures.stage("summary"):
         print_summary(result, folder)
     end(result)
-
-
-def methods_by_error(methods: dict[str, xr.Dataset], estimate: Estimate, truth: Truth) -> Table:
-    """RMS errors of each method against the simulation's truth, after the adaptation."""
-    window = evaluation_window(estimate.time)
-    columns = tuple(range(1, 1 + len(methods)))
-    rows = table("", *methods, numbers=columns, title="Methods by RMS error against the truth")
-    errors = [truth_errors(name, data, truth.data, window, LEG).values for name, data in methods.items()]
-    for (title, unit), values in zip(FIGURES, zip(*errors, strict=True), strict=True):
-        rows.add_row(f"{title}, {unit}", *(f"{value:.0f}" if value >= 10.0 else f"{value:.2g}" for value in values))
-    return rows
-
-
-def compared_with_truth(estimate: Estimate, truth: Truth) -> Table:
-    """RMS errors of angles, speeds and moments of each coordinate against the simulation's, and how often the truth
-    lies in the angle's own 95 % interval."""
-    window = evaluation_window(estimate.time)
-    rows = table(
-        "coordinate",
-        "angle, deg",
-        "in 95 %",
-        "speed, deg/s",
-        "moment, N m",
-        numbers=(1, 2, 3, 4),
-        title="EKF (default) by coordinate: RMS error against the truth",
-    )
-    kinds = ("coordinates", "speeds", "moments")
-    found = block_coverage(estimate.data, truth.data, window)[0]
-    inside = {name: f"{100.0 * share:.0f} %" for name, share in zip(found.names, found.inside, strict=True)}
-    for name in estimate.coordinate_names:
-        pairs = ((truth.data[kind].sel(coordinate=name), estimate.data[kind].sel(coordinate=name)) for kind in kinds)
-        errors = np.array([truth_error(true.values[window], given.values[window]).rms for true, given in pairs], float)
-        angle, speed = np.degrees(errors[:2])
-        rows.add_row(name, f"{angle:.1f}", inside.get(name, ""), f"{speed:.0f}", f"{errors[2]:.1f}")
-    return rows
-
-
-def own_uncertainty(estimate: Estimate, truth: Truth) -> Table:
-    """Each block's errors and the standard deviations that the filter gives with it."""
-    rows = table(
-        "",
-        "in 95 %",
-        "no offset",
-        "error²/sd²",
-        "verdict",
-        numbers=(1, 2, 3),
-        title="EKF (default): are its standard deviations right? Truth within their 95 % interval",
-    )
-    found = block_coverage(estimate.data, truth.data, evaluation_window(estimate.time))
-    for block in found + parameter_coverage(estimate.parameters, truth.parameters):
-        about_mean = block.pooled_about_mean
-        rows.add_row(
-            block.block,
-            f"{100.0 * block.pooled:.0f} %",
-            "" if about_mean is None else f"{100.0 * about_mean:.0f} %",
-            f"{block.mean_square:.2g}",
-            block.judgement if block.judgement == "consistent" else f"{block.judgement}, {block.sizes()}",
-        )
-    return rows
-
-
-def constants_in_words(estimate: Estimate, truth: Truth) -> str:
-    """How far lengths and inertia were from the truth at the start, and are at the end."""
-    errors = parameter_errors(estimate.parameters, truth.parameters).items()
-    parts = [f"{title} {e.start_percent:.1f} % at the start, {e.end_percent:.1f} % at the end" for title, e in errors]
-    return f"Constants, RMS error against the truth: {'; '.join(parts)}."

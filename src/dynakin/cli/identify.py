@@ -4,27 +4,25 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from dynakin.cli.console import out, progress_bar, table
+from dynakin.cli.console import out, table
 from dynakin.cli.options import OF_A_MODEL, OF_THE_LABORATORY, Given, with_settings
 from dynakin.errors import ConfigError
-from dynakin.filter.build import estimator_of
-from dynakin.identification.change import change_between, change_in_words
-from dynakin.identification.report import base_in_words, segment_rows
-from dynakin.identification.subject import Identification, identify_subject
-from dynakin.model.identified import read_identified
-from dynakin.recordings.read import extensions, read
-from dynakin.recordings.recording import Recording
+from dynakin.progress import stage
 from dynakin.settings.settings import Settings
+
+if TYPE_CHECKING:
+    from dynakin.identification.subject import Identification
+    from dynakin.recordings.recording import Recording
 
 
 @with_settings(*OF_A_MODEL, *OF_THE_LABORATORY)
 def identify(
     trials: Annotated[
-        list[Path] | None, typer.Argument(help=f"Recordings of one subject with force plates ({extensions()}).")
+        list[Path] | None, typer.Argument(help="Recordings of one subject with force plates (.c3d, .trc, .csv).")
     ] = None,
     forces: Annotated[
         list[Path] | None,
@@ -38,6 +36,9 @@ def identify(
     ] = False,
 ) -> None:
     """Identify a subject, and keep what predicts trials that it was not fitted to better than the table does."""
+    from dynakin.filter.build import estimator_of
+    from dynakin.identification.subject import identify_subject
+
     paths = trials or []
     if compare:
         _compare(paths)
@@ -49,7 +50,7 @@ def identify(
     settings = Settings.of({}, "identify", (), given)
     recordings, standing = _read(paths, forces or [], settings.static)
     estimator = estimator_of(settings)
-    with progress_bar("identifying") as progress:
+    with stage("identifying") as progress:
         found = identify_subject(estimator, recordings, static=standing, progress=progress)
     found.subject.write(output)
     _print(found)
@@ -58,6 +59,8 @@ def identify(
 
 def _print(found: Identification) -> None:
     """What the decision was, what moved, how sure."""
+    from dynakin.identification.report import base_in_words, segment_rows
+
     console = out()
     for text in (*found.lost, *found.decision.in_words()):
         console.print(f"- {text}")
@@ -97,6 +100,8 @@ def _check_output(output: Path) -> None:
 
 def _read(paths: list[Path], forces: list[Path], static: Path | None) -> tuple[list[Recording], Recording | None]:
     """The trials and the standing one, each with the ground forces given or found in its folder."""
+    from dynakin.recordings.read import read
+
     if forces and len(forces) != len(paths):
         raise ConfigError(f"identify: {len(forces)} force files for {len(paths)} trials, expected one a trial or none")
     chosen: list[Path | None] = [*forces] or [_forces_of(path) for path in paths]
@@ -121,6 +126,9 @@ def _forces_of(path: Path) -> Path | None:
 
 
 def _compare(paths: list[Path]) -> None:
+    from dynakin.identification.change import change_between, change_in_words
+    from dynakin.model.identified import read_identified
+
     if len(paths) != 2:
         raise ConfigError(f"identify --compare: {len(paths)} files, expected two subject files (before, after)")
     before, after = (read_identified(path) for path in paths)

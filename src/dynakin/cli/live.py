@@ -5,30 +5,26 @@ from __future__ import annotations
 import gc
 from datetime import datetime
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from dynakin.cli.console import busy, out
+from dynakin.cli.console import out
 from dynakin.cli.options import (
     OF_A_MODEL,
     OF_THE_LABORATORY,
     Given,
     with_settings,
 )
-from dynakin.cli.summary import end, print_summary
 from dynakin.errors import ConfigError
-from dynakin.filter.build import estimator_of
-from dynakin.recordings.read import FORCE_READERS, read
+from dynakin.progress import stage
+from dynakin.settings.defaults import DELAY_S
 from dynakin.settings.lag import LIVE_LAG_S
 from dynakin.settings.settings import Settings
-from dynakin.stream.fusion import DELAY_S
-from dynakin.stream.session import Live
-from dynakin.stream.sinks.base import Sink
-from dynakin.stream.sinks.recorder import Recorder, finish
-from dynakin.stream.sources.plugins import SINKS, SOURCES, plugin
-from dynakin.stream.sources.replay import Replay
-from dynakin.stream.start import read_known
+
+if TYPE_CHECKING:
+    from dynakin.stream.sinks.base import Sink
+    from dynakin.stream.sources.replay import Replay
 
 # Seconds of standing that are asked for, and how long they are waited for.
 _LIVE_STANDING_S, _REPLAY_STANDING_S, _SHORT_STANDING_S = (2.0, 20.0), (2.0, 3.0), (0.4, 0.4)
@@ -84,11 +80,18 @@ def live(
 
     Exit code 1 where a recording could not be written to its end.
     """
+    from dynakin.cli.summary import end, print_summary
+    from dynakin.filter.build import estimator_of
+    from dynakin.recordings.read import read
+    from dynakin.stream.session import Live
+    from dynakin.stream.sinks.recorder import Recorder, finish
+    from dynakin.stream.sources.replay import Replay
+    from dynakin.stream.start import read_known
+
     if finish_folder is not None:
         if output is None:
             raise typer.BadParameter("--finish needs -o OUT, the folder for the results")
-        with busy("estimating"):
-            result = finish(finish_folder, output)
+        result = finish(finish_folder, output)
         with result.failures.stage("summary"):
             print_summary(result, output)
         end(result)
@@ -107,19 +110,20 @@ def live(
         standing, wait = _for_replay(sources[0], source, view and record is None)
     sinks = _sinks(settings, record, publish, view, host, port)
     try:
-        session = Live(
-            estimator_of(Settings.of({}, "live", (), settings)),
-            sources,
-            sinks,
-            lag_s=lag,
-            delay_s=delay,
-            standing_s=standing,
-            standing_wait_s=wait if standing_wait is None else standing_wait,
-            static=None if static is None else read(static),
-            known=None if parameters is None else read_known(parameters),
-            record=lambda: Recorder(Path(f"live-{datetime.now():%Y%m%d-%H%M%S}"), settings),
-            say=lambda text: out().print(text, soft_wrap=True),
-        )
+        with stage("starting"):
+            session = Live(
+                estimator_of(Settings.of({}, "live", (), settings)),
+                sources,
+                sinks,
+                lag_s=lag,
+                delay_s=delay,
+                standing_s=standing,
+                standing_wait_s=wait if standing_wait is None else standing_wait,
+                static=None if static is None else read(static),
+                known=None if parameters is None else read_known(parameters),
+                record=lambda: Recorder(Path(f"live-{datetime.now():%Y%m%d-%H%M%S}"), settings),
+                say=lambda text: out().print(text, soft_wrap=True),
+            )
     except BaseException:
         for sink in sinks:
             sink.close()
@@ -147,6 +151,9 @@ def _for_replay(replay: Replay, address: str, again: bool) -> tuple[float, float
 
 
 def _sources(source: str, forces: str | None) -> list[Any]:
+    from dynakin.recordings.read import FORCE_READERS
+    from dynakin.stream.sources.plugins import SOURCES, plugin
+
     if forces is None:
         return [plugin(SOURCES, source)]
     if Path(forces).suffix.casefold() in FORCE_READERS and ":" not in forces[2:]:
@@ -159,6 +166,9 @@ def _sources(source: str, forces: str | None) -> list[Any]:
 def _sinks(
     settings: dict[str, Any], record: Path | None, publish: str | None, view: bool, host: str, port: int
 ) -> list[Sink]:
+    from dynakin.stream.sinks.recorder import Recorder
+    from dynakin.stream.sources.plugins import SINKS, plugin
+
     sinks: list[Sink] = []
     if publish is not None:
         sinks.append(plugin(SINKS, publish))

@@ -10,12 +10,6 @@ import typer
 
 from dynakin.cli.console import out, table
 from dynakin.errors import ConfigError
-from dynakin.model.calibration.needs import in_words, lacking, needs
-from dynakin.model.definition import available_models, load_built_in_or_toml
-from dynakin.model.markers.anatomy import anatomy
-from dynakin.model.markers.draft.draft import guess_markers, toml_text
-from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
-from dynakin.recordings.read import read
 
 markers = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Marker sets: built in, and one of your own.")
 
@@ -23,6 +17,8 @@ markers = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Marker 
 @markers.command("list")
 def list_sets() -> None:
     """The built-in marker sets."""
+    from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
+
     shown = table("set", "markers", "what it is", numbers=(1,))
     for name in available_marker_sets():
         found = load_marker_set(name)
@@ -34,6 +30,9 @@ def list_sets() -> None:
 @markers.command()
 def show(name: Annotated[str, typer.Argument(metavar="SET", help="A built-in marker set, or a .toml file.")]) -> None:
     """A marker set: its places, and under which names recordings have them."""
+    from dynakin.model.markers.anatomy import anatomy
+    from dynakin.model.markers.marker_set import load_marker_set
+
     found = load_marker_set(name)
     shown = table(
         "place", "right", "left", "middle", "segment", "where it is", title=f"{found.name}: {found.description}"
@@ -48,6 +47,8 @@ def show(name: Annotated[str, typer.Argument(metavar="SET", help="A built-in mar
 @markers.command()
 def places() -> None:
     """Places of the body that a marker set may name, and segments whose clusters it may name."""
+    from dynakin.model.markers.anatomy import anatomy
+
     shown = table("place", "segment", "where it is")
     for name, about in anatomy()["places"].items():
         shown.add_row(name, about.get("segment", ""), about["description"])
@@ -58,6 +59,9 @@ def places() -> None:
 @markers.command("needs")
 def needs_of(model: Annotated[str, typer.Argument(metavar="MODEL", help="A built-in model, or a .toml file.")]) -> None:
     """Which places a model needs marked."""
+    from dynakin.model.calibration.needs import in_words, needs
+    from dynakin.model.definition import load_built_in_or_toml
+
     definition = load_built_in_or_toml(model)
     shown = table(
         "for", "segments", "needed", "places that give it", title=f"{definition.name}: the first that are marked"
@@ -81,6 +85,13 @@ def new(
 
     Each line says how sure it is and why. Nothing is asked; what is missing for each model is listed at once.
     """
+    from dynakin.model.calibration.needs import in_words, lacking
+    from dynakin.model.definition import available_models, load_built_in_or_toml
+    from dynakin.model.markers.anatomy import anatomy
+    from dynakin.model.markers.draft.draft import guess_markers, toml_text
+    from dynakin.model.markers.marker_set import load_marker_set
+    from dynakin.recordings.read import read
+
     if output.suffix != ".toml":
         raise ConfigError(f"{output}: expected a name that ends in .toml")
     if output.exists():

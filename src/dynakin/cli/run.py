@@ -7,15 +7,9 @@ from typing import Annotated
 
 import typer
 
-from dynakin.cli.console import busy, out, progress_bar
+from dynakin.cli.console import out
 from dynakin.cli.options import OF_A_MODEL, OF_THE_LABORATORY, OF_THE_PLATES, Given, with_settings
-from dynakin.cli.prepared import assumed, print_rows
-from dynakin.cli.summary import end, print_summary
-from dynakin.pipeline.stages import configure, prepare_case, run_case
-from dynakin.recordings.read import extensions
-from dynakin.report.paper_figures.sensitivity import read_sensitivity
-from dynakin.results.files.folder import check_folder_writable, check_output_writable
-from dynakin.validation.case import case_of
+from dynakin.progress import stage
 
 
 @with_settings(
@@ -32,7 +26,7 @@ from dynakin.validation.case import case_of
     "output",
 )
 def run(
-    trial: Annotated[Path, typer.Argument(help=f"Recording ({extensions()}), or a configuration (.toml).")],
+    trial: Annotated[Path, typer.Argument(help="Recording (.c3d, .trc, .csv), or a configuration (.toml).")],
     *,
     given: Given,
     figures: Annotated[
@@ -46,6 +40,13 @@ def run(
     ] = None,
 ) -> None:
     """Estimate coordinates, moments, lengths and masses from a recording, and write a report."""
+    from dynakin.cli.prepared import assumed, print_rows
+    from dynakin.cli.summary import end, print_summary
+    from dynakin.pipeline.stages import configure, prepare_case, run_case
+    from dynakin.report.paper_figures.sensitivity import read_sensitivity
+    from dynakin.results.files.folder import check_folder_writable, check_output_writable
+    from dynakin.validation.case import case_of
+
     config = configure(trial, given, options=True)
     check_output_writable(config.output)
     if sensitivity is not None and figures is None:
@@ -54,21 +55,18 @@ def run(
         check_folder_writable(figures)
     grid = None if sensitivity is None else read_sensitivity(sensitivity)
     case = case_of(config)
-    with busy("measuring the person"):
+    with stage("measuring the person"):
         ready = prepare_case(case)
     print_rows(out(), assumed(next(iter(ready.values())), config))
-    with progress_bar("estimating") as progress:
-        result = run_case(case, ready=ready, keep_lost=keep_lost, keep="--keep-lost", progress=progress)
-    with busy("writing results and report"):
-        folder = result.save(config.output, keep_lost=keep_lost, check=False)
+    result = run_case(case, ready=ready, keep_lost=keep_lost, keep="--keep-lost")
+    folder = result.save(config.output, keep_lost=keep_lost, check=False)
     failures = result.failures
     saved = len(failures.found)
     with failures.stage("summary"):
         print_summary(result, folder)
     if figures is not None:
         with failures.stage("figures"):
-            with busy("drawing figures"):
-                written = result.save_figures(figures, sensitivity=grid)
+            written = result.save_figures(figures, sensitivity=grid)
             out().print(f"Figures  {figures} ({len(written)} files)", soft_wrap=True)
     if len(failures.found) > saved:  # what failed since then is to stand in the files too
         with failures.stage("what failed, in the files"):  # these stay as they were saved

@@ -4,28 +4,28 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.table import Table
 
-from dynakin.cli.console import busy, out, table
+from dynakin.cli.console import out, table
 from dynakin.errors import ConfigError
-from dynakin.simulation.bodies.registry import BODIES
-from dynakin.simulation.bodies.subject import Spread
-from dynakin.simulation.motions.motion_file import CUTOFF_HZ
-from dynakin.simulation.motions.registry import MOTIONS, MOTIONS_IN_SPACE
-from dynakin.simulation.output import SimulatedTrial, check_trial_folder
-from dynakin.simulation.sensors.sizes import load_sensors
-from dynakin.simulation.support import PLATES
-from dynakin.simulation.trial import simulate as simulate_trial
+from dynakin.progress import stage
+from dynakin.settings.defaults import CUTOFF_HZ
 
-_MOTIONS = f"{', '.join(MOTIONS)} (fullbody: {', '.join(MOTIONS_IN_SPACE)})"
+if TYPE_CHECKING:
+    from dynakin.simulation.output import SimulatedTrial
+
+# Words, because the registries that they stand in load all that simulates; a test compares them.
+_MODELS = "sagittal7, squat7 or fullbody"
+_MOTIONS = "squat, sit-to-stand, sway (fullbody: squat, gait, belt, sit, steps, steps-down, drop-jump)"
+_PLATES = "feet, all, shared, right, left, none"
 
 
 def simulate(
     output: Annotated[Path, typer.Option("-o", "--output", help="Folder for the trial.")],
-    model: Annotated[str, typer.Option(help=f"Model whose coordinates move: {' or '.join(BODIES)}.")] = "sagittal7",
+    model: Annotated[str, typer.Option(help=f"Model whose coordinates move: {_MODELS}.")] = "sagittal7",
     motion: Annotated[str, typer.Option(help=f"{_MOTIONS}, or a coordinates file (.mot, .sto).")] = "squat",
     seed: Annotated[int, typer.Option(help="Of everything that is drawn at random, from 0.")] = 1,
     duration: Annotated[
@@ -44,13 +44,18 @@ def simulate(
     markers: Annotated[
         str | None, typer.Option(help="Marker set that fullbody wears, built in or a .toml file.")
     ] = None,
-    plates: Annotated[str, typer.Option(help=f"What of fullbody has a plate: {', '.join(PLATES)}.")] = "feet",
+    plates: Annotated[str, typer.Option(help=f"What of fullbody has a plate: {_PLATES}.")] = "feet",
     rail: Annotated[float, typer.Option(help="Push of fullbody's hands on a rail, of body weight, to 0.3.")] = 0.0,
 ) -> None:
     """Simulate a trial whose truth is known, and write recording and truth."""
+    from dynakin.simulation.bodies.subject import Spread
+    from dynakin.simulation.output import check_trial_folder
+    from dynakin.simulation.sensors.sizes import load_sensors
+    from dynakin.simulation.trial import simulate as simulate_trial
+
     check_trial_folder(output)
     noise = load_sensors(sensors).changed(_pairs(sensor or []))
-    with busy("simulating"):
+    with stage("simulating"):
         trial = simulate_trial(
             model,
             motion,

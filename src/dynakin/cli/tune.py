@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
-import numpy as np
 import typer
 from rich.padding import Padding
 
-from dynakin.cli.compare_inputs import cases_of
-from dynakin.cli.console import as_table, busy, out, progress_bar
+from dynakin.cli.console import as_table, out
 from dynakin.cli.options import (
     OF_A_MODEL,
     OF_THE_LABORATORY,
@@ -26,22 +24,16 @@ from dynakin.cli.options import (
     with_settings,
 )
 from dynakin.errors import ConfigError
-from dynakin.recordings.smoothing import CUTOFF_HZ
-from dynakin.report.paper_figures.figures import save_sensitivity_figures
-from dynakin.report.paper_figures.sensitivity import GAIN_NAMES, GAIN_UNITS, Sensitivity
+from dynakin.progress import stage
 from dynakin.settings import presets
+from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.settings.noise import SCALES
-from dynakin.studies.engine.folder import ROWS, open_folder
-from dynakin.studies.engine.journal import Journal
-from dynakin.studies.engine.pools import open_pool
-from dynakin.studies.tuning.advice import recommendation
-from dynakin.studies.tuning.fit import Fitter, belongs_to_fit, usual_names
-from dynakin.studies.tuning.grid import Axis, Grid, axis, belongs_to, paper_axes, run_grid
-from dynakin.studies.tuning.output import write_fit, write_grid
-from dynakin.studies.tuning.score import CRITERIA, Shared
-from dynakin.studies.tuning.tables import criteria_text, figures_text, grid_text, settings_text
-from dynakin.studies.tuning.trial import prepare
-from dynakin.validation.case import Case
+
+if TYPE_CHECKING:
+    from dynakin.report.paper_figures.sensitivity import Sensitivity
+    from dynakin.studies.tuning.grid import Axis, Grid
+    from dynakin.studies.tuning.score import Shared
+    from dynakin.validation.case import Case
 
 tune = typer.Typer(no_args_is_help=True, rich_markup_mode=None, help="Choose noise settings by measurement.")
 
@@ -74,6 +66,15 @@ def grid(
 
     A run that was stopped goes on where it was when it is started again with the same folder.
     """
+    from dynakin.cli.compare_inputs import cases_of
+    from dynakin.report.paper_figures.figures import save_sensitivity_figures
+    from dynakin.studies.engine.folder import ROWS, open_folder
+    from dynakin.studies.engine.journal import Journal
+    from dynakin.studies.engine.pools import open_pool
+    from dynakin.studies.tuning.grid import belongs_to, run_grid
+    from dynakin.studies.tuning.output import write_grid
+    from dynakin.studies.tuning.tables import criteria_text, grid_text
+
     preset = given.pop("preset", None)
     cases = cases_of(trials or [], forces or [], [], CUTOFF_HZ, given, "tune grid")
     axes = axes_of(vary or [], cases)
@@ -81,9 +82,9 @@ def grid(
     shared = shared_of(cases, base, left_out)
     folder = open_folder(output, ("grid.", "preset_", "figure3_"))
     journal = Journal(folder / ROWS, belongs_to(shared, axes))
-    with progress_bar("grid") as progress, open_pool(backend, jobs, scheduler) as pool:
+    with stage("grid") as progress, open_pool(backend, jobs, scheduler) as pool:
         found = run_grid(shared, axes, pool, journal=journal, progress=progress)
-    with busy("drawing figures"):
+    with stage("drawing figures"):
         write_grid(folder, found, presets.title(base))
         save_sensitivity_figures(figures_of(found), folder, ("svg", "png"))
     console = out()
@@ -117,6 +118,15 @@ def fit(
 
     A run that was stopped goes on where it was when it is started again with the same folder.
     """
+    from dynakin.cli.compare_inputs import cases_of
+    from dynakin.studies.engine.folder import ROWS, open_folder
+    from dynakin.studies.engine.journal import Journal
+    from dynakin.studies.engine.pools import open_pool
+    from dynakin.studies.tuning.advice import recommendation
+    from dynakin.studies.tuning.fit import Fitter, belongs_to_fit, usual_names
+    from dynakin.studies.tuning.output import write_fit
+    from dynakin.studies.tuning.tables import figures_text, settings_text
+
     preset = given.pop("preset", None)
     cases = cases_of(trials or [], forces or [], [], CUTOFF_HZ, given, "tune fit")
     base = preset or cases[0].config.preset
@@ -125,7 +135,7 @@ def fit(
     folder = open_folder(output, ("fit.", "preset_"))
     journal = Journal(folder / ROWS, belongs_to_fit(shared))
     others = {name: make() for name, make in presets.PRESETS.items() if make() != shared.base}
-    with progress_bar("fitting") as progress, open_pool(backend, jobs, scheduler) as pool:
+    with stage("fitting") as progress, open_pool(backend, jobs, scheduler) as pool:
         found = Fitter(shared, names, pool, journal, criterion, others, progress).run()
     advice = recommendation(found)
     write_fit(folder, found, presets.title(base), advice)
@@ -140,6 +150,8 @@ def fit(
 
 def axes_of(vary: Sequence[str], cases: Sequence[Case]) -> tuple[Axis, ...]:
     """The settings to vary: of the command line, else of the first configuration's [grid], else the paper's gains."""
+    from dynakin.studies.tuning.grid import axis, paper_axes
+
     if vary:
         return tuple(_axis(text) for text in vary)
     grid = cases[0].config.grid
@@ -147,6 +159,8 @@ def axes_of(vary: Sequence[str], cases: Sequence[Case]) -> tuple[Axis, ...]:
 
 
 def _axis(text: str) -> Axis:
+    from dynakin.studies.tuning.grid import axis
+
     name, _, span = text.partition("=")
     try:
         low, high, steps = span.split(":")
@@ -159,10 +173,13 @@ def _axis(text: str) -> Axis:
 
 def shared_of(cases: Sequence[Case], base: str, left_out: bool = False) -> Shared:
     """Trials made ready with the settings of a preset; changes in [noise] of the first configuration hold for all."""
+    from dynakin.studies.tuning.score import Shared
+    from dynakin.studies.tuning.trial import prepare
+
     noise = presets.preset(base, cases[0].config.noise)
     ready = []
     for case in cases:
-        with busy(f"reading {case.recording.name}"):
+        with stage(f"reading {case.recording.name}"):
             estimator = replace(case.setup, noise={base: noise}).estimator(base)
             ready.append(prepare(case.recording, estimator, static=case.static))
     return Shared(tuple(ready), noise, left_out)
@@ -170,6 +187,11 @@ def shared_of(cases: Sequence[Case], base: str, left_out: bool = False) -> Share
 
 def figures_of(found: Grid) -> dict[str, Sensitivity]:
     """Figure 3 by each criterion."""
+    import numpy as np
+
+    from dynakin.report.paper_figures.sensitivity import GAIN_UNITS, Sensitivity
+    from dynakin.studies.tuning.score import CRITERIA
+
     exponents = tuple(np.log10(axis.values) for axis in found.axes)
     names = tuple(_label(axis.name) for axis in found.axes)
     units = tuple(GAIN_UNITS[_GAINS.index(a.name)] if a.name in _GAINS else SCALES[a.name].unit for a in found.axes)
@@ -180,4 +202,6 @@ def figures_of(found: Grid) -> dict[str, Sensitivity]:
 
 
 def _label(name: str) -> str:
+    from dynakin.report.paper_figures.sensitivity import GAIN_NAMES
+
     return GAIN_NAMES[_GAINS.index(name)] if name in _GAINS else name

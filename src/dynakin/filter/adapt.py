@@ -20,6 +20,7 @@ from dynakin.filter.augment import continuous_noise
 from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.noise import joint_groups
 from dynakin.filter.tracker import Tracker
+from dynakin.progress import Progress
 from dynakin.results.records import FOLLOWING
 from dynakin.settings.noise import JointGroup, Noise
 
@@ -55,7 +56,13 @@ class Trial(NamedTuple):
 
 
 def calibrated_noise(
-    tracker: Tracker, arrays: dict[str, Array], trial: Trial, frames: Flags | None = None, *, late: bool = False
+    tracker: Tracker,
+    arrays: dict[str, Array],
+    trial: Trial,
+    frames: Flags | None = None,
+    *,
+    late: bool = False,
+    progress: Progress | None = None,
 ) -> Noise | None:
     """The noise with the scales that a recording asks for; None where it is too short.
 
@@ -63,7 +70,7 @@ def calibrated_noise(
 
     Args:
         tracker: of the run. arrays: of that run, as `Tracker.run_arrays` gives them. frames: (T,) to look at; all
-            where not given. late: for estimates without any lag.
+            where not given. late: for estimates without any lag. progress: called with (frames done, frames in all).
     """
     chosen: Flags = trial.time >= trial.time[0] + SETTLING_S
     if frames is not None:
@@ -79,7 +86,7 @@ def calibrated_noise(
     scaled = _scaled(noise, ratio, jerk_ratios(tracker, arrays, trial.time, chosen, groups))
     time, markers, wrench, contacts = trial.first(end)
     try:
-        again = tracker.changed(scaled).run_arrays(time, markers, wrench, None, contacts)
+        again = tracker.changed(scaled).run_arrays(time, markers, wrench, progress, contacts)
     except DivergenceError:  # with other jerk: the factor alone leaves the movement as it is
         return _believed(_scaled(noise, ratio), noise, late)
     after = nis_per_row(again, chosen[:end])

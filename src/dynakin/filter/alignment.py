@@ -10,8 +10,9 @@ import numpy.typing as npt
 from dynakin.filter.closure import plates_misfit
 from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.samples import in_step
-from dynakin.filter.tracker import Progress, Tracker
+from dynakin.filter.tracker import Tracker
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.progress import Progress
 
 Array = npt.NDArray[np.float64]
 

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ConfigError, RecordingError
-from dynakin.filter.adapt import Trial, calibrated_noise
+from dynakin.filter.adapt import CALIBRATED_S, Trial, calibrated_noise
 from dynakin.filter.alignment import PASSES, run_in_step
 from dynakin.filter.assemble import assemble
 from dynakin.filter.augment import initial_covariance
@@ -20,12 +20,13 @@ from dynakin.filter.prepared import Prepared
 from dynakin.filter.samples import in_step, recording_arrays
 from dynakin.filter.skin import following_skin
 from dynakin.filter.total_wrench import Ground, doubtful_mass, known_ground
-from dynakin.filter.tracker import Progress, Tracker, known_lag
+from dynakin.filter.tracker import Tracker, known_lag
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.contacts import with_contacts
 from dynakin.model.calibration.loads import with_loads
 from dynakin.model.definition import Definition
 from dynakin.model.identified import IdentifiedSubject, with_identified
+from dynakin.progress import Progress
 from dynakin.recordings.limits import rate_problem
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
@@ -258,8 +259,10 @@ class Estimator:
         lag_s = ALL_FRAMES if late is None else late / recording.rate
         adapt, notes = ready.tracker.noise.calibrates(bool(calibrated.feet)), list(ground.notes)
         try:
-            ways = 2 if lag_s == ALL_FRAMES else int(adapt or lag_s > 0.0)  # over the frames, after the first run
-            there, back = _shares(progress, recording.n_frames, ways)
+            ways = 2 if lag_s == ALL_FRAMES else int(adapt or lag_s > 0.0)  # over all frames, after the first run
+            frames = recording.n_frames
+            again = min(frames, round(CALIBRATED_S * recording.rate)) if adapt else 0
+            there, calibrating, back = _shares(progress, (frames, again, ways * frames))
             passes = 0 if ready.doubt else PASSES
             tracker, arrays, shift, clock = run_in_step(
                 ready.tracker.fresh(), recording.time, markers, ready.wrench, there, on_feet, passes
@@ -267,7 +270,7 @@ class Estimator:
             wrench = in_step(recording.time, ready.wrench, shift) if shift else ready.wrench
             on_feet = on_feet and on_feet.in_step(recording.time, shift)
             trial = Trial(recording.time, markers, wrench, on_feet)
-            found = calibrated_noise(tracker, arrays, trial, late=not lag_s) if adapt else None
+            found = calibrated_noise(tracker, arrays, trial, late=not lag_s, progress=calibrating) if adapt else None
             if adapt and found is None:
                 notes.append("Too few frames are followed to calibrate the noise on them: it is as declared.")
             if lag_s or found:
@@ -331,9 +334,9 @@ class Estimator:
         }
 
 
-def _shares(progress: Progress | None, frames: int, ways: int) -> tuple[Progress | None, Progress | None]:
-    """One progress for a run forwards and the smoothing after it, which goes over the frames ``ways`` times."""
+def _shares(progress: Progress | None, passes: Sequence[int]) -> list[Progress | None]:
+    """One progress for passes that follow each other, each over so many frames."""
     if progress is None:
-        return None, None
-    total = (1 + ways) * frames
-    return lambda done, _: progress(done, total), lambda done, _: progress(frames + done, total)
+        return [None] * len(passes)
+    before, total = [sum(passes[:k]) for k in range(len(passes))], sum(passes)
+    return [lambda done, _, first=first: progress(first + done, total) for first in before]  # type: ignore[misc]

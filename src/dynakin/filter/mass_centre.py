@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
-from scipy import signal
+import scipy
 
 from dynakin.arrays import runs
 from dynakin.bindings import _core
@@ -108,8 +108,8 @@ def _bridged(time: Array, markers: Array, axes: Flags, rate: float) -> tuple[Arr
 
 
 def _second_derivative(path: Array, rate: float) -> Array:
-    sos = signal.butter(2, CUTOFF_HZ / 0.802, fs=rate, output="sos")  # twice: -3 dB at the cut-off
-    smooth = signal.sosfiltfilt(sos, path, axis=0, padlen=min(len(path) - 1, round(rate / CUTOFF_HZ)))
+    sos = scipy.signal.butter(2, CUTOFF_HZ / 0.802, fs=rate, output="sos")  # twice: -3 dB at the cut-off
+    smooth = scipy.signal.sosfiltfilt(sos, path, axis=0, padlen=min(len(path) - 1, round(rate / CUTOFF_HZ)))
     return np.asarray(np.gradient(np.gradient(smooth, 1.0 / rate, axis=0), 1.0 / rate, axis=0))
 
 

@@ -6,7 +6,7 @@ from collections.abc import Collection
 
 import numpy as np
 import numpy.typing as npt
-from scipy.stats import chi2
+from scipy.special import chdtri
 
 from dynakin.bindings import _core
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -92,7 +92,7 @@ def gate_limits(probability: float, scale: float = 1.0) -> list[float] | None:
     """
     if probability == 0.0:
         return None
-    return [float(chi2.isf(probability, rows)) / min(scale, 1.0) for rows in range(1, 7)]
+    return [float(chdtri(rows, probability)) / min(scale, 1.0) for rows in range(1, 7)]
 
 
 def limit_sd(noise: Noise, declared: float | None) -> float:

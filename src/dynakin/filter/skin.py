@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import cho_factor, cho_solve
 
 from dynakin.bindings import _core
 from dynakin.filter.noise import soft_tissue_time_s
@@ -85,7 +86,7 @@ def following_skin(tracker: Tracker, arrays: dict[str, Array], time: Array) -> F
         phi = followed_by[:, chosen]
         found = arrays["state"][:, columns[markers]][used]
         normal = phi[used].T @ phi[used] + ridge * np.eye(phi.shape[1])
-        local[:, markers] = phi @ np.linalg.solve(normal, phi[used].T @ (found - found.mean(axis=0)))
+        local[:, markers] = phi @ cho_solve(cho_factor(normal), phi[used].T @ (found - found.mean(axis=0)))
     shift = np.nan_to_num(_turned(model, arrays["state"], segment, local))
     return FollowingSkin(model, segment, columns, local, shift)
 

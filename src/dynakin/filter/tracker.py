@@ -20,6 +20,7 @@ from dynakin.filter.sources import ContactSources
 from dynakin.filter.step import Codes, Labelled, Labels, StepEstimate, deviations_of, step_estimate
 from dynakin.filter.systematic import Systematic
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.progress import Progress
 from dynakin.recordings.feet.contact import UNMEASURED
 from dynakin.results.measures.sources import ABSENT, MEASURED
 from dynakin.results.records import NOT_SMOOTHED
@@ -28,7 +29,6 @@ from dynakin.settings.model import QUANTITIES, Quantity
 from dynakin.settings.noise import Noise
 
 Array = npt.NDArray[np.float64]
-Progress = Callable[[int, int], None]
 
 
 class _Stepped(NamedTuple):

@@ -7,7 +7,7 @@ single frames: the model's error is alike from frame to frame, so single frames 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
@@ -17,10 +17,10 @@ import numpy.typing as npt
 from dynakin.identification.batch import SHORTEST_S, Posterior, at_start, identify_batch, known_s
 from dynakin.identification.trials import Common, MeasuredTrial, about, middle_of
 from dynakin.identification.unknowns import Unknowns
+from dynakin.progress import Progress
 from dynakin.results.estimate import COMPONENTS
 
 Array = npt.NDArray[np.float64]
-Progress = Callable[[int, int], None]
 Use = Literal["table", "bodies"]
 USES: tuple[Use, ...] = get_args(Use)
 

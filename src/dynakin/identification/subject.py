@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -18,10 +18,10 @@ from dynakin.identification.observability.measured import MeasuredModel
 from dynakin.identification.report import in_words
 from dynakin.identification.trials import Common, MeasuredTrial, measure_all
 from dynakin.model.identified import Batch, HeldOut, IdentifiedSubject
+from dynakin.progress import Progress
 from dynakin.recordings.recording import Recording
 
 Array = npt.NDArray[np.float64]
-Progress = Callable[[int, int], None]
 
 _WORK, _SEEING = 1000, 850  # of a progress bar: nearly all of the time goes into the kinematics
 

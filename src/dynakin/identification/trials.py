@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,17 +13,18 @@ from dynakin.errors import LostError, ModelError, RecordingError
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.tracker import Tracker
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.progress import Progress
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.recordings.recording import Recording
-from dynakin.recordings.smoothing import CUTOFF_HZ, smooth
+from dynakin.recordings.smoothing import smooth
 from dynakin.results.measures.tracking import why_lost
+from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.units import GRAVITY_M_S2
 from dynakin.validation.freeze import freeze, initial_values
 from dynakin.validation.held_out import as_estimate, marker_paths, measured_wrench, start_as
 
 Array = npt.NDArray[np.float64]
-Progress = Callable[[int, int], None]
 
 RATE_HZ = 25.0
 """Frames a second that are kept: the model's error is alike for 0.15 to 0.3 s, so more say nothing new."""

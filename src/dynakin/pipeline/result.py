@@ -12,9 +12,7 @@ from typing import TYPE_CHECKING, Any
 from dynakin.errors import ConfigError, OutputError
 from dynakin.identification.observability.trial import Identifiability
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.report.page import write_report
-from dynakin.report.paper_figures.figures import FORMATS, save_figures
-from dynakin.report.paper_figures.sensitivity import Sensitivity
+from dynakin.progress import stage
 from dynakin.results.estimate import Estimate
 from dynakin.results.failures import LOG, Failures
 from dynakin.results.files import body as body_files
@@ -33,6 +31,8 @@ from dynakin.validation.methods import Trial
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from dynakin.report.paper_figures.sensitivity import Sensitivity
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -143,10 +143,14 @@ class Result:
         return folder
 
     def save_figures(
-        self, folder: str | Path, formats: Sequence[str] = FORMATS, *, sensitivity: Sensitivity | None = None
+        self, folder: str | Path, formats: Sequence[str] | None = None, *, sensitivity: Sensitivity | None = None
     ) -> list[Path]:
         """Write the paper's figures of this run into ``folder`` (see `dynakin.report.save_figures`);
         one that fails stands in ``failures``.
+
+        Args:
+            formats: some of svg, pdf, png; None: all.
+            sensitivity: a criterion over the gains, the paper's Figure 3.
 
         Returns:
             The files written.
@@ -154,16 +158,21 @@ class Result:
         Raises:
             ConfigError: an unknown format. OutputError: the folder cannot be written.
         """
+        from dynakin.report.paper_figures.figures import save_figures  # Matplotlib: only who draws waits
+        from dynakin.report.paper_figures.saving import FORMATS
+
         return save_figures(
             self.estimate,
             folder,
-            formats,
+            FORMATS if formats is None else formats,
             comparison=self.comparison,
             sensitivity=sensitivity,
             failures=self.failures,
         )
 
     def _write(self, folder: Path, overwrite: bool) -> None:
+        from dynakin.report.page import write_report  # as above
+
         estimate, failed, metrics = self.estimate, self.failures, self.metrics()
         if self.settings is not None:
             estimate = replace(estimate, config=estimate.config | {"output": str(folder.absolute())})
@@ -179,14 +188,18 @@ class Result:
             "parameters.json": write_parameters,
             "estimate.nc": write_netcdf,
         }
-        with replacing(folder, overwrite=overwrite) as made:
-            for name, write in files.items():
+        with stage("writing results and report") as report, replacing(folder, overwrite=overwrite) as made:
+            in_all = len(files) + 2  # the page takes longest
+            for done, (name, write) in enumerate(files.items()):
+                report(done, in_all)
                 _written(made / name, failed, lambda path, write=write: write(estimate, path))  # type: ignore[misc]
             with failed.stage("files of the body", writes=True):
                 body_files.write_body_files(estimate, made)
+            report(len(files), in_all)
             _written(made / "repetitions.csv", failed, self._write_repetitions)
             write_config(estimate.config, made / "config.toml")
             whole = replace(estimate, messages=[*estimate.messages, *failed.messages()])
+            report(len(files) + 1, in_all)
             _written(
                 made / "report.html",
                 failed,

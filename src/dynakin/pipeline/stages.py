@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -12,6 +12,7 @@ from dynakin.filter.prepared import Prepared
 from dynakin.filter.tracker import Tracker
 from dynakin.identification.observability.trial import Identifiability, identifiability
 from dynakin.pipeline.result import Result
+from dynakin.progress import Progress, stage
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
 from dynakin.results.failures import Failures
@@ -21,8 +22,6 @@ from dynakin.settings.settings import Settings, read_keys
 from dynakin.settings.subject import Subject
 from dynakin.validation.case import Case, case_of
 from dynakin.validation.methods import Trial, estimate_each, trial_of, with_lost
-
-Progress = Callable[[int, int], None]
 
 LARGEST_BENCH = 250
 """States up to which a run also judges the observability of the constants: it filters a dozen motions more."""
@@ -57,7 +56,8 @@ def run(
         output: folder for `Result.save`, which nothing is written into before.
         keep_lost: go on with a trial that was lost.
         observability: whether to judge the observability of the constants; it takes longer than the estimate.
-        progress: called with (frames done, frames in all) now and then.
+        progress: called with (frames done, frames in all) now and then; not given: a terminal or a notebook shows
+            how far it is, and how much time remains.
         settings: further keys of a configuration (`dynakin print-config` lists them), such as ``preset``, ``lag_s``.
 
     Raises:
@@ -141,15 +141,19 @@ def run_case(
         DynakinError, LostError: as `run`.
     """
     failures = Failures()
-    estimates, _, trackers = estimate_each(
-        case.recording,
-        case.setup,
-        static=case.static,
-        progress=progress,
-        keep_lost=True,
-        failures=failures,
-        ready=ready,
-    )
+    if ready is None:
+        with stage("measuring the person"):
+            ready = prepare_case(case)
+    with stage("estimating", progress) as report:
+        estimates, _, trackers = estimate_each(
+            case.recording,
+            case.setup,
+            static=case.static,
+            progress=report,
+            keep_lost=True,
+            failures=failures,
+            ready=ready,
+        )
     if not keep_lost:
         for estimate in estimates.values():
             refuse_lost(estimate, keep)
@@ -176,14 +180,14 @@ def judged(
     title, first = next(iter(estimates.items()))
     initial = list(trackers.values())[-1].calibrated
     comparison: Trial | None = None
-    with failures.stage("comparison with the reference methods"):
+    with failures.stage("comparison with the reference methods"), stage("comparing with the reference methods"):
         setup = case.setup
         comparison = trial_of(estimates, initial, setup.definition, setup.cutoff_hz, tolerant=tolerant)
         comparison = with_lost(comparison, lost)
     observed: Identifiability | None = None
     if observability:
-        with failures.stage("observability of the constants"):
-            observed, note = _observability(trackers[title], first)
+        with failures.stage("observability of the constants"), stage("trying motions") as report:
+            observed, note = _observability(trackers[title], first, report)
             if note:
                 first = replace(first, messages=[*first.messages, f"{_LEFT_OUT}: {note}"])
     return Result(first, initial, comparison, observed, case.config, failures)
@@ -192,12 +196,12 @@ def judged(
 _LEFT_OUT = "Observability of the constants is left out"
 
 
-def _observability(tracker: Tracker, estimate: Estimate) -> tuple[Identifiability | None, str]:
+def _observability(tracker: Tracker, estimate: Estimate, progress: Progress) -> tuple[Identifiability | None, str]:
     """Observability of the constants in this recording, or why it is left out, which is no failure."""
     n_states = len(tracker.calibrated.names)
     if n_states > LARGEST_BENCH:
         return None, f"with {n_states} states it takes many minutes; use dynakin model --identifiability."
     try:
-        return identifiability(tracker, estimate), ""
+        return identifiability(tracker, estimate, progress), ""
     except DynakinError as error:  # a trial of a few frames, say
         return None, error.message

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import interpolate, signal
+import scipy
 
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.recordings.recording import Array
@@ -32,9 +32,9 @@ class CausalLowPass:
 
     def __init__(self, rate_hz: float, cutoff_hz: float, order: int = _CAUSAL_ORDER) -> None:
         _check_cutoff(rate_hz, cutoff_hz)
-        self._sos = signal.butter(order, cutoff_hz, fs=rate_hz, output="sos")
-        b, a = signal.butter(order, cutoff_hz, fs=rate_hz)
-        self.delay_s: float = float(signal.group_delay((b, a), w=[0.0], fs=rate_hz)[1][0] / rate_hz)
+        self._sos = scipy.signal.butter(order, cutoff_hz, fs=rate_hz, output="sos")
+        b, a = scipy.signal.butter(order, cutoff_hz, fs=rate_hz)
+        self.delay_s: float = float(scipy.signal.group_delay((b, a), w=[0.0], fs=rate_hz)[1][0] / rate_hz)
         self._state: Array | None = None
 
     def push(self, block: Array) -> Array:
@@ -43,8 +43,8 @@ class CausalLowPass:
         if not len(block):
             return block.copy()
         if self._state is None:
-            self._state = signal.sosfilt_zi(self._sos)[:, :, None] * block[0]
-        out, self._state = signal.sosfilt(self._sos, block, axis=0, zi=self._state)
+            self._state = scipy.signal.sosfilt_zi(self._sos)[:, :, None] * block[0]
+        out, self._state = scipy.signal.sosfilt(self._sos, block, axis=0, zi=self._state)
         return np.asarray(out)
 
 
@@ -72,7 +72,7 @@ def reach_s(rate_in: float, rate_out: float, cutoff_hz: float | None) -> float:
     kernel, and where the second's answer to an impulse has come down to a ten thousandth."""
     kernel = 0.0
     if rate_in > 1.01 * rate_out:
-        kernel = 0.5 * signal.kaiserord(_STOP_DB, (_STOP - _PASS) * rate_out / (0.5 * rate_in))[0] / rate_in
+        kernel = 0.5 * scipy.signal.kaiserord(_STOP_DB, (_STOP - _PASS) * rate_out / (0.5 * rate_in))[0] / rate_in
     return kernel + (0.0 if cutoff_hz is None else 2.0 / cutoff_hz)
 
 
@@ -89,8 +89,10 @@ def low_pass(samples: Array, rate_hz: float, cutoff_hz: float, *, causal: bool =
     _check_cutoff(rate_hz, cutoff_hz)
     # Two passes of |H|^2 = 1/(1 + w^4), w warped, are -3 dB where w = (sqrt 2 - 1)^(1/4).
     warped = np.tan(np.pi * cutoff_hz / rate_hz) / (np.sqrt(2) - 1) ** 0.25
-    sos = signal.butter(2, np.arctan(warped) / np.pi * rate_hz, fs=rate_hz, output="sos")
-    return np.asarray(signal.sosfiltfilt(sos, samples, axis=0, padlen=min(len(samples) - 1, int(rate_hz / cutoff_hz))))
+    sos = scipy.signal.butter(2, np.arctan(warped) / np.pi * rate_hz, fs=rate_hz, output="sos")
+    return np.asarray(
+        scipy.signal.sosfiltfilt(sos, samples, axis=0, padlen=min(len(samples) - 1, int(rate_hz / cutoff_hz)))
+    )
 
 
 def resample(samples: Array, time_in: Array, time_out: Array, *, causal: bool = False) -> Array:
@@ -129,7 +131,7 @@ def resample(samples: Array, time_in: Array, time_out: Array, *, causal: bool = 
         picked: Array = samples[nearest]
         return picked
     inside = np.clip(time_out, time_in[0], time_in[-1])
-    return np.asarray(interpolate.CubicSpline(time_in, samples, axis=0)(inside))
+    return np.asarray(scipy.interpolate.CubicSpline(time_in, samples, axis=0)(inside))
 
 
 def low_pass_for(rate_in: float, rate_out: float) -> CausalLowPass | None:
@@ -150,14 +152,14 @@ def same_times(a: Array, b: Array) -> bool:
 
 def _antialias(samples: Array, rate_in: float, rate_out: float) -> Array:
     width = (_STOP - _PASS) * rate_out
-    taps, beta = signal.kaiserord(_STOP_DB, width / (0.5 * rate_in))
+    taps, beta = scipy.signal.kaiserord(_STOP_DB, width / (0.5 * rate_in))
     half = taps // 2
     cutoff = min(0.5 * (_PASS + _STOP) * rate_out, 0.49 * rate_in)
-    kernel = signal.firwin(2 * half + 1, cutoff, window=("kaiser", beta), fs=rate_in)
+    kernel = scipy.signal.firwin(2 * half + 1, cutoff, window=("kaiser", beta), fs=rate_in)
     reach = min(half, len(samples) - 1)
     padded = np.pad(samples, ((reach, reach), (0, 0)), mode="reflect", reflect_type="odd")
     padded = np.pad(padded, ((half - reach, half - reach), (0, 0)), mode="edge")
-    return np.asarray(signal.oaconvolve(padded, kernel[:, None], mode="valid", axes=0))
+    return np.asarray(scipy.signal.oaconvolve(padded, kernel[:, None], mode="valid", axes=0))
 
 
 def _rate(time: Array) -> float:

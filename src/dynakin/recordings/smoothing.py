@@ -7,17 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import interpolate
+import scipy
 
 from dynakin.arrays import runs
 from dynakin.errors import RecordingError
 from dynakin.recordings.resampling import low_pass
+from dynakin.settings.defaults import CUTOFF_HZ
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
-CUTOFF_HZ = 6.0
-"""Usual for markers of slow movements (Winter 2009, section 3.4.4.3: 4 to 8 Hz by residual analysis)."""
 MAX_GAP_S = 0.1
 """Longer gaps stay gaps: at 6 Hz a spline over more than half a period invents the movement."""
 
@@ -78,7 +77,7 @@ def smooth(
             part = column[first:end]
             if cutoff_hz is not None:
                 part = low_pass(part[:, None], 1.0 / step, cutoff_hz)[:, 0]
-            spline = interpolate.make_interp_spline(step * np.arange(len(part)), part, k=_DEGREE)
+            spline = scipy.interpolate.make_interp_spline(step * np.arange(len(part)), part, k=_DEGREE)
             at = step * np.arange(len(part))
             values[first:end, k] = part
             rates[first:end, k], seconds[first:end, k] = spline.derivative(1)(at), spline.derivative(2)(at)
@@ -115,7 +114,7 @@ def fill_gaps(signal: Array, max_frames: int) -> tuple[Array, Mask]:
     found = np.array(signal, dtype=float)
     found[missing] = np.nan
     if filled.any() and len(known) >= 4:
-        found[filled] = interpolate.CubicSpline(known, signal[known])(np.flatnonzero(filled))
+        found[filled] = scipy.interpolate.CubicSpline(known, signal[known])(np.flatnonzero(filled))
     elif filled.any():
         filled[:] = False
     return found, filled

@@ -12,12 +12,12 @@ from numpy.typing import NDArray
 
 from dynakin.errors import ConfigError
 from dynakin.recordings.recording import Recording
+from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.bodies.registry import choose_body
 from dynakin.simulation.bodies.subject import Spread
 from dynakin.simulation.contacts import mechanical_state
 from dynakin.simulation.mechanics import Motion
-from dynakin.simulation.motions.motion_file import CUTOFF_HZ
 from dynakin.simulation.motions.movement import Movement
 from dynakin.simulation.motions.rail import hold_rail
 from dynakin.simulation.motions.registry import choose_movement

@@ -11,6 +11,7 @@ from dynakin.errors import StreamError
 from dynakin.filter.samples import Sample
 from dynakin.recordings.limits import FARTHEST_M
 from dynakin.recordings.plates.pressure import UNLOADED_N
+from dynakin.settings.defaults import DELAY_S
 from dynakin.stream.plate_samples import PlateSamples
 from dynakin.stream.sources.clock import Clock, offset_between
 from dynakin.stream.sources.in_order import Counts, InOrder
@@ -18,8 +19,6 @@ from dynakin.stream.sources.packets import MarkerPacket, Packet, PlatePacket, St
 
 Array = npt.NDArray[np.float64]
 
-DELAY_S = 0.05
-"""Longest wait for a packet that is missing or late."""
 SILENT_S = 0.25
 """A stream from which nothing has come for so long is silent: nobody waits for it."""
 OFFSET_S = 1.0

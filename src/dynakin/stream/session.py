@@ -13,8 +13,9 @@ from dynakin.filter.estimator import Estimator
 from dynakin.filter.samples import Sample, sample_arrays
 from dynakin.filter.tracker import Tracker, live_lag
 from dynakin.recordings.recording import Recording
+from dynakin.settings.defaults import DELAY_S
 from dynakin.stream.feet import LiveFeet
-from dynakin.stream.fusion import DELAY_S, Fused, Fusion
+from dynakin.stream.fusion import Fused, Fusion
 from dynakin.stream.monitor import Monitor
 from dynakin.stream.sinks.base import LiveFrame, Sink, Started, Status
 from dynakin.stream.sources.packets import Source

@@ -11,9 +11,9 @@ from dynakin.filter.build import definition_of, identified_of
 from dynakin.recordings.plates.loads import without_plate_loads
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
-from dynakin.recordings.smoothing import CUTOFF_HZ
 from dynakin.results.estimate import Estimate
 from dynakin.settings import presets as known_presets
+from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.settings.settings import Settings
 from dynakin.validation.setup import Setup
 

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+import scipy
 import xarray as xr
-from scipy import stats
 
 from dynakin.results.measures.consistency import CONSISTENT, INSIDE, Judgement, judge, mean_interval_95
 from dynakin.results.records import Parameter
@@ -171,7 +171,7 @@ def coverage(block: str, names: Sequence[str], error: Array, sd: Array, *, own_m
 def _too_seldom(inside: float, dof: float) -> bool:
     """Whether the truth is in less than `INSIDE` of the 95 % intervals, and 97.5 % of runs of ``dof`` independent
     values would have more."""
-    return inside < INSIDE and float(stats.binom.cdf(np.floor(inside * dof), np.floor(dof), 0.95)) < 0.025
+    return inside < INSIDE and float(scipy.stats.binom.cdf(np.floor(inside * dof), np.floor(dof), 0.95)) < 0.025
 
 
 def independent(z: Array) -> float:

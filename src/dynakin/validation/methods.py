@@ -3,7 +3,7 @@ table ("AT") and "classical" of a planar chain, inverse kinematics and dynamics 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 
@@ -17,8 +17,8 @@ from dynakin.filter.tracker import Tracker
 from dynakin.filter.zero import asked_angles
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition
+from dynakin.progress import Progress, stage
 from dynakin.recordings.recording import Recording
-from dynakin.recordings.smoothing import CUTOFF_HZ
 from dynakin.results.estimate import COMPONENTS, Estimate
 from dynakin.results.failures import Failures
 from dynakin.results.measures.facing import facing
@@ -27,6 +27,7 @@ from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.measures.repetitions import Found, repetitions_of
 from dynakin.results.measures.sources import measured_only, moment_sources, wrench_sources
 from dynakin.results.measures.tracking import why_lost
+from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.settings.lag import in_words
 from dynakin.validation.reference.inverse_dynamics import (
     INVERSE,
@@ -40,7 +41,6 @@ from dynakin.validation.setup import Setup
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
-Progress = Callable[[int, int], None]
 
 AT = "AT"
 CLASSICAL = "classical"
@@ -136,7 +136,8 @@ def compare_trial(
     """
     estimates, lost, trackers = estimate_each(recording, setup, static=static, progress=progress)
     initial = list(trackers.values())[-1].calibrated
-    trial = trial_of(estimates, initial, setup.definition, setup.cutoff_hz, inverse=True)
+    with stage(f"{recording.name}: the reference methods"):
+        trial = trial_of(estimates, initial, setup.definition, setup.cutoff_hz, inverse=True)
     mass = [text for text in initial.messages if text.startswith(("Mass ", "Warning: mass "))]
     return with_lost(replace(trial, notes=(*mass, *trial.notes)), lost)
 

@@ -10,10 +10,10 @@ from dynakin.filter.estimator import Estimator
 from dynakin.filter.zero import Zero
 from dynakin.model.definition import Definition
 from dynakin.model.identified import IdentifiedSubject
-from dynakin.recordings.smoothing import CUTOFF_HZ
 from dynakin.results.measures.angles import Signs
 from dynakin.settings import presets
 from dynakin.settings.contacts import DeclaredContact
+from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.settings.model import QUANTITIES, Bounds, Priors, Quantity
 from dynakin.settings.noise import Noise
 from dynakin.settings.subject import CarriedLoad

@@ -3,7 +3,7 @@ proves little, since large gains follow anything; these cannot be had by followi
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,19 +14,20 @@ from dynakin.errors import ConfigError, RecordingError
 from dynakin.filter.core_filter import filter_settings
 from dynakin.filter.estimator import Estimator
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.progress import Progress
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import COMPONENTS
 from dynakin.results.measures.fit import marker_rms_mm, signal_fit
 from dynakin.results.measures.metrics import evaluation_window
+from dynakin.settings.defaults import HORIZON_S
 from dynakin.validation.extrapolation import extrapolated, held, line, persisted, span_frames
 from dynakin.validation.held_out import halves, identify_on, judge, predict_blind
 from dynakin.validation.setup import Setup
 from dynakin.validation.table2 import MARKERS, Spread, spread, unit_of
 from dynakin.validation.unseen_in_space import figures_in_space
-from dynakin.validation.yardsticks import HORIZON_S, LEFT_OUT, LINEAR, PERSISTENCE, WITHHELD, Figures, ahead, with_mean
+from dynakin.validation.yardsticks import LEFT_OUT, LINEAR, PERSISTENCE, WITHHELD, Figures, ahead, with_mean
 
 Array = npt.NDArray[np.float64]
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)

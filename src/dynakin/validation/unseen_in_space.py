@@ -3,7 +3,7 @@ filter and by inverse kinematics and dynamics on the same calibrated model."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from dynakin.filter.estimator import Estimator
 from dynakin.filter.expected import ContactPaths
 from dynakin.filter.prepared import Prepared
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.progress import Progress
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.smoothing import smooth
 from dynakin.results.estimate import COMPONENTS, Estimate
@@ -33,7 +34,6 @@ from dynakin.validation.setup import Setup
 from dynakin.validation.yardsticks import LEFT_OUT, LINEAR, PERSISTENCE, WITHHELD, Figures, ahead, with_mean
 
 Array = npt.NDArray[np.float64]
-Progress = Callable[[int, int], None]
 
 _BLOCKS = ("coordinates", "speeds", "accelerations")
 _PAST_S = 0.5

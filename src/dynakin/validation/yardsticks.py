@@ -7,7 +7,6 @@ from dynakin.validation.table2 import MARKERS, spread
 
 Figures = dict[tuple[str, str, str], float | None]  # (yardstick, quantity, method) -> RMS in the quantity's unit
 
-HORIZON_S = 0.1
 WITHHELD, LEFT_OUT = "plates withheld", "marker left out"
 PERSISTENCE, LINEAR = "persistence", "linear extrapolation"
 

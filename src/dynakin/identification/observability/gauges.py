@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import linprog
+import scipy
 
 from dynakin.errors import ModelError
 from dynakin.identification.observability.measured import MeasuredModel
@@ -171,7 +171,7 @@ def _least(null: Array, part: list[int], k: int) -> Array:
     c, d = B.shape
     eye = np.eye(c)
     for method in ("highs", "highs-ipm"):  # the simplex method gives up on some of a whole body's
-        fit = linprog(
+        fit = scipy.optimize.linprog(
             np.concatenate([np.zeros(d), np.ones(c)]),
             A_ub=np.block([[B, -eye], [-B, -eye]]),
             b_ub=np.zeros(2 * c),

@@ -7,7 +7,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, TypeVar
 
-import ezc3d
 import numpy as np
 
 from dynakin.errors import RecordingError
@@ -57,6 +56,8 @@ def read_c3d_results(path: Path) -> dict[str, Array]:
 
 
 def _opened(path: Path, use: Callable[[Any, list[str]], _Read]) -> _Read:
+    import ezc3d
+
     layout_notes, corrections = check_c3d_file(path)
     try:
         data: Any = _corrected(path, corrections) if corrections else ezc3d.c3d(str(path))
@@ -74,6 +75,8 @@ def _opened(path: Path, use: Callable[[Any, list[str]], _Read]) -> _Read:
 
 def _corrected(path: Path, corrections: list[Correction]) -> Any:
     """What ezc3d reads from a copy in which these bytes are put right."""
+    import ezc3d
+
     content = bytearray(path.read_bytes())
     for at, new in corrections:
         content[at : at + len(new)] = new

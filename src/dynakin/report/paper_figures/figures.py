@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import nullcontext
+from contextlib import AbstractContextManager, nullcontext
 from functools import partial
 from pathlib import Path
 
@@ -11,6 +11,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from dynakin.errors import ConfigError, OutputError
+from dynakin.progress import stage
 from dynakin.report.paper_figures.movement import (
     angles_figure,
     knee_moment_figure,
@@ -19,15 +20,13 @@ from dynakin.report.paper_figures.movement import (
     wrench_figure,
 )
 from dynakin.report.paper_figures.parameters import inertias_figure, lengths_and_masses_figure
+from dynakin.report.paper_figures.saving import FORMATS, save_each
 from dynakin.report.paper_figures.sensitivity import Sensitivity, read_sensitivity, sensitivity_figure
 from dynakin.report.plot import FILE_STYLE
 from dynakin.results.estimate import Estimate
 from dynakin.results.failures import Failures
 from dynakin.results.measures.facing import facing
 from dynakin.validation.methods import Trial
-
-FORMATS = ("svg", "pdf", "png")
-_DATES: dict[str, dict[str, None]] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}, "png": {}}
 
 Draw = Callable[[Estimate, Trial | None], Figure | None]
 FIGURES: dict[str, Draw] = {
@@ -114,17 +113,25 @@ def _write(
     unknown = [name for name in formats if name not in FORMATS]
     if unknown:
         raise ConfigError(f"formats: {unknown[0]!r} is not known, expected some of {', '.join(FORMATS)}")
-    written = []
+
+    def guarded(name: str) -> AbstractContextManager[object]:
+        return nullcontext() if failures is None else failures.stage(f"figure {name}", writes=True)
+
+    figures: dict[str, Figure] = {}
+    written: list[Path] = []
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        for name, draw in draws.items():
-            guarded = nullcontext() if failures is None else failures.stage(f"figure {name}", writes=True)
-            with guarded, mpl.rc_context({**FILE_STYLE, "svg.hashsalt": name}):
-                figure = draw()
-                for form in formats if figure is not None else ():
-                    assert figure is not None
-                    figure.savefig(folder / f"{name}.{form}", dpi=300, metadata=_DATES[form])
-                    written.append(folder / f"{name}.{form}")
+        with stage("drawing figures"):
+            for name, draw in draws.items():
+                with guarded(name), mpl.rc_context(FILE_STYLE):
+                    figure = draw()
+                    if figure is not None:
+                        figures[name] = figure
+        for name, made in save_each(figures, folder, formats).items():
+            with guarded(name):
+                if isinstance(made, Exception):
+                    raise made
+                written += made
     except OSError as error:
         raise OutputError(f"{folder}: cannot write figures there ({error.strerror or error})") from error
     return written

@@ -9,7 +9,7 @@ import numpy as np
 from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.results.estimate import AXES, COMPONENTS, Estimate
 from dynakin.results.files.motion import force_stem, write_sources
-from dynakin.results.files.storage import write_storage
+from dynakin.results.files.storage import DIGITS, write_storage
 from dynakin.results.measures.angles import angle_columns
 from dynakin.results.measures.feet import foot_sources
 from dynakin.results.measures.pressure import foot_pressure
@@ -51,7 +51,9 @@ def write_powers(estimate: Estimate, path: Path) -> None:
 def write_angles(estimate: Estimate, path: Path) -> None:
     """``angles.sto``: joint angles in degrees from the zero and with the names and signs that were asked for."""
     names, values, lines = angle_columns(estimate)
-    write_storage(path, "Joint angles", estimate.time, names, values, in_degrees=True, notes=["Degrees.", *lines])
+    write_storage(
+        path, "Joint angles", estimate.time, names, values, in_degrees=True, notes=["Degrees.", *lines], digits=DIGITS
+    )
 
 
 def write_mass_centre(estimate: Estimate, path: Path) -> None:
@@ -163,4 +165,4 @@ def write_feet(estimate: Estimate, path: Path) -> None:
 
 
 def _write(path: Path, title: str, estimate: Estimate, names: list[str], values: np.ndarray, notes: list[str]) -> None:
-    write_storage(path, title, estimate.time, names, values, in_degrees=False, notes=notes)
+    write_storage(path, title, estimate.time, names, values, in_degrees=False, notes=notes, digits=DIGITS)

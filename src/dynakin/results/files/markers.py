@@ -8,8 +8,8 @@ import numpy as np
 
 from dynakin.results.estimate import Estimate
 
-# 1e-9 m: far below what cameras see, so that figures recomputed from the file equal the ones in metrics.json.
-_DECIMALS = {"m": 9, "mm": 6}
+DECIMALS = 7
+"""Of a metre, of estimated markers: a thousandth of what cameras see."""
 _PER_METRE = {"m": 1.0, "mm": 1000.0}
 
 
@@ -39,15 +39,18 @@ def write_markers(estimate: Estimate, path: Path) -> None:
         estimate.marker_names,
         laboratory_markers(estimate),
         unit=estimate.recording.length_unit,
+        decimals=DECIMALS,
     )
 
 
-def write_trc(path: Path, time: np.ndarray, names: list[str], points: np.ndarray, *, unit: str) -> None:
-    """Write markers ``points`` (T, M, 3), m, as a TRC file in ``unit`` ("m" or "mm"); NaN becomes blank cells."""
+def write_trc(
+    path: Path, time: np.ndarray, names: list[str], points: np.ndarray, *, unit: str, decimals: int = 9
+) -> None:
+    """Write markers ``points`` (T, M, 3), m, as a TRC file in ``unit`` ("m" or "mm"), ``decimals`` of a metre;
+    NaN becomes blank cells."""
     frames, count = len(time), len(names)
     rate = (frames - 1) / (time[-1] - time[0]) if frames > 1 else 0.0
     rate_text = f"{rate:.10g}"
-    decimals = _DECIMALS[unit]
     lines = [
         f"PathFileType\t4\t(X/Y/Z)\t{path.name}",
         "DataRate\tCameraRate\tNumFrames\tNumMarkers\tUnits\tOrigDataRate\tOrigDataStartFrame\tOrigNumFrames",
@@ -58,10 +61,9 @@ def write_trc(path: Path, time: np.ndarray, names: list[str], points: np.ndarray
     ]
     scaled = np.asarray(points, dtype=float).reshape(frames, 3 * count) * _PER_METRE[unit]
     missing = ~np.isfinite(scaled)
-    for index in range(frames):
-        cells = [
-            "" if blank else f"{value:.{decimals}f}" for value, blank in zip(scaled[index], missing[index], strict=True)
-        ]
+    number = f"%.{decimals - (3 if unit == 'mm' else 0)}f"
+    for index, row in enumerate(scaled.tolist()):
+        cells = ["" if blank else number % value for value, blank in zip(row, missing[index].tolist(), strict=True)]
         if missing[index, -1]:
             cells.append("")  # OpenSim takes a tab as the end of a cell and would miss an empty one at the end of a row
         lines.append("\t".join([str(index + 1), f"{time[index]:.12g}", *cells]))

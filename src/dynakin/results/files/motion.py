@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from dynakin.results.estimate import AXES, COMPONENTS, Estimate
-from dynakin.results.files.storage import write_storage
+from dynakin.results.files.storage import DIGITS, DIGITS_OF_SD, write_storage
 from dynakin.results.measures.feet import foot_sources
 from dynakin.results.measures.sources import ABSENT, NOTES, moment_sources
 
@@ -58,7 +58,7 @@ def _write_motion(estimate: Estimate, path: Path, title: str, variable: str, uni
     if held:
         notes.append(f"Left out, because no marker shows them: {', '.join(held)}.")
     values = _in_degrees(estimate, variable)[:, seen]
-    write_storage(path, title, estimate.time, names, values, in_degrees=True, notes=notes)
+    write_storage(path, title, estimate.time, names, values, in_degrees=True, notes=notes, digits=DIGITS)
 
 
 def _seen(estimate: Estimate) -> np.ndarray:
@@ -79,6 +79,7 @@ def write_moments(estimate: Estimate, path: Path) -> None:
             "Moments in N m, forces in N. In a model that lumps both sides, leg moments are the sum of both legs.",
             "moments_source.sto says of each whether it is measured, derived, a prior or absent (nan).",
         ],
+        digits=DIGITS,
     )
 
 
@@ -133,6 +134,7 @@ def write_deviations(estimate: Estimate, path: Path) -> None:
             "Of moments and feet's forces that are derived or a prior too (moments_source.sto, feet_source.sto); nan "
             "where absent.",
         ],
+        digits=DIGITS_OF_SD,
     )
 
 
@@ -163,6 +165,7 @@ def write_wrench(estimate: Estimate, path: Path) -> None:
             "Estimated where it is not measured, derived from the motion.",
             _frame(estimate),
         ],
+        digits=DIGITS,
     )
 
 

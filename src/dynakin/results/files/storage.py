@@ -10,8 +10,13 @@ import numpy as np
 from dynakin.arrays import finite
 from dynakin.errors import OutputError
 
-# 15 significant digits: what a reader computes from the file equals what was computed from the arrays.
-_NUMBER = "%.15g"
+EXACT = 15
+"""Significant digits that hold a double: of truth and recordings, which others compute from."""
+DIGITS = 8
+"""Of an estimate: no coarser than the single precision of ``estimate.nc``, far below any deviation."""
+DIGITS_OF_SD = 5
+"""Of a standard deviation, which itself is not known to two."""
+_TIME = "%.12g"
 
 
 def write_storage(
@@ -23,6 +28,7 @@ def write_storage(
     *,
     in_degrees: bool,
     notes: Sequence[str] = (),
+    digits: int = EXACT,
 ) -> None:
     """Write one table.
 
@@ -33,6 +39,7 @@ def write_storage(
         values: (T, N) in the units that the file is to carry; NaN is written as ``nan``, and so is infinity.
         in_degrees: OpenSim's header line; says in what the rotational columns are given.
         notes: lines of the header for people, ``;`` and ``=`` excluded since readers take ``key=value`` for settings.
+        digits: significant ones of the values.
     """
     values = finite(values)
     if values.shape != (len(time), len(names)):
@@ -53,4 +60,5 @@ def write_storage(
     ]
     with path.open("w", encoding="utf-8", newline="\n") as file:
         file.write("\n".join(header) + "\n")
-        np.savetxt(file, np.column_stack([time, values]), fmt=_NUMBER, delimiter="\t")
+        row = "\t".join([_TIME, *[f"%.{digits}g"] * len(names)]) + "\n"
+        file.write("".join(row % tuple(line) for line in np.column_stack([time, values]).tolist()))

@@ -17,7 +17,7 @@ from importlib import resources
 from typing import Any, Literal, NamedTuple, get_args
 
 import numpy as np
-from scipy import stats
+import scipy
 
 from dynakin.results.naming import listed
 
@@ -197,7 +197,7 @@ def judge_group(statistics: Mapping[str, float], own: Limits) -> Judgement | Non
 
 def mean_interval_95(dof: float) -> tuple[float, float]:
     """Where the mean of ``dof`` independent squared standard normal numbers lies in 95 % of cases."""
-    return float(stats.chi2.ppf(0.025, dof) / dof), float(stats.chi2.ppf(0.975, dof) / dof)
+    return float(scipy.stats.chi2.ppf(0.025, dof) / dof), float(scipy.stats.chi2.ppf(0.975, dof) / dof)
 
 
 def judge(ratio: float, band: tuple[float, float] = CONSISTENT) -> Judgement:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 from collections.abc import Iterable, Sequence
-from dataclasses import asdict, dataclass, fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 import numpy as np
@@ -190,7 +190,13 @@ def curve_points(trial: str, curves: Iterable[MeanCurve]) -> list[CurvePoint]:
 
 def write_curves(path: Path, points: Iterable[CurvePoint]) -> None:
     """``repetitions.csv``; only the line of names where nothing repeats."""
+    names = [entry.name for entry in fields(CurvePoint)]
     with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, [entry.name for entry in fields(CurvePoint)], lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(asdict(point) for point in points)
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(names)
+        writer.writerows([_cell(getattr(point, name)) for name in names] for point in points)
+
+
+def _cell(value: object) -> object:
+    """Numbers as in the motion files."""
+    return f"{value:.8g}" if isinstance(value, float) else value

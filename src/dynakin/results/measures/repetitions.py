@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import find_peaks
+import scipy
 
 from dynakin.arrays import runs
 from dynakin.elements import element
@@ -156,7 +156,7 @@ def squats(time: Array, height: Array) -> list[Repetition]:
         return []
     path = np.where(known, path, path[known].max())  # a long gap is no squat
     travel, standing = float(np.ptp(path[known])), float(np.percentile(path[known], 95))
-    lows, _ = find_peaks(-path, prominence=max(PROMINENCE * travel, LEAST_DEPTH_M))
+    lows, _ = scipy.signal.find_peaks(-path, prominence=max(PROMINENCE * travel, LEAST_DEPTH_M))
     tops = [0, *(int(a + np.argmax(path[a:b])) for a, b in pairwise(lows)), len(path) - 1]
     found = []
     for k, low in enumerate(lows):
@@ -205,7 +205,7 @@ def initial_contacts(time: Array, ahead: Array) -> list[list[int]]:
     found = []
     for first, end in runs(np.isfinite(path)):
         low = [float(path[first:end].min())]  # beyond the ends counts as low: a swing that is cut has its contact too
-        peaks, _ = find_peaks(np.concatenate([low, path[first:end], low]), prominence=LEAST_STEP_M)
+        peaks, _ = scipy.signal.find_peaks(np.concatenate([low, path[first:end], low]), prominence=LEAST_STEP_M)
         frames = [first + int(peak) - 1 for peak in peaks]
         found.append([k for k in frames if min(time[k] - time[first], time[end - 1] - time[k]) > EDGE_S])
     return found

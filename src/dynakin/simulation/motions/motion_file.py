@@ -5,19 +5,19 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy import interpolate
 
 from dynakin.errors import ConfigError
 from dynakin.recordings.formats.mot import read_table
 from dynakin.recordings.resampling import low_pass
+from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.mechanics import Motion
 from dynakin.simulation.motions.movement import Movement
 
 Array = NDArray[np.float64]
 
-CUTOFF_HZ = 6.0  # of the low-pass: what human movements without impacts hold (Winter 2009)
 _DEGREE = 5  # a quintic spline: forces, from its second derivative, have no corners
 _FEWEST_ROWS = 20
 
@@ -53,7 +53,7 @@ def file_movement(path: Path, body: SimulatedBody, cutoff_hz: float = CUTOFF_HZ)
             f"simulation: motion_cutoff_hz is {cutoff_hz:g}, expected 0 to {0.5 * rate_hz:g} Hz ({path} has "
             f"{rate_hz:g} rows a second)"
         )
-    spline = interpolate.make_interp_spline(time, low_pass(values, rate_hz, cutoff_hz), k=_DEGREE)
+    spline = scipy.interpolate.make_interp_spline(time, low_pass(values, rate_hz, cutoff_hz), k=_DEGREE)
     rate, second = spline.derivative(1), spline.derivative(2)
     end_s = float(time[-1])
 

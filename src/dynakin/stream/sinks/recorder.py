@@ -20,8 +20,9 @@ from dynakin.pipeline.stages import run_case
 from dynakin.recordings.limits import FASTEST_HZ, SLOWEST_HZ
 from dynakin.recordings.recording import Recording
 from dynakin.results.files.folder import check_output_writable
+from dynakin.settings.defaults import DELAY_S
 from dynakin.settings.settings import Settings
-from dynakin.stream.fusion import DELAY_S, Fused, Fusion
+from dynakin.stream.fusion import Fused, Fusion
 from dynakin.stream.sinks.append import SYSTEM_ERROR
 from dynakin.stream.sinks.base import Sink, Status
 from dynakin.stream.sinks.record_format import packet_record, read_records, text_record

@@ -9,19 +9,20 @@ from typing import Any
 
 from dynakin.errors import DynakinError
 from dynakin.pipeline.stages import judged
-from dynakin.recordings.smoothing import CUTOFF_HZ
+from dynakin.progress import Progress
 from dynakin.results.estimate import COMPONENTS
 from dynakin.results.failures import Failures
 from dynakin.results.files.config import versions
 from dynakin.results.measures.fit import SignalFit
 from dynakin.results.measures.metrics import compute_metrics
+from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.settings.settings import Settings
 from dynakin.studies.batch.dataset import Dataset, Session
 from dynakin.studies.engine.folder import write_csv, write_json
 from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import Pool
 from dynakin.studies.engine.tasks import Failure, Task
-from dynakin.studies.engine.work import Progress, work
+from dynakin.studies.engine.work import work
 from dynakin.validation.case import case_of
 from dynakin.validation.files import flat
 from dynakin.validation.methods import estimate_each

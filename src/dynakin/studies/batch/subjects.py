@@ -13,6 +13,7 @@ from dynakin.filter.estimator import Estimator
 from dynakin.filter.tracker import can_smooth
 from dynakin.identification.subject import identify_subject
 from dynakin.identification.trials import Common
+from dynakin.progress import Progress
 from dynakin.recordings.recording import Recording
 from dynakin.results.naming import listed
 from dynakin.settings import presets
@@ -21,7 +22,7 @@ from dynakin.studies.batch.dataset import Dataset, Session
 from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import Pool
 from dynakin.studies.engine.tasks import Outcome, Task
-from dynakin.studies.engine.work import Progress, work
+from dynakin.studies.engine.work import work
 from dynakin.validation.case import case_of
 
 FILE = "subject.toml"

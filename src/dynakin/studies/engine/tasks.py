@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from dynakin.errors import DynakinError
+from dynakin.progress import silent
 
 Row = dict[str, Any]
 """What a task gives: plain data that JSON carries (numbers, texts, lists, None)."""
@@ -48,7 +49,8 @@ class Outcome:
 def attempt(function: Function, shared: Any, task: Task) -> Outcome:
     """Work on one task where it lands; its errors come back as values, so that none stops another task."""
     try:
-        return Outcome(task.key, row=function(shared, task.payload))
+        with silent():
+            return Outcome(task.key, row=function(shared, task.payload))
     except DynakinError as error:
         return Outcome(task.key, failure=Failure(error.message))
     except Exception as error:  # a bug, or a file that no reader foresaw: one task's matter

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
+from dynakin.progress import Progress
 from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import Pool
 from dynakin.studies.engine.tasks import Function, Outcome, Task
-
-Progress = Callable[[int, int], None]
 
 
 def work(

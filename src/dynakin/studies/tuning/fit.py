@@ -10,11 +10,11 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ConfigError
+from dynakin.progress import Progress
 from dynakin.results.files.config import versions
 from dynakin.settings.noise import Noise
 from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import Pool
-from dynakin.studies.engine.work import Progress
 from dynakin.studies.tuning.likelihood import REACH, Likelihood
 from dynakin.studies.tuning.optimise import SETTLED, Optimum, curvature, deviations, minimise
 from dynakin.studies.tuning.score import CRITERIA, Shared

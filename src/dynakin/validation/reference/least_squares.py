@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import lsq_linear
+import scipy
 
 from dynakin.model.inertia import RigidBody
 from dynakin.model.plan import ModelPlan
@@ -99,7 +99,7 @@ def _bounded(problem: Condensed, plan: ModelPlan, bounds: Bounds) -> tuple[Array
     A, b = problem.with_mass()
     pull = _TO_TABLE * np.eye(len(names))
     start = problem.table[problem.estimated] / size
-    fit = lsq_linear(
+    fit = scipy.optimize.lsq_linear(
         np.vstack([A, pull]), np.append(b, _TO_TABLE * start), (lower, upper), method="bvls", tol=1e-12
     )  # fmt: skip
     on = tuple(name for name, active in zip(names, fit.active_mask, strict=True) if active)
