@@ -9,16 +9,6 @@
 namespace dynakin {
 namespace {
 
-// The smoother undoes optimal gains; (7) restricts the gain, and a sigmoid bends the state between frames.
-const FilterSettings& smoothable(const FilterSettings& settings) {
-  const bool plain = settings.constraint == ConstraintKind::none || settings.constraint == ConstraintKind::projection;
-  if (!plain && (settings.lower.array().isFinite().any() || settings.upper.array().isFinite().any()))
-    throw std::invalid_argument(std::string("smoothing: bounds are kept by constraint '") +
-                                (settings.constraint == ConstraintKind::gain ? "gain" : "sigmoid") +
-                                "', which has no smoother, expected 'projection' or 'none'");
-  return settings;
-}
-
 // out += A B. In panels of the inner dimension, so that Eigen's packed panels stay on the stack.
 template <class Out, class A, class B>
 void add_product(const A& a, const B& b, Out&& out) {
@@ -30,6 +20,16 @@ void add_product(const A& a, const B& b, Out&& out) {
 }
 
 }  // namespace
+
+// The smoother undoes optimal gains; (7) restricts the gain, and a sigmoid bends the state between frames.
+const FilterSettings& smoothable(const FilterSettings& settings) {
+  const bool plain = settings.constraint == ConstraintKind::none || settings.constraint == ConstraintKind::projection;
+  if (!plain && (settings.lower.array().isFinite().any() || settings.upper.array().isFinite().any()))
+    throw std::invalid_argument(std::string("smoothing: bounds are kept by constraint '") +
+                                (settings.constraint == ConstraintKind::gain ? "gain" : "sigmoid") +
+                                "', which has no smoother, expected 'projection' or 'none'");
+  return settings;
+}
 
 BackwardPass::BackwardPass(const Model& model, const FilterSettings& settings, int max_rows, bool covariance)
     : model_(model), settings_(smoothable(settings)), projection_(model, settings), covariance_(covariance) {

@@ -9,6 +9,9 @@
 
 namespace dynakin {
 
+// Throws std::invalid_argument where constraints are kept in a way that has no smoother.
+const FilterSettings& smoothable(const FilterSettings& settings);
+
 // With lambda and Lambda at a frame whose filtered state and covariance are x and P, the smoothed ones are x - P lambda
 // and P - P Lambda P. No predicted covariance is inverted (docs/derivations.md, section 9). Allocates at construction.
 class BackwardPass {
