@@ -14,6 +14,7 @@ constexpr double k_nothing = 1e-13;  // of a variance: what rounding leaves of o
 
 // A = C C' in place, of a covariance that may leave some combinations no variance: their columns of C are zero.
 void factor(Eigen::MatrixXd& A) {
+  if (A.rows() == 0) return;
   const Eigen::VectorXd variance = A.diagonal();
   const Eigen::MatrixXd given = A;
   if (Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>>(A).info() != Eigen::Success ||
@@ -136,6 +137,7 @@ void GivenConstants::end(const Belief& last) {
   Lambda_.setZero();
   Wt_.setZero();
   there_ = false;
+  ended_ = true;
 }
 
 void GivenConstants::start(const Belief& before, const Eigen::VectorXd& moved) {
@@ -148,14 +150,16 @@ void GivenConstants::start(const Belief& before, const Eigen::VectorXd& moved) {
       L(k, k) = 1.0;
       Vt_.row(k).setZero();
     }
-  L.triangularView<Eigen::Lower>().solveInPlace(Vt_);
   S_ = before.P(moving_, moving_);
+  there_ = false;
+  shift_.setZero();
+  if (constants() == 0) return;
+  L.triangularView<Eigen::Lower>().solveInPlace(Vt_);
   S_.selfadjointView<Eigen::Lower>().rankUpdate(Vt_.transpose(), -1.0);
   mirror_lower(S_);
   L.transpose().triangularView<Eigen::Upper>().solveInPlace(Vt_);
   shift_.noalias() = Vt_.transpose() * (c_now_ - before.x(constant_));
   Vt_ = (Ct_.triangularView<Eigen::Upper>() * Vt_).eval();
-  there_ = false;
 }
 
 void GivenConstants::step(const std::vector<RowBlock>& blocks, const Frame* last, Frame& frame) {
@@ -315,7 +319,7 @@ void GivenConstants::correct(int from, int end, Frame& frame) {
   Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(L);
   const auto upper = L.transpose().triangularView<Eigen::Upper>();
   upper.solveInPlace<Eigen::OnTheRight>(Z);
-  upper.solveInPlace<Eigen::OnTheRight>(Dt);
+  if (constants() > 0) upper.solveInPlace<Eigen::OnTheRight>(Dt);
   L.triangularView<Eigen::Lower>().solveInPlace(w);
   frame.S.selfadjointView<Eigen::Lower>().rankUpdate(Z, -1.0);
   mirror_lower(frame.S);
@@ -379,11 +383,14 @@ void GivenConstants::look(const Frame& frame, Eigen::VectorXd& x) {
     decayed_ = 1.0;
   }
   x(constant_) = c_;
-  x(moving_) = frame.mean - frame.S * lambda_;
+  if (ended_)
+    x(moving_) = frame.after(moving_);  // to the last bit
+  else
+    x(moving_) = frame.mean - frame.S * lambda_;
   const auto wide = static_cast<Eigen::Index>(wide_.size());
   for (Eigen::Index k = 0; k < wide; ++k) Yw_.col(k) = Yt_.col(wide_[k]);
   Pw_.setZero(wide, wide);
-  Pw_.selfadjointView<Eigen::Lower>().rankUpdate(Yw_.transpose());
+  if (c > 0) Pw_.selfadjointView<Eigen::Lower>().rankUpdate(Yw_.transpose());
   mirror_lower(Pw_);
   Pwc_.resize(wide, wide_constants_);
   Pwc_.noalias() = Yw_.topRows(wide_constants_).transpose() * Ct_.topLeftCorner(wide_constants_, wide_constants_);
@@ -422,6 +429,7 @@ void GivenConstants::complete() {
 }
 
 void GivenConstants::undo(const Frame& frame, const Frame* last) {
+  ended_ = false;
   const Decision& decided = *frame.decided;
   for (const auto& [column, u] : decided.pull)
     if (const int i = place_[column]; i >= 0) lambda_(i) -= u;
@@ -477,6 +485,7 @@ void GivenConstants::undo_chunk(const Frame& frame, int from, int end) {
     each(r, [&](int j, double h) { X_.col(j) += h * B.col(r); });
   for (int j = 0; j < d; ++j) Lambda_.col(j).tail(d - j) -= X_.col(j).tail(d - j) + X_.row(j).tail(d - j).transpose();
   mirror_lower(Lambda_);
+  if (c == 0) return;
   auto M = M_.topLeftCorner(c, rows);
   M = -frame.Dt.middleCols(from, rows);
   M.noalias() += Wt_ * Z;

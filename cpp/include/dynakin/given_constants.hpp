@@ -101,6 +101,7 @@ class GivenConstants {
   Eigen::MatrixXd Lambda_, Wt_;
   Eigen::MatrixXd P_, Yt_;  // (d, d) covariance given z from all frames, V' from all frames (c, d)
   bool there_ = false;      // they are of the frame that is looked at
+  bool ended_ = false;      // no later frame has said anything yet
   int since_ = 0;           // frames since they were not carried here from the frame after
   double decayed_ = 1.0;    // least that was kept of an element on the way
   Eigen::MatrixXd G_, M_, X_, T_, Yw_, Pw_, Pwc_, covariance_;
