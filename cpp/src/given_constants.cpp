@@ -130,7 +130,7 @@ void GivenConstants::sort_columns() {
 void GivenConstants::end(const Belief& last) {
   c_ = last.x(constant_);
   Eigen::MatrixXd C = last.P(constant_, constant_);
-  covariance_(constant_, constant_) = C;
+  covariance_ = last.P;
   factor(C);
   Ct_ = C.transpose();
   lambda_.setZero();
@@ -144,6 +144,14 @@ void GivenConstants::start(const Belief& before, const Eigen::VectorXd& moved) {
   c_now_ = c_ - moved(constant_);
   Eigen::MatrixXd L = before.P(constant_, constant_);
   Vt_ = before.P(constant_, moving_);
+  // Combinations that an equality has made sure have rounding for a variance; with some of their own they say nothing.
+  for (Eigen::Index e = 0; e < settings_.equality.rows(); ++e) {
+    if (!settings_.equality.row(e)(moving_).isZero(0.0)) continue;
+    const Eigen::VectorXd a = settings_.equality.row(e)(constant_).transpose();
+    const double most = (a.array().square() * L.diagonal().array()).sum();
+    if (a.dot(L * a) > 1e-9 * most) continue;  // not yet
+    L += (most > 0.0 ? most : 1.0) / (a.squaredNorm() * a.squaredNorm()) * a * a.transpose();
+  }
   factor(L);
   for (int k = 0; k < constants(); ++k)
     if (L(k, k) == 0.0) {  // no variance is left: d does not hang on it
@@ -235,13 +243,15 @@ void GivenConstants::predict(const Eigen::MatrixXd& S, const Eigen::MatrixXd& Vt
 
 // Rows that nothing moving has a part in tell nothing that the constants do not hold already.
 void GivenConstants::gather(const std::vector<RowBlock>& blocks, Frame& frame) {
-  for (auto* of : {&frame.row_ends, &frame.columns, &frame.chunk_ends, &c_ends_, &c_columns_, &block_first_}) of->clear();
+  for (auto* of : {&frame.row_ends, &frame.columns, &frame.chunk_ends, &c_ends_, &c_columns_, &block_first_})
+    of->clear();
   for (auto* of : {&frame.values, &c_values_, &innovation_}) of->clear();
   const bool elsewhere = frame.decided->linearised.size() > 0;
   int chunk_first = 0;
   for (const RowBlock& block : blocks) {
     const std::vector<int>& columns = *block.columns;
-    if (block.rows == 0 || std::none_of(columns.begin(), columns.end(), [&](int c) { return place_[c] >= 0; })) continue;
+    if (block.rows == 0 || std::none_of(columns.begin(), columns.end(), [&](int c) { return place_[c] >= 0; }))
+      continue;
     const int first = frame.rows();
     if (first > chunk_first && first + block.rows - chunk_first > k_chunk_rows) {
       frame.chunk_ends.push_back(first);
@@ -383,10 +393,11 @@ void GivenConstants::look(const Frame& frame, Eigen::VectorXd& x) {
     decayed_ = 1.0;
   }
   x(constant_) = c_;
-  if (ended_)
-    x(moving_) = frame.after(moving_);  // to the last bit
-  else
-    x(moving_) = frame.mean - frame.S * lambda_;
+  if (ended_) {  // to the last bit; the covariance is the last one's
+    x(moving_) = frame.after(moving_);
+    return;
+  }
+  x(moving_) = frame.mean - frame.S * lambda_;
   const auto wide = static_cast<Eigen::Index>(wide_.size());
   for (Eigen::Index k = 0; k < wide; ++k) Yw_.col(k) = Yt_.col(wide_[k]);
   Pw_.setZero(wide, wide);
@@ -422,6 +433,7 @@ void GivenConstants::look(const Frame& frame, Eigen::VectorXd& x) {
 }
 
 void GivenConstants::complete() {
+  if (ended_) return;
   const Eigen::MatrixXd dd = P_ + Yt_.transpose() * Yt_, dc = Yt_.transpose() * Ct_;
   covariance_(moving_, moving_) = dd;
   covariance_(moving_, constant_) = dc;
@@ -478,11 +490,9 @@ void GivenConstants::undo_chunk(const Frame& frame, int from, int end) {
   L.solveInPlace<Eigen::OnTheRight>(T);
   frame.L.block(0, from, rows, rows).transpose().triangularView<Eigen::Upper>().solveInPlace(T);
   T *= 0.5;
-  for (int r = 0; r < rows; ++r)
-    each(r, [&](int j, double h) { B.row(j).noalias() -= h * T.row(r); });
+  for (int r = 0; r < rows; ++r) each(r, [&](int j, double h) { B.row(j).noalias() -= h * T.row(r); });
   X_.setZero();
-  for (int r = 0; r < rows; ++r)
-    each(r, [&](int j, double h) { X_.col(j) += h * B.col(r); });
+  for (int r = 0; r < rows; ++r) each(r, [&](int j, double h) { X_.col(j) += h * B.col(r); });
   for (int j = 0; j < d; ++j) Lambda_.col(j).tail(d - j) -= X_.col(j).tail(d - j) + X_.row(j).tail(d - j).transpose();
   mirror_lower(Lambda_);
   if (c == 0) return;
@@ -490,8 +500,7 @@ void GivenConstants::undo_chunk(const Frame& frame, int from, int end) {
   M = -frame.Dt.middleCols(from, rows);
   M.noalias() += Wt_ * Z;
   L.solveInPlace<Eigen::OnTheRight>(M);
-  for (int r = 0; r < rows; ++r)
-    each(r, [&](int j, double h) { Wt_.col(j) -= h * M.col(r); });
+  for (int r = 0; r < rows; ++r) each(r, [&](int j, double h) { Wt_.col(j) -= h * M.col(r); });
 }
 
 // Lambda <- F' Lambda F, W <- F' W. With the frame before also P and V from all frames: F V = V + Q W and

@@ -122,7 +122,8 @@ void Smoother::replay(std::size_t k, std::size_t first, const RunRecord& record)
   else if (cut)
     frame.before = frame.after;
   else
-    frame.before = predicted(k, decided.carried, k == 0 ? checkpoints_[0].belief.x : Eigen::VectorXd(state(k - 1, record)));
+    frame.before =
+        predicted(k, decided.carried, k == 0 ? checkpoints_[0].belief.x : Eigen::VectorXd(state(k - 1, record)));
   measurement_.admit_all();
   for (std::size_t b = 0; b <= filter_.model().markers().size(); ++b)
     if (cut || !decided.used[b]) measurement_.leave_out(static_cast<int>(b));

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <vector>
 
 #include "dynakin/frame_tape.hpp"
 #include "dynakin/projection.hpp"
@@ -42,6 +43,8 @@ class BackwardPass {
   Eigen::MatrixXd G_, B_;  // (n, rows)
   Eigen::MatrixXd T_;      // (rows, rows)
   Eigen::MatrixXd LambdaP_;
+  std::vector<int> touched_;  // rows of a chunk's A' that are not zero
+  Eigen::MatrixXd Au_, U_;    // these, and Au B'
 };
 
 }  // namespace dynakin

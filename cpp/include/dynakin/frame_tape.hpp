@@ -40,8 +40,8 @@ struct FrameTape {
 
   // With sensors only.
   bool tells() const { return !used.empty(); }
-  std::vector<std::uint8_t> used;      // blocks that the update took
-  Eigen::VectorXd before, linearised;  // (n,) the state that it corrected, and where its rows were linearised last
+  std::vector<std::uint8_t> used;         // blocks that the update took
+  Eigen::VectorXd before, linearised;     // (n,) the state that it corrected, and where its rows were linearised last
   double stirred = 0.0, stirred_s = 0.0;  // before it: what `stir` was asked for, times and seconds
   Eigen::VectorXd moved;                  // (n,) by constraints that no state within reach kept all of
   bool fell_back = false;

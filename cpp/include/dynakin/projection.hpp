@@ -62,7 +62,7 @@ class Projection {
   const Consistency consistency_;
   std::vector<Active> active_, before_;
   int capacity_;
-  int k_ = 0;                    // active constraints
+  int k_ = 0;  // active constraints
   bool fell_back_ = false;
   Eigen::MatrixXd PN_;           // (n, capacity): P a of each active constraint
   Eigen::MatrixXd gram_, chol_;  // N' P N and its factor
