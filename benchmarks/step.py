@@ -1,5 +1,5 @@
-"""Median and 99th percentile of a filter step, against the bare dense update of its size in the same run; what smoothing
-and fixed lags take beside a step, and beside the bare products of their size.
+"""Median and 99th percentile of a filter step, against the bare dense update of its size in the same run; what
+smoothing and fixed lags take beside a step, and beside the bare products of their size.
 
 Run with ``make bench``. The trial is `squats1` of the shared recordings where they are (DYNAKIN_TEST_DATA or
 ../shared/data), else a simulated squat; it is repeated until there are at least 20000 steps.
@@ -48,8 +48,8 @@ def trials() -> list[tuple[str, str, dynakin.Recording, dynakin.Subject]]:
 
 
 def smoothing(title: str, model: Definition, recording: dynakin.Recording) -> None:
-    """Medians over rounds in turn, so that a busy machine is as busy for all: a step, what smoothing adds to it, its bare
-    products, a step with a lag, and a lag with deviations in each frame, beside which stands the run without it."""
+    """Medians over rounds in turn, so that a busy machine is as busy for all: a step, what smoothing adds to it, its
+    bare products, steps with a lag, and whole runs with a lag, which have deviations in each frame."""
     ready = dynakin.Estimator(model).prepare(recording)
     start, frames = ready.tracker, slice(0, SMOOTHED)
     data = (recording.time[frames], ready.markers[frames], ready.wrench[frames])
