@@ -1,4 +1,5 @@
-// Times a filter's steps and, between them, the bare dense update of the same size: n states, as many rows as that frame.
+// Times a filter's steps and, between them, the bare dense update of the same size: n states, as many rows as that
+// frame; and the bare products of a smoother's frame.
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
@@ -27,7 +28,13 @@ double us_since(clock_type::time_point start) {
 class DenseUpdate {
  public:
   DenseUpdate(int n, int m)
-      : H_(Eigen::MatrixXd::Random(m, n)), P0_(Eigen::MatrixXd::Identity(n, n)), P_(n, n), HP_(m, n), S_(m, m), x_(n), v_(m) {}
+      : H_(Eigen::MatrixXd::Random(m, n)),
+        P0_(Eigen::MatrixXd::Identity(n, n)),
+        P_(n, n),
+        HP_(m, n),
+        S_(m, m),
+        x_(n),
+        v_(m) {}
 
   double time() {
     P_ = P0_;
@@ -51,6 +58,34 @@ class DenseUpdate {
   Eigen::VectorXd x_, v_;
 };
 
+// What smoothing a frame cannot do without, of d states that move and c constants (docs/derivations.md, section 9): S
+// and V forwards, Lambda, W and the covariance backwards, and the constants' part of it.
+class SmoothingProducts {
+ public:
+  SmoothingProducts(int d, int c, int rows)
+      : S_(Eigen::MatrixXd::Identity(d, d)),
+        X_(Eigen::MatrixXd::Random(d, d)),
+        Z_(Eigen::MatrixXd::Random(d, rows)),
+        V_(Eigen::MatrixXd::Random(c, d)),
+        D_(Eigen::MatrixXd::Random(c, rows)),
+        dd_(d, d),
+        dm_(d, rows),
+        cm_(c, rows) {}
+
+  double time() {
+    const auto start = clock_type::now();
+    S_.selfadjointView<Eigen::Lower>().rankUpdate(Z_, -1e-9);
+    V_.noalias() -= D_ * Z_.transpose();
+    dm_.noalias() = X_ * Z_;
+    cm_.noalias() = V_ * Z_;
+    dd_.noalias() = S_ * X_;
+    return us_since(start);
+  }
+
+ private:
+  Eigen::MatrixXd S_, X_, Z_, V_, D_, dd_, dm_, cm_;
+};
+
 nb::tuple interleaved(Filter& filter, const Array1& time, const Array3& markers, const Array2& wrench, int rows) {
   const std::size_t frames = time.shape(0), m = 3 * filter.model().markers().size();
   DenseUpdate dense(filter.model().state_size(), rows);
@@ -71,12 +106,19 @@ nb::tuple interleaved(Filter& filter, const Array1& time, const Array3& markers,
 }  // namespace
 
 NB_MODULE(dynakin_bench, m) {
+  m.def("smoothing_products", [](int d, int c, int rows, int times) {
+    SmoothingProducts products(d, c, rows);
+    std::vector<double> us;
+    for (int k = 0; k < times; ++k) us.push_back(products.time());
+    return us;
+  });
   nb::module_::import_("dynakin.bindings._core");  // registers Model and FilterSettings
-  m.def("interleaved",
-        [](const Model& model, const FilterSettings& settings, const Eigen::VectorXd& x0, const Eigen::MatrixXd& P0,
-           const Array1& time, const Array3& markers, const Array2& wrench, int rows) {
-          Filter filter(model, settings, x0, P0);
-          return interleaved(filter, time, markers, wrench, rows);
-        },
-        "Times (us) of each step and of a dense update of its size, taken in turn.");
+  m.def(
+      "interleaved",
+      [](const Model& model, const FilterSettings& settings, const Eigen::VectorXd& x0, const Eigen::MatrixXd& P0,
+         const Array1& time, const Array3& markers, const Array2& wrench, int rows) {
+        Filter filter(model, settings, x0, P0);
+        return interleaved(filter, time, markers, wrench, rows);
+      },
+      "Times (us) of each step and of a dense update of its size, taken in turn.");
 }

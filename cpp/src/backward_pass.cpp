@@ -9,16 +9,6 @@
 namespace dynakin {
 namespace {
 
-// The smoother undoes optimal gains; (7) restricts the gain, and a sigmoid bends the state between frames.
-const FilterSettings& smoothable(const FilterSettings& settings) {
-  const bool plain = settings.constraint == ConstraintKind::none || settings.constraint == ConstraintKind::projection;
-  if (!plain && (settings.lower.array().isFinite().any() || settings.upper.array().isFinite().any()))
-    throw std::invalid_argument(std::string("smoothing: bounds are kept by constraint '") +
-                                (settings.constraint == ConstraintKind::gain ? "gain" : "sigmoid") +
-                                "', which has no smoother, expected 'projection' or 'none'");
-  return settings;
-}
-
 // out += A B. In panels of the inner dimension, so that Eigen's packed panels stay on the stack.
 template <class Out, class A, class B>
 void add_product(const A& a, const B& b, Out&& out) {
@@ -31,6 +21,16 @@ void add_product(const A& a, const B& b, Out&& out) {
 
 }  // namespace
 
+// The smoother undoes optimal gains; (7) restricts the gain, and a sigmoid bends the state between frames.
+const FilterSettings& smoothable(const FilterSettings& settings) {
+  const bool plain = settings.constraint == ConstraintKind::none || settings.constraint == ConstraintKind::projection;
+  if (!plain && (settings.lower.array().isFinite().any() || settings.upper.array().isFinite().any()))
+    throw std::invalid_argument(std::string("smoothing: bounds are kept by constraint '") +
+                                (settings.constraint == ConstraintKind::gain ? "gain" : "sigmoid") +
+                                "', which has no smoother, expected 'projection' or 'none'");
+  return settings;
+}
+
 BackwardPass::BackwardPass(const Model& model, const FilterSettings& settings, int max_rows, bool covariance)
     : model_(model), settings_(smoothable(settings)), projection_(model, settings), covariance_(covariance) {
   const int n = model.state_size();
@@ -42,6 +42,9 @@ BackwardPass::BackwardPass(const Model& model, const FilterSettings& settings, i
   G_.setZero(n, max_rows);
   B_.setZero(n, max_rows);
   T_.setZero(max_rows, max_rows);
+  touched_.reserve(n);
+  Au_.setZero(n, max_rows);
+  U_.setZero(n, n);
 }
 
 void BackwardPass::start() {
@@ -93,8 +96,26 @@ void BackwardPass::undo_chunk(const FrameTape& tape, int from, int rows) {
   T.diagonal().array() += 0.5;
   Bt = -Gt;
   Bt.noalias() += At * T;
-  Lambda_.triangularView<Eigen::Lower>() += At * Bt.transpose();
-  Lambda_.triangularView<Eigen::Lower>() += Bt * At.transpose();
+  // A' B + B' A: most rows of A' are zero, as a marker moves with few states.
+  touched_.clear();
+  for (Eigen::Index i = 0; i < At.rows(); ++i) {
+    if (At.row(i).isZero(0.0)) continue;
+    Au_.row(static_cast<Eigen::Index>(touched_.size())).head(rows) = At.row(i);
+    touched_.push_back(static_cast<int>(i));
+  }
+  const auto some = static_cast<Eigen::Index>(touched_.size());
+  auto U = U_.topRows(some);
+  constexpr Eigen::Index width = 128;  // what Eigen packs stays on the stack
+  for (Eigen::Index c = 0; c < U.cols(); c += width) {
+    const Eigen::Index w = std::min(width, U.cols() - c);
+    U.middleCols(c, w).noalias() = Au_.topLeftCorner(some, rows) * Bt.middleRows(c, w).transpose();
+  }
+  for (Eigen::Index c = 0; c < U.cols(); ++c)
+    for (Eigen::Index k = some; k-- > 0 && touched_[k] >= c;) Lambda_(touched_[k], c) += U(k, c);
+  for (Eigen::Index k = 0; k < some; ++k) {
+    const Eigen::Index c = touched_[k], below = U.cols() - c;
+    Lambda_.col(c).tail(below) += U.row(k).tail(below).transpose();
+  }
   mirror_lower(Lambda_);
 }
 

@@ -46,6 +46,11 @@ void Correction::correct(const MarkerRef& markers, const Vector6& wrench) {
   if (uncertainty_seen() > settings.iterate_beyond) return iterate(markers, wrench, most_iterations);
   leave_out_refused();
   sums = update_.apply(measurement.blocks(), now.P, dx);
+  note_linearised();
+}
+
+void Correction::note_linearised() {
+  if (tape && tape->tells()) tape->linearised = now.x;
 }
 
 void Correction::iterate(const MarkerRef& markers, const Vector6& wrench, int most) {
@@ -67,6 +72,7 @@ void Correction::iterate(const MarkerRef& markers, const Vector6& wrench, int mo
     now.P = before.P;
     measurement.linearise(now.x, markers, wrench);
   }
+  note_linearised();
   now.x = before.x;
 }
 

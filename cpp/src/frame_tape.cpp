@@ -5,24 +5,28 @@
 
 namespace dynakin {
 
-FrameTape::FrameTape(int state_size, int max_rows)
+FrameTape::FrameTape(int state_size, int max_rows, std::size_t sensors)
     : A(Eigen::MatrixXd::Zero(state_size, max_rows)),
       Z(A),
       w(Eigen::VectorXd::Zero(max_rows)),
       forgotten(state_size, 0),
-      pull(Eigen::VectorXd::Zero(state_size)) {
+      pull(Eigen::VectorXd::Zero(state_size)),
+      used(sensors, 0) {
+  if (tells()) before = linearised = moved = pull;
   ends.reserve(max_rows);
 }
 
 void FrameTape::clear() {
   clear_chunks();
   if (any_forgotten) std::fill(forgotten.begin(), forgotten.end(), std::uint8_t{0});
-  any_forgotten = pulled = cut = false;
+  any_forgotten = pulled = cut = fell_back = false;
+  stirred = stirred_s = 0.0;
 }
 
 void FrameTape::add_chunk(const std::vector<RowBlock>& blocks, int first, int end,
                           const Eigen::Ref<const Eigen::MatrixXd>& L, const Eigen::Ref<const Eigen::MatrixXd>& Z_chunk,
                           const Eigen::Ref<const Eigen::VectorXd>& w_chunk) {
+  if (A.cols() == 0) return;
   const int from = rows();
   const int count = static_cast<int>(w_chunk.size());
   auto Ht = A.middleCols(from, count);
@@ -41,6 +45,7 @@ void FrameTape::add_chunk(const std::vector<RowBlock>& blocks, int first, int en
 
 void FrameTape::add_equality(const Eigen::Ref<const Eigen::VectorXd, 0, Eigen::InnerStride<>>& a,
                              const Eigen::Ref<const Eigen::VectorXd>& Pa, double aPa, double missing) {
+  if (A.cols() == 0) return;
   const int at = rows();
   const double L = std::sqrt(aPa);
   A.col(at) = a / L;

@@ -8,20 +8,32 @@ namespace dynakin {
 namespace {
 
 // Noise of density w[0] on the rate of q, w[1] on that of qd, w[2] (the jerk) on that of qdd, integrated over dt.
-void add_chain_noise(const Eigen::VectorXd& density, int n, double dt, Eigen::MatrixXd& P, double times = 1.0) {
-  const double d2 = dt * dt, d3 = d2 * dt;
-  for (int i = 0; i < n; ++i) {
+struct ChainNoise {
+  ChainNoise(const Eigen::VectorXd& density, int n, int i, double dt, double times) {
+    const double d2 = dt * dt, d3 = d2 * dt;
     const double w0 = times * density(i), w1 = times * density(n + i), w2 = times * density(2 * n + i);
-    const double q_qd = w1 * d2 / 2.0 + w2 * d2 * d2 / 8.0, q_qdd = w2 * d3 / 6.0, qd_qdd = w2 * d2 / 2.0;
-    P(i, i) += w0 * dt + w1 * d3 / 3.0 + w2 * d3 * d2 / 20.0;
-    P(n + i, n + i) += w1 * dt + w2 * d3 / 3.0;
-    P(2 * n + i, 2 * n + i) += w2 * dt;
-    P(n + i, i) += q_qd;
-    P(i, n + i) += q_qd;
-    P(2 * n + i, i) += q_qdd;
-    P(i, 2 * n + i) += q_qdd;
-    P(2 * n + i, n + i) += qd_qdd;
-    P(n + i, 2 * n + i) += qd_qdd;
+    q = w0 * dt + w1 * d3 / 3.0 + w2 * d3 * d2 / 20.0;
+    qd = w1 * dt + w2 * d3 / 3.0;
+    qdd = w2 * dt;
+    q_qd = w1 * d2 / 2.0 + w2 * d2 * d2 / 8.0;
+    q_qdd = w2 * d3 / 6.0;
+    qd_qdd = w2 * d2 / 2.0;
+  }
+  double q, qd, qdd, q_qd, q_qdd, qd_qdd;
+};
+
+void add_chain_noise(const Eigen::VectorXd& density, int n, double dt, Eigen::MatrixXd& P, double times = 1.0) {
+  for (int i = 0; i < n; ++i) {
+    const ChainNoise w(density, n, i, dt, times);
+    P(i, i) += w.q;
+    P(n + i, n + i) += w.qd;
+    P(2 * n + i, 2 * n + i) += w.qdd;
+    P(n + i, i) += w.q_qd;
+    P(i, n + i) += w.q_qd;
+    P(2 * n + i, i) += w.q_qdd;
+    P(i, 2 * n + i) += w.q_qdd;
+    P(2 * n + i, n + i) += w.qd_qdd;
+    P(n + i, 2 * n + i) += w.qd_qdd;
   }
 }
 
@@ -81,6 +93,46 @@ void predict(const Model& model, const FilterSettings& settings, double dt, Eige
   for (int i = 3 * n; i < size; ++i)
     if (settings.process_density(i) > 0.0)
       P(i, i) += decayed_noise(settings.process_density(i), settings.decay_rate(i), dt);
+}
+
+Transition::Transition(const Model& model)
+    : kept(Eigen::VectorXd::Ones(model.state_size())), variance(Eigen::VectorXd::Zero(model.state_size())) {
+  shared.setZero(model.n_free(), 3);
+}
+
+void transition(const Model& model, const FilterSettings& settings, double carried, double dt, Transition& out) {
+  const bool predicts = carried == dt || carried > 0.0;
+  const double rest = dt - carried;
+  out.step = carried;
+  out.kept.setOnes();
+  out.variance.setZero();
+  out.shared.setZero();
+  if (predicts) {
+    out.variance = settings.process_variance;
+    stir(model, settings, 1.0, carried, out);
+  }
+  for (int i = 3 * model.n_free(); i < model.state_size(); ++i) {
+    const double rate = settings.decay_rate(i), density = settings.process_density(i);
+    double& variance = out.variance(i);
+    if (predicts && density > 0.0) variance += decayed_noise(density, rate, carried);
+    if (rate == 0.0) continue;
+    out.kept(i) = std::exp(-rate * carried);
+    if (!(rest > 0.0)) continue;
+    const double kept = std::exp(-rate * rest);
+    out.kept(i) *= kept;
+    variance = variance * kept * kept + decayed_noise(density, rate, rest);
+  }
+}
+
+void stir(const Model& model, const FilterSettings& settings, double times, double dt, Transition& out) {
+  const int n = model.n_free();
+  for (int i = 0; i < n; ++i) {
+    const ChainNoise w(settings.process_density, n, i, dt, times);
+    out.variance(i) += w.q;
+    out.variance(n + i) += w.qd;
+    out.variance(2 * n + i) += w.qdd;
+    out.shared.row(i) += Eigen::RowVector3d(w.q_qd, w.q_qdd, w.qd_qdd);
+  }
 }
 
 void stir(const Model& model, const FilterSettings& settings, double times, double dt, Eigen::MatrixXd& P) {

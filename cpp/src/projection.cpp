@@ -46,6 +46,10 @@ ProjectionReport Projection::apply(Eigen::VectorXd& x, Eigen::MatrixXd& P, Frame
       for (int i = 0; i < active_[k].row.size; ++i)
         tape->pull(active_[k].row.index[i]) += active_[k].multiplier * active_[k].row.value[i];
   }
+  if (tape && tape->tells() && fell_back_) {
+    tape->fell_back = true;
+    tape->moved = x - wanted_;
+  }
   return report;
 }
 
@@ -72,12 +76,20 @@ ProjectionReport Projection::bound(Eigen::VectorXd& x, const Eigen::MatrixXd& P)
     k_ = 0;
     fall_back(x);
   }
+  fell_back_ = !report.solved;
   for (int k = 0; k < k_; ++k)  // to the last bit
     if (const int i = active_[k].kind; i != k_cut) x(i) = active_[k].row.value[0] * active_[k].row.bound;
   x = x.cwiseMax(settings_.lower).cwiseMin(settings_.upper);  // what is left is rounding
   report.active = k_;
   last_ = x;
   return report;
+}
+
+bool Projection::holds(const Eigen::VectorXd& x) const {
+  HalfSpace cut;
+  for (int b = 0; b < consistency_.size(); ++b)
+    if (consistency_.cut(b, x, cut)) return false;
+  return (x.array() >= settings_.lower.array()).all() && (x.array() <= settings_.upper.array()).all();
 }
 
 // x + P a (b - a x) / a' P a, and P without what it had along a. A row of which P leaves nothing open is left alone;

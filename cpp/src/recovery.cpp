@@ -39,7 +39,9 @@ void Recovery::restart() {
   if (c_.tape) c_.tape->cut = true;
 }
 
-double Recovery::carry_on(double dt) {
+double Recovery::carry_on(double dt) { return carried_ = carried_of(dt); }
+
+double Recovery::carried_of(double dt) {
   constexpr double rounding = 1e-9;
   const double blind = settings_.blind_s;
   const double unbelieved = memory_.unbelieved_s;
@@ -93,7 +95,10 @@ void Recovery::expect_impact() {
   kept_.P = now_.P;
   stir(model_, c_.settings, times, lasts_s, now_.P);
   gate_.judge(c_.settings, measurement_.blocks(), now_.P);
-  if (2 * gate_.markers_refused() <= refused) return;
+  if (2 * gate_.markers_refused() <= refused) {
+    if (c_.tape) c_.tape->stirred = times, c_.tape->stirred_s = lasts_s;
+    return;
+  }
   now_.P = kept_.P;
   gate_.judge(c_.settings, measurement_.blocks(), now_.P);
 }
@@ -191,6 +196,7 @@ bool Recovery::turn_towards(const MarkerRef& markers) {
 bool Recovery::seek_better(const MarkerRef& markers, const Vector6& wrench, int refused) {
   if (c_.tape) forgotten_ = c_.tape->forgotten;
   const bool any_forgotten = c_.tape && c_.tape->any_forgotten;
+  const double stirred = c_.tape ? c_.tape->stirred : 0.0;
   if (2 * gate_.markers_measured() >= measurement_.markers_in_use()) {
     if (unseen_ && seek_motion(markers, refused)) return true;
     hold_motion();
@@ -200,6 +206,7 @@ bool Recovery::seek_better(const MarkerRef& markers, const Vector6& wrench, int 
   if (c_.tape) {
     c_.tape->forgotten = forgotten_;
     c_.tape->any_forgotten = any_forgotten;
+    c_.tape->stirred = stirred;
   }
   c_.measure(markers, wrench);
   return false;
@@ -302,6 +309,7 @@ void Recovery::hold_coordinate(int i) {
 // motion.
 void Recovery::hold_motion() {
   for (int i = 0; i < model_.n_free(); ++i) hold_coordinate(i);
+  if (c_.tape) c_.tape->stirred = 0.0;
 }
 
 // Fits the motion to the markers, leaves out those that do not fit, and fits again, until the same ones fit: a marker

@@ -3,14 +3,21 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
-#include <string>
+
+#include "dynakin/backward_pass.hpp"
 
 namespace dynakin {
 namespace {
 
+using clock = std::chrono::steady_clock;
+
 std::size_t stretch_of(std::size_t frames, std::size_t asked) {
   const auto root = static_cast<std::size_t>(std::ceil(std::sqrt(static_cast<double>(frames))));
   return std::clamp<std::size_t>(asked == 0 ? root : asked, 1, std::max<std::size_t>(frames, 1));
+}
+
+double us_since(clock::time_point start) {
+  return std::chrono::duration<double, std::micro>(clock::now() - start).count();
 }
 
 }  // namespace
@@ -21,59 +28,136 @@ Smoother::Smoother(Filter& filter, const Trial& trial, std::size_t stretch)
       stretch_(stretch_of(trial.frames, stretch)),
       left_(trial.frames),
       checkpoints_((trial.frames + stretch_ - 1) / stretch_ + 1),
-      pass_(filter.model(), filter.settings(), filter.tape_rows(), true),
+      decisions_(trial.frames),
+      tape_(filter.model().state_size(), 0, filter.tape_sensors()),
+      pass_(filter.model(), smoothable(filter.settings()), filter.tape_rows()),
+      projection_(filter.model(), filter.settings()),
+      measurement_(filter.model(), filter.settings()),
       kinematics_(filter.model()),
-      dynamics_(filter.model()) {
-  pass_.start();
-}
+      dynamics_(filter.model()),
+      x_(filter.state()) {}
 
 void Smoother::forward(std::size_t first, std::size_t end, RunRecord& record, ContactRecord* contacts) {
-  while (first < end) {
-    if (first % stretch_ == 0) filter_.save(checkpoints_[first / stretch_]);
-    const std::size_t next = std::min(end, (first / stretch_ + 1) * stretch_);
-    run_frames(filter_, trial_, first, next, record, contacts);
-    first = next;
+  filter_.record_to(&tape_);
+  for (std::size_t k = first; k < end; ++k) {
+    if (k % stretch_ == 0) filter_.save(checkpoints_[k / stretch_]);
+    x_ = filter_.state();
+    run_frames(filter_, trial_, k, k + 1, record, contacts);
+    decisions_[k] = decision(k, x_);
+    if (tape_.cut) restarted_ = filter_.belief();
   }
+  filter_.record_to(nullptr);
   if (end == trial_.frames) filter_.save(checkpoints_.back());
 }
 
-// The same steps once more from their checkpoint, taped.
-void Smoother::replay(std::size_t first, std::size_t end, const RunRecord& record) {
-  const Model& model = filter_.model();
-  const auto n = static_cast<std::size_t>(model.state_size());
-  while (replayed_.size() < end - first) replayed_.push_back({{}, FrameTape(model.state_size(), filter_.tape_rows())});
-  filter_.restore(checkpoints_[first / stretch_]);
-  filter_.report_sensors(false);
-  WrenchModel how;
-  for (std::size_t k = first; k < end; ++k) {
-    Frame& frame = replayed_[k - first];
-    filter_.record_to(&frame.tape);
-    trial_.step(filter_, k, how);
-    frame.filtered = filter_.belief();
-    const Eigen::VectorXd& x = frame.filtered.x;
-    if (!std::equal(x.begin(), x.end(), record.state.begin() + static_cast<std::ptrdiff_t>(k * n)))
-      throw std::logic_error("smoothing: frame " + std::to_string(k) + " does not repeat itself from its checkpoint");
+// Of the frame that the tape tells of; last: the state after the frame before.
+Decision Smoother::decision(std::size_t k, const Eigen::VectorXd& last) const {
+  Decision out;
+  out.cut = tape_.cut;
+  out.carried = k == 0 ? 0.0 : filter_.carried();
+  out.used = tape_.used;
+  if (tape_.before != predicted(k, out.carried, last)) out.before = tape_.before;
+  if (tape_.linearised != tape_.before) out.linearised = tape_.linearised;
+  const int n = filter_.model().state_size();
+  for (int i = 0; i < n; ++i) {
+    if (tape_.any_forgotten && tape_.forgotten[i]) out.forgotten.push_back(i);
+    if (tape_.pulled && tape_.pull(i) != 0.0) out.pull.emplace_back(i, tape_.pull(i));
   }
-  filter_.record_to(nullptr);
-  filter_.report_sensors(true);
+  out.stirred = tape_.stirred;
+  out.stirred_s = tape_.stirred_s;
+  if (tape_.fell_back) out.moved = tape_.moved;
+  return out;
+}
+
+Eigen::VectorXd Smoother::predicted(std::size_t k, double carried, Eigen::VectorXd x) const {
+  if (k == 0) return x;
+  const double dt = trial_.dt(k);
+  if (carried == dt || carried > 0.0) predict_mean(filter_.model(), filter_.settings(), carried, x);
+  const Eigen::VectorXd& rate = filter_.settings().decay_rate;
+  if (carried < dt)
+    for (Eigen::Index i = 3 * filter_.model().n_free(); i < x.size(); ++i)
+      if (rate(i) != 0.0) x(i) *= std::exp(-rate(i) * (dt - carried));
+  return x;
+}
+
+Eigen::Map<const Eigen::VectorXd> Smoother::state(std::size_t k, const RunRecord& record) const {
+  const Eigen::Index n = filter_.model().state_size();
+  return {record.state.data() + static_cast<Eigen::Index>(k) * n, n};
+}
+
+// After frame k. Needed where a frame has nothing to learn from later ones, which is rare: the filter goes there again.
+Belief Smoother::belief_at(std::size_t k, const RunRecord& record) {
+  if (k + 1 == trial_.frames) return checkpoints_.back().belief;
+  if (decisions_[k].cut) return restarted_;
+  filter_.restore(checkpoints_[k / stretch_]);
+  WrenchModel how;
+  for (std::size_t j = k / stretch_ * stretch_; j <= k; ++j) trial_.step(filter_, j, how);
+  if (filter_.state() != state(k, record))
+    throw std::logic_error("smoothing: frame " + std::to_string(k) + " does not repeat itself from its checkpoint");
+  return filter_.belief();
+}
+
+// From first to the last frame that is left.
+void Smoother::begin(std::size_t first, const RunRecord& record) {
+  if (left_ == trial_.frames || decisions_[left_].cut) pass_.end(belief_at(left_ - 1, record));
+  const bool cut = decisions_[first].cut;
+  Eigen::VectorXd moved = Eigen::VectorXd::Zero(x_.size());
+  for (std::size_t k = first + cut; k < left_; ++k)
+    if (decisions_[k].moved.size() > 0) moved += decisions_[k].moved;
+  pass_.start(cut ? restarted_ : checkpoints_[first / stretch_].belief, moved);
+  while (frames_.size() < left_ - first) frames_.emplace_back(filter_.model());
+}
+
+// The filter's update once more, given the constants: its rows come from where it linearised them.
+void Smoother::replay(std::size_t k, std::size_t first, const RunRecord& record) {
+  const bool cut = decisions_[k].cut;
+  GivenConstants::Frame& frame = frames_[k - first];
+  const Decision& decided = cut ? nothing_ : decisions_[k];
+  frame.decided = &decided;
+  frame.dt = trial_.dt(k);
+  frame.first = k == 0 || cut;
+  frame.after = state(k, record);
+  if (decided.before.size() > 0)
+    frame.before = decided.before;
+  else if (cut)
+    frame.before = frame.after;
+  else
+    frame.before =
+        predicted(k, decided.carried, k == 0 ? checkpoints_[0].belief.x : Eigen::VectorXd(state(k - 1, record)));
+  measurement_.admit_all();
+  for (std::size_t b = 0; b <= filter_.model().markers().size(); ++b)
+    if (cut || !decided.used[b]) measurement_.leave_out(static_cast<int>(b));
+  measurement_.expect(trial_.wrench_model(k, filter_.model().contacts(), how_));
+  measurement_.linearise(decided.linearised.size() > 0 ? decided.linearised : frame.before,
+                         trial_.markers_at(k, filter_.model().markers().size()), trial_.wrench_at(k));
+  pass_.step(measurement_.blocks(), k == first ? nullptr : &frames_[k - first - 1], frame);
 }
 
 std::size_t Smoother::backward(const RunRecord& record, SmoothRecord& out, ContactRecord* contacts) {
-  using clock = std::chrono::steady_clock;
   if (left_ == 0) return 0;
-  const std::size_t first = (left_ - 1) / stretch_ * stretch_;
-  replay(first, left_, record);
+  std::size_t first = left_ - 1;
+  while (first % stretch_ != 0 && !decisions_[first].cut) --first;
+  auto start = clock::now();
+  begin(first, record);
+  const double begun_us = us_since(start) / static_cast<double>(left_ - first);
+  for (std::size_t k = first; k < left_; ++k) {
+    start = clock::now();
+    replay(k, first, record);
+    out.backward_us[k] = begun_us + us_since(start);
+  }
   for (std::size_t k = left_; k-- > first;) {
-    const Frame& frame = replayed_[k - first];
-    const auto start = clock::now();
-    pass_.smooth(frame.filtered.x, frame.filtered.P, smoothed_.x);
-    pass_.smooth(frame.filtered.P, smoothed_.P);
-    pass_.bound(smoothed_.x, smoothed_.P);
-    forward_kinematics(filter_.model(), smoothed_.x, kinematics_);
-    subtree_dynamics(filter_.model(), smoothed_.x, kinematics_, dynamics_);
-    out.report(k, smoothed_.x, smoothed_.P, kinematics_, dynamics_, contacts);
-    pass_.undo(frame.tape, trial_.dt(k));
-    out.backward_us[k] = std::chrono::duration<double, std::micro>(clock::now() - start).count();
+    start = clock::now();
+    const GivenConstants::Frame& frame = frames_[k - first];
+    pass_.look(frame, x_);
+    if (filter_.settings().constraint == ConstraintKind::projection) {
+      if (!projection_.holds(x_)) pass_.complete();
+      projection_.bound(x_, pass_.covariance());
+    }
+    forward_kinematics(filter_.model(), x_, kinematics_);
+    subtree_dynamics(filter_.model(), x_, kinematics_, dynamics_);
+    out.report(k, x_, pass_.covariance(), kinematics_, dynamics_, contacts);
+    pass_.undo(frame, k == first ? nullptr : &frames_[k - first - 1]);
+    out.backward_us[k] += us_since(start);
   }
   left_ = first;
   if (left_ == 0) filter_.restore(checkpoints_.back());

@@ -7,7 +7,7 @@ import pytest
 
 from dynakin.bindings import _core
 from support.core.random_models import planar_model, spatial_model
-from support.core.smoother_cases import BOUNDED, case, lost_and_found
+from support.core.smoother_cases import BOUNDED, case, impact, lost_and_found, walk
 
 CASES = {
     "planar": lambda: case(planar_model(50, n_segments=5), 31, 40),
@@ -15,6 +15,7 @@ CASES = {
     "contacts": lambda: case(spatial_model(4, nonlinear=False), 31, 40, states="contacts"),
     "bounds": BOUNDED["all blocks"],
     "lost and found": lost_and_found,
+    "impact": impact,
 }
 
 
@@ -99,3 +100,14 @@ def test_what_is_not_there_is_refused_by_name():
         _ = smoother.state
     with pytest.raises(ValueError, match="no smoothed frame before frame 3"):
         _ = smoother.state_sd
+
+
+def test_the_impact_is_expected():
+    """The case `impact` is one: deviations of innovations are larger than the prediction's."""
+    c = impact()
+    w, seen = walk(c), c.smoothed()["innovation_sd"]
+    frames = [np.sqrt(np.diag(f.H @ P @ f.H.T + f.R)) for f, P in zip(w.frames, w.P_predicted, strict=True)]
+    measured = [row[np.isfinite(row)] for row in seen]  # without the total mass, the last of the rows
+    grown = [(row / sd[: len(row)]).max() for row, sd in zip(measured, frames, strict=True)]
+    assert grown[20] < 1.0 + 1e-9
+    assert grown[21] > 1.5

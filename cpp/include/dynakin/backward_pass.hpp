@@ -2,12 +2,16 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <vector>
 
 #include "dynakin/frame_tape.hpp"
 #include "dynakin/projection.hpp"
 #include "dynakin/settings.hpp"
 
 namespace dynakin {
+
+// Throws std::invalid_argument where constraints are kept in a way that has no smoother.
+const FilterSettings& smoothable(const FilterSettings& settings);
 
 // With lambda and Lambda at a frame whose filtered state and covariance are x and P, the smoothed ones are x - P lambda
 // and P - P Lambda P. No predicted covariance is inverted (docs/derivations.md, section 9). Allocates at construction.
@@ -39,6 +43,8 @@ class BackwardPass {
   Eigen::MatrixXd G_, B_;  // (n, rows)
   Eigen::MatrixXd T_;      // (rows, rows)
   Eigen::MatrixXd LambdaP_;
+  std::vector<int> touched_;  // rows of a chunk's A' that are not zero
+  Eigen::MatrixXd Au_, U_;    // these, and Au B'
 };
 
 }  // namespace dynakin

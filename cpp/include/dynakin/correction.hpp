@@ -37,6 +37,7 @@ struct Correction {
  private:
   void leave_out_refused();
   double uncertainty_seen() const;
+  void note_linearised();
 
   ChunkedUpdate update_;
 };

@@ -58,6 +58,9 @@ class Filter {
   // time.
   void record_to(FrameTape* tape) { correction_.record_to(tape); }
   int tape_rows() const { return correction_.measurement.max_rows() + static_cast<int>(settings_.equality.rows()); }
+  std::size_t tape_sensors() const { return correction_.measurement.blocks().size(); }
+  // Of the last predict: see Recovery::carry_on.
+  double carried() const { return recovery_.carried(); }
   // All that later steps depend on: restored, they give the same numbers to the last bit.
   struct Checkpoint {
     Belief belief;

@@ -9,9 +9,11 @@
 
 namespace dynakin {
 
-// Sized once for a filter (Filter::tape_rows); writing allocates nothing.
+// Sized once for a filter (Filter::tape_rows); writing allocates nothing. With sensors (as many as Measurement has
+// blocks) it is also told how the update came about, so that its rows can be linearised again; with max_rows 0 nothing
+// else is kept.
 struct FrameTape {
-  FrameTape(int state_size, int max_rows);
+  FrameTape(int state_size, int max_rows, std::size_t sensors = 0);
 
   void clear();                          // a new frame
   void clear_chunks() { ends.clear(); }  // an update begins anew: only its last linearisation counts
@@ -35,6 +37,14 @@ struct FrameTape {
   Eigen::VectorXd pull;  // (n,) N' u: binding inequalities and their multipliers, the mean moved by P N' u
   bool pulled = false;
   bool cut = false;  // everything started again after the update
+
+  // With sensors only.
+  bool tells() const { return !used.empty(); }
+  std::vector<std::uint8_t> used;         // blocks that the update took
+  Eigen::VectorXd before, linearised;     // (n,) the state that it corrected, and where its rows were linearised last
+  double stirred = 0.0, stirred_s = 0.0;  // before it: what `stir` was asked for, times and seconds
+  Eigen::VectorXd moved;                  // (n,) by constraints that no state within reach kept all of
+  bool fell_back = false;
 
  private:
   int rows() const { return ends.empty() ? 0 : ends.back(); }

@@ -15,6 +15,20 @@ namespace dynakin {
 void predict(const Model& model, const FilterSettings& settings, double dt, Eigen::VectorXd& scratch,
              Eigen::VectorXd& x, Eigen::MatrixXd& P);
 
+// F and Q of predict over `carried` and then decay over the rest of dt, by their entries; carried 0 of a dt that is
+// not: the coordinates are held.
+struct Transition {
+  explicit Transition(const Model& model);
+
+  double step = 0.0;                                // of the coordinates, s
+  Eigen::VectorXd kept;                             // (n,) what is left of each element, 1 of all but what decays
+  Eigen::VectorXd variance;                         // (n,) diagonal of Q
+  Eigen::Matrix<double, Eigen::Dynamic, 3> shared;  // (free,) Q between q and qd, q and qdd, qd and qdd
+};
+void transition(const Model& model, const FilterSettings& settings, double carried, double dt, Transition& out);
+// Q plus what stir adds.
+void stir(const Model& model, const FilterSettings& settings, double times, double dt, Transition& out);
+
 // The same of what decays alone, over a time in which nothing is seen: coordinates and constants stay as they are.
 void decay(const Model& model, const FilterSettings& settings, double dt, Eigen::VectorXd& scratch, Eigen::VectorXd& x,
            Eigen::MatrixXd& P);

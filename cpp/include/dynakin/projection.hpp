@@ -37,6 +37,8 @@ class Projection {
   ProjectionReport apply(Eigen::VectorXd& x, Eigen::MatrixXd& P, FrameTape* tape = nullptr);
   // Inequalities alone.
   ProjectionReport bound(Eigen::VectorXd& x, const Eigen::MatrixXd& P);
+  // Whether bound() would leave x alone, and so not look at P beyond its diagonal.
+  bool holds(const Eigen::VectorXd& x) const;
   // What the next apply() depends on, besides its arguments.
   struct Memory {
     std::vector<Active> active;
@@ -60,7 +62,8 @@ class Projection {
   const Consistency consistency_;
   std::vector<Active> active_, before_;
   int capacity_;
-  int k_ = 0;                    // active constraints
+  int k_ = 0;  // active constraints
+  bool fell_back_ = false;
   Eigen::MatrixXd PN_;           // (n, capacity): P a of each active constraint
   Eigen::MatrixXd gram_, chol_;  // N' P N and its factor
   Eigen::VectorXd Pa_, step_, r_, wanted_, last_;

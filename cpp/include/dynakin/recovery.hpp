@@ -32,6 +32,7 @@ class Recovery {
   // person does meanwhile that is worth having: beyond blind_s without a marker that is believed the motion is held
   // where it was. Where frames are further apart, blind_s reaches to the next one, but never twice as far.
   double carry_on(double dt);
+  double carried() const { return carried_; }  // what it gave last
   // Before a frame is measured: holds a motion that is lost, and coordinates that have not been seen for long.
   void hold();
   // Of a frame that is measured and judged: P is corrected and dx is what the state has still to take.
@@ -42,6 +43,7 @@ class Recovery {
 
  private:
   bool believes_most() const { return 2 * gate_.markers_refused() <= gate_.markers_measured(); }
+  double carried_of(double dt);
   void expect_impact();
   Tracking doubt();
   Tracking seek(const MarkerRef& markers);
@@ -64,6 +66,7 @@ class Recovery {
   Gate& gate_;
   Belief& now_;
   Memory memory_;
+  double carried_ = 0.0;
   bool unseen_ = false;           // coordinates are held in this frame, because nothing is seen of them
   Belief start_, kept_, sought_;  // kept_: as the frame found it; sought_: from where its motion was sought
   Eigen::VectorXd ahead_, posture_, best_;

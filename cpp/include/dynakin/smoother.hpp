@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "dynakin/backward_pass.hpp"
+#include "dynakin/given_constants.hpp"
 #include "dynakin/run.hpp"
 
 namespace dynakin {
@@ -12,12 +12,12 @@ namespace dynakin {
 struct SmoothRecord : StateRecord {
   SmoothRecord(const Model& of, std::size_t frames) : StateRecord(of, frames, true), backward_us(frames) {}
 
-  std::vector<double> backward_us;  // without the second run forwards
+  std::vector<double> backward_us;  // all that smoothing adds to the run
 };
 
-// The forward run keeps a checkpoint every so many frames. The way back runs each stretch between two of them forwards
-// once more, now with tapes, so memory grows with the root of the number of frames. Afterwards the filter stands
-// where the run left it.
+// The forward run keeps a checkpoint every so many frames, and of each frame what the filter decided. The way back
+// takes each stretch between two checkpoints forwards once more, now given the constants, so memory grows with the root
+// of the number of frames. Afterwards the filter stands where the run left it.
 class Smoother {
  public:
   // stretch: frames between checkpoints, 0: sqrt(frames). Throws std::invalid_argument where constraints are kept in a
@@ -33,21 +33,29 @@ class Smoother {
   std::size_t backward(const RunRecord& record, SmoothRecord& out, ContactRecord* contacts = nullptr);
 
  private:
-  struct Frame {
-    Belief filtered;
-    FrameTape tape;
-  };
-  void replay(std::size_t first, std::size_t end, const RunRecord& record);
+  Decision decision(std::size_t k, const Eigen::VectorXd& last) const;
+  Eigen::VectorXd predicted(std::size_t k, double carried, Eigen::VectorXd x) const;
+  Eigen::Map<const Eigen::VectorXd> state(std::size_t k, const RunRecord& record) const;
+  Belief belief_at(std::size_t k, const RunRecord& record);
+  void begin(std::size_t first, const RunRecord& record);
+  void replay(std::size_t k, std::size_t first, const RunRecord& record);
 
   Filter& filter_;
   Trial trial_;
   std::size_t stretch_, left_;
   std::vector<Filter::Checkpoint> checkpoints_;  // before each stretch and, last, after the run
-  std::vector<Frame> replayed_;
-  BackwardPass pass_;
+  std::vector<Decision> decisions_;
+  const Decision nothing_;
+  Belief restarted_;  // after a frame with which everything started again
+  FrameTape tape_;
+  std::vector<GivenConstants::Frame> frames_;
+  GivenConstants pass_;
+  Projection projection_;
+  Measurement measurement_;
   KinematicState kinematics_;
   DynamicState dynamics_;
-  Belief smoothed_;
+  WrenchModel how_;
+  Eigen::VectorXd x_;
 };
 
 }  // namespace dynakin

@@ -133,3 +133,14 @@ def lost_and_found():
     c.options |= {"marker_gate": [4.0] * 6, "wrench_needs_markers": True}
     c.data.markers[30:60] = np.nan
     return c
+
+
+def impact():
+    """At rest until the motion goes on at six times its speed: the filter expects an impact, and its noise grows."""
+    sought = _core.RecoverySettings(blind_s=0.2, fit_m=1.0, coordinate_sd=0.01)
+    c = case(planar_model(50, n_segments=9), 31, 40, states="all", recovery=sought)
+    c.options |= {"marker_gate": [6.0] * 6}
+    c.data.markers[:20] = c.data.markers[20]
+    c.data.markers[20:] = c.data.markers[np.minimum(20 + 6 * np.arange(20), 39)]
+    c.data.wrench[:] = np.nan
+    return c
