@@ -14,7 +14,7 @@ import argparse
 import time
 
 import numpy as np
-from live_latency import RATE_HZ, fullbody, planar, resident_kb
+from live_latency import RATE_HZ, fullbody, planar, resident_kb, there_and_back
 
 from dynakin.bindings import _core
 from dynakin.filter.core_filter import core_filter
@@ -39,6 +39,7 @@ def main() -> None:
     parser.add_argument("--lag", type=int, default=0, help="frames")
     asked = parser.parse_args()
     recording, estimator = planar() if asked.model == "planar" else fullbody()
+    recording = there_and_back(recording) if asked.model == "planar" else recording
     tracker = estimator.start(recording, rate_hz=RATE_HZ)
     if asked.preset != "default":
         tracker = Estimator(estimator.model, noise=preset(asked.preset)).start(recording, rate_hz=RATE_HZ)
@@ -51,10 +52,9 @@ def main() -> None:
     print(f"{asked.model}, {size} states, lag of {asked.lag} frames\n")
     print("| steps | memory, MB | smallest eigenvalue | least, largest sd of a constant over its prior | ms a step |")
     print("|---|---|---|---|---|", flush=True)
-    order = [*range(len(markers)), *range(len(markers) - 2, 0, -1)]
     began, before = time.process_time(), 0
     for done in range(1, asked.steps + 1):
-        k = order[(done - 1) % len(order)]
+        k = (done - 1) % len(markers)
         dt = 0.0 if done == 1 else 1.0 / RATE_HZ
         if lag is not None:
             report = lag.step(dt, markers[k], wrench[k])

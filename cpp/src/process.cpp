@@ -7,6 +7,11 @@
 namespace dynakin {
 namespace {
 
+// What never moves is known ever better along some directions and no better along others, until the covariance is
+// singular to rounding (1e-16 of the correlation's eigenvalues after 10^5 steps of preset paper). This much more variance
+// a step, 3e-8 in 10^6 of them, keeps the smallest eigenvalue above 1e-11 (BENCHMARKS.md, A session that never ends).
+constexpr double k_stirred = 1.0 + 0x1p-45;
+
 // Noise of density w[0] on the rate of q, w[1] on that of qd, w[2] (the jerk) on that of qdd, integrated over dt.
 struct ChainNoise {
   ChainNoise(const Eigen::VectorXd& density, int n, int i, double dt, double times) {
@@ -89,6 +94,7 @@ void predict(const Model& model, const FilterSettings& settings, double dt, Eige
   scale_decaying(settings, 3 * n, dt, scratch, x, P);
   P.topRightCorner(3 * n, rest) = P.bottomLeftCorner(rest, 3 * n).transpose();
   P.diagonal() += settings.process_variance;
+  P.diagonal().tail(rest) *= k_stirred;
   add_chain_noise(settings.process_density, n, dt, P);
   for (int i = 3 * n; i < size; ++i)
     if (settings.process_density(i) > 0.0)

@@ -161,8 +161,8 @@ def test_what_each_sensor_said_is_in_steps_run_and_file(trial: SimulatedTrial, t
             both = [data[f"{of}_{name}"].values[k].ravel() for of in ("markers", "wrench")]
             np.testing.assert_allclose(sensors[name], np.concatenate(both), rtol=1e-9, atol=1e-12)
     with xr.open_dataset(Result(result).save(tmp_path / "out") / "estimate.nc") as stored:
-        np.testing.assert_allclose(stored["test_ratio"].values, ratio, rtol=1e-6)
-        np.testing.assert_allclose(stored["markers_innovation_sd"].values, data["markers_innovation_sd"].values, 1e-6)
+        np.testing.assert_allclose(stored["test_ratio"].values, ratio, rtol=3e-4)
+        np.testing.assert_allclose(stored["markers_innovation_sd"].values, data["markers_innovation_sd"].values, 3e-4)
         assert stored["verdict"].attrs["flag_meanings"] == "missing accepted refused"
 
 

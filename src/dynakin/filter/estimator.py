@@ -259,23 +259,25 @@ class Estimator:
         lag_s = ALL_FRAMES if late is None else late / recording.rate
         adapt, notes = ready.tracker.noise.calibrates(bool(calibrated.feet)), list(ground.notes)
         try:
-            ways = 2 if lag_s == ALL_FRAMES else int(adapt or lag_s > 0.0)  # over all frames, after the first run
-            frames = recording.n_frames
+            # joints found from markers are off by what follows angles as skin does
+            scaled = late is None and calibrated.plan is None and ready.tracker.noise.following_skin_fraction > 0.0
+            once = not (adapt or scaled)  # a first run shows nothing that the next is to know
+            frames, ways = recording.n_frames, 2 if late is None else 1
             again = min(frames, round(CALIBRATED_S * recording.rate)) if adapt else 0
-            there, calibrating, back = _shares(progress, (frames, again, ways * frames))
+            shares = (ways * frames,) if once else (frames, again, ways * frames)
+            there, calibrating, back = (*_shares(progress, shares), None, None)[:3]
             passes = 0 if ready.doubt else PASSES
             tracker, arrays, shift, clock = run_in_step(
-                ready.tracker.fresh(), recording.time, markers, ready.wrench, there, on_feet, passes
-            )
+                ready.tracker.fresh(), recording.time, markers, ready.wrench, there, on_feet, passes,
+                late if once else 0,
+            )  # fmt: skip
             wrench = in_step(recording.time, ready.wrench, shift) if shift else ready.wrench
             on_feet = on_feet and on_feet.in_step(recording.time, shift)
             trial = Trial(recording.time, markers, wrench, on_feet)
             found = calibrated_noise(tracker, arrays, trial, late=not lag_s, progress=calibrating) if adapt else None
             if adapt and found is None:
                 notes.append("Too few frames are followed to calibrate the noise on them: it is as declared.")
-            if lag_s or found:
-                # joints found from markers are off by what follows angles as skin does
-                scaled = lag_s == ALL_FRAMES and calibrated.plan is None
+            if not once and (found or late != 0):
                 skin = following_skin(tracker, arrays, recording.time) if scaled else None
                 seen = markers if skin is None else markers - skin.shift_m
                 tracker = tracker.changed(found or tracker.noise)
