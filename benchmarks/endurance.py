@@ -1,6 +1,6 @@
 """A session that never ends: memory and the covariance's smallest eigenvalue over a million steps.
 
-    OMP_NUM_THREADS=1 .venv/bin/python benchmarks/endurance.py [--model planar|fullbody] [--steps 1000000] [--lag 0] [--preset paper]
+    OMP_NUM_THREADS=1 .venv/bin/python benchmarks/endurance.py [--model planar|fullbody] [--steps 1000000] [--lag 0]
 
 A recording is stepped through again and again, forwards and backwards in turn (a reversal of time leaves accelerations
 and forces as they are). At 1, 2 and 5 times each power of ten a line is printed: memory of the process, smallest
