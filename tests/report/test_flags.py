@@ -3,7 +3,6 @@ says so first."""
 
 from __future__ import annotations
 
-import base64
 import json
 import re
 from dataclasses import replace
@@ -30,6 +29,7 @@ from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.repetitions import Found, Repetition
 from dynakin.results.measures.sources import ABSENT, DERIVED, PRIOR, measured_moments
 from dynakin.validation.methods import Trial
+from support.estimates.played import unpacked
 from support.estimates.walking import make_walker
 from support.page import shown
 
@@ -158,9 +158,7 @@ def test_the_film_dashes_what_is_derived(walker: Estimate) -> None:
     found = playback(walker)
     content = json.loads(str(found.data))
     frames = np.searchsorted(walker.time, np.array(content["time"]) - 1e-6)
-    packed = content["arrays"]["sources"]
-    numbers = np.frombuffer(base64.b64decode(packed["values"]), dtype="<i2").astype(float)
-    derived = packed["scale"] * numbers.reshape(-1, packed["columns"])
+    derived = unpacked(content["arrays"]["sources"])
     np.testing.assert_allclose(derived[:, 1], (frames >= 170) & (frames < 230), atol=1e-3)
     assert not derived[:, 0].any() and found.has_derived
     assert [entry["sourced"] for entry in content["arrows"]] == [False, False, True, True]
@@ -177,9 +175,7 @@ def test_the_film_dots_a_prior() -> None:
     content = json.loads(str(found.data))
     frames = np.searchsorted(walker.time, np.array(content["time"]) - 1e-6)
     for name, column in (("sources", 1), ("moment_sources", 1)):
-        packed = content["arrays"][name]
-        numbers = np.frombuffer(base64.b64decode(packed["values"]), dtype="<i2").astype(float)
-        codes = packed["scale"] * numbers.reshape(-1, packed["columns"])
+        codes = unpacked(content["arrays"][name])
         np.testing.assert_allclose(codes[:, column], PRIOR * ((frames >= 170) & (frames < 230)), atol=1e-3)
     html = render_report(walker)
     assert "A dotted arrow, and a moment with ≈?, takes a prior" in html and "A dashed arrow" not in html

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 from dataclasses import replace
 from typing import Any
@@ -17,13 +16,8 @@ from dynakin.report.playback import playback
 from dynakin.report.styles import segment_colours
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.pressure import floor_height
+from support.estimates.played import unpacked
 from support.estimates.synthetic import make_estimate
-
-
-def unpacked(packed: dict[str, Any]) -> np.ndarray:
-    numbers = np.frombuffer(base64.b64decode(packed["values"]), dtype="<i2").astype(float)
-    numbers[numbers == -32768] = np.nan
-    return packed["scale"] * numbers.reshape(-1, packed["columns"])
 
 
 @pytest.fixture(scope="module")
@@ -36,14 +30,14 @@ def test_positions_in_the_page_are_the_estimates(jointed: Estimate, content: dic
     assert len(frames) == 401  # thirty pictures a second out of a hundred
     for kind in ("measured", "estimated"):
         expected = 1000.0 * jointed.data[f"markers_{kind}"].values[frames] * [1.0, 1.0, 0.0]  # in the model's plane
-        np.testing.assert_allclose(unpacked(arrays[kind])[:, 0::3], expected[:, :, 0], atol=0.1)
-        np.testing.assert_allclose(unpacked(arrays[kind])[:, 1::3], expected[:, :, 1], atol=0.1)
+        np.testing.assert_allclose(unpacked(arrays[kind])[:, 0::3], expected[:, :, 0], atol=0.51)
+        np.testing.assert_allclose(unpacked(arrays[kind])[:, 1::3], expected[:, :, 1], atol=0.51)
         assert not unpacked(arrays[kind])[:, 2::3].any()
     assert np.isnan(unpacked(arrays["measured"])).any()  # gaps stay gaps
     knee = unpacked(arrays["points"])[:, 6]
-    np.testing.assert_allclose(knee, 10.0 * np.array(content["time"]), atol=0.1)
+    np.testing.assert_allclose(knee, 10.0 * np.array(content["time"]), atol=0.51)
     degrees = np.degrees(jointed.data["coordinates"].values[frames, :7])
-    np.testing.assert_allclose(unpacked(arrays["angles"])[:, :7], degrees, atol=0.01)
+    np.testing.assert_allclose(unpacked(arrays["angles"])[:, :7], degrees, atol=0.051)
 
 
 def test_chain_joins_each_joint_to_the_next_and_the_last_to_its_farthest_marker(jointed: Estimate) -> None:
@@ -64,8 +58,8 @@ def test_force_acts_where_its_moment_vanishes(jointed: Estimate) -> None:
     found = json.loads(str(playback(replace(jointed, data=data)).data))
     point, force = (unpacked(found["arrays"][f"measured_{name}"]) for name in ("points", "forces"))
     x, y, z = 1e-3 * point[0]
-    assert y == pytest.approx(floor_height(jointed), abs=1e-4) and z == 0.0
-    assert x * 600.0 - y * 30.0 == pytest.approx(-72.0, abs=0.05)
+    assert y == pytest.approx(floor_height(jointed), abs=5.1e-4) and z == 0.0
+    assert x * 600.0 - y * 30.0 == pytest.approx(-72.0, abs=0.35)  # 600 N half a millimetre off
     np.testing.assert_allclose(force[0], [30.0, 600.0, 0.0], atol=0.02)
     assert np.isnan(point[20:, :2]).all()  # hardly loaded, not known
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import base64
 import json
 import re
 from pathlib import Path
@@ -24,6 +23,7 @@ from dynakin.report.styles import SIDE_COLOURS, side_of
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.angles import with_angles
 from dynakin.results.measures.metrics import compute_metrics
+from support.estimates.played import unpacked
 from support.estimates.spatial import MASS_KG, make_spatial
 from support.page import shown
 
@@ -41,12 +41,6 @@ def metrics(spatial: Estimate) -> dict[str, Any]:
 @pytest.fixture(scope="module")
 def html(spatial: Estimate) -> str:
     return render_report(spatial)
-
-
-def unpacked(packed: dict[str, Any]) -> np.ndarray:
-    numbers = np.frombuffer(base64.b64decode(packed["values"]), dtype="<i2").astype(float)
-    numbers[numbers == -32768] = np.nan
-    return packed["scale"] * numbers.reshape(-1, packed["columns"])
 
 
 def test_right_and_left_stand_together_legs_first_and_what_is_locked_is_left_out(spatial: Estimate) -> None:
@@ -140,17 +134,17 @@ def test_film_holds_positions_forces_and_centres_of_pressure(spatial: Estimate) 
     frames = np.searchsorted(spatial.time, np.array(content["time"]) - 1e-6)
     arrays = {name: unpacked(packed) for name, packed in content["arrays"].items()}
     expected = 1000.0 * spatial.data["markers_estimated"].values[frames].reshape(len(frames), -1)
-    np.testing.assert_allclose(arrays["estimated"], expected, atol=0.1)
+    np.testing.assert_allclose(arrays["estimated"], expected, atol=0.51)
     np.testing.assert_allclose(
-        arrays["estimated_points"], np.tile([50, 0, 100, 50, 0, -100], (len(frames), 1)), atol=0.1
+        arrays["estimated_points"], np.tile([50, 0, 100, 50, 0, -100], (len(frames), 1)), atol=0.51
     )
-    np.testing.assert_allclose(arrays["estimated_forces"][:, [1, 4]], 0.5 * MASS_KG * 9.80665, atol=0.1)
+    np.testing.assert_allclose(arrays["estimated_forces"][:, [1, 4]], 0.5 * MASS_KG * 9.80665, atol=0.51)
     assert np.isnan(arrays["measured_points"][:, 3:]).any()  # the left foot is not always measured
     assert [entry["colour"] for entry in content["arrows"][2:]] == [SIDE_COLOURS["right"], SIDE_COLOURS["left"]]
     assert not content["view"]["follow"]
     knee = next(row for row in found.rows if row["title"] == "Knee angle")
     degrees = np.degrees(spatial.data["coordinates"].sel(coordinate="knee_angle_r").values[frames])
-    np.testing.assert_allclose(arrays["angles"][:, knee["columns"]["right"]], degrees, atol=0.02)
+    np.testing.assert_allclose(arrays["angles"][:, knee["columns"]["right"]], degrees, atol=0.051)
     bones = {tuple(bone[:2]): bone[2] for bone in content["bones"]}
     assert (
         bones[0, 1] == SIDE_COLOURS[""] and bones[1, 3] == SIDE_COLOURS["right"] and bones[2, 4] == SIDE_COLOURS["left"]

@@ -21,7 +21,11 @@ from support.estimates.synthetic import make_estimate
 
 DIGITS = 5e-8
 """Relative: tables have eight significant digits."""
-TENTH_OF_A_MICROMETRE = 1e-7
+DIGITS_OF_LOADS = 5e-6
+"""Those of moments and powers six."""
+MICROMETRE = 1e-6
+STEPS = ("markers", "joint_centres", "joint_orientations")
+"""In whole steps of about 1e-6 in estimate.nc."""
 
 
 @pytest.fixture(scope="module")
@@ -58,7 +62,7 @@ def test_moments_are_named_as_inverse_dynamics_names_them(folder: Path, estimate
     table = read_table(folder / "moments.sto")
     assert not table.in_degrees
     assert table.names[2] == "knee_moment" and table.names[-1] == "slide_force"
-    np.testing.assert_allclose(table.values, estimate.data["moments"].values, rtol=DIGITS)
+    np.testing.assert_allclose(table.values, estimate.data["moments"].values, rtol=DIGITS_OF_LOADS)
 
 
 def test_wrench_has_columns_for_what_is_measured_and_modelled_only(folder: Path) -> None:
@@ -91,12 +95,10 @@ def test_markers_are_written_in_the_unit_and_frame_of_the_recording(tmp_path: Pa
     assert list(back.marker_names) == made.marker_names
     measured = made.recording.markers[:, : len(made.marker_names)]
     difference = made.ground.vectors_to_ground(back.markers - measured)
-    assert np.abs(difference[..., 2]).max() < TENTH_OF_A_MICROMETRE  # as measured
+    assert np.abs(difference[..., 2]).max() < MICROMETRE  # as measured
     assert 0.001 < np.std(difference[..., :2]) < 0.005
     expected = made.data["markers_estimated"].values[..., :2]
-    np.testing.assert_allclose(
-        made.ground.points_to_ground(back.markers)[..., :2], expected, atol=TENTH_OF_A_MICROMETRE
-    )
+    np.testing.assert_allclose(made.ground.points_to_ground(back.markers)[..., :2], expected, atol=MICROMETRE)
 
 
 def test_missing_markers_are_blank_cells(folder: Path) -> None:
@@ -129,7 +131,8 @@ def test_netcdf_gives_everything_back_with_labels(folder: Path, estimate: Estima
         for name, variable in estimate.data.data_vars.items():
             over_time = variable.dtype.kind == "f" and variable.ndim > 1 and variable.dims[0] == "time"
             bits = 0 if not over_time else 13 if str(name).endswith("_sd") else 24
-            np.testing.assert_allclose(data[name].values, variable.values, rtol=2.0**-bits if bits else 0.0, atol=0.0)
+            off = 2.0**-21 if over_time and bits == 24 and str(name).startswith(STEPS) else 0.0
+            np.testing.assert_allclose(data[name].values, variable.values, rtol=2.0**-bits if bits else 0.0, atol=off)
         np.testing.assert_array_equal(data["time"].values, estimate.time)
         knee = data["coordinates"].sel(coordinate="knee")
         expected = estimate.data["coordinates"].sel(coordinate="knee")

@@ -23,6 +23,8 @@ _WIDTH, _HEIGHT = 2592, 1440
 _LEFT, _RIGHT, _TOP, _BOTTOM = 400, 2560, 70, 1140
 _MARGIN = 0.08
 _MOST_POINTS = 240
+_UNSEEN = 3.0
+"""Less than half of a screen's pixel, and a third of a line's width."""
 _RARE = 2.0
 """Per cent of derived values and priors that may leave the panel at either end: a centre of pressure is far off where a
 foot sets down."""
@@ -175,10 +177,30 @@ def _labels(ticks: Array) -> list[str]:
 def _path(at: Array, values: Array, x: Place, y: Place) -> str:
     """Stretches between gaps, as moves and relative steps of whole numbers; a stretch of one point is not seen."""
     return "".join(
-        _steps(x(at[first:last]), y(values[first:last]))
+        _steps(*_simplified(x(at[first:last]), y(values[first:last])))
         for first, last in runs(np.isfinite(values))
         if last - first > 1
     )
+
+
+def _simplified(across: Array, down: Array) -> tuple[Array, Array]:
+    """The corners without which a line would be drawn more than `_UNSEEN` beside its place (Douglas and Peucker 1973,
+    all stretches at once)."""
+    if len(across) < 3:
+        return across, down
+    kept = np.zeros(len(across), dtype=bool)
+    kept[[0, -1]] = True
+    while True:
+        corners = np.flatnonzero(kept)
+        stretch = np.minimum(np.searchsorted(corners, np.arange(len(across)), side="right"), len(corners) - 1) - 1
+        start, end = corners[stretch], corners[stretch + 1]
+        dx, dy = across[end] - across[start], down[end] - down[start]
+        away = np.abs((down - down[start]) * dx - (across - across[start]) * dy) / np.maximum(np.hypot(dx, dy), 1.0)
+        worst = np.maximum.reduceat(away, corners[:-1])
+        far = (away > _UNSEEN) & (away == worst[stretch])
+        if not far.any():
+            return across[corners], down[corners]
+        kept |= far
 
 
 def _steps(across: Array, down: Array) -> str:
@@ -198,7 +220,8 @@ def _band(time: Array, line: Line, low: float, high: float, x: Place, y: Place) 
         across = x(time[kept][own])
         above = y(np.clip(values[own] + half[own], low, high))
         below = y(np.clip(values[own] - half[own], low, high))
-        parts.append(_steps(np.concatenate([across, across[::-1]]), np.concatenate([above, below[::-1]])) + "z")
+        edges = _simplified(across, above), _simplified(across[::-1], below[::-1])
+        parts.append(_steps(*(np.concatenate(pair) for pair in zip(*edges, strict=True))) + "z")
     return f'<path d="{"".join(parts)}" class="spread" fill="{line.colour}"/>' if parts else ""
 
 

@@ -1,4 +1,4 @@
-"""The movement for the page's player, which turns it: positions as small whole numbers, few enough for a light page.
+"""The movement for the page's player, which turns it: whole numbers, few enough for a light page.
 
 A planar model is seen from the right and does not turn.
 """
@@ -29,8 +29,19 @@ from dynakin.units import GRAVITY_M_S2
 Array = npt.NDArray[np.float64]
 
 _PICTURES_PER_SECOND = 30.0
-_MOST_BYTES = 750_000  # of base64 in the page
-_MISSING = -32768
+_MOST_BYTES = 375_000  # of base64 in the page, about: where each number takes one byte
+_STEPS = {
+    "points": 1.0,
+    "measured": 1.0,
+    "estimated": 1.0,
+    "centre": 1.0,
+    "mass_centre": 1.0,
+    "angles": 0.1,
+    "moments": 0.01,
+    "moment_sources": 1.0,
+    "sources": 1.0,
+} | {f"{kind}_{what}": 1.0 for kind in ("measured", "estimated") for what in ("points", "forces", "sizes")}
+"""What the numbers are rounded to: no finer than they are drawn (mm, N) or written (degrees, N m/kg)."""
 _FOLLOWED_FROM_MM = 1200.0
 """A person whose middle covers more ground than this is followed."""
 _MOST_SQUARES = 200  # along the floor
@@ -94,7 +105,7 @@ def playback(estimate: Estimate) -> Playback:
         "markers": [[names[n], colours.get(carriers.get(n, ""), SIDE_COLOURS[""])] for n in estimate.marker_names],
         "arrows": arrows,
         "view": view,
-        "arrays": {name: _packed(array[frames]) for name, array in arrays.items()},
+        "arrays": {name: _packed(array[frames], _STEPS[name]) for name, array in arrays.items()},
     }
     curve, label = _curve(estimate)
     return Playback(
@@ -231,24 +242,38 @@ def _reaction_rows(arrays: dict[str, Array]) -> list[dict[str, Any]]:
 def _frames_shown(estimate: Estimate, columns: int) -> np.ndarray:
     """Frames that are shown: thirty a second, fewer where the page would become heavy."""
     frames = len(estimate.time)
-    bytes_in_all = frames * columns * 2 * 4 / 3
+    bytes_in_all = frames * columns * 4 / 3
     rate = estimate.recording.rate if frames > 1 else 0.0  # one frame has none
     step = max(round(rate / _PICTURES_PER_SECOND), int(np.ceil(bytes_in_all / _MOST_BYTES)), 1)
     return np.arange(0, frames, step)
 
 
-def _packed(values: np.ndarray) -> dict[str, Any]:
-    """(N, C) as little-endian 16-bit numbers in base64: value = scale x number, -32768 missing."""
-    finite = values[np.isfinite(values)]
-    scale = float(np.max(np.abs(finite), initial=0.0)) / 32000.0 or 1.0
-    numbers = np.where(
-        np.isfinite(values), np.round(np.nan_to_num(values, posinf=0.0, neginf=0.0) / scale), _MISSING
-    ).astype("<i2")
+def _packed(values: Array, step: float) -> dict[str, Any]:
+    """(N, C) in whole steps, column after column, as base64 of the changes from one frame to the next: most are one
+    byte, where the numbers themselves take two.
+
+    A change d is the number 1 + 2 d, or -2 d where it is negative, in LEB128 (seven bits a byte, the lowest first, the
+    highest bit set where more follow); 0 stands for a missing value. A column's first change is from zero.
+    """
+    known = np.isfinite(values).T
+    numbers = np.round(np.where(np.isfinite(values), values, 0.0) / step).astype(np.int64).T
+    codes = np.zeros(known.shape, dtype=np.int64)
+    for own, seen, code in zip(numbers, known, codes, strict=True):
+        change = np.diff(own[seen], prepend=0)
+        code[seen] = np.where(change < 0, -2 * change, 2 * change + 1)
     return {
-        "scale": float(f"{scale:.6g}"),
+        "step": step,
         "columns": values.shape[1],
-        "values": base64.b64encode(numbers.tobytes()).decode(),
+        "values": base64.b64encode(_leb128(codes.ravel())).decode(),
     }
+
+
+def _leb128(numbers: npt.NDArray[np.int64]) -> bytes:
+    groups = numbers[:, None] >> np.arange(0, 63, 7)
+    used = groups > 0
+    used[:, 0] = True
+    more = np.column_stack([used[:, 1:], np.zeros(len(used), dtype=bool)])
+    return ((groups & 0x7F) | (more << 7))[used].astype(np.uint8).tobytes()
 
 
 def _curve(estimate: Estimate) -> tuple[str, str]:

@@ -83,17 +83,18 @@ def thin(time: np.ndarray, values: np.ndarray, most: int = _MOST_POINTS) -> tupl
     lost."""
     if len(time) <= most:
         return time, values
-    kept: list[int] = []
-    for part in np.array_split(np.arange(len(time)), most // 2):
-        finite = part[np.isfinite(values[part])]
-        if not len(finite):
-            kept.append(int(part[0]))  # a gap stays a gap
-            continue
-        ends = {int(finite[np.argmin(values[finite])]), int(finite[np.argmax(values[finite])])}
-        if len(finite) < len(part):
-            ends.add(int(part[~np.isfinite(values[part])][0]))
-        kept += sorted(ends)
-    return time[kept], values[kept]
+    parts = np.array_split(np.arange(len(time)), most // 2)
+    starts = np.array([part[0] for part in parts])
+    part_of = np.repeat(np.arange(len(parts)), [len(part) for part in parts])
+    finite = np.isfinite(values)
+    lowest = np.minimum.reduceat(np.where(finite, values, np.inf), starts)
+    highest = np.maximum.reduceat(np.where(finite, values, -np.inf), starts)
+    kept = []
+    for wanted in (values == lowest[part_of], values == highest[part_of], ~finite):  # a gap stays a gap
+        found = np.flatnonzero(wanted)
+        kept.append(found[np.unique(part_of[found], return_index=True)[1]])
+    shown = np.unique(np.concatenate(kept))
+    return time[shown], values[shown]
 
 
 def with_next(part: np.ndarray) -> np.ndarray:

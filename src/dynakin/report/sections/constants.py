@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from dynakin.elements import element
+from dynakin.report.bars import Bar, share_bars
 from dynakin.report.chart import Bound, Line, Panel, chart
 from dynakin.report.labels import parameter_label, short_marker_names, signed_percent
-from dynakin.report.plot import ESTIMATED, GRID, INK, MEASURED, QUIET, new_axes, to_svg
+from dynakin.report.plot import ESTIMATED
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.styles import BAND, BOUND_LINE, ESTIMATED_LINE
 from dynakin.report.text_tables import TextTable
@@ -19,18 +19,6 @@ from dynakin.results.estimate import Estimate
 from dynakin.results.measures.posterior import JUDGEMENT_WORDS, KNOWN, NOTHING, group_of, posterior_in_words
 from dynakin.results.naming import number, sentence, words
 from dynakin.results.records import Parameter
-
-_ROW_IN = 0.155
-
-
-@dataclass(frozen=True)
-class ShareRow:
-    """One line of the figure: how much of the prior standard deviation is left, and both in words."""
-
-    label: str
-    share: float
-    sizes: str
-
 
 _KEY = (ESTIMATED_LINE, BOUND_LINE)
 
@@ -92,7 +80,7 @@ def observability_section(page: Page) -> Section | None:
     base = block.get("base_parameters", {}).get("parameters", {})
     if base:
         groups["Base parameters"] = [
-            ShareRow(_base_label(name), entry["share"], _sizes(entry["prior_sd"], entry["sd"], _base_unit(name)))
+            Bar(_base_label(name), entry["share"], _sizes(entry["prior_sd"], entry["sd"], _base_unit(name)))
             for name, entry in base.items()
         ]
     if not groups:
@@ -119,7 +107,7 @@ def observability_section(page: Page) -> Section | None:
         "Posterior against prior: the whole line is each constant’s standard deviation before the first frame, the "
         f"blue part that after the last. Up to the first mark ({KNOWN:g}) a value is the data’s, from the second "
         f"({NOTHING:g}) on it is the prior’s. A base parameter is named after one of the numbers in it.",
-        wide=[_panel(f"posterior-{k}", rows) for k, rows in enumerate((left, right)) if rows],
+        wide=[_panel(rows) for rows in (left, right) if rows],
         notes=(*posterior_in_words(estimate), *_base_sentence(block)),
         parts=parts,
     )
@@ -139,9 +127,9 @@ _GAUGES = (
 )
 
 
-def _groups(estimate: Estimate, entries: Mapping[str, Mapping[str, Any]]) -> dict[str, list[ShareRow]]:
+def _groups(estimate: Estimate, entries: Mapping[str, Mapping[str, Any]]) -> dict[str, list[Bar]]:
     names = short_marker_names(estimate.marker_names)
-    found: dict[str, list[ShareRow]] = {}
+    found: dict[str, list[Bar]] = {}
     of_marker: dict[str, list[Mapping[str, Any]]] = {}
     recorded = _recorded(estimate)
     for p in estimate.parameters:
@@ -152,11 +140,11 @@ def _groups(estimate: Estimate, entries: Mapping[str, Mapping[str, Any]]) -> dic
             of_marker.setdefault(element(p.name).owner, []).append(entry)
         else:
             sizes = _sizes(entry["prior_sd"], entry["sd"], p.unit)
-            found.setdefault(sentence(group), []).append(ShareRow(_label(p, names), entry["share"], sizes))
+            found.setdefault(sentence(group), []).append(Bar(_label(p, names), entry["share"], sizes))
     for marker, axes in of_marker.items():
         prior, after = (float(np.sqrt(np.mean([axis[key] ** 2 for axis in axes]))) for key in ("prior_sd", "sd"))
         label = names.get(recorded.get(marker, marker), marker)
-        found.setdefault("Marker places", []).append(ShareRow(label, after / prior, _sizes(prior, after, "m")))
+        found.setdefault("Marker places", []).append(Bar(label, after / prior, _sizes(prior, after, "m")))
     return found
 
 
@@ -209,37 +197,9 @@ def _base_table(base: Mapping[str, Mapping[str, Any]]) -> TextTable:
     return TextTable("The base parameters as the sums that they are", headings, rows, (2, 3, 4), folded=True)
 
 
-def _panel(key: str, groups: Mapping[str, Sequence[ShareRow]]) -> Panel:
-    count = sum(len(rows) for rows in groups.values()) + 1.6 * len(groups)
-    figure, axes = new_axes(4.3, 0.35 + _ROW_IN * count)
-    place, ticks, labels = 0.0, [], []
-    for title, rows in groups.items():
-        place -= 1.6
-        axes.annotate(
-            title, (0.0, place + 0.85), xytext=(0, 0), textcoords="offset points", color=INK, weight="bold", fontsize=8,
-            va="center",
-            bbox={"facecolor": "white", "edgecolor": "none", "pad": 0.8},
-            zorder=4,
-        )  # fmt: skip
-        for row in rows:
-            shown = min(row.share, 1.0)
-            axes.plot([0.0, 1.0], [place, place], color=MEASURED, alpha=0.45, linewidth=3.2, solid_capstyle="butt")
-            axes.plot([0.0, shown], [place, place], color=ESTIMATED, linewidth=3.2, solid_capstyle="butt")
-            axes.annotate(
-                row.sizes, (1.0, place), xytext=(5, 0), textcoords="offset points", color=QUIET, fontsize=7, va="center"
-            )
-            ticks.append(place)
-            labels.append(row.label)
-            place -= 1.0
-    for mark in (KNOWN, NOTHING):
-        axes.axvline(mark, color=QUIET, linewidth=0.7, linestyle=(0, (4, 3)), zorder=3)
-    axes.set_yticks(ticks, labels, color=INK, fontsize=7.5)
-    axes.set_xlim(0.0, 1.0)
-    axes.set_ylim(place + 0.2, 0.2)
-    axes.set_xticks([0.0, KNOWN, NOTHING, 1.0], ["0", f"{KNOWN:g}", f"{NOTHING:g}", "1"])
-    axes.tick_params(axis="x", color=GRID)
-    axes.grid(False)
+def _panel(groups: Mapping[str, Sequence[Bar]]) -> Panel:
     titles = [title if k == 0 else title.lower() for k, title in enumerate(groups)]
     title = " and ".join([", ".join(titles[:-1]), titles[-1]] if len(titles) > 1 else titles)
     note = "standard deviation left, as a part of the prior one; prior → end"
-    return Panel(title, note, to_svg(figure, key, f"{title}: standard deviation at the end over that before"))
+    description = f"{title}: standard deviation at the end over that before"
+    return share_bars(title, note, groups, (KNOWN, NOTHING), description)

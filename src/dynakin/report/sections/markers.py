@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from matplotlib.axes import Axes
 
+from dynakin.report.bars import Bar, value_bars
 from dynakin.report.body import marker_segments
 from dynakin.report.chart import Line, Panel, chart
 from dynakin.report.labels import short_marker_names
@@ -35,7 +36,7 @@ def marker_section(page: Page) -> Section | None:
             "Markers",
             f"Root mean square distance {span} In the plane of the model.",
             wide=[
-                _rms_bars("rms", "RMS distance of each marker", rms),
+                _rms_bars("RMS distance of each marker", rms),
                 _plane_paths("paths", list(names.values()), measured[:, :, :2], estimated[:, :, :2]),
             ],
             folded=_over_time(page, measured, estimated),
@@ -51,8 +52,8 @@ def marker_section(page: Page) -> Section | None:
         f"Root mean square distance in space {span} Where soft tissue is estimated, an estimated marker holds its "
         "displacement: how far each moves on its segment says how well a rigid body fits.",
         wide=[
-            _rms_bars(f"rms-{k}", f"RMS distance, {what}", {name: rms[name] for name in part}, most)
-            for k, (what, part) in enumerate((("largest first", order[:half]), ("continued", order[half:])))
+            _rms_bars(f"RMS distance, {what}", {name: rms[name] for name in part}, most)
+            for what, part in (("largest first", order[:half]), ("continued", order[half:]))
             if part
         ],
         folded=_differences(page, 1000.0 * (estimated - measured), rms),
@@ -107,32 +108,13 @@ def _displacements(page: Page) -> TextTable:
     return TextTable("Movement of each marker on its segment", headings, rows, (2, 3, 4), folded=True)
 
 
-def _rms_bars(key: str, title: str, rms: dict[str, float | None], most: float | None = None) -> Panel:
+def _rms_bars(title: str, rms: dict[str, float | None], most: float | None = None) -> Panel:
     """RMS distance of each marker as labelled bars, in the order given; ``most`` fills the width, else the largest."""
-    names = [name for name, value in rms.items() if value is not None]
-    values = [value for value in rms.values() if value is not None]
-    figure, axes = new_axes(4.3, 0.42 + 0.2 * len(names))
-    places = np.arange(len(names))[::-1]
-    most = most or max(values, default=1.0)
+    known = {name: value for name, value in rms.items() if value is not None}
+    most = most or max(known.values(), default=1.0)
     decimals = 1 if most >= 1.0 else 2
-    axes.barh(places, values, color=ESTIMATED, height=0.62)
-    for place, value in zip(places, values, strict=True):
-        axes.annotate(
-            f"{value:.{decimals}f} mm",
-            (value, place),
-            xytext=(4, 0),
-            textcoords="offset points",
-            va="center",
-            color=INK,
-            fontsize=8,
-        )
-    axes.set_yticks(places, names, color=INK)
-    axes.set_xlim(0.0, 1.18 * most or 1.0)
-    axes.set_ylim(-0.6, len(names) - 0.4)
-    axes.grid(False)
-    axes.set_xticks([])
-    axes.spines["bottom"].set_visible(False)
-    return Panel(title, "estimated against measured, mm", to_svg(figure, key, "RMS of each marker, mm"))
+    bars = [Bar(name, value, f"{value:.{decimals}f} mm") for name, value in known.items()]
+    return value_bars(title, "estimated against measured, mm", bars, most, "RMS of each marker, mm")
 
 
 def _plane_paths(key: str, names: list[str], measured: np.ndarray, estimated: np.ndarray) -> Panel:

@@ -1,13 +1,20 @@
 var dynakinPlayer = (function () {
   "use strict";
-  function unpack(packed) {
-    var text = atob(packed.values), bytes = new Uint8Array(text.length), view, k;
-    for (k = 0; k < text.length; k++) { bytes[k] = text.charCodeAt(k); }
-    view = new DataView(bytes.buffer);
-    return function (row, column) {
-      var value = view.getInt16(2 * (row * packed.columns + column), true);
-      return value === -32768 ? NaN : value * packed.scale;
-    };
+  // Column after column, changes between frames as variable-length numbers; 0: missing (dynakin.report.playback).
+  function unpack(packed, rows) {
+    var text = atob(packed.values), numbers = new Float32Array(rows * packed.columns), at = 0, last = 0, k;
+    function next() {
+      var byte, code = 0, place = 1;
+      do { byte = text.charCodeAt(at++); code += (byte & 127) * place; place *= 128; } while (byte & 128);
+      return code;
+    }
+    for (k = 0; k < numbers.length; k++) {
+      if (k % rows === 0) { last = 0; }
+      var code = next();
+      if (code) { last += code % 2 ? (code - 1) / 2 : -code / 2; }
+      numbers[k] = code ? last * packed.step : NaN;
+    }
+    return function (row, column) { return numbers[column * rows + row]; };
   }
   function text(value, digits, unit) {
     if (!isFinite(value)) { return "–"; }
@@ -75,7 +82,7 @@ var dynakinPlayer = (function () {
   var unpack = dynakinPlayer.unpack, text = dynakinPlayer.text;
   var canvas = root.querySelector("canvas"), pen = canvas.getContext("2d");
   var arrays = {};
-  Object.keys(data.arrays).forEach(function (name) { arrays[name] = unpack(data.arrays[name]); });
+  Object.keys(data.arrays).forEach(function (name) { arrays[name] = unpack(data.arrays[name], data.time.length); });
   var cells = Array.prototype.slice.call(root.querySelectorAll("td[data-column]"));
   var azimuth = data.view.azimuth, elevation = data.view.elevation, zoom = 1, player = null;
   var size = { width: 0, height: 0, scale: 1 };

@@ -9,7 +9,7 @@ import numpy as np
 from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.results.estimate import AXES, COMPONENTS, Estimate
 from dynakin.results.files.motion import force_stem, write_sources
-from dynakin.results.files.storage import DIGITS, write_storage
+from dynakin.results.files.storage import DIGITS, DIGITS_OF_LOADS, write_storage
 from dynakin.results.measures.angles import angle_columns
 from dynakin.results.measures.feet import foot_sources
 from dynakin.results.measures.pressure import foot_pressure
@@ -65,7 +65,7 @@ def write_mass_centre(estimate: Estimate, path: Path) -> None:
             names.append(prefix + AXES[k])
             columns.append(values[:, k])
     notes = [f"Whole-body centre of mass in m and its velocity in m/s, {estimate.ground.in_words}."]
-    _write(path, "Centre of mass", estimate, names, np.column_stack(columns), notes)
+    _write(path, "Centre of mass", estimate, names, np.column_stack(columns), notes, DIGITS)
 
 
 def write_centre_of_pressure(estimate: Estimate, path: Path) -> None:
@@ -164,5 +164,13 @@ def write_feet(estimate: Estimate, path: Path) -> None:
     _write(path, "Ground reaction of the feet", estimate, names, np.hstack(columns), notes)
 
 
-def _write(path: Path, title: str, estimate: Estimate, names: list[str], values: np.ndarray, notes: list[str]) -> None:
-    write_storage(path, title, estimate.time, names, values, in_degrees=False, notes=notes, digits=DIGITS)
+def _write(
+    path: Path,
+    title: str,
+    estimate: Estimate,
+    names: list[str],
+    values: np.ndarray,
+    notes: list[str],
+    digits: int = DIGITS_OF_LOADS,
+) -> None:
+    write_storage(path, title, estimate.time, names, values, in_degrees=False, notes=notes, digits=digits)

@@ -8,8 +8,8 @@ import numpy as np
 
 from dynakin.results.estimate import Estimate
 
-DECIMALS = 7
-"""Of a metre, of estimated markers: a thousandth of what cameras see."""
+DECIMALS = 6
+"""Of a metre, of estimated markers: a hundredth of what cameras see."""
 _PER_METRE = {"m": 1.0, "mm": 1000.0}
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from dynakin.results.estimate import AXES, COMPONENTS, Estimate
-from dynakin.results.files.storage import DIGITS, DIGITS_OF_SD, write_storage
+from dynakin.results.files.storage import DIGITS, DIGITS_OF_LOADS, DIGITS_OF_SD, write_storage
 from dynakin.results.measures.feet import foot_sources
 from dynakin.results.measures.sources import ABSENT, NOTES, moment_sources
 
@@ -79,7 +79,7 @@ def write_moments(estimate: Estimate, path: Path) -> None:
             "Moments in N m, forces in N. In a model that lumps both sides, leg moments are the sum of both legs.",
             "moments_source.sto says of each whether it is measured, derived, a prior or absent (nan).",
         ],
-        digits=DIGITS,
+        digits=DIGITS_OF_LOADS,
     )
 
 

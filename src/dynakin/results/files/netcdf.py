@@ -45,6 +45,10 @@ _FLAGGED = {"moments": "moment_source", "moments_sd": "moment_source", "joint_lo
 )
 _SMALL = 1000  # values; fewer are not worth compressing
 _SD_BITS = 12
+_COVARIANCE_BITS = 32
+"""The smallest eigenvalues of a covariance are differences of large numbers."""
+_STEPS = {"markers": 2.0**-20, "joint_centres": 2.0**-20, "joint_orientations": 2.0**-20, "joint_loads": 2.0**-10}
+"""About 1 µm, 1e-6 of a direction's cosine, 1 mN and 1 mN m. Powers of two leave zeros at the end, which compress."""
 _PARAMETER_NUMBERS = ("value", "sd", "initial", "table", "lower", "upper")
 
 
@@ -104,26 +108,30 @@ def full_dataset(estimate: Estimate) -> xr.Dataset:
 
 
 def write_netcdf(estimate: Estimate, path: Path) -> None:
-    """Write `full_dataset`, compressed, its tables over time in single precision (6e-8 of each value, deviations 1e-4).
+    """Write `full_dataset`, compressed, tables over time in single precision (6e-8 of each value), those of `_STEPS`
+    in whole steps, deviations to 1e-4 and covariances to 1e-10 of each entry.
 
-    Times, constants, and covariances, whose smallest eigenvalues are differences of large numbers, stay as they are.
+    Times and constants stay as they are.
     """
     data = full_dataset(estimate)
     encoding: dict[str, dict[str, object]] = {}
-    for name, variable in data.data_vars.items():
+    for key, variable in data.data_vars.items():
+        name = str(key)
         if variable.dtype.kind != "f" or variable.size <= _SMALL:
             continue
-        encoding[str(name)] = {"zlib": True, "complevel": 4, "shuffle": True}
-        if variable.dims[0] == "time" and variable.ndim > 1:
-            encoding[str(name)]["dtype"] = "float32"
-            if str(name).endswith("_sd"):
-                data[name] = variable.copy(data=_rounded(variable.values))
+        encoding[name] = {"zlib": True, "complevel": 4, "shuffle": True}
+        if name.endswith("_covariance"):
+            data[key] = variable.copy(data=_to_bits(variable.values, _COVARIANCE_BITS))
+        elif variable.dims[0] == "time" and variable.ndim > 1:
+            encoding[name]["dtype"] = "float32"
+            if name.endswith("_sd"):
+                data[key] = variable.copy(data=_to_bits(variable.values, _SD_BITS))
+            elif step := next((step for stem, step in _STEPS.items() if name.startswith(stem)), 0.0):
+                data[key] = variable.copy(data=step * np.round(variable.values / step))
     data.to_netcdf(path, engine="h5netcdf", encoding=encoding)
 
 
-def _rounded(values: np.ndarray) -> np.ndarray:
-    """Deviations as float32 with the first `_SD_BITS` bits of the mantissa, rounded: the rest would not compress."""
-    bits = values.astype(np.float32).view(np.uint32)
-    dropped = np.uint32(23 - _SD_BITS)
-    kept = ((bits + (np.uint32(1) << (dropped - np.uint32(1)))) >> dropped) << dropped
-    return np.where(np.isfinite(values), kept.view(np.float32), np.float32(np.nan))
+def _to_bits(values: np.ndarray, bits: int) -> np.ndarray:
+    """Rounded to a mantissa of so many bits: the rest, which says nothing, would not compress."""
+    mantissa, exponent = np.frexp(values)
+    return np.asarray(np.ldexp(np.round(np.ldexp(mantissa, bits + 1)), exponent - (bits + 1)))

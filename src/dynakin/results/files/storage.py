@@ -14,7 +14,9 @@ EXACT = 15
 """Significant digits that hold a double: of truth and recordings, which others compute from."""
 DIGITS = 8
 """Of an estimate: no coarser than the single precision of ``estimate.nc``, far below any deviation."""
-DIGITS_OF_SD = 5
+DIGITS_OF_LOADS = 6
+"""Of forces, moments and powers: 1 mN of a body's weight."""
+DIGITS_OF_SD = 4
 """Of a standard deviation, which itself is not known to two."""
 _TIME = "%.12g"
 
