@@ -110,6 +110,7 @@ peers: $(VENV)/.dev
 	$(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[dev,peers]"
 	$(BIN)/python -m pytest -m peers
 	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/peers.py
+	OMP_NUM_THREADS=1 $(BIN)/python benchmarks/end_to_end.py
 
 clean:
 	rm -rf build out $(VENV)

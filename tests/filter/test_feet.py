@@ -223,14 +223,14 @@ def test_files(estimate: Estimate, tmp_path: Path) -> None:
         )
         moment = np.cross(point, force) + torque
         expected = values(estimate, "foot_wrench")[:, foot]
-        np.testing.assert_allclose(np.hstack([force, moment]), expected, rtol=1e-6, atol=1e-4)
+        np.testing.assert_allclose(np.hstack([force, moment]), expected, rtol=6e-6, atol=1e-4)  # six digits
     mass_centre = read_table(folder / "centre_of_mass.sto")
     assert list(mass_centre.names) == ["com_x", "com_y", "com_z", "com_vx", "com_vy", "com_vz"]
-    np.testing.assert_allclose(mass_centre.values[:, :3], values(estimate, "mass_centre"), rtol=5e-8)
+    np.testing.assert_allclose(mass_centre.values[:, :3], values(estimate, "mass_centre"), rtol=6e-6)
     loads = read_table(folder / "joint_reactions.sto")
     joint = [str(name) for name in estimate.data["joint"].values][3]
     here = list(loads.names).index(f"{joint}_on_left_2_in_ground_fy")
-    np.testing.assert_allclose(loads.values[:, here], values(estimate, "joint_loads")[:, 3, 1], rtol=5e-8)
+    np.testing.assert_allclose(loads.values[:, here], values(estimate, "joint_loads")[:, 3, 1], rtol=6e-6)
     powers = read_table(folder / "powers.sto")
     assert powers.names[0] == f"{estimate.coordinate_names[0]}_power"
     with xr.open_dataset(folder / "estimate.nc") as stored:
