@@ -150,3 +150,28 @@ def test_settings_show_what_they_were_given():
     kept = _core.FilterSettings(**options)
     for key in ("process_variance", "marker_variance", "lower", "upper"):
         np.testing.assert_array_equal(getattr(kept, key), options[key])
+
+
+@each_spec
+def test_constants_keep_clear_of_rounding(spec):
+    """Constants that are known in one sum only: after many frames the correlations' smallest eigenvalue has left
+    rounding, and no standard deviation has changed by more than a billionth."""
+    layout = Layout(spec)
+    first = layout.block("lengths").start
+    x, P = start(spec)
+    sd = np.sqrt(np.diag(P))
+    same = np.outer(sd, sd)
+    P[first:, first:] = (1.0 - 1e-13) * same[first:, first:]  # each a multiple of the others
+    np.fill_diagonal(P, sd**2)
+    P[:first, first:] = 0.0
+    P[first:, :first] = 0.0
+    still = {key: np.zeros(layout.size) for key in ("process_variance", "process_density")}
+    f = filter_of(spec, settings(spec, 1) | still, x, P)
+    for _ in range(4096):
+        f.predict(1e-3)
+    constants = [k for k in range(first, layout.size) if not layout.names[k].startswith(("soft_tissue", "plates"))]
+    after = f.covariance[np.ix_(constants, constants)]
+    grown = np.sqrt(np.diag(after))
+    least = np.linalg.eigvalsh(after / np.outer(grown, grown))[0]
+    assert 0.9e-10 < least < 1.3e-10
+    np.testing.assert_allclose(grown, sd[constants], rtol=1e-9)
