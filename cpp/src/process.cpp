@@ -8,8 +8,8 @@ namespace dynakin {
 namespace {
 
 // What never moves is known ever better along some directions and no better along others, until the covariance is
-// singular to rounding (1e-16 of the correlation's eigenvalues after 10^5 steps of preset paper). This much more variance
-// a step, 3e-8 in 10^6 of them, keeps the smallest eigenvalue above 1e-11 (BENCHMARKS.md, A session that never ends).
+// singular to rounding (7e-16 is the correlation's smallest eigenvalue after 2 10^5 steps of preset paper). This much
+// more variance a step, 3e-8 in 10^6 of them, keeps it at 1e-10 (BENCHMARKS.md, A session that never ends).
 constexpr double k_stirred = 1.0 + 0x1p-45;
 
 // Noise of density w[0] on the rate of q, w[1] on that of qd, w[2] (the jerk) on that of qdd, integrated over dt.
