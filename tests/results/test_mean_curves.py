@@ -83,12 +83,12 @@ def test_file_of_a_run_holds_the_mean_of_its_repetitions(estimate: Estimate, tmp
     with (tmp_path / "r.csv").open() as file:
         rows = list(csv.DictReader(file))
     assert {row["method"] for row in rows} == {"EKF (paper)", MEASURED} and len(rows) % 101 == 0
-    (start,) = [row for row in rows if (row["quantity"], row["percent"]) == ("knee", "0.0")]
+    (start,) = [row for row in rows if (row["quantity"], row["percent"]) == ("knee", "0")]
     knee = np.degrees(estimate.data["coordinates"].sel(coordinate="knee").values)
     found = [knee[r.first] for r in repetitions_of(estimate).items]
     assert float(start["mean"]) == pytest.approx(np.mean(found)) and start["mean_per_kg"] == ""
     assert float(start["sd"]) == pytest.approx(np.std(found, ddof=1)) and int(start["n"]) == len(found)
-    (force,) = [r for r in rows if (r["quantity"], r["percent"], r["method"]) == ("fy", "50.0", MEASURED)]
+    (force,) = [r for r in rows if (r["quantity"], r["percent"], r["method"]) == ("fy", "50", MEASURED)]
     assert float(force["mean_per_kg"]) == pytest.approx(float(force["mean"]) / 60.05)
 
 
