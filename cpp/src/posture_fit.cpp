@@ -88,6 +88,10 @@ PostureFit fit_posture(const Model& model, const Eigen::VectorXd& x0, const Post
                                 std::to_string(start.size()));
   PostureFit fit{start.cwiseMax(problem.lower).cwiseMin(problem.upper), 0.0, false};
   fit.cost = residual.cost(fit.q);
+  if (n == 0) {
+    fit.converged = true;
+    return fit;
+  }
   Eigen::VectorXd gradient(n), step(n), next(n), moved;
   Eigen::MatrixXd H(n, n), reduced;
   Eigen::LDLT<Eigen::MatrixXd> factor;

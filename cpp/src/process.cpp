@@ -7,7 +7,7 @@
 namespace dynakin {
 namespace {
 
-// What never moves is known ever better along some directions and no better along others, until the covariance is
+// What does not move is known ever better along some directions and no better along others, until the covariance is
 // singular to rounding (7e-16 is the correlation's smallest eigenvalue after 2 10^5 steps of preset paper). This much
 // more variance a step, 3e-8 in 10^6 of them, keeps it at 1e-10 (BENCHMARKS.md, A session that never ends).
 constexpr double k_stirred = 1.0 + 0x1p-45;

@@ -95,11 +95,14 @@ class _Terminal:
         from rich.progress import BarColumn, Progress, TaskID, TaskProgressColumn, TextColumn, TimeElapsedColumn
         from rich.progress import TimeRemainingColumn as Remaining
 
+        own = sys.stdout is not None and sys.stdout.isatty()  # what a file is to have stays out of the terminal
+
         self._id = TaskID
         columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeElapsedColumn())
         self._bars = Progress(
-            *columns, TextColumn("remaining"), Remaining(), console=Console(stderr=True), transient=True
-        )
+            *columns, TextColumn("passed,"), Remaining(), TextColumn("remaining"), console=Console(stderr=True),
+            transient=True, redirect_stdout=own,
+        )  # fmt: skip
 
     def open(self, what: str) -> int:
         if not self._bars.tasks:

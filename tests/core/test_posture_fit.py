@@ -67,3 +67,14 @@ def test_what_does_not_fit_is_named() -> None:
         _core.fit_posture(model, x, nothing + 1.0, -wide[:2], wide, none + 1.0, none, none)
     with pytest.raises(ValueError, match="9 markers, found 15 and 4"):
         _core.fit_posture(model, x, np.zeros((4, 3)), -wide, wide, none + 1.0, none, none)
+
+
+def test_nothing_to_fit_is_fitted() -> None:
+    axis = _core.AxisSpec("elbow")
+    marker = _core.MarkerSpec("hand", "arm", np.ones(3), estimated=[False] * 3)
+    locked = [_core.CoordinateSpec("elbow", 0.3, True)]
+    model = _core.Model(_core.ModelSpec("still", locked, [], [_core.SegmentSpec("arm", axes=[axis])], [marker]))
+    none = np.zeros(0)
+    x = np.zeros(model.layout.size)
+    q, cost, found = _core.fit_posture(model, x, np.zeros((1, 3)), none, none, none, none, none)
+    assert len(q) == 0 and found and cost > 0.0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from dynakin.model.calibration.posture import axes_from, joint_motion, solve_joint
 from dynakin.model.schema import Axis, Segment
@@ -59,3 +60,17 @@ def test_coordinates_that_are_fixed_stay() -> None:
     segment = Segment(name="s", axes=axes)
     found = solve_joint(segment, joint_motion(axes, {"a": 0.3, "b": 0.5}, {}), {"a": 0.1}, {})
     assert found == pytest.approx({"b": 0.7})
+
+
+def test_a_pose_that_a_joint_cannot_meet_is_met_in_the_plane() -> None:
+    """A root that slides and turns in the plane, told of a turn out of it: its origin stays, and the turn is that of
+    least squares alone, as where it cannot slide."""
+    axes = (
+        Axis(coordinate="x", kind="translation", direction=(1, 0, 0)),
+        Axis(coordinate="y", kind="translation", direction=(0, 1, 0)),
+        Axis(coordinate="turn"),
+    )
+    tilted = Rotation.from_euler("ZXY", [20.0, 5.0, 8.0], degrees=True).as_matrix()
+    found = solve_joint(Segment(name="root", axes=axes), (tilted, np.array([0.5, 0.9, 0.1])), {}, {})
+    alone = solve_joint(Segment(name="root", axes=axes[2:]), (tilted, np.zeros(3)), {}, {})
+    assert found == pytest.approx({"x": 0.5, "y": 0.9, **alone}, abs=1e-8)

@@ -15,8 +15,8 @@ namespace dynakin {
 void predict(const Model& model, const FilterSettings& settings, double dt, Eigen::VectorXd& scratch,
              Eigen::VectorXd& x, Eigen::MatrixXd& P);
 
-// F and Q of predict over `carried` and then decay over the rest of dt, by their entries; carried 0 of a dt that is
-// not: the coordinates are held.
+// F and Q of predict (but for what keeps it clear of rounding) over `carried` and then decay over the rest of dt, by
+// their entries; carried 0 of a dt that is not: the coordinates are held.
 struct Transition {
   explicit Transition(const Model& model);
 

@@ -66,7 +66,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     DYNAKIN_DEBUG=1 in the environment lets the traceback through.
     """
     # The matrices outside the core are small: threads of BLAS only wait for each other, on a busy machine for minutes.
-    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    if "OMP_NUM_THREADS" not in os.environ:
+        os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     words = list(sys.argv[1:] if arguments is None else arguments)
     if wrong := _without_value(words):
         print_error(wrong)

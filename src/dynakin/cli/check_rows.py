@@ -79,9 +79,12 @@ def _gaps(recording: Recording) -> str:
     gappy = sorted((part, name) for name, part in share.items() if part < 1.0)
     if not gappy:
         return "none: every marker is seen in every frame."
-    told = [f"{name} {'never' if part == 0.0 else f'{np.floor(1000 * part) / 10:.1f} %'}" for part, name in gappy]
+    told = [
+        f"{name} {'never seen' if part == 0.0 else f'seen in {np.floor(1000 * part) / 10:.1f} %'}"
+        for part, name in gappy
+    ]
     rest = f" and {len(told) - _LISTED} more" if len(told) > _LISTED else ""
-    return f"{len(gappy)} of {len(share)} markers are not always seen: {', '.join(told[:_LISTED])}{rest}."
+    return f"{len(gappy)} of {len(share)} markers have gaps: {', '.join(told[:_LISTED])}{rest}."
 
 
 def model_rows(ready: Prepared, settings: Settings, refusal: DynakinError | None) -> Rows:

@@ -18,7 +18,7 @@ from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.expected import ContactPaths, expected_loads
 from dynakin.filter.prepared import Prepared
 from dynakin.filter.samples import in_step, recording_arrays
-from dynakin.filter.skin import following_skin
+from dynakin.filter.skin import following_skin, may_follow
 from dynakin.filter.total_wrench import Ground, doubtful_mass, known_ground
 from dynakin.filter.tracker import Tracker, known_lag
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -215,7 +215,8 @@ class Estimator:
         feet: Feet | None = None,
         progress: Progress | None = None,
     ) -> Tracked:
-        """`run`, and the tracker that made it: the calibrated model, and the state after the last frame."""
+        """`run`, and the tracker that made it: the calibrated model, and the state after the last frame (of a smoothed
+        .osim without the displacements of skin that follow the joints)."""
         return self.follow(self.prepare(recording, static=static, lag_s=lag_s, feet=feet), progress)
 
     def prepare(
@@ -260,7 +261,7 @@ class Estimator:
         adapt, notes = ready.tracker.noise.calibrates(bool(calibrated.feet)), list(ground.notes)
         try:
             # joints found from markers are off by what follows angles as skin does
-            scaled = late is None and calibrated.plan is None and ready.tracker.noise.following_skin_fraction > 0.0
+            scaled = late is None and calibrated.plan is None and may_follow(calibrated, ready.tracker.noise)
             once = not (adapt or scaled)  # a first run shows nothing that the next is to know
             frames, ways = recording.n_frames, 2 if late is None else 1
             again = min(frames, round(CALIBRATED_S * recording.rate)) if adapt else 0

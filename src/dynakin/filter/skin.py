@@ -18,7 +18,9 @@ from dynakin.bindings import _core
 from dynakin.filter.noise import soft_tissue_time_s
 from dynakin.filter.systematic import drives, followed
 from dynakin.filter.tracker import Tracker
+from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.results.records import FOLLOWING
+from dynakin.settings.noise import Noise
 
 Array = npt.NDArray[np.float64]
 
@@ -53,6 +55,12 @@ class FollowingSkin:
         }
 
 
+def may_follow(calibrated: CalibratedModel, noise: Noise) -> bool:
+    """Whether there are displacements of skin, and what follows the joints of them is wanted."""
+    skin = any(name.startswith("soft_tissue/") for name in calibrated.names)
+    return bool(noise.following_skin_fraction and calibrated.feet and skin)
+
+
 def following_skin(tracker: Tracker, arrays: dict[str, Array], time: Array) -> FollowingSkin | None:
     """What follows the joints of the displacements that a run found; None where there are none or none is wanted.
 
@@ -67,7 +75,7 @@ def following_skin(tracker: Tracker, arrays: dict[str, Array], time: Array) -> F
     place = {name: k for k, name in enumerate(model.layout.names)}
     columns = np.array([[place.get(f"soft_tissue/{m.name}/{a}", -1) for a in "xyz"] for m in spec.markers])
     used = (arrays["tracking"] == FOLLOWING) & np.isfinite(arrays["state"]).all(axis=1)
-    if not (noise.following_skin_fraction and calibrated.feet and (columns >= 0).any() and used.sum() > 1):
+    if not (may_follow(calibrated, noise) and used.sum() > 1):
         return None
     names = [segment.name for segment in spec.segments]
     segment = np.array([names.index(marker.segment) for marker in spec.markers])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from html import escape
+from math import isfinite
 
 from dynakin.report.chart import Panel
 from dynakin.report.plot import ESTIMATED, INK, MEASURED, QUIET
@@ -75,7 +76,7 @@ def _columns(bars: Sequence[Bar]) -> tuple[int, int]:
 
 
 def _length(share: float, left: int, right: int) -> int:
-    return round(share * (right - left))
+    return round(share * (right - left)) if isfinite(share) else 0
 
 
 def _text(x: int, y: int, words: str, colour: str, anchor: str = "", more: str = "") -> str:

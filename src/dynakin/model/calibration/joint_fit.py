@@ -40,7 +40,8 @@ def joint_coordinates(
     free = [c for c in used if not c.locked]
     if not free:
         return {}
-    points = [*np.eye(3), *([np.zeros(3)] if any(axis.kind == "translation" for axis in segment.axes) else [])]
+    arms = np.sqrt(3.0) * np.eye(3)  # about the origin: what is missed of the turn moves the segment nowhere
+    points = [*arms, *-arms]
     markers = [
         _core.MarkerSpec(f"point{k}", segment.name, point, estimated=[False] * 3) for k, point in enumerate(points)
     ]
