@@ -30,7 +30,7 @@ def test_what_is_there_and_what_run_would_do(data_dir: Path, capsys: Said) -> No
     trial = str(data_dir / "plugin_gait" / "S1_FlywheelSquat.c3d")
     assert main(["check", trial, "--model", "squat7", "--mass", "78.6"]) == 0
     found, _ = told(capsys)
-    for words in ("317 frames at 100 Hz", "2 force plates", "Vertical +Z", "RSHO 78.5 %", "abdomen"):
+    for words in ("317 frames at 100 Hz", "2 force plates", "Vertical +Z", "RSHO seen in 78.5 %", "abdomen"):
         assert words in found
     assert "Marker set plug-in-gait" in found and "markers by name; next best" in found
     assert "--static S1_StandingRef.c3d (found beside the recording)" in found
