@@ -18,6 +18,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from opensim_peer import inverse_kinematics, load, residual
 
 from peers import DATA, FEET, FILE, MASS
 
@@ -35,31 +36,29 @@ PROGRAMS = {
 }
 
 
-def one(how: str, trial: str) -> None:
-    """One program on one trial, in this process."""
-    if how == "opensim":
-        from opensim_peer import inverse_kinematics, load, residual
+def with_opensim(trial: str) -> None:
+    """OpenSim on one trial, in this process."""
+    kinematics = inverse_kinematics(load(FILE, as_shipped=True), DATA / f"{trial}.trc")
+    residual(load(FILE, mass_kg=MASS[trial]), kinematics, DATA / f"{trial}_grf.mot", FEET, 6.0)
 
-        kinematics = inverse_kinematics(load(FILE, as_shipped=True), DATA / f"{trial}.trc")
-        residual(load(FILE, mass_kg=MASS[trial]), kinematics, DATA / f"{trial}_grf.mot", FEET, 6.0)
-        return
-    import dynakin
 
-    noise = {"adapt": False} if "given" in how else None
-    dynakin.run(
-        DATA / f"{trial}.trc",
-        forces=DATA / f"{trial}_grf.mot",
-        model=str(FILE) if "osim" in how else "fullbody",
-        mass_kg=MASS[trial],
-        lag_s=0.0 if "live" in how else None,
-        noise=noise,
-    )
+def with_dynakin(how: str, trial: str) -> str:
+    """A program that imports dynakin and nothing else."""
+    given: dict[str, object] = {
+        "forces": f"{DATA / trial}_grf.mot",
+        "model": str(FILE) if "osim" in how else "fullbody",
+        "mass_kg": MASS[trial],
+        "lag_s": 0.0 if "live" in how else None,
+        "noise": {"adapt": False} if "given" in how else None,
+    }
+    return f"import dynakin; dynakin.run({f'{DATA / trial}.trc'!r}, **{given!r})"
 
 
 def command(how: str, trial: str, folder: Path) -> list[str]:
     """The words of a process."""
     if not how.startswith("command"):
-        return [sys.executable, __file__, "--one", how, "--trial", trial]
+        own = [__file__, "--opensim", "--trial", trial] if how == "opensim" else ["-c", with_dynakin(how, trial)]
+        return [sys.executable, *own]
     (folder / "noise.toml").write_text(GIVEN, encoding="utf-8")
     words = ["run", f"{DATA / trial}.trc", "--forces", f"{DATA / trial}_grf.mot", "--mass", str(MASS[trial])]
     words += ["--preset", str(folder / "noise.toml")] if "given" in how else []
@@ -72,10 +71,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--rounds", type=int, default=3)
     parser.add_argument("--trial", default="squats1", choices=sorted(MASS))
-    parser.add_argument("--one", help=argparse.SUPPRESS)
+    parser.add_argument("--opensim", action="store_true", help=argparse.SUPPRESS)
     asked = parser.parse_args()
-    if asked.one:
-        one(asked.one, asked.trial)
+    if asked.opensim:
+        with_opensim(asked.trial)
         return
     found: dict[str, list[tuple[float, float]]] = {name: [] for name in PROGRAMS}
     for _ in range(asked.rounds):

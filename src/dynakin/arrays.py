@@ -1,4 +1,4 @@
-"""What all share of arrays: runs of true values, and what is not a finite number, which is absent from every file."""
+"""What all share of arrays: runs of true values, angles within a turn, and no infinities, which no file may have."""
 
 from __future__ import annotations
 
@@ -13,6 +13,11 @@ def runs(flags: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Frames [first, end) of each stretch of true in ``flags`` (T,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     return [(int(first), int(end)) for first, end in edges.reshape(-1, 2)]
+
+
+def wrapped(angles: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    """Angles (rad) within half a turn of zero."""
+    return np.asarray((np.asarray(angles) + np.pi) % (2.0 * np.pi) - np.pi)
 
 
 def finite(values: npt.ArrayLike) -> npt.NDArray[np.float64]:

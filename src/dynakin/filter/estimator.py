@@ -33,7 +33,7 @@ from dynakin.results.estimate import Estimate
 from dynakin.results.measures.tracking import without_lost
 from dynakin.settings import presets
 from dynakin.settings.contacts import DeclaredContact, declared
-from dynakin.settings.lag import ALL_FRAMES, check_lag, lag_frames
+from dynakin.settings.lag import ALL_FRAMES, check_lag, frames_later, lag_frames
 from dynakin.settings.model import QUANTITIES, Bounds, Priors, Quantity
 from dynakin.settings.noise import Noise
 from dynakin.settings.strict import nearest
@@ -256,7 +256,7 @@ class Estimator:
         """
         recording, calibrated, markers = ready.recording, ready.calibrated, ready.markers
         lag_s, ground, on_feet = ready.lag_s, ready.ground, ready.contacts
-        late = None if lag_s == ALL_FRAMES else lag_frames(lag_s, recording.rate)
+        late = frames_later(lag_s, recording.rate)
         lag_s = ALL_FRAMES if late is None else late / recording.rate
         adapt, notes = ready.tracker.noise.calibrates(bool(calibrated.feet)), list(ground.notes)
         try:
@@ -265,8 +265,8 @@ class Estimator:
             once = not (adapt or scaled)  # a first run shows nothing that the next is to know
             frames, ways = recording.n_frames, 2 if late is None else 1
             again = min(frames, round(CALIBRATED_S * recording.rate)) if adapt else 0
-            shares = (ways * frames,) if once else (frames, again, ways * frames)
-            there, calibrating, back = (*_shares(progress, shares), None, None)[:3]
+            shares = (ways * frames, 0, 0) if once else (frames, again, ways * frames)
+            there, calibrating, back = _shares(progress, shares)
             passes = 0 if ready.doubt else PASSES
             tracker, arrays, shift, clock = run_in_step(
                 ready.tracker.fresh(), recording.time, markers, ready.wrench, there, on_feet, passes,

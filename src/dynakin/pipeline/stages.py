@@ -186,8 +186,8 @@ def judged(
         comparison = with_lost(comparison, lost)
     observed: Identifiability | None = None
     if observability:
-        with failures.stage("observability of the constants"), stage("trying motions") as report:
-            observed, note = _observability(trackers[title], first, report)
+        with failures.stage("observability of the constants"):
+            observed, note = _observability(trackers[title], first)
             if note:
                 first = replace(first, messages=[*first.messages, f"{_LEFT_OUT}: {note}"])
     return Result(first, initial, comparison, observed, case.config, failures)
@@ -196,12 +196,13 @@ def judged(
 _LEFT_OUT = "Observability of the constants is left out"
 
 
-def _observability(tracker: Tracker, estimate: Estimate, progress: Progress) -> tuple[Identifiability | None, str]:
+def _observability(tracker: Tracker, estimate: Estimate) -> tuple[Identifiability | None, str]:
     """Observability of the constants in this recording, or why it is left out, which is no failure."""
     n_states = len(tracker.calibrated.names)
     if n_states > LARGEST_BENCH:
         return None, f"with {n_states} states it takes many minutes; use dynakin model --identifiability."
     try:
-        return identifiability(tracker, estimate, progress), ""
+        with stage("trying motions") as report:
+            return identifiability(tracker, estimate, report), ""
     except DynakinError as error:  # a trial of a few frames, say
         return None, error.message

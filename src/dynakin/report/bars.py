@@ -28,13 +28,14 @@ def value_bars(title: str, note: str, bars: Sequence[Bar], most: float, descript
     """One bar below the other in the order given; ``most`` fills the width."""
     row = 144
     left, right = _columns(bars)
-    parts = [
-        _text(left - _GAP, row * k + 72, bar.label, INK, "end")
-        + f'<path d="M{left} {row * k + 72}h{_length(bar.value / most if most else 0.0, left, right)}" '
-        f'stroke="{ESTIMATED}" stroke-width="90"/>'
-        + _text(left + _length(bar.value / most if most else 0.0, left, right) + 40, row * k + 72, bar.text, INK)
-        for k, bar in enumerate(bars)
-    ]
+    parts: list[str] = []
+    for k, bar in enumerate(bars):
+        own = _length(bar.value / most if most else 0.0, left, right)
+        parts += [
+            _text(left - _GAP, row * k + 72, bar.label, INK, "end"),
+            f'<path d="M{left} {row * k + 72}h{own}" stroke="{ESTIMATED}" stroke-width="90"/>',
+            _text(left + own + 40, row * k + 72, bar.text, INK),
+        ]
     return Panel(title, note, _svg(parts, row * len(bars), description))
 
 

@@ -39,6 +39,11 @@ def lag_frames(lag_s: float, rate_hz: float) -> int:
     return max(1, min(round(lag_s * rate_hz), int(LONGEST_LAG_S * rate_hz))) if lag_s > 0.0 else 0
 
 
+def frames_later(lag_s: float, rate_hz: float) -> int | None:
+    """`lag_frames`, and None for `ALL_FRAMES`."""
+    return None if lag_s == ALL_FRAMES else lag_frames(lag_s, rate_hz)
+
+
 def in_words(lag_s: float) -> str:
     """How each frame was estimated: "from all frames", "as it would be live", "as it would be live, 50 ms late"."""
     if lag_s == ALL_FRAMES:

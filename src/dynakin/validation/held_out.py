@@ -22,7 +22,7 @@ from dynakin.results.estimate import COMPONENTS, Estimate
 from dynakin.results.measures.fit import signal_fit
 from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.measures.tracking import why_lost, without_lost
-from dynakin.settings.lag import ALL_FRAMES, lag_frames
+from dynakin.settings.lag import frames_later
 from dynakin.settings.model import Bounds, Priors
 from dynakin.validation.freeze import final_values, freeze, initial_values
 from dynakin.validation.reference.inverse_dynamics import inverse_name, rigid_motions, usual_cutoffs
@@ -147,7 +147,7 @@ def predict_blind(identified: IdentifyingTrial, recording: Recording) -> Blind:
     found: dict[str, Array] = {}
     for preset in identified.estimates:
         lag_s, _ = known_lag(setup.lag_s, setup.noise[preset])
-        late = None if lag_s == ALL_FRAMES else lag_frames(lag_s, recording.rate)
+        late = frames_later(lag_s, recording.rate)
         for label, values in identified.constants(preset).items():
             method, estimator = f"EKF ({preset}), {label}", identified.estimator(preset)
             tracker = estimator.start(freeze(measured, values, coordinates))

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import wrapped
 from dynakin.bindings import _core
 
 Array = npt.NDArray[np.float64]
@@ -75,11 +76,6 @@ def joint_coordinates(
         fits += [fitted(_other_reading(q, turns)) for q, _ in fits]
     best = min(fits, key=rank)[0]
     return {c.name: float(value) for c, value in zip(free, best, strict=True)}
-
-
-def wrapped(angles: Array) -> Array:
-    """Within half a turn of zero."""
-    return np.asarray((angles + np.pi) % (2.0 * np.pi) - np.pi)
 
 
 def _other_reading(values: Array, turning: npt.NDArray[np.bool_]) -> Array:

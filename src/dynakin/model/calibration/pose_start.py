@@ -13,9 +13,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy.spatial.transform import Rotation
 
+from dynakin.arrays import wrapped
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
-from dynakin.model.calibration.joint_fit import joint_coordinates, wrapped
+from dynakin.model.calibration.joint_fit import joint_coordinates
 from dynakin.model.schema import Interval
 
 Array = npt.NDArray[np.float64]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dynakin.arrays import wrapped
 from dynakin.errors import ConfigError
 from dynakin.simulation.jets import Jet, polynomial
 from dynakin.simulation.mechanics import Motion, Segment, kinematics
@@ -83,7 +84,7 @@ def balanced_angle(tree: Sequence[Segment], path: PosturePath, levels: Array, ta
             "the table (a smaller spread, or another seed)"
         )
     angle = np.arctan2(c, b) - np.arccos(reach)
-    return np.asarray((angle + np.pi) % (2.0 * np.pi) - np.pi)
+    return wrapped(angle)
 
 
 def ankle_x(tree: Sequence[Segment]) -> float:
