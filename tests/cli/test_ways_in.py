@@ -83,7 +83,7 @@ def test_a_batch_gives_the_same_folder(trial: Path, saved: Path) -> None:
 def test_settings_and_a_recording_that_was_read_give_the_same(
     trial: Path, from_python: dynakin.Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(stages, "identifiability", lambda *_: None)
+    monkeypatch.setattr(stages, "identifiability", lambda *_, **__: None)
     recording = dynakin.read(trial / "markers.trc", forces=trial / "forces.mot")
     subject = dynakin.Subject(mass_kg=70.0, height_m=1.75)
     read = dynakin.run(recording, model="sagittal7", markers="opencap", subject=subject)

@@ -63,12 +63,9 @@ def model(
         export_model(definition, export, parameters, settings.mass_kg, trial, settings.forces)
         console.print(f"Written {export}", soft_wrap=True)
         return
-    if isinstance(definition, OpenSimDefinition):
-        if identifiable:
-            raise typer.BadParameter("--identifiability: expected a built-in model or a .toml file")
-        print_opensim(console, definition)
-        return
     if identifiable:
         print_identifiability(definition, trial, settings.forces)
-        return
-    print_model(console, definition)
+    elif isinstance(definition, OpenSimDefinition):
+        print_opensim(console, definition)
+    else:
+        print_model(console, definition)

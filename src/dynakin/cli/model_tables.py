@@ -138,14 +138,16 @@ def _states(model: ModelFile) -> Table:
     return rows
 
 
-def print_identifiability(definition: ModelDefinition, trial: Path | None, forces: Path | None) -> None:
+def print_identifiability(definition: Definition, trial: Path | None, forces: Path | None) -> None:
     """Structure of the model, by a simulated person where no trial is given; the trial's posterior where one is.
 
     Raises:
         DynakinError: model and trial do not fit.
     """
     if trial is None:
-        _print_structure(structure_of(tracker_of(definition)))
+        with stage("looking at what is observed"):
+            structure = structure_of(tracker_of(definition))
+        _print_structure(structure)
         return
     with stage("estimating") as progress:
         estimate, tracker = Estimator(definition).track(read(trial, forces), progress=progress)

@@ -23,9 +23,6 @@ from dynakin.settings.subject import Subject
 from dynakin.validation.case import Case, case_of
 from dynakin.validation.methods import Trial, estimate_each, trial_of, with_lost
 
-LARGEST_BENCH = 250
-"""States up to which a run also judges the observability of the constants: it filters a dozen motions more."""
-
 
 def run(
     trial: str | Path | Recording | Settings,
@@ -55,7 +52,7 @@ def run(
         noise: changes of the preset's noise settings, or all of them.
         output: folder for `Result.save`, which nothing is written into before.
         keep_lost: go on with a trial that was lost.
-        observability: whether to judge the observability of the constants; it takes longer than the estimate.
+        observability: whether to judge the observability of the constants.
         progress: called with (frames done, frames in all) now and then; not given: a terminal or a notebook shows
             how far it is, and how much time remains.
         settings: further keys of a configuration (`dynakin print-config` lists them), such as ``preset``, ``lag_s``.
@@ -198,11 +195,8 @@ _LEFT_OUT = "Observability of the constants is left out"
 
 def _observability(tracker: Tracker, estimate: Estimate) -> tuple[Identifiability | None, str]:
     """Observability of the constants in this recording, or why it is left out, which is no failure."""
-    n_states = len(tracker.calibrated.names)
-    if n_states > LARGEST_BENCH:
-        return None, f"with {n_states} states it takes many minutes; use dynakin model --identifiability."
     try:
-        with stage("trying motions") as report:
-            return identifiability(tracker, estimate, report), ""
+        with stage("looking at what is observed"):
+            return identifiability(tracker, estimate, motions=False), ""
     except DynakinError as error:  # a trial of a few frames, say
         return None, error.message

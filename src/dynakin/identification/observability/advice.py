@@ -52,22 +52,30 @@ def gains_of(
 
 def advice_in_words(
     bench: Bench,
-    tried: Sequence[Excitation],
+    tried: Sequence[Excitation] | None,
     gains: Mapping[str, Mapping[str, float]],
     shares: Mapping[str, float],
     alone: frozenset[str],
 ) -> list[str]:
-    """Sentences: each motion that would identify more, then what none identifies and why."""
+    """Sentences: each motion that would identify more, then what none identifies and why.
+
+    Args:
+        tried: None where no motion was.
+    """
     planar = is_planar([name for name in shares if name.startswith("inertia/")])
     said = []
-    for excitation in tried:
+    for excitation in tried or ():
         if excitation.name in gains:
             parts = [f"{_called(n, planar)} {f:.1f} times" for n, f in gains[excitation.name].items()]
             on_top = "" if excitation.name == "faster" else " on top of this movement"
             said.append(f"{sentence(excitation.words)}{on_top} would shrink standard deviations: {listed(parts, 6)}.")
     gained = {name for found in gains.values() for name in found}
     silent = [n for n, share in shares.items() if n.startswith("inertia/") and share >= NOTHING and n not in gained]
-    said += _silence(bench, silent, alone, planar)
+    sentences, rest = _still(bench, silent)
+    said += sentences
+    if tried is None:
+        return [*said, "dynakin model MODEL --identifiability --trial FILE tries movements that would help."]
+    said += _silence(rest, alone, planar)
     motions = [words(e.name) for e in tried if e.name != "faster"]
     left_out = [words(n) for n in bench.coordinates if n not in bench.grounded and words(n) not in motions]
     if left_out:
@@ -78,22 +86,27 @@ def advice_in_words(
     return said
 
 
-def _silence(bench: Bench, silent: list[str], alone: frozenset[str], planar: bool) -> list[str]:
-    """The numbers that neither the trial nor any motion identifies, by the reason."""
+def _still(bench: Bench, silent: list[str]) -> tuple[list[str], list[str]]:
+    """A sentence on each segment that does not move, and the numbers of all others."""
     said = []
     turned = turns(bench)
-    grounded = {s.name: s.parent == "ground" for s in bench.measured.initial.spec.segments}
     still = {s for s, deg in turned.items() if deg < STILL_DEG and any(element(n).owner == s for n in silent)}
     for segment in sorted(still, key=list(turned).index):
         numbers = [INERTIA[element(n).number] for n in silent if element(n).owner == segment]
-        why = "and no movement that leaves it there can identify them" if grounded[segment] else "it would have to"
+        stands = segment in bench.standing
+        why = "and no movement that leaves it there can identify them" if stands else "it would have to"
         said.append(
             f"The data say nothing about the {words(segment)}'s {listed(numbers, 10)}: it does not move (it turns by "
             f"{turned[segment]:.1f} deg), {why}."
         )
-    rest = [n for n in silent if element(n).owner not in still]
-    sums = [n for n in rest if n not in alone]
-    weak = [n for n in rest if n in alone]
+    return said, [n for n in silent if element(n).owner not in still]
+
+
+def _silence(silent: list[str], alone: frozenset[str], planar: bool) -> list[str]:
+    """The other numbers that neither the trial nor any motion identifies, by the reason."""
+    said = []
+    sums = [n for n in silent if n not in alone]
+    weak = [n for n in silent if n in alone]
     if sums:
         names = listed([_called(n, planar) for n in sums], 20)
         said.append(

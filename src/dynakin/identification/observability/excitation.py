@@ -1,23 +1,24 @@
-"""Which motion would identify more: the filter's own covariance on the trial's motion with something added to it.
+"""Which motion would identify more: the filter's own deviations after the trial's motion with something added to it.
 
-Nothing is drawn at random and nothing is fitted: exact measurements of a motion are put through the same filter from
-the same prior, and the covariance at its end is read. So a gain counts all that the filter does not know either
-(coordinates, soft tissue, slow errors of the plates), which the information matrix of the regressor alone leaves out:
-that one takes the motion for known and can promise twice too much (the arm's first moment of `squat7`, shoulder
-swinging: 8.5 times instead of 4.4).
+Nothing is drawn at random and nothing is fitted: from the same prior, with the same noise, least squares along the
+motion (`KnownMotion`) give the deviations that the filter would end with. So a gain counts all that the filter does not
+know either (coordinates, soft tissue, slow errors of the plates), which the information matrix of the regressor alone
+leaves out: that one takes the motion for known and can promise twice too much (the arm's first moment of `squat7`,
+shoulder swinging: 8.5 times instead of 4.4).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import numpy.typing as npt
 
 from dynakin.bindings import _core
-from dynakin.filter.core_filter import filter_settings
 from dynakin.filter.tracker import Tracker
+from dynakin.identification.observability.known_motion import Known, KnownMotion
 from dynakin.identification.observability.measured import MeasuredModel
 from dynakin.results.estimate import Estimate
 from dynakin.results.naming import words
@@ -51,7 +52,7 @@ class Excitation:
 
     Attributes:
         name: coordinate that is moved, or "faster". words: what to do.
-        sd: (n,) standard deviations after it.
+        sd: (n,) standard deviations after it, as `Bench.deviations` gives them.
     """
 
     name: str
@@ -59,16 +60,8 @@ class Excitation:
     sd: Array
 
 
-def _trusting(tracker: Tracker) -> _core.FilterSettings:
-    """The same filter without gates, bounds and recovery: what it is shown is exact, and no verdict on a single frame
-    shall decide between two motions."""
-    free = {"marker_gate": 0.0, "wrench_gate": 0.0, "recover": False, "constraint": "none", "iterate_beyond_sd": None}
-    noise = tracker.noise.changed(**free)
-    return filter_settings(tracker.calibrated, noise, tracker.core_model.layout, tracker.estimate)
-
-
 class Bench:
-    """The trial's motion and its filter, to try other motions on.
+    """The trial's motion, to try other motions in its place.
 
     Args:
         tracker, estimate: as `Estimator.track` gave them.
@@ -76,7 +69,6 @@ class Bench:
 
     def __init__(self, tracker: Tracker, estimate: Estimate) -> None:
         self.measured = MeasuredModel.of(tracker)
-        self.settings = _trusting(tracker)
         initial = tracker.calibrated
         self.coordinates = self.measured.names[self.measured.block("coordinates")]
         time = estimate.time
@@ -94,11 +86,19 @@ class Bench:
             self.constants[self.measured.block(block)] = 0.0
         at = [self.measured.block(block) for block in ("coordinates", "speeds", "accelerations")]
         self.trial = Motion(time[stretch] - time[first], *(state[stretch, block] for block in at))
+        self._tracker = tracker
         self.limits = (initial.lower[at[0]], initial.upper[at[0]])
         rotations = {name for name, kind in zip(estimate.coordinate_names, estimate.is_rotation(), strict=True) if kind}
         self.rotation = [name in rotations for name in self.coordinates]
         spec = initial.spec
-        self.grounded = {a.coordinate for s in spec.segments if s.parent == "ground" for a in s.axes}
+        parents = {segment.name: segment.parent for segment in spec.segments}
+        self.standing = set(initial.feet.values()) or {name for name, parent in parents.items() if parent == "ground"}
+        held = set(self.standing)  # what would move the feet: all between them and the root, and toes
+        for foot in self.standing:
+            while (foot := parents[foot]) != "ground":
+                held.add(foot)
+        held |= {name for name, parent in parents.items() if initial.feet and parent in self.standing}
+        self.grounded = {axis.coordinate for s in spec.segments if s.name in held for axis in s.axes}
         self.support = self._support()
         self.least_load = _LIGHTEST * abs(float(self.loads(self.trial)[0].mean()))
 
@@ -109,25 +109,19 @@ class Bench:
             states[:, self.measured.block(block)] = values
         return states
 
-    def covariance(self, *motions: Motion) -> Array:
-        """Covariance (n, n) of the filter after these motions, one after the other, measured as the trial was."""
-        P, first = self.measured.prior, 0
-        moving = slice(0, self.measured.block("lengths").start)
+    @cached_property
+    def _known(self) -> KnownMotion:
+        return KnownMotion(self._tracker, self.measured, float(np.median(np.diff(self.trial.time))))
+
+    def deviations(self, *motions: Motion) -> Array:
+        """Standard deviations (n,) after these motions, one after the other, measured as the trial was; NaN: skin and
+        contacts."""
+        known, first = [], 0
         for motion in motions:
-            states, end = self.states(motion), first + len(motion.time)
-            core = self.measured.core
-            markers = np.stack([_core.marker_positions(core, x) for x in states])
-            wrench = np.stack([_core.wrench(core, x) for x in states])
-            markers[self.missing[first:end]] = np.nan
-            wrench[self.blind[first:end]] = np.nan
-            if first:  # what moves is not known again; the constants are
-                P = P.copy()
-                P[moving] = P[:, moving] = 0.0
-                P[moving, moving] = self.measured.prior[moving, moving]
-            kalman = _core.Filter(core, self.settings, states[0], P)
-            kalman.run(np.ascontiguousarray(motion.time), markers, wrench)
-            P, first = kalman.covariance, end
-        return P
+            end = first + len(motion.time)
+            known.append(Known(self.states(motion), self.missing[first:end], self.blind[first:end]))
+            first = end
+        return self._known.deviations(*known)
 
     def loads(self, motion: Motion) -> tuple[Array, Array]:
         """Vertical force (T,) N and centre of pressure (T,) m, forward from the ground origin, of a motion."""
@@ -170,22 +164,22 @@ class Bench:
 
     def try_all(self, progress: Callable[[int, int], None] | None = None) -> tuple[Array, list[Excitation]]:
         """Standard deviations (n,) after the trial's own motion, and after each motion that is possible."""
-        now = np.sqrt(np.diag(self.covariance(self.trial)))
+        now = self.deviations(self.trial)
         found = []
         for k, name in enumerate(self.coordinates):
-            if name not in self.grounded and (tried := self._liveliest(k)) is not None:
-                found.append(Excitation(name, tried[0], np.sqrt(np.diag(self.covariance(tried[1])))))
+            if name not in self.grounded and (tried := self.liveliest(k)) is not None:
+                found.append(Excitation(name, tried[0], self.deviations(tried[1])))
             if progress is not None:
                 progress(k + 1, len(self.coordinates) + 1)
         for factor in FASTER:
             quick = self.faster(factor)
             if all(self.possible(motion) for motion in quick):
                 text = f"the same movement {factor:g} times as fast"
-                found.append(Excitation("faster", text, np.sqrt(np.diag(self.covariance(*quick)))))
+                found.append(Excitation("faster", text, self.deviations(*quick)))
                 break
         return now, found
 
-    def _liveliest(self, index: int) -> tuple[str, Motion] | None:
+    def liveliest(self, index: int) -> tuple[str, Motion] | None:
         """The first of the sinusoids of one coordinate that is possible, in words too."""
         turns = self.rotation[index]
         for size, frequency in ROTATIONS if turns else TRANSLATIONS:
@@ -200,8 +194,7 @@ class Bench:
         """From the rearmost to the foremost point of what stands on the ground, or as far as the trial's own centre of
         pressure goes, m forward from the ground origin."""
         spec = self.measured.initial.spec
-        grounded = {segment.name for segment in spec.segments if segment.parent == "ground"}
         places = _core.marker_positions(self.measured.core, self.states(self.trial)[0])
-        ends = [0.0, *(float(p[0]) for p, m in zip(places, spec.markers, strict=True) if m.segment in grounded)]
+        ends = [0.0, *(float(p[0]) for p, m in zip(places, spec.markers, strict=True) if m.segment in self.standing)]
         centre = self.loads(self.trial)[1]
         return min(*ends, float(centre.min())), max(*ends, float(centre.max()))

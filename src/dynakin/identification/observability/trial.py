@@ -2,21 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.filter.augment import variance_scales
 from dynakin.filter.tracker import Tracker
 from dynakin.identification.observability.advice import advice_in_words, gains_of
 from dynakin.identification.observability.base import base_of, base_spread
 from dynakin.identification.observability.excitation import Bench, Excitation
 from dynakin.identification.observability.structure import Structure, structure_of
+from dynakin.progress import Progress
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.posterior import judged, posterior_figures, share_of
-from dynakin.validation.reference.base_parameters import BaseParameters
+from dynakin.settings.noise import Noise
 
 Array = npt.NDArray[np.float64]
 
@@ -47,7 +48,8 @@ class Identifiability:
         structure: what the model's measurements can identify at all.
         condition: of the base parameters over the trial's motion.
         base: posterior of the base parameters. posterior: the block of `dynakin.results.measures.posterior`.
-        tried: motions that were tried in place of the trial's, gains: factors on standard deviations (motion -> name).
+        tried: motions that were tried in place of the trial's; None: none were to be. gains: factors on standard
+            deviations (motion -> name).
         advice: sentences.
     """
 
@@ -55,7 +57,7 @@ class Identifiability:
     condition: float
     base: tuple[BasePosterior, ...]
     posterior: dict[str, Any]
-    tried: tuple[Excitation, ...]
+    tried: tuple[Excitation, ...] | None
     gains: dict[str, dict[str, float]]
     advice: tuple[str, ...]
 
@@ -97,7 +99,7 @@ class Identifiability:
             "gauges": gauges,
             "excitation": {
                 "what": "factor by which a motion would shrink a standard deviation, each under its best motion",
-                "tried": {e.name: e.words for e in self.tried},
+                "tried": {e.name: e.words for e in self.tried or ()},
                 "gains": self.gains,
             },
             "advice": list(self.advice),
@@ -105,39 +107,46 @@ class Identifiability:
 
 
 def identifiability(
-    tracker: Tracker, estimate: Estimate, progress: Callable[[int, int], None] | None = None
+    tracker: Tracker, estimate: Estimate, progress: Progress | None = None, *, motions: bool = True
 ) -> Identifiability:
     """Posterior of a trial's constants against their prior, and movements that would identify more.
 
     Args:
         tracker, estimate: as `Estimator.track` gave them.
         progress: called with (motions tried, in all).
+        motions: whether to try any; all else follows from the estimate and the model alone.
     """
     structure, bench = structure_of(tracker), Bench(tracker, estimate)
     shares = {p.name: share for p in estimate.parameters if (share := share_of(p)) is not None}
-    now, tried = bench.try_all(progress)
-    ended = estimate.data["state_sd"].isel(time=-1).values
-    gains = gains_of(bench.measured.names, ended, now, tried, shares)
+    tried: list[Excitation] | None = None
+    gains: dict[str, dict[str, float]] = {}
+    if motions:
+        now, tried = bench.try_all(progress)
+        ended = np.sqrt(np.diag(estimate.data["final_covariance"].values))  # by the filter's own noise, as the bench
+        gains = gains_of(bench.measured.names, ended, now, tried, shares)
     states = bench.states(bench.trial)
     return Identifiability(
         structure=structure,
         condition=base_of(bench.measured, states[:: max(1, len(states) // _MOST_FRAMES)]).condition,
-        base=_base_posterior(structure.base, structure.base_in_words, estimate),
+        base=_base_posterior(structure, tracker.noise, estimate),
         posterior=posterior_figures(estimate),
-        tried=tuple(tried),
+        tried=None if tried is None else tuple(tried),
         gains=gains,
         advice=tuple(advice_in_words(bench, tried, gains, shares, structure.alone)),
     )
 
 
-def _base_posterior(base: BaseParameters, words: tuple[str, ...], estimate: Estimate) -> tuple[BasePosterior, ...]:
-    over = list(base.over)
+def _base_posterior(structure: Structure, noise: Noise, estimate: Estimate) -> tuple[BasePosterior, ...]:
+    base, over = structure.base, list(structure.base.over)
     values = base.K @ estimate.data["state"].isel(time=-1).sel(element=over).values
+    root = np.sqrt(variance_scales(over, noise))  # by the declared variances, as the constants' own deviations
     prior, after = (
-        base_spread(base, estimate.data[f"{when}_covariance"].sel(element=over, element_=over).values)
+        base_spread(
+            base, estimate.data[f"{when}_covariance"].sel(element=over, element_=over).values / np.outer(root, root)
+        )
         for when in ("initial", "final")
     )
     return tuple(
         BasePosterior(*entry[:2], *(float(number) for number in entry[2:]))
-        for entry in zip(base.names, words, values, prior, after, strict=True)
+        for entry in zip(base.names, structure.base_in_words, values, prior, after, strict=True)
     )

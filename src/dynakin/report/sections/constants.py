@@ -91,10 +91,11 @@ def observability_section(page: Page) -> Section | None:
         left = {title: rows for title, rows in groups.items() if title in ("Lengths", "Masses")}
         groups = left | {title: rows for title, rows in groups.items() if title == "Marker places"}
     right = {title: rows for title, rows in groups.items() if title not in left}
+    tried = bool(block.get("excitation", {}).get("tried"))
     parts = [
         Section(f"identifiability-{anchor}", title, text, notes=tuple(sentence(note) for note in notes))
         for anchor, title, text, notes in (
-            ("advice", "Movements that would help", _ADVICE, block.get("advice", [])),
+            ("advice", *(_TRIED if tried else _NOT_TRIED), block.get("advice", [])),
             ("gauges", "What no measurement observes", _GAUGES, block.get("gauges", {}).get("words", [])),
         )
         if notes
@@ -117,10 +118,12 @@ _BASE = (
     "The ground reaction depends on the segments’ inertia through these sums only: what leaves them as they are, no "
     "movement can identify."
 )
-_ADVICE = (
-    "Each motion was put through the same filter in place of this recording’s; a factor says how much smaller the "
-    "standard deviation would have ended."
+_TRIED = (
+    "Movements that would help",
+    "Each motion was looked at in place of this recording’s; a factor says how much smaller the standard deviation "
+    "would have ended.",
 )
+_NOT_TRIED = ("What the data leave open", "Why the data say nothing about these numbers.")
 _GAUGES = (
     "Along these directions constants and angles’ zeros can move against each other without any change in markers or "
     "plates. Only what is known beforehand holds them."
