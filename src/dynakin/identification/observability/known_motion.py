@@ -28,10 +28,10 @@ Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
 RATE_HZ = 10.0
-"""Frames a second: movements hold little above 2 Hz."""
+"""Frames a second: what is tried swings once a second."""
 JERK = 0.02
-"""Part of the jerk's density at that rate. Accelerations err at some 8 Hz, where the movement has nothing: all frames
-together average that out, few cannot. With less jerk they err more slowly, still faster than the movement."""
+"""Part of the jerk's density at that rate. Accelerations err faster than anything moves: all frames together average
+that out, few cannot. With less jerk they err more slowly, still faster than the movement."""
 
 
 class Known(NamedTuple):
