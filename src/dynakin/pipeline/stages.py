@@ -194,9 +194,10 @@ _LEFT_OUT = "Observability of the constants is left out"
 
 
 def _observability(tracker: Tracker, estimate: Estimate) -> tuple[Identifiability | None, str]:
-    """Observability of the constants in this recording, or why it is left out, which is no failure."""
+    """Observability of the constants in this recording, or why it is left out, which is no failure. Of a body that is
+    fixed nowhere no other movements are tried: that takes as long as the estimate of a short trial."""
     try:
-        with stage("looking at what is observed"):
-            return identifiability(tracker, estimate, motions=False), ""
+        with stage("looking at what is observed") as report:
+            return identifiability(tracker, estimate, report, motions=not tracker.calibrated.feet), ""
     except DynakinError as error:  # a trial of a few frames, say
         return None, error.message
