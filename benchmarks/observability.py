@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import sys
 import time
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
@@ -60,7 +61,7 @@ def main(model: str, trial: str, forces: str, mass_kg: str) -> None:
     print(f"{len(names)} states, {len(bench.trial.time)} frames, {len(motions) - 1} motions")
     print(f"a motion: {seconds[0]:.3f} s, the filter's pass {seconds[1]:.3f} s")
     known, expected = (values[0] / values[1:] for values in sd)
-    for low, high in zip(SIZES, SIZES[1:], strict=False):
+    for low, high in pairwise(SIZES):
         chosen = (expected >= low) & (expected < high)
         if chosen.any():
             least, middle, most = np.percentile((known / expected)[chosen], [0, 50, 100])
