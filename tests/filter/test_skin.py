@@ -57,11 +57,11 @@ def test_what_follows_a_joint_is_found_and_the_rest_is_not_touched(start: Tracke
     assert skin is not None
     found = skin.local_m[:, skin.columns == element][:, 0]
     wanted = arrays["state"][:, element] - arrays["state"][:, element].mean()
-    # a Bayesian line: noise of half the declared size, independent every 100 frames (twice 0.5 s), and a prior
+    # a Bayesian line: noise of half the declared size, independent every 30 frames (twice 0.15 s), and a prior
     # of the whole size
     q = arrays["state"][:, : start.core_model.layout.blocks["coordinates"][1]]
     knee = followed(q, start.calibrated)[:, list(start.core_model.layout.names).index("knee_angle_r")]
-    ridge = 100.0 * 0.5**2 / 1.0**2
+    ridge = 30.0 * 0.5**2 / 1.0**2
     np.testing.assert_allclose(found, wanted / (1.0 + ridge / (FRAMES * knee.var())), atol=1e-9)
     assert not skin.local_m[:, skin.columns != element].any()
     assert np.linalg.norm(skin.shift_m, axis=-1).max() == pytest.approx(np.abs(found).max())

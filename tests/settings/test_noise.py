@@ -37,7 +37,7 @@ DEFAULT: dict[str, Any] = {
     "soft_tissue_sd_fraction": 0.5,
     "soft_tissue_least_sd_m": 0.002,
     "soft_tissue_time_s": 6.0,
-    "floating_soft_tissue_time_s": 0.5,
+    "floating_soft_tissue_time_s": 0.15,
     "following_skin_fraction": 1.0,
     "marker_sd_m": 0.0007,
     "marker_variance_scale": 1.0,

@@ -142,7 +142,7 @@ def continuous_noise(initial: CalibratedModel, noise: Noise, layout: _core.State
         density[k] = whole * jerk[kinds[coordinate]] * (1.0 if group is None else noise.jerk_scale.get(group, 1.0))
     offset, size = layout.blocks["lengths"]
     density[offset : offset + size] = whole * noise.length_drift_density_m2_s
-    skin_s = soft_tissue_time_s(noise, floating=bool(initial.feet))
+    skin_s = soft_tissue_time_s(noise, initial)
     offset, size = layout.blocks["contacts"]
     decay[offset : offset + size], density[offset : offset + size] = 1.0 / CONTACT_TIME_S, whole * 2.0 / CONTACT_TIME_S
     for block, time in (("soft_tissue", skin_s), ("plates", noise.plate_time_s)):

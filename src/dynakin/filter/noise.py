@@ -62,11 +62,10 @@ def soft_tissue_sd(noise: Noise, declared_m: Array) -> Array:
     return np.where(sd < noise.soft_tissue_least_sd_m, 0.0, sd)
 
 
-def soft_tissue_time_s(noise: Noise, *, floating: bool) -> float:
+def soft_tissue_time_s(noise: Noise, initial: CalibratedModel) -> float:
     """Time constant of that displacement, of a model that is fixed in the ground or of a floating one."""
-    if floating and noise.floating_soft_tissue_time_s is not None:
-        return noise.floating_soft_tissue_time_s
-    return noise.soft_tissue_time_s
+    floating = noise.floating_soft_tissue_time_s if initial.feet else None
+    return initial.skin_lasts * (noise.soft_tissue_time_s if floating is None else floating)
 
 
 def marker_variance(initial: CalibratedModel, noise: Noise, estimate: Collection[Quantity] = QUANTITIES) -> Array:

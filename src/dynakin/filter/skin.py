@@ -84,7 +84,7 @@ def following_skin(tracker: Tracker, arrays: dict[str, Array], time: Array) -> F
     followed_by = np.nan_to_num(followed_by - followed_by[used].mean(axis=0))
     # the filter's displacements: independent every two time constants
     step_s = float(np.median(np.diff(time)))
-    independent = 2.0 * soft_tissue_time_s(noise, floating=True) / step_s
+    independent = 2.0 * soft_tissue_time_s(noise, calibrated) / step_s
     ridge = independent * (noise.soft_tissue_sd_fraction / noise.following_skin_fraction) ** 2
     local = np.zeros((len(time), *columns.shape))
     for k, chosen in enumerate(drives(spec, free).astype(bool)):

@@ -35,6 +35,8 @@ from dynakin.settings.strict import nearest, read_toml, validate
 from dynakin.settings.subject import Subject
 
 _FOLDER = resources.files("dynakin.model") / "builtin"
+_MODEL_M = 0.0015
+"""Standard deviation of a marker for what hinges and rigid segments that are found from markers get wrong in space."""
 
 
 def available_models() -> list[str]:
@@ -230,6 +232,7 @@ class ModelDefinition:
             table=in_layout(names, plan.table_values(), np.nan),
             marker_variance=np.array([site.variance for site in plan.sites]),
             soft_tissue_m=np.array([site.soft_tissue_m for site in plan.sites]),
+            unmodelled_m=_MODEL_M if plan.model.sided else 0.0,
             ground=rest.ground,
             plate_centre=first_centre_of_pressure(recording, rest.ground),
             recorded_markers=tuple(site.recorded for site in plan.sites),

@@ -167,6 +167,7 @@ def with_identified(initial: CalibratedModel, subject: IdentifiedSubject) -> Cal
             ]
         )
     spec.segments = segments
+    found = JointPrior(subject.batch.names, covariance)
     gain = "" if subject.held_out is None else f"; {subject.held_out.in_words()}"
     message = f"Identified inertial parameters are used, from {', '.join(subject.trials)}{gain}."
     return replace(
@@ -176,6 +177,6 @@ def with_identified(initial: CalibratedModel, subject: IdentifiedSubject) -> Cal
         sd0=sd0,
         lower=lower,
         upper=upper,
-        joint_prior=JointPrior(subject.batch.names, covariance),
+        joint_prior=found if initial.joint_prior is None else initial.joint_prior.with_known(found),
         messages=(*initial.messages, message),
     )

@@ -10,7 +10,7 @@ from scipy.linalg import block_diag
 
 from dynakin.model.inertia import INERTIA_NAMES, PLANAR_INERTIA, RigidBody
 from dynakin.model.schema import Interval, ModelFile, Segment
-from dynakin.model.state_priors import inertia_covariance, state_bounds, state_prior
+from dynakin.model.state_priors import cluster_covariance, inertia_covariance, state_bounds, state_prior
 from dynakin.settings.model import Bounds, Priors
 
 Array = npt.NDArray[np.float64]
@@ -85,10 +85,13 @@ class ModelPlan:
     def prior(self, priors: Priors) -> dict[str, float]:
         """Standard deviation of every element that a state can have, by the core's name of it."""
         names = [site.name for site in self.sites]
-        return state_prior(
+        sd = state_prior(
             self._kinds(), self.geometry.lengths, self._length_sd(), names, self.bodies, self.reach, priors,
             self.worn_kg(priors),
         )  # fmt: skip
+        if (together := self.joint_prior(priors)) is not None:
+            sd |= dict(zip(together[0], np.sqrt(np.diag(together[1])).tolist(), strict=True))
+        return sd
 
     def worn_kg(self, priors: Priors) -> float:
         """Standard deviation of what a segment may weigh more or less than in the table, whatever its size."""
@@ -96,12 +99,18 @@ class ModelPlan:
         return priors.worn_mass_sd_fraction * total if self.model.sided else 0.0
 
     def joint_prior(self, priors: Priors) -> tuple[tuple[str, ...], Array] | None:
-        """Names and covariance of the inertia of all segments, where what a segment weighs more changes all of it."""
-        worn_kg = self.worn_kg(priors)
-        if worn_kg == 0.0:
+        """Names and covariance of what is known together of models in space: the inertia of a segment, all of which
+        changes with what it weighs more, and the places of its markers, which were measured side by side."""
+        if not self.model.sided:
             return None
+        worn_kg = self.worn_kg(priors)
+        names = [f"inertia/{name}/{each}" for name in self.bodies for each in INERTIA_NAMES]
         blocks = [inertia_covariance(body, self.reach[name], priors, worn_kg) for name, body in self.bodies.items()]
-        return tuple(f"inertia/{name}/{each}" for name in self.bodies for each in INERTIA_NAMES), block_diag(*blocks)
+        for segment in dict.fromkeys(site.segment for site in self.sites):
+            own = [site for site in self.sites if site.segment == segment]
+            names += [f"marker/{site.name}/{axis}" for site in own for axis in "xyz"]
+            blocks.append(cluster_covariance(np.array([site.position for site in own]), priors))
+        return tuple(names), block_diag(*blocks)
 
     def bounds(self, bounds: Bounds, priors: Priors | None = None) -> dict[str, Interval]:
         """Bounds of (9) by the core's names; speeds and accelerations have none."""

@@ -91,6 +91,15 @@ def inertia_covariance(body: RigidBody, length: float, priors: Priors, worn_kg: 
     return np.asarray(np.diag(sd**2) + worn_kg**2 * np.outer(per_kg, per_kg))
 
 
+def cluster_covariance(places: Array, priors: Priors) -> Array:
+    """Prior covariance (3 M, 3 M) of the places (M, 3) of a segment's markers that were measured together: a shift and
+    a turn of all of them, and what each has of its own."""
+    shifts = np.tile(np.eye(3), (len(places), 1))
+    turns = np.cross(np.eye(3), (places - places.mean(axis=0))[:, None]).swapaxes(1, 2).reshape(-1, 3)
+    together = np.hstack([priors.cluster_shift_sd_m * shifts, np.deg2rad(priors.cluster_turn_sd_deg) * turns])
+    return np.asarray(together @ together.T + priors.cluster_marker_sd_m**2 * np.eye(len(shifts)))
+
+
 def inertia_prior(body: RigidBody, length: float, priors: Priors) -> dict[str, float]:
     """Standard deviation of each of the ten numbers, each by itself."""
     moment = priors.inertia_sd_fraction * max(float(np.trace(body.inertia)) / 2.0, 1e-12)

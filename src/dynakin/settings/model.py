@@ -58,6 +58,13 @@ class Priors(Strict, use_attribute_docstrings=True):
     """Local marker positions, measured while standing: the segment's frame hangs on the same landmarks, so one that is
     put elsewhere moves frame and places alike; what is left is the skin's shape at rest. Tried on simulated landmarks
     7 mm off: 4 to 10 mm do, the smaller the better. What skin and flesh do later is not part of it."""
+    cluster_shift_sd_m: Positive = 0.002
+    """Of built-in models in space: all markers of a segment together against the segment. What stands measured is how
+    they lie to each other; where the bone is among them is what landmarks miss."""
+    cluster_turn_sd_deg: Positive = 1.0
+    """The same, turned about their middle."""
+    cluster_marker_sd_m: Positive = 0.0005
+    """Of such models, a marker among the others of its segment, instead of `marker_sd_m`."""
     mass_sd_fraction: Positive = 0.10
     """Segment masses, of the table's value: half of the +-20 % of (9), so that the bound lies at two
     sigma."""

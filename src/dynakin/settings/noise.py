@@ -106,9 +106,10 @@ class Noise(Strict, use_attribute_docstrings=True):
     of its own: a foot is not as rigid, nor its toe as fixed in the ground, as a model has it."""
     soft_tissue_time_s: Seconds = scale(6.0, "s", "how long skin stays displaced")
     """Time constant of that displacement (first-order Gauss-Markov process)."""
-    floating_soft_tissue_time_s: Seconds | None = scale(0.5, "s", "how long skin stays displaced")
-    """The same for a model that is fixed nowhere; not given: as ``soft_tissue_time_s``. A step lasts half a second, and
-    skin that takes longer to come back looks like longer bones."""
+    floating_soft_tissue_time_s: Seconds | None = scale(0.15, "s", "how long skin stays displaced")
+    """The same for a model that is fixed nowhere; not given: as ``soft_tissue_time_s``. What markers show beside the
+    model goes with the movement, and skin that takes longer to come back looks like other bones. For an .osim it is
+    `CalibratedModel.skin_lasts` times as long."""
 
     following_skin_fraction: NotNegative = 1.0
     """Prior standard deviation of the displacement of skin that follows one joint to its end, of the declared size: it

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 import numpy.typing as npt
+from scipy.linalg import block_diag
 
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
@@ -29,6 +30,12 @@ class JointPrior:
 
     names: tuple[str, ...]
     covariance: Array
+
+    def with_known(self, other: JointPrior) -> JointPrior:
+        """With what is known otherwise of some of the elements, or of others."""
+        kept = [k for k, name in enumerate(self.names) if name not in other.names]
+        names = (*(self.names[k] for k in kept), *other.names)
+        return JointPrior(names, block_diag(self.covariance[np.ix_(kept, kept)], other.covariance))
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,6 +65,7 @@ class CalibratedModel:
         foot_markers: "right", "left" -> the recording's names of the markers on that foot.
         unmodelled_m: (M,) standard deviation of what neither a state nor the cameras explain of each marker; it is
             added to the noise of the cameras.
+        skin_lasts: how many times longer skin stays displaced than the noise settings say of any model.
         dimensionless: geometry parameters that are factors, not lengths.
         carried_kg: mass of the known loads (`model.calibration.loads`), not in ``mass_kg``.
         unmarked_kg: mass of the segments that no marker shows, and that hang still on their neighbours.
@@ -87,6 +95,7 @@ class CalibratedModel:
     feet: dict[str, str] = field(default_factory=dict)
     foot_markers: dict[str, list[str]] = field(default_factory=dict)
     unmodelled_m: Array | float = 0.0
+    skin_lasts: float = 1.0
     dimensionless: frozenset[str] = frozenset()
     carried_kg: float = 0.0
     unmarked_kg: float = 0.0

@@ -41,6 +41,9 @@ from dynakin.settings.subject import Subject
 _MODEL_M = 0.003
 """Standard deviation of a marker for what a generic skeleton, scaled, gets wrong of a person's joints: on `squats1` the
 normalised innovations are consistent with it (1.1), and far too large with the cameras' noise alone (1.9 to 18)."""
+_SKIN_LASTS = 10.0 / 3.0
+"""The skeleton's joints do not hang on the markers, so that what these show beside it is skin, which moves slowly:
+0.5 s with the default noise (`docs/validation.md`, What was tried)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,6 +202,7 @@ class OpenSimDefinition:
             feet=feet_of(source),
             foot_markers=on_feet,
             unmodelled_m=np.full(len(skin), _MODEL_M),
+            skin_lasts=_SKIN_LASTS,
             dimensionless=frozenset(lengths),
         )
 
