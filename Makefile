@@ -4,6 +4,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 OUT ?= out/demo
+LEVEL ?= v3
 CORE := $(shell find cpp/include cpp/src src/dynakin/bindings -name '*.?pp') CMakeLists.txt pyproject.toml \
   $(shell find src/dynakin -name __init__.py)  # a new package must be made known to the editable install
 CPP_TESTS := $(shell find cpp/tests -type f)
@@ -101,10 +102,10 @@ lint: $(VENV)/.dev
 	$(BIN)/clang-format --dry-run --Werror $$(find cpp examples/cpp src/dynakin/bindings -name '*.cpp' -o -name '*.hpp')
 
 bench: $(VENV)/.dev
-	$(BIN)/cmake -S . -B build/bench -G Ninja -DDYNAKIN_BENCH=ON -DPython_EXECUTABLE=$(CURDIR)/$(BIN)/python \
+	$(BIN)/cmake -S . -B build/bench -G Ninja -DDYNAKIN_BENCH=ON -DDYNAKIN_VECTOR=$(LEVEL) -DPython_EXECUTABLE=$(CURDIR)/$(BIN)/python \
 	  -DCMAKE_PREFIX_PATH="$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" >/dev/null
 	$(BIN)/cmake --build build/bench --target dynakin_bench >/dev/null
-	PYTHONPATH=build/bench $(BIN)/python benchmarks/step.py
+	DYNAKIN_VECTOR=$(LEVEL) PYTHONPATH=build/bench $(BIN)/python benchmarks/step.py
 
 peers: $(VENV)/.dev
 	$(BIN)/python -m pip install --quiet --no-build-isolation --editable ".[dev,peers]"

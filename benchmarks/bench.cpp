@@ -3,6 +3,7 @@
 #include <nanobind/eigen/dense.h>
 #include <nanobind/nanobind.h>
 #include <nanobind/ndarray.h>
+#include <nanobind/stl/string.h>
 #include <nanobind/stl/vector.h>
 
 #include <Eigen/Cholesky>
@@ -106,6 +107,10 @@ nb::tuple interleaved(Filter& filter, const Array1& time, const Array3& markers,
 }  // namespace
 
 NB_MODULE(dynakin_bench, m) {
+  const auto loaded = nb::cast<std::string>(nb::module_::import_("dynakin.bindings").attr("level"));
+  if (loaded != DYNAKIN_LEVEL)  // what the two hand each other is laid out by level
+    throw std::runtime_error("dynakin_bench is built for " DYNAKIN_LEVEL ", and the core that is loaded for " + loaded +
+                             ": set DYNAKIN_VECTOR=" DYNAKIN_LEVEL);
   m.def("smoothing_products", [](int d, int c, int rows, int times) {
     SmoothingProducts products(d, c, rows);
     std::vector<double> us;

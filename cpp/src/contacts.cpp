@@ -44,7 +44,7 @@ ContactMoments::ContactMoments(const Model& model, std::vector<int> segments)
   lever_.assign(segments_.size(), Lever::Zero(nc, 6));
   common_.setZero(nc, 6);
   wrench_J_.setZero(6, model.state_size());
-  wrench_JP_ = wrench_J_;
+  wrench_PJ_.setZero(model.state_size(), 6);
   J_.setZero(nc, model.state_size());
 }
 
@@ -161,10 +161,11 @@ void ContactMoments::deviations(const StateRef& x, const KinematicState& state, 
     }
     moments_sd[c] = std::sqrt(std::max(moments_sd[c], 0.0));
   }
-  wrench_JP_.setZero();
-  for (const int c : model_.wrench_columns()) wrench_JP_.noalias() += wrench_J_.col(c) * P.col(c).transpose();
+  wrench_PJ_.setZero();
+  for (const int c : model_.wrench_columns())
+    for (int k = 0; k < 6; ++k) wrench_PJ_.col(k) += wrench_J_(k, c) * P.col(c);
   Matrix6 needed = Matrix6::Zero();  // covariance of what the state needs
-  for (const int c : model_.wrench_columns()) needed.noalias() += wrench_JP_.col(c) * wrench_J_.col(c).transpose();
+  for (const int c : model_.wrench_columns()) needed.noalias() += wrench_J_.col(c) * wrench_PJ_.row(c);
   for (std::size_t k = 0; k < n; ++k) {
     Eigen::Map<Vector6> sd(wrench_sd + 6 * k);
     if (!touches(k)) {
@@ -173,7 +174,7 @@ void ContactMoments::deviations(const StateRef& x, const KinematicState& state, 
     }
     Matrix6 C = share_[k] * needed * share_[k].transpose() + block(k, k) - share_[k] * with_sum_[k].transpose();
     if (const int c = column(k); c != k_none) {
-      const Matrix6 own = effects(k), with_need = share_[k] * wrench_JP_.middleCols<6>(c) * own.transpose();
+      const Matrix6 own = effects(k), with_need = share_[k] * wrench_PJ_.middleRows<6>(c).transpose() * own.transpose();
       C += with_need + with_need.transpose() + own * P.block<6, 6>(c, c) * own.transpose();
     }
     sd = C.diagonal().cwiseMax(0.0).cwiseSqrt();

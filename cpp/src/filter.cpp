@@ -118,7 +118,8 @@ void Filter::constrain(StepReport& report) {
 }
 
 StepStatus Filter::check() const {
-  if (!state().allFinite() || !covariance().allFinite()) return StepStatus::not_finite;
+  // What is not finite off the diagonal of P - Z Z' is not finite on it.
+  if (!state().allFinite() || !covariance().diagonal().allFinite()) return StepStatus::not_finite;
   const double least = covariance().diagonal().minCoeff();
   const bool may_be_sure = settings_.equality.rows() > 0;  // of an element that an equality alone decides
   if (least < 0.0 || (least == 0.0 && !may_be_sure)) return StepStatus::variance_not_positive;

@@ -24,7 +24,7 @@ void FrameTape::clear() {
 }
 
 void FrameTape::add_chunk(const std::vector<RowBlock>& blocks, int first, int end,
-                          const Eigen::Ref<const Eigen::MatrixXd>& L, const Eigen::Ref<const Eigen::MatrixXd>& Z_chunk,
+                          const Eigen::Ref<const Eigen::MatrixXd>& L, const Panels& Z_rows, int first_row,
                           const Eigen::Ref<const Eigen::VectorXd>& w_chunk) {
   if (A.cols() == 0) return;
   const int from = rows();
@@ -38,7 +38,7 @@ void FrameTape::add_chunk(const std::vector<RowBlock>& blocks, int first, int en
       for (std::size_t c = 0; c < block.columns->size(); ++c) Ht((*block.columns)[c], at) = block.H(r, c);
   }
   L.transpose().triangularView<Eigen::Upper>().solveInPlace<Eigen::OnTheRight>(Ht);
-  Z.middleCols(from, count) = Z_chunk.transpose();
+  Z_rows.get(first_row, Z.middleCols(from, count));
   w.segment(from, count) = w_chunk;
   ends.push_back(from + count);
 }

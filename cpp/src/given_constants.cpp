@@ -9,7 +9,7 @@
 namespace dynakin {
 namespace {
 
-constexpr int k_chunk_rows = 48;
+constexpr int k_chunk_rows = 256;    // all rows of a frame, of all but a hundred markers
 constexpr double k_nothing = 1e-13;  // of a variance: what rounding leaves of one that is zero
 
 // A = C C' in place, of a covariance that may leave some combinations no variance: their columns of C are zero.
@@ -87,7 +87,9 @@ GivenConstants::GivenConstants(const Model& model, const FilterSettings& setting
   R_.setZero(6, max_rows);
   const int chunk = std::min(std::max(k_chunk_rows, 6), std::max(max_rows, 1));
   Zt_.setZero(chunk, d);
-  S_rows_.setZero(chunk, chunk);
+  Z_panels_ = Panels(d, chunk);
+  D_panels_ = Panels(c, chunk);
+  S_rows_.setZero(Z_panels_.max_columns(), chunk);
   Lambda_ = P_ = X_ = S_;
   Wt_ = Yt_ = Vt_;
   G_.setZero(d, chunk);
@@ -243,7 +245,7 @@ void GivenConstants::predict(const Eigen::MatrixXd& S, const Eigen::MatrixXd& Vt
 
 // Rows that nothing moving has a part in tell nothing that the constants do not hold already.
 void GivenConstants::gather(const std::vector<RowBlock>& blocks, Frame& frame) {
-  for (auto* of : {&frame.row_ends, &frame.columns, &frame.chunk_ends, &c_ends_, &c_columns_, &block_first_})
+  for (auto* of : {&frame.row_ends, &frame.columns, &frame.chunk_ends, &frame.block_first, &c_ends_, &c_columns_})
     of->clear();
   for (auto* of : {&frame.values, &c_values_, &innovation_}) of->clear();
   const bool elsewhere = frame.decided->linearised.size() > 0;
@@ -261,7 +263,6 @@ void GivenConstants::gather(const std::vector<RowBlock>& blocks, Frame& frame) {
       double v = block.v(r);
       for (std::size_t k = 0; k < columns.size(); ++k) {
         const double h = block.H(r, k);
-        if (h == 0.0) continue;
         const int column = columns[k], place = place_[column];
         if (elsewhere) v += h * (frame.decided->linearised(column) - frame.before(column));
         if (place >= 0) {
@@ -275,7 +276,7 @@ void GivenConstants::gather(const std::vector<RowBlock>& blocks, Frame& frame) {
       }
       for (int s = 0; s < block.rows; ++s) R_(s, frame.rows()) = block.R(s, r);
       innovation_.push_back(v);
-      block_first_.push_back(first);
+      frame.block_first.push_back(first);
       frame.row_ends.push_back(static_cast<int>(frame.columns.size()));
       c_ends_.push_back(static_cast<int>(c_columns_.size()));
     }
@@ -295,44 +296,55 @@ void GivenConstants::correct(int from, int end, Frame& frame) {
   auto Z = frame.Z.middleCols(from, rows);
   auto Dt = frame.Dt.middleCols(from, rows);
   auto w = frame.w.segment(from, rows);
-  Z.setZero();
-  Dt.setZero();
   for (int r = 0; r < rows; ++r) {
-    const int row = from + r;
-    double v = innovation_[row];
-    for (int k = row == 0 ? 0 : frame.row_ends[row - 1]; k < frame.row_ends[row]; ++k) {
-      const int j = frame.columns[k];
-      const double h = frame.values[k];
-      Z.col(r) += h * frame.S.col(j);
-      Dt.col(r) += h * frame.Vt.col(j);
-      v -= h * shift_(j);
-    }
-    for (int k = row == 0 ? 0 : c_ends_[row - 1]; k < c_ends_[row]; ++k) {
-      const int c = c_columns_[k];
-      Dt.col(r).head(c + 1) += c_values_[k] * Ct_.col(c).head(c + 1);
-    }
+    double v = innovation_[from + r];
+    for (int k = frame.begin(from + r); k < frame.row_ends[from + r]; ++k)
+      v -= frame.values[k] * shift_(frame.columns[k]);
     w(r) = v;
   }
+  // Rows of a block have the same columns.
+  for (int row = from; row < end;) {
+    const int first = frame.block_first[row], at = row - from;
+    int count = 1;
+    while (row + count < end && frame.block_first[row + count] == first) ++count;
+    const auto rows_of = [&](const std::vector<int>& ends, const std::vector<int>& columns,
+                             const std::vector<double>& values) {
+      const int begin = row == 0 ? 0 : ends[row - 1], size = ends[row] - begin;
+      return Panels::Rows{
+          {columns.data() + begin, static_cast<std::size_t>(size)}, values.data() + begin, count, size, 1};
+    };
+    const Panels::Rows H = rows_of(frame.row_ends, frame.columns, frame.values);
+    const Panels::Rows Hc = rows_of(c_ends_, c_columns_, c_values_);
+    for (Eigen::Index p = 0; p < Z_panels_.count(); ++p) Z_panels_.combine(p, at, H, frame.S);
+    for (Eigen::Index p = 0; p < D_panels_.count(); ++p) {
+      D_panels_.combine(p, at, H, frame.Vt);
+      D_panels_.combine(p, at, Hc, Ct_, true);
+    }
+    row += count;
+  }
   auto Zt = Zt_.topRows(rows);
-  Zt = Z.transpose();
+  Z_panels_.get_transposed(Zt);
   auto L = frame.L.block(0, from, rows, rows);
   auto S = S_rows_.topLeftCorner(rows, rows);
-  S.setZero();
   for (int r = 0; r < rows; ++r) {
-    const int row = from + r, first = block_first_[row];
-    for (int k = row == 0 ? 0 : frame.row_ends[row - 1]; k < frame.row_ends[row]; ++k)
-      S.col(r) += frame.values[k] * Zt.col(frame.columns[k]);
-    for (int other = first; other < end && block_first_[other] == first; ++other)
+    const int row = from + r, first = frame.block_first[row];
+    auto below = S.col(r).tail(rows - r);
+    below.setZero();
+    for (int k = frame.begin(row); k < frame.row_ends[row]; ++k)
+      below += frame.values[k] * Zt.col(frame.columns[k]).tail(rows - r);
+    for (int other = row; other < end && frame.block_first[other] == first; ++other)
       S(other - from, r) += R_(other - first, row);
   }
   L = S.triangularView<Eigen::Lower>();
   Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(L);
-  const auto upper = L.transpose().triangularView<Eigen::Upper>();
-  upper.solveInPlace<Eigen::OnTheRight>(Z);
-  if (constants() > 0) upper.solveInPlace<Eigen::OnTheRight>(Dt);
+  Z_panels_.divide(L, rows);
+  Z_panels_.get(0, Z);
+  if (constants() > 0) {
+    D_panels_.divide(L, rows);
+    D_panels_.get(0, Dt);
+  }
   L.triangularView<Eigen::Lower>().solveInPlace(w);
-  frame.S.selfadjointView<Eigen::Lower>().rankUpdate(Z, -1.0);
-  mirror_lower(frame.S);
+  Z_panels_.take_square(rows, frame.S);
   frame.Vt.noalias() -= Dt * Z.transpose();
   shift_.noalias() += Z * w;
 }
@@ -370,7 +382,7 @@ void GivenConstants::keep_equalities(Frame& frame) {
     }
     R_.col(row).setZero();
     innovation_.push_back(v);
-    block_first_.push_back(row);
+    frame.block_first.push_back(row);
     frame.row_ends.push_back(static_cast<int>(frame.columns.size()));
     c_ends_.push_back(static_cast<int>(c_columns_.size()));
     frame.chunk_ends.push_back(row + 1);
@@ -468,39 +480,60 @@ void GivenConstants::undo(const Frame& frame, const Frame* last) {
 // lambda - H' L^-T (w + Z' lambda), Lambda - H' B' - B H with B = (Lambda Z - H' L^-T T / 2) L^-1, T = 1 + Z' Lambda Z,
 // and of W' W' - (W' Z - D') L^-1 H.
 void GivenConstants::undo_chunk(const Frame& frame, int from, int end) {
-  const int rows = end - from, d = moving(), c = constants();
+  const int rows = end - from, c = constants();
   const auto Z = frame.Z.middleCols(from, rows);
   const auto L = frame.L.block(0, from, rows, rows).triangularView<Eigen::Lower>();
   auto y = T_.col(0).head(rows);
   y = frame.w.segment(from, rows);
   y.noalias() += Z.transpose() * lambda_;
   frame.L.block(0, from, rows, rows).transpose().triangularView<Eigen::Upper>().solveInPlace(y);
-  auto each = [&](int r, auto&& act) {
-    const int row = from + r;
-    for (int k = row == 0 ? 0 : frame.row_ends[row - 1]; k < frame.row_ends[row]; ++k)
-      act(frame.columns[k], frame.values[k]);
+  for (int r = 0; r < rows; ++r)
+    for (int k = frame.begin(from + r); k < frame.row_ends[from + r]; ++k)
+      lambda_(frame.columns[k]) -= frame.values[k] * y(r);
+  // out + sign * M H by columns; those of a block's rows are the same, so that three rows go in one pass.
+  const auto spread = [&](double sign, const auto& M, auto&& out) {
+    for (int row = from; row < end;) {
+      const int r = row - from, begin = frame.begin(row), size = frame.row_ends[row] - begin;
+      const bool three = row + 2 < end && frame.block_first[row + 2] == frame.block_first[row];
+      for (int k = 0; k < size; ++k) {
+        const double* const h = &frame.values[begin + k];
+        auto to = out.col(frame.columns[begin + k]);
+        if (three)
+          to += sign * h[0] * M.col(r) + sign * h[size] * M.col(r + 1) + sign * h[2 * size] * M.col(r + 2);
+        else
+          to += sign * h[0] * M.col(r);
+      }
+      row += three ? 3 : 1;
+    }
   };
-  for (int r = 0; r < rows; ++r) each(r, [&](int j, double h) { lambda_(j) -= h * y(r); });
   auto B = G_.leftCols(rows);
   auto T = T_.topLeftCorner(rows, rows);
   B.noalias() = Lambda_ * Z;
   T.noalias() = Z.transpose() * B;
   T.diagonal().array() += 1.0;
-  L.solveInPlace<Eigen::OnTheRight>(B);
+  auto U = S_rows_.topLeftCorner(rows, rows);
+  U = frame.L.block(0, from, rows, rows).transpose();
+  Z_panels_.set(B);
+  Z_panels_.divide_back(U, rows);
+  Z_panels_.get(0, B);
   L.solveInPlace<Eigen::OnTheRight>(T);
   frame.L.block(0, from, rows, rows).transpose().triangularView<Eigen::Upper>().solveInPlace(T);
   T *= 0.5;
-  for (int r = 0; r < rows; ++r) each(r, [&](int j, double h) { B.row(j).noalias() -= h * T.row(r); });
+  auto Bt = Zt_.topRows(rows);  // T is symmetric, and columns are read faster than rows
+  Bt = B.transpose();
+  spread(-1.0, T, Bt);
+  B = Bt.transpose();
   X_.setZero();
-  for (int r = 0; r < rows; ++r) each(r, [&](int j, double h) { X_.col(j) += h * B.col(r); });
-  for (int j = 0; j < d; ++j) Lambda_.col(j).tail(d - j) -= X_.col(j).tail(d - j) + X_.row(j).tail(d - j).transpose();
-  mirror_lower(Lambda_);
+  spread(1.0, B, X_);
+  add_both(-1.0, X_, Lambda_);
   if (c == 0) return;
   auto M = M_.topLeftCorner(c, rows);
   M = -frame.Dt.middleCols(from, rows);
   M.noalias() += Wt_ * Z;
-  L.solveInPlace<Eigen::OnTheRight>(M);
-  for (int r = 0; r < rows; ++r) each(r, [&](int j, double h) { Wt_.col(j) -= h * M.col(r); });
+  D_panels_.set(M);
+  D_panels_.divide_back(U, rows);
+  D_panels_.get(0, M);
+  spread(-1.0, M, Wt_);
 }
 
 // Lambda <- F' Lambda F, W <- F' W. With the frame before also P and V from all frames: F V = V + Q W and
@@ -561,8 +594,7 @@ void GivenConstants::undo_transition(const Transition& how, const Frame* last) {
     }
     auto M = M_.topLeftCorner(d, d);
     M.noalias() = last->S * X_;
-    for (int j = 0; j < d; ++j) P_.col(j).tail(d - j) += M.col(j).tail(d - j) + M.row(j).tail(d - j).transpose();
-    mirror_lower(P_);
+    add_both(1.0, M, P_);
   }
   rows_by_transposed(dt, n, lambda_);
   keep(lambda_, false);

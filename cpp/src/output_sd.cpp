@@ -9,14 +9,14 @@ namespace {
 // sqrt of row J P J', with the row's columns of P. Rounding may leave a variance of 0 below it.
 template <class Row>
 double deviation(const Row& row, const std::vector<int>& columns, const Eigen::MatrixXd& P,
-                 const std::vector<int>* slot) {
+                 const std::vector<int>& slot) {
   double variance = 0.0;
   for (const int c : columns) {
-    const double a = row(slot ? (*slot)[c] : c);
+    const double a = row(slot[c]);
     if (a == 0.0) continue;
     double sum = 0.0;
     const double* column = P.col(c).data();
-    for (const int d : columns) sum += column[d] * row(slot ? (*slot)[d] : d);
+    for (const int d : columns) sum += column[d] * row(slot[d]);
     variance += a * sum;
   }
   return std::sqrt(std::max(variance, 0.0));
@@ -30,7 +30,7 @@ RowVariances::RowVariances(Eigen::Index rows, Eigen::Index states) : columns_(st
   P_.setZero(states, states);
 }
 
-void RowVariances::operator()(const Eigen::MatrixXd& J, const Eigen::MatrixXd& P, double* out) {
+void RowVariances::operator()(const Eigen::Ref<const Eigen::MatrixXd>& J, const Eigen::MatrixXd& P, double* out) {
   Eigen::Index used = 0;
   for (Eigen::Index c = 0; c < J.cols(); ++c)
     if (!J.col(c).isZero(0.0)) columns_[used++] = c;
@@ -56,6 +56,7 @@ OutputDeviation::OutputDeviation(const Model& model)
     : model_(model),
       slot_(marker_column_slots(model)),
       work_(model),
+      wrench_variances_(6, model.state_size()),
       moment_variances_(static_cast<Eigen::Index>(model.coordinates().size()), model.state_size()) {
   std::size_t widest = 0;
   for (std::size_t m = 0; m < model.markers().size(); ++m)
@@ -70,14 +71,15 @@ void OutputDeviation::markers(const KinematicState& state, const Eigen::MatrixXd
     const auto& columns = model_.marker_columns(static_cast<int>(m));
     auto J = marker_J_.leftCols(static_cast<Eigen::Index>(columns.size()));
     marker_jacobian(model_, state, static_cast<int>(m), slot_[m], J);
-    for (int k = 0; k < 3; ++k) out[3 * m + k] = deviation(J.row(k), columns, P, &slot_[m]);
+    for (int k = 0; k < 3; ++k) out[3 * m + k] = deviation(J.row(k), columns, P, slot_[m]);
   }
 }
 
 void OutputDeviation::wrench(const KinematicState& state, const DynamicState& dynamics, const Eigen::MatrixXd& P,
                              double* out) {
   wrench_jacobian(model_, state, dynamics, wrench_J_);
-  for (int k = 0; k < 6; ++k) out[k] = deviation(wrench_J_.row(k), model_.wrench_columns(), P, nullptr);
+  wrench_variances_(wrench_J_, P, out);
+  for (int k = 0; k < 6; ++k) out[k] = std::sqrt(std::max(out[k], 0.0));
 }
 
 void OutputDeviation::moments(const StateRef& x, const KinematicState& state, const DynamicState& dynamics,

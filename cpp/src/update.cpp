@@ -1,84 +1,96 @@
 #include "dynakin/update.hpp"
 
+#include <Eigen/Cholesky>
+#include <algorithm>
 #include <cmath>
 
-#include "mirror.hpp"
-
 namespace dynakin {
+namespace {
 
-ChunkedUpdate::ChunkedUpdate(int state_size, int chunk_rows, int max_rows) : chunk_rows_(chunk_rows) {
-  const int capacity = std::min(std::max(chunk_rows, 6), std::max(max_rows, 1));  // a block is never split
-  PHt_.setZero(state_size, capacity);
-  Z_.setZero(capacity, state_size);
+using Eigen::Index;
+
+}  // namespace
+
+JointUpdate::JointUpdate(int state_size, int tape_rows, int max_rows)
+    : tape_rows_(tape_rows), Z_(state_size, std::max(max_rows, 1)) {
+  const Index capacity = Z_.max_columns();
+  HP_.setZero(capacity, state_size);
   S_.setZero(capacity, capacity);
   v_.setZero(capacity);
 }
 
-UpdateSums ChunkedUpdate::apply(const std::vector<RowBlock>& blocks, Eigen::MatrixXd& P, Eigen::VectorXd& dx) {
+UpdateSums JointUpdate::apply(const std::vector<RowBlock>& blocks, Eigen::MatrixXd& P, Eigen::VectorXd& dx) {
   dx.setZero();
   if (tape_) tape_->clear_chunks();
   UpdateSums sums;
-  const int n_blocks = static_cast<int>(blocks.size());
-  int first = 0;
-  while (first < n_blocks && sums.factored) {
-    int end = first, rows = 0;
-    while (end < n_blocks && (rows == 0 || rows + blocks[end].rows <= chunk_rows_)) rows += blocks[end++].rows;
-    if (rows > 0) apply_chunk(first, end, rows, blocks, P, dx, sums);
-    first = end;
+  for (const RowBlock& block : blocks) {
+    v_.segment(sums.rows, block.rows) = block.v.head(block.rows);
+    sums.rows += block.rows;
   }
+  const int rows = sums.rows;
+  if (rows == 0) return sums;
+  gather(blocks, P);
+  add_up(blocks, rows);
+  auto S = S_.topLeftCorner(rows, rows);
+  Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(S);  // in place; reads the lower triangle
+  if (llt.info() != Eigen::Success || !S.diagonal().allFinite()) {
+    sums.factored = false;
+    return sums;
+  }
+  auto v = v_.head(rows);
+  S.triangularView<Eigen::Lower>().solveInPlace(v);
+  Z_.divide(S, rows);
+  if (tape_) record(blocks);
+  Z_.take_square(rows, P);
+  Z_.add_product(v, dx);
+  sums.nis = v.squaredNorm();
+  sums.log_determinant = 2.0 * S.diagonal().array().log().sum();
   return sums;
 }
 
-void ChunkedUpdate::apply_chunk(int first_block, int end_block, int rows, const std::vector<RowBlock>& blocks,
-                                Eigen::MatrixXd& P, Eigen::VectorXd& dx, UpdateSums& sums) {
-  auto PHt = PHt_.leftCols(rows);
-  PHt.setZero();
-  int at = 0;
-  for (int b = first_block; b < end_block; ++b) {
-    const RowBlock& block = blocks[b];
-    const std::vector<int>& columns = *block.columns;
-    for (int r = 0; r < block.rows; ++r) {
-      double v = block.v(r);
-      for (std::size_t c = 0; c < columns.size(); ++c) {
-        const double h = block.H(r, c);
-        PHt.col(at + r) += h * P.col(columns[c]);
-        v -= h * dx(columns[c]);
-      }
-      v_(at + r) = v;
+// Z <- P H', panel by panel: each part of P is read from afar once.
+void JointUpdate::gather(const std::vector<RowBlock>& blocks, const Eigen::MatrixXd& P) {
+  for (Index p = 0; p < Z_.count(); ++p) {
+    Index at = 0;
+    for (const RowBlock& block : blocks) {
+      Z_.combine(p, at, {*block.columns, block.H.data(), block.rows, 1, block.H.outerStride()}, P);
+      at += block.rows;
     }
-    at += block.rows;
   }
+}
 
-  auto Z = Z_.topRows(rows);
-  Z = PHt.transpose();
+// S <- H P H' + R below its diagonal.
+void JointUpdate::add_up(const std::vector<RowBlock>& blocks, int rows) {
+  auto HP = HP_.topRows(rows);
+  Z_.get_transposed(HP);
   auto S = S_.topLeftCorner(rows, rows);
-  S.setZero();
-  at = 0;
-  for (int b = first_block; b < end_block; ++b) {
-    const RowBlock& block = blocks[b];
-    const std::vector<int>& columns = *block.columns;
-    for (int r = 0; r < block.rows; ++r)
-      for (std::size_t c = 0; c < columns.size(); ++c) S.col(at + r) += block.H(r, c) * Z.col(columns[c]);
+  int at = 0;
+  for (const RowBlock& block : blocks) {
+    const int below = rows - at;
+    for (int r = 0; r < block.rows; ++r) {
+      auto column = S.col(at + r).tail(below);
+      column.setZero();
+      for (std::size_t c = 0; c < block.columns->size(); ++c)
+        column += block.H(r, c) * HP.col((*block.columns)[c]).tail(below);
+    }
     S.block(at, at, block.rows, block.rows) += block.R.topLeftCorner(block.rows, block.rows);
     at += block.rows;
   }
+}
 
-  Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>> llt(S);  // in place; reads the lower triangle
-  if (llt.info() != Eigen::Success || !S.allFinite()) {
-    sums.factored = false;
-    return;
+// In chunks of rows as if they had been taken one after the other, which gives the same Z and w, and for L the blocks
+// on the diagonal of S's factor.
+void JointUpdate::record(const std::vector<RowBlock>& blocks) {
+  const int n_blocks = static_cast<int>(blocks.size());
+  int first = 0, from = 0;
+  while (first < n_blocks) {
+    int end = first, rows = 0;
+    while (end < n_blocks && (rows == 0 || rows + blocks[end].rows <= tape_rows_)) rows += blocks[end++].rows;
+    if (rows > 0)
+      tape_->add_chunk(blocks, first, end, S_.block(from, from, rows, rows), Z_, from, v_.segment(from, rows));
+    first = end;
+    from += rows;
   }
-  const auto L = S.triangularView<Eigen::Lower>();
-  L.solveInPlace(Z);
-  auto v = v_.head(rows);
-  L.solveInPlace(v);
-  if (tape_) tape_->add_chunk(blocks, first_block, end_block, S, Z, v);
-  P.selfadjointView<Eigen::Lower>().rankUpdate(Z.transpose(), -1.0);
-  mirror_lower(P);
-  dx.noalias() += Z.transpose() * v;
-  sums.rows += rows;
-  sums.nis += v.squaredNorm();
-  sums.log_determinant += 2.0 * S.diagonal().array().log().sum();
 }
 
 }  // namespace dynakin

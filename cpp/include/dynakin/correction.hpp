@@ -39,7 +39,7 @@ struct Correction {
   double uncertainty_seen() const;
   void note_linearised();
 
-  ChunkedUpdate update_;
+  JointUpdate update_;
 };
 
 }  // namespace dynakin

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "dynakin/measurement.hpp"
+#include "dynakin/panels.hpp"
 
 namespace dynakin {
 
@@ -17,9 +18,10 @@ struct FrameTape {
 
   void clear();                          // a new frame
   void clear_chunks() { ends.clear(); }  // an update begins anew: only its last linearisation counts
-  // After S = L L': Z = L^-1 H P and w = L^-1 v of the blocks from first to end - 1. A = L^-1 H is formed here.
+  // After S = L L': Z = P H' L^-T, in the panels' columns from `from` on, and w = L^-1 v of the blocks from first to
+  // end - 1. A = L^-1 H is formed here.
   void add_chunk(const std::vector<RowBlock>& blocks, int first, int end, const Eigen::Ref<const Eigen::MatrixXd>& L,
-                 const Eigen::Ref<const Eigen::MatrixXd>& Z, const Eigen::Ref<const Eigen::VectorXd>& w);
+                 const Panels& Z, int from, const Eigen::Ref<const Eigen::VectorXd>& w);
   // The row a x = b, known for sure, with Pa = P a and missing = b - a x.
   void add_equality(const Eigen::Ref<const Eigen::VectorXd, 0, Eigen::InnerStride<>>& a,
                     const Eigen::Ref<const Eigen::VectorXd>& Pa, double aPa, double missing);

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "dynakin/correction.hpp"
+#include "dynakin/panels.hpp"
 #include "dynakin/process.hpp"
 
 namespace dynakin {
@@ -43,10 +44,12 @@ class GivenConstants {
     // H over d by its entries, row after row. With S = L L' of a chunk: Z = S_before H' L^-T, Dt = (H_c C + H V)' L^-T,
     // w = L^-1 (innovation), a column or number a row; L stands beside its rows.
     std::vector<int> row_ends, columns, chunk_ends;
+    std::vector<int> block_first;  // of a row: the first of its block, whose rows all have the same columns
     std::vector<double> values;
     Eigen::MatrixXd Z, Dt, L;
     Eigen::VectorXd w;
     int rows() const { return static_cast<int>(row_ends.size()); }
+    int begin(int row) const { return row == 0 ? 0 : row_ends[row - 1]; }
   };
 
   GivenConstants(const Model& model, const FilterSettings& settings, int max_rows);
@@ -93,9 +96,10 @@ class GivenConstants {
   Eigen::MatrixXd S_, Vt_;
   Eigen::VectorXd shift_;  // (d,) m less the whole filter's mean
   // Of the present frame's rows.
-  std::vector<int> c_ends_, c_columns_, block_first_, block_ends_;
+  std::vector<int> c_ends_, c_columns_;
   std::vector<double> c_values_, innovation_;
   Eigen::MatrixXd R_, Zt_, S_rows_;  // R_: (6, rows)
+  Panels Z_panels_, D_panels_;
   // Backwards: the adjoints of m, S and V.
   Eigen::VectorXd lambda_;
   Eigen::MatrixXd Lambda_, Wt_;

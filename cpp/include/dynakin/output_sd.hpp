@@ -12,7 +12,7 @@ namespace dynakin {
 class RowVariances {
  public:
   RowVariances(Eigen::Index rows, Eigen::Index states);
-  void operator()(const Eigen::MatrixXd& J, const Eigen::MatrixXd& P, double* out);
+  void operator()(const Eigen::Ref<const Eigen::MatrixXd>& J, const Eigen::MatrixXd& P, double* out);
 
  private:
   std::vector<Eigen::Index> columns_;  // of J, those that are not zero
@@ -39,7 +39,7 @@ class OutputDeviation {
   Eigen::Matrix<double, 6, Eigen::Dynamic> wrench_J_;
   MomentWorkspace work_;
   Eigen::MatrixXd moment_J_;
-  RowVariances moment_variances_;
+  RowVariances wrench_variances_, moment_variances_;
 };
 
 }  // namespace dynakin

@@ -1,12 +1,12 @@
-// The measurement update by row blocks in chunks: the joint update of all rows, without ever forming it whole.
+// The measurement update: all rows at once, by row blocks, without ever forming H whole.
 #pragma once
 
-#include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <vector>
 
 #include "dynakin/frame_tape.hpp"
 #include "dynakin/measurement.hpp"
+#include "dynakin/panels.hpp"
 
 namespace dynakin {
 
@@ -14,27 +14,29 @@ struct UpdateSums {
   int rows = 0;
   double nis = 0.0;              // v' S^-1 v
   double log_determinant = 0.0;  // log det S
-  bool factored = true;          // false: S of some chunk was not positive definite
+  bool factored = true;          // false: S was not positive definite
 };
 
-class ChunkedUpdate {
+class JointUpdate {
  public:
-  ChunkedUpdate(int state_size, int chunk_rows, int max_rows);
+  // tape_rows: of a chunk on the tape, whose panels stay on the stack where they are undone.
+  JointUpdate(int state_size, int tape_rows, int max_rows);
 
   // Each update is also written to the tape, if there is one.
   void record_to(FrameTape* tape) { tape_ = tape; }
-  // H and v of all blocks belong to the same predicted state; dx gathers the correction, v of later chunks is lessened
-  // by H dx. The sums equal those of one joint update. P stays symmetric: its lower triangle is updated, then mirrored.
+  // H and v of all blocks belong to the same predicted state; dx is the correction. P stays symmetric to the bit. Where
+  // S is not positive definite nothing has changed but dx, which is zero.
   UpdateSums apply(const std::vector<RowBlock>& blocks, Eigen::MatrixXd& P, Eigen::VectorXd& dx);
 
  private:
-  void apply_chunk(int first_block, int end_block, int rows, const std::vector<RowBlock>& blocks, Eigen::MatrixXd& P,
-                   Eigen::VectorXd& dx, UpdateSums& sums);
+  void gather(const std::vector<RowBlock>& blocks, const Eigen::MatrixXd& P);
+  void add_up(const std::vector<RowBlock>& blocks, int rows);
+  void record(const std::vector<RowBlock>& blocks);
 
-  int chunk_rows_;
+  int tape_rows_;
   FrameTape* tape_ = nullptr;
-  Eigen::MatrixXd PHt_;  // (n, rows)
-  Eigen::MatrixXd Z_;    // (rows, n): H P, then L^-1 H P with S = L L'
+  Panels Z_;            // (n, rows) P H', then P H' L^-T with S = L L'
+  Eigen::MatrixXd HP_;  // (rows, n)
   Eigen::MatrixXd S_;
   Eigen::VectorXd v_;
 };

@@ -52,8 +52,8 @@ PyContactLoads contact_loads(std::vector<std::string> segments, const Array3& wr
   return out;
 }
 
-struct At {
-  At(const Model& model, const StateRef& x) : kinematics(model), dynamics(model) {
+struct AtFrames {
+  AtFrames(const Model& model, const StateRef& x) : kinematics(model), dynamics(model) {
     if (x.size() != model.state_size())
       throw std::invalid_argument("x: expected " + std::to_string(model.state_size()) + " numbers, found " +
                                   std::to_string(x.size()));
@@ -75,7 +75,7 @@ void check_frame(const PyContactLoads& loads, std::size_t frame) {
 
 nb::dict contact_moments(const Model& model, const StateRef& x, const PyContactLoads& loads, std::size_t frame,
                          const std::optional<Eigen::MatrixXd>& P) {
-  const At at(model, x);
+  const AtFrames at(model, x);
   check_frame(loads, frame);
   if (P && (P->rows() != x.size() || P->cols() != x.size()))
     throw std::invalid_argument("covariance: expected " + shape({std::size_t(x.size()), std::size_t(x.size())}));
@@ -121,7 +121,7 @@ nb::dict whole_body(const Model& model, const Array2& states, const std::vector<
       rotations(9 * ns * frames), loads(6 * ns * frames);
   {
     nb::gil_scoped_release release;
-    At at(model, Eigen::Map<const Eigen::VectorXd>(states.data(), frames ? static_cast<Eigen::Index>(n) : 0));
+    AtFrames at(model, Eigen::Map<const Eigen::VectorXd>(states.data(), frames ? static_cast<Eigen::Index>(n) : 0));
     std::vector<Force> external(ns), joints(ns);
     for (std::size_t k = 0; k < frames; ++k) {
       at.set(model, Eigen::Map<const Eigen::VectorXd>(states.data() + k * n, static_cast<Eigen::Index>(n)));

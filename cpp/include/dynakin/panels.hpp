@@ -1,0 +1,56 @@
+// A matrix of few columns in panels of rows, each of which stays in the cache: P - Z Z' in one pass over P, at the
+// speed of the processor's vectors, and nothing is allocated for it.
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+
+namespace dynakin {
+
+class Panels {
+ public:
+  static constexpr Eigen::Index height = 24;  // three of the widest vectors
+  static constexpr Eigen::Index width = 8;    // columns of one product
+
+  Panels() = default;
+  // Columns up to the next multiple of `width` can be written; panels end with rows of zero.
+  Panels(Eigen::Index rows, Eigen::Index max_columns)
+      : rows_(rows),
+        columns_((max_columns + width - 1) / width * width),
+        numbers_(Eigen::VectorXd::Zero((rows + height - 1) / height * height * columns_)) {}
+
+  Eigen::Index count() const { return columns_ == 0 ? 0 : numbers_.size() / (height * columns_); }
+  Eigen::Index max_columns() const { return columns_; }
+  // The rows from p height on: columns one after the other, `height` numbers each.
+  double* panel(Eigen::Index p) { return numbers_.data() + p * height * columns_; }
+  const double* panel(Eigen::Index p) const { return numbers_.data() + p * height * columns_; }
+
+  // A sensor's rows H, or some of them: `rows` of them, of entries h[r * row_step + k * column_step] at columns[k].
+  struct Rows {
+    std::span<const int> columns;
+    const double* h;
+    Eigen::Index rows, row_step, column_step;
+  };
+
+  // Columns of panel p from `at` on <- M H' (add: more of it), with M symmetric or whole, of as many rows as the
+  // panels.
+  void combine(Eigen::Index p, Eigen::Index at, const Rows& H, const Eigen::MatrixXd& M, bool add = false);
+  // Z, the first columns of the panels.
+  void set(const Eigen::Ref<const Eigen::MatrixXd>& Z);
+  void get(Eigen::Index from, Eigen::Ref<Eigen::MatrixXd> Z) const;  // Z's columns from there on
+  void get_transposed(Eigen::Ref<Eigen::MatrixXd> Zt) const;         // Z', as many rows of it
+  // Z <- Z L^-T, L (columns, columns) lower triangular, stored with max_columns() rows at least.
+  void divide(const Eigen::Ref<const Eigen::MatrixXd>& L, Eigen::Index columns);
+  // Z <- Z L^-1, of U = L' stored likewise.
+  void divide_back(const Eigen::Ref<const Eigen::MatrixXd>& U, Eigen::Index columns);
+  // x + Z w
+  void add_product(const Eigen::Ref<const Eigen::VectorXd>& w, Eigen::VectorXd& x) const;
+  // P - Z Z', symmetric to the bit; the lower triangle of P is read, both are written.
+  void take_square(Eigen::Index columns, Eigen::MatrixXd& P) const;
+
+ private:
+  Eigen::Index rows_ = 0, columns_ = 0;
+  Eigen::VectorXd numbers_;
+};
+
+}  // namespace dynakin

@@ -1,0 +1,56 @@
+"""Trials side by side give the same bits as one after the other: the core shares nothing between filters."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+import pytest
+
+import dynakin
+from dynakin.filter.prepared import Prepared
+from dynakin.simulation.trial import simulate
+from dynakin.studies.engine.pools import open_pool
+from dynakin.studies.engine.tasks import Task
+
+SUBJECT = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
+TRIALS = {f"{kind} {seed}": (kind, seed) for seed in (1, 2, 3) for kind in ("sagittal7", "fullbody")}
+TIMES = {"step_us", "backward_us"}
+
+
+@pytest.fixture(scope="module")
+def ready() -> dict[str, Prepared]:
+    found = {}
+    for name, (kind, seed) in TRIALS.items():
+        recording = simulate(kind, "squat", seed, 5.0).recording.window(1.0, 1.5)
+        markers = {"markers": "opencap"} if kind == "sagittal7" else {}
+        model = dynakin.load_model(kind, subject=SUBJECT, **markers)
+        found[name] = dynakin.Estimator(model).prepare(recording, lag_s=0.0)
+    return found
+
+
+def smoothed(ready: dict[str, Prepared], name: str) -> dict[str, np.ndarray]:
+    one = ready[name]
+    run = one.tracker.fresh().run_smoothed_arrays
+    return run(one.recording.time, one.markers, one.wrench, None, one.contacts)
+
+
+def by_executor(ready: dict[str, Prepared], threads: int) -> dict[str, dict[str, np.ndarray]]:
+    with ThreadPoolExecutor(threads) as pool:
+        return dict(zip(TRIALS, pool.map(lambda name: smoothed(ready, name), TRIALS), strict=True))
+
+
+def by_engine(ready: dict[str, Prepared], threads: int) -> dict[str, dict[str, np.ndarray]]:
+    with open_pool("threads", threads) as pool:
+        outcomes = list(pool.run(smoothed, ready, [Task(name, name) for name in TRIALS]))
+    assert all(outcome.failure is None for outcome in outcomes)
+    return {outcome.key: outcome.row for outcome in outcomes}
+
+
+@pytest.mark.parametrize("side_by_side", [by_executor, by_engine])
+def test_two_threads_give_the_bits_of_one(ready, side_by_side):
+    one, two = by_executor(ready, 1), side_by_side(ready, 2)
+    for name in TRIALS:
+        assert one[name].keys() == two[name].keys()
+        for array in one[name].keys() - TIMES:
+            assert one[name][array].tobytes() == two[name][array].tobytes(), (name, array)
