@@ -19,7 +19,7 @@ import argparse
 import json
 import pickle
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, astuple, dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 
@@ -177,7 +177,8 @@ def figures(run: Run, sizes: Sizes | None) -> dict[str, tuple[float, ...]]:
     for title, block, places in groups_of(run):
         e, variance = run.error[block][:, places], run.own[block][:, places] ** 2
         if sizes is not None:
-            variance = variance + sum(getattr(sizes, k) ** 2 * run.parts[k][block][:, places] for k in KINDS)
+            added = sum(getattr(sizes, k) ** 2 * run.parts[k][block][:, places] for k in KINDS)
+            variance = (sizes.own_moments if block == "moments" else sizes.own_motion) ** 2 * variance + added
         sd = np.sqrt(variance)
         if block == "coordinates":
             e = e - np.nanmean(e, axis=0)
@@ -222,7 +223,7 @@ def tell(runs: Sequence[Run], sizes: dict[str, Sizes]) -> None:
 
 def choose(runs: Sequence[Run], kind: str, start: dict[str, Sizes]) -> Sizes:
     """Sizes of one kind of model for which groups lie nearest to 94 % and 1.3, and none is far off."""
-    first = np.log([getattr(start[kind], k) for k in KINDS])
+    first = np.log(astuple(start[kind]))
     mine = [run for run in runs if run.sizes == kind]
 
     def loss(theta: Array) -> float:

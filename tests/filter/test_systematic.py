@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -207,7 +208,7 @@ def test_reported_deviations_hold_both_parts_and_a_scale_of_zero_leaves_the_filt
     subject = Systematic(calibrated(), Noise(), Sizes(*SIZES))
     x = np.r_[Q, QD, QDD]
     own = {block: np.full(10, 0.02) for block in ("coordinates", "speeds", "accelerations", "moments")}
-    both = subject.added(own, x, CONTACT[None], ["shank"])
+    both = subject.added(own, x, CONTACT[None], ["shank"], late=True)
     external = np.zeros((3, 6))
     external[2] = CONTACT
     parts = subject.parts(Q, QD, QDD, external)
@@ -215,6 +216,11 @@ def test_reported_deviations_hold_both_parts_and_a_scale_of_zero_leaves_the_filt
     for block, sd in both.items():
         total = 0.02**2 + sum(sizes[kind] ** 2 * parts[kind][block] for kind in KINDS)
         np.testing.assert_allclose(sd, np.sqrt(total))
+    wider = Systematic(calibrated(), Noise(), replace(subject.sizes, own_motion=2.0, own_moments=3.0))
+    for late, factors in ((True, (2.0, 3.0)), (False, (1.0, 1.0))):  # at once the filter's own stay
+        found = wider.added(own, x, CONTACT[None], ["shank"], late=late)
+        for block, factor in zip(("speeds", "moments"), factors, strict=True):
+            np.testing.assert_allclose(found[block] ** 2 - both[block] ** 2, (factor**2 - 1.0) * 0.02**2, atol=1e-12)
     nothing = subject.sizes.scaled(0.0)
-    none = Systematic(calibrated(), Noise(), nothing).added(own, x, CONTACT[None], ["shank"])
+    none = Systematic(calibrated(), Noise(), nothing).added(own, x, CONTACT[None], ["shank"], late=True)
     np.testing.assert_allclose(none["moments"], 0.02)

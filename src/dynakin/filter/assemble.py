@@ -99,7 +99,7 @@ def assemble(
     }
     events = events_of(data, parameters, initial, limit_sd(used, used.unseen_sd))  # by what the filter itself believes
     if systematic is not None:
-        data = systematic.added_over_time(data)
+        data = systematic.added_over_time(data, late=bool(config.get("lag_s")))
     estimate = Estimate(
         data=data,
         parameters=parameters,

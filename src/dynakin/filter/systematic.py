@@ -8,7 +8,7 @@ is reported is worked out afterwards and added to the filter's own variances ([d
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import astuple, dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
@@ -35,6 +35,9 @@ class Sizes:
         hinge_centre, ball_centre: m, of the centre of a joint with one or two axes (knee, ankle), with three (hip).
         hinge_axes, ball_axes: rad, of the turn of its axes. root: rad, of the turn of the pelvis' frame in the pelvis.
         skin: of the displacement of a marker that follows a joint's angle, as a fraction of the declared size.
+        own_motion, own_moments: factors on the filter's own deviations of what later frames helped to estimate. What
+            shows beside a model that is found from markers lasts and is shared by them, so that frames tell less than
+            the filter counts; a scaled skeleton leaves less at the root than the declared residual.
     """
 
     hinge_centre: float
@@ -43,15 +46,19 @@ class Sizes:
     ball_axes: float
     root: float
     skin: float
+    own_motion: float = 1.0
+    own_moments: float = 1.0
 
     def scaled(self, factor: float) -> Sizes:
-        """All of them times a factor."""
-        return Sizes(*(factor * value for value in astuple(self)))
+        """The errors times a factor."""
+        return replace(self, **{kind: factor * getattr(self, kind) for kind in KINDS})
 
 
-LANDMARKS = Sizes(0.006, 0.003, np.radians(2.0), np.radians(0.8), np.radians(1.2), 0.15)
+LANDMARKS = Sizes(
+    0.005, 0.003, np.radians(2.0), np.radians(0.8), np.radians(1.2), 0.15, own_motion=1.6, own_moments=1.6
+)
 """Joints that are found from markers on the skin."""
-SCALED = Sizes(0.002, 0.0016, np.radians(1.2), np.radians(0.8), np.radians(1.0), 0.095)
+SCALED = Sizes(0.002, 0.0016, np.radians(1.2), np.radians(0.8), np.radians(1.0), 0.095, 1.0, 0.55)
 """Joints of a skeleton that was scaled to the person (.osim)."""
 
 
@@ -220,23 +227,32 @@ class Systematic:
             for block in BLOCKS
         }
 
-    def added(self, found: Mapping[str, Array], x: Array, wrench: Array, segments: Sequence[str]) -> dict[str, Array]:
+    def added(
+        self, found: Mapping[str, Array], x: Array, wrench: Array, segments: Sequence[str], *, late: bool
+    ) -> dict[str, Array]:
         """The filter's standard deviations of one frame (block -> (C,)) with these errors.
 
         Args:
-            x: (n,) state. wrench: (F, 6) of the contacts on these segments.
+            x: (n,) state. wrench: (F, 6) of the contacts on these segments. late: whether later frames helped.
         """
-        variances = self.variances(self._at(x, wrench, segments))
-        return {block: np.hypot(found[block], np.sqrt(variances[block])) for block in BLOCKS}
+        variances, own = self.variances(self._at(x, wrench, segments)), self._own(late)
+        return {block: np.hypot(own[block] * found[block], np.sqrt(variances[block])) for block in BLOCKS}
 
-    def added_over_time(self, data: xr.Dataset) -> xr.Dataset:
+    def added_over_time(self, data: xr.Dataset, *, late: bool) -> xr.Dataset:
         """The same of a recording: ``data`` with other ``coordinates_sd`` ... ``moments_sd``."""
         variances = self.variances(self.over_time(data))
         order = ("time", "coordinate")
         sd = {f"{block}_sd": data[f"{block}_sd"].transpose(*order).values for block in BLOCKS}
+        own = self._own(late)
         return data.assign(
-            {name: (order, np.hypot(sd[name], np.sqrt(variances[name.removesuffix("_sd")]))) for name in sd}
+            {f"{b}_sd": (order, np.hypot(own[b] * sd[f"{b}_sd"], np.sqrt(variances[b]))) for b in BLOCKS}
         )
+
+    def _own(self, late: bool) -> dict[str, float]:
+        """By block the factor on the filter's own deviations."""
+        if not late:
+            return dict.fromkeys(BLOCKS, 1.0)
+        return dict.fromkeys(BLOCKS, self.sizes.own_motion) | {"moments": self.sizes.own_moments}
 
 
 def _differences(values: list[Array]) -> tuple[Array, Array, Array]:

@@ -195,7 +195,7 @@ class Tracker:
         """
         state, covariance = self.state, self.covariance
         step = self._stepped[-1] if self._stepped else None
-        if delayed and self._with_lag().ready:
+        if late := delayed and self._with_lag().ready:
             lag = self._with_lag()
             step, state, covariance = self._delayed_step(lag), lag.state, lag.covariance
         loads = step and step.loads
@@ -207,7 +207,7 @@ class Tracker:
             wrench = np.zeros((0, 6))
             if loads is not None:
                 wrench = _core.contact_moments(self.core_model, state, loads)["foot_wrench"]
-            found |= self.systematic.added(found, state, wrench, () if step is None else step.segments)
+            found |= self.systematic.added(found, state, wrench, () if step is None else step.segments, late=late)
         if step is not None:
             found["moments"] = np.where(step.sources == ABSENT, np.nan, found["moments"])
         return {name: Labelled(values, self._labels.on(name)) for name, values in found.items()}
