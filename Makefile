@@ -4,7 +4,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 OUT ?= out/demo
-LEVEL ?= v3
+LEVEL ?= $(if $(filter x86_64 amd64,$(shell uname -m)),v3,baseline)
 CORE := $(shell find cpp/include cpp/src src/dynakin/bindings -name '*.?pp') CMakeLists.txt pyproject.toml \
   $(shell find src/dynakin -name __init__.py)  # a new package must be made known to the editable install
 CPP_TESTS := $(shell find cpp/tests -type f)

@@ -35,8 +35,7 @@ def test_distances_within_a_cluster_are_known() -> None:
     row = np.concatenate([between, -between, np.zeros(3)])
     assert np.sqrt(row @ found @ row) == pytest.approx(np.sqrt(2.0) * priors.cluster_marker_sd_m)
     alone = cluster_covariance(PLACES[:1], priors)
-    own = np.hypot(priors.cluster_shift_sd_m, priors.cluster_marker_sd_m)
-    np.testing.assert_allclose(alone, own**2 * np.eye(3))
+    np.testing.assert_allclose(alone, priors.marker_sd_m**2 * np.eye(3))
 
 
 def test_the_filter_starts_from_it() -> None:

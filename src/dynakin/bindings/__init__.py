@@ -30,15 +30,16 @@ def _chosen(asked: str | None) -> str:
                 "build it with: pip install --config-settings=cmake.define.DYNAKIN_LEVELS=baseline ."
             )
         return runs[0]
+    asked = asked.removeprefix("x86-64-")
     if asked not in _LEVELS:
         raise ConfigError(f"DYNAKIN_VECTOR is {asked!r}, expected {_listed(_LEVELS)}, or nothing for the widest")
+    if not _cpu.has(asked):
+        raise ConfigError(f"DYNAKIN_VECTOR is {asked!r}, which this processor lacks, expected {_listed(runs)}")
     if asked not in built:
         raise ConfigError(
             f"DYNAKIN_VECTOR is {asked!r}, for which this dynakin was not built (it was for {_listed(built)}); "
             f"build it with: pip install --config-settings=cmake.define.DYNAKIN_LEVELS={asked} ."
         )
-    if asked not in runs:
-        raise ConfigError(f"DYNAKIN_VECTOR is {asked!r}, which this processor lacks, expected {_listed(runs)}")
     return asked
 
 

@@ -65,7 +65,7 @@ def soft_tissue_sd(noise: Noise, declared_m: Array) -> Array:
 def soft_tissue_time_s(noise: Noise, initial: CalibratedModel) -> float:
     """Time constant of that displacement, of a model that is fixed in the ground or of a floating one."""
     floating = noise.floating_soft_tissue_time_s if initial.feet else None
-    return initial.skin_lasts * (noise.soft_tissue_time_s if floating is None else floating)
+    return noise.soft_tissue_time_s if floating is None else initial.skin_lasts * floating
 
 
 def marker_variance(initial: CalibratedModel, noise: Noise, estimate: Collection[Quantity] = QUANTITIES) -> Array:

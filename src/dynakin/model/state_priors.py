@@ -93,7 +93,9 @@ def inertia_covariance(body: RigidBody, length: float, priors: Priors, worn_kg: 
 
 def cluster_covariance(places: Array, priors: Priors) -> Array:
     """Prior covariance (3 M, 3 M) of the places (M, 3) of a segment's markers that were measured together: a shift and
-    a turn of all of them, and what each has of its own."""
+    a turn of all of them, and what each has of its own; of one alone as of any marker."""
+    if len(places) == 1:
+        return np.asarray(priors.marker_sd_m**2 * np.eye(3))
     shifts = np.tile(np.eye(3), (len(places), 1))
     turns = np.cross(np.eye(3), (places - places.mean(axis=0))[:, None]).swapaxes(1, 2).reshape(-1, 3)
     together = np.hstack([priors.cluster_shift_sd_m * shifts, np.deg2rad(priors.cluster_turn_sd_deg) * turns])

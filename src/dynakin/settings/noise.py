@@ -109,7 +109,7 @@ class Noise(Strict, use_attribute_docstrings=True):
     floating_soft_tissue_time_s: Seconds | None = scale(0.15, "s", "how long skin stays displaced")
     """The same for a model that is fixed nowhere; not given: as ``soft_tissue_time_s``. What markers show beside the
     model goes with the movement, and skin that takes longer to come back looks like other bones. For an .osim it is
-    `CalibratedModel.skin_lasts` times as long."""
+    10/3 times as long."""
 
     following_skin_fraction: NotNegative = 1.0
     """Prior standard deviation of the displacement of skin that follows one joint to its end, of the declared size: it

@@ -98,7 +98,7 @@ def test_skin_is_eliminated(tracker: Tracker) -> None:
 def test_few_frames_show_as_much_as_all(tracker: Tracker) -> None:
     """What a livelier motion gains is what the filter gains at 100 Hz."""
     measured, time = MeasuredModel.of(tracker), np.arange(200) / 100.0
-    motions = [swinging(measured, time, lively=lively) for lively in (0.1, 1.0)]
+    motions = [swinging(measured, time, lively=lively) for lively in (0.1, 2.0)]
     known = KnownMotion(tracker, measured, 0.01)
     quiet, lively = (known.deviations(motion) for motion in motions)
     all_quiet, all_lively = (filtered(tracker, time, motion) for motion in motions)

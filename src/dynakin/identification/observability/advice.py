@@ -19,7 +19,7 @@ Array = npt.NDArray[np.float64]
 GAIN = 1.25
 """Least factor on a standard deviation that is worth saying: a third of the variance."""
 REPEATED = 0.15
-"""Part by which the trial's own motion, measured exactly, may miss the standard deviation that the trial ended with."""
+"""Part by which least squares along the trial's own motion may miss the deviation that the trial ended with."""
 STILL_DEG = 5.0
 """A segment that turns by less over the trial does not move: soft tissue alone makes it seem to turn that far."""
 
@@ -30,7 +30,7 @@ def gains_of(
     """Factors by which the standard deviation of what is not known yet would shrink, by motion.
 
     Args:
-        ended: (n,) standard deviations that the trial ended with. now: (n,) those of its own motion, measured exactly;
+        ended: (n,) standard deviations that the trial ended with. now: (n,) those of its own motion, by least squares;
             what the two disagree on depends on the path that the estimate took, and nothing is promised of it.
         shares: posterior over prior of each constant.
 
@@ -73,11 +73,13 @@ def advice_in_words(
     silent = [n for n, share in shares.items() if n.startswith("inertia/") and share >= NOTHING and n not in gained]
     sentences, rest = _still(bench, silent)
     said += sentences
+    said += _silence(rest, alone, planar, bool(tried))
     if tried is None:
-        return [*said, "dynakin model MODEL --identifiability --trial FILE tries movements that would help."]
-    said += _silence(rest, alone, planar)
+        return [*said, "Movements that would help are found by: dynakin model MODEL --identifiability --trial FILE."]
     motions = [words(e.name) for e in tried if e.name != "faster"]
     left_out = [words(n) for n in bench.coordinates if n not in bench.grounded and words(n) not in motions]
+    if not any(name not in bench.grounded for name in bench.coordinates):
+        said.append("No movement could be tried: all that the markers show would move the feet.")
     if left_out:
         said.append(
             f"Not tried, because even ± 5 deg on top would take a joint to its limit or the person off balance: "
@@ -102,7 +104,7 @@ def _still(bench: Bench, silent: list[str]) -> tuple[list[str], list[str]]:
     return said, [n for n in silent if element(n).owner not in still]
 
 
-def _silence(silent: list[str], alone: frozenset[str], planar: bool) -> list[str]:
+def _silence(silent: list[str], alone: frozenset[str], planar: bool, tried: bool) -> list[str]:
     """The other numbers that neither the trial nor any motion identifies, by the reason."""
     said = []
     sums = [n for n in silent if n not in alone]
@@ -113,7 +115,7 @@ def _silence(silent: list[str], alone: frozenset[str], planar: bool) -> list[str
             f"The data say nothing about {names} by themselves, and no movement can: a mass at a joint may belong to "
             "either neighbour, so only sums with what they carry (base parameters) act on the ground."
         )
-    if weak:
+    if weak and tried:
         names = listed([_called(n, planar) for n in weak], 20)
         said.append(f"The data say nothing about {names}, and none of the movements tried would help much.")
     return said

@@ -111,7 +111,8 @@ class Bench:
 
     @cached_property
     def _known(self) -> KnownMotion:
-        return KnownMotion(self._tracker, self.measured, float(np.median(np.diff(self.trial.time))))
+        steps = np.diff(self.trial.time)
+        return KnownMotion(self._tracker, self.measured, float(np.median(steps)) if len(steps) else 1.0)
 
     def deviations(self, *motions: Motion) -> Array:
         """Standard deviations (n,) after these motions, one after the other, measured as the trial was; NaN: skin and

@@ -99,7 +99,7 @@ class Identifiability:
             "gauges": gauges,
             "excitation": {
                 "what": "factor by which a motion would shrink a standard deviation, each under its best motion",
-                "tried": {e.name: e.words for e in self.tried or ()},
+                "tried": None if self.tried is None else {e.name: e.words for e in self.tried},
                 "gains": self.gains,
             },
             "advice": list(self.advice),

@@ -65,7 +65,7 @@ class CalibratedModel:
         foot_markers: "right", "left" -> the recording's names of the markers on that foot.
         unmodelled_m: (M,) standard deviation of what neither a state nor the cameras explain of each marker; it is
             added to the noise of the cameras.
-        skin_lasts: how many times longer skin stays displaced than the noise settings say of any model.
+        skin_lasts: how many times longer skin stays displaced than the noise settings say of a floating model.
         dimensionless: geometry parameters that are factors, not lengths.
         carried_kg: mass of the known loads (`model.calibration.loads`), not in ``mass_kg``.
         unmarked_kg: mass of the segments that no marker shows, and that hang still on their neighbours.

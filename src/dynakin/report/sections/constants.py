@@ -91,7 +91,7 @@ def observability_section(page: Page) -> Section | None:
         left = {title: rows for title, rows in groups.items() if title in ("Lengths", "Masses")}
         groups = left | {title: rows for title, rows in groups.items() if title == "Marker places"}
     right = {title: rows for title, rows in groups.items() if title not in left}
-    tried = bool(block.get("excitation", {}).get("tried"))
+    tried = block.get("excitation", {}).get("tried") is not None
     parts = [
         Section(f"identifiability-{anchor}", title, text, notes=tuple(sentence(note) for note in notes))
         for anchor, title, text, notes in (
