@@ -49,6 +49,7 @@ def seen(monkeypatch: pytest.MonkeyPatch) -> Seen:
 
 
 def test_a_terminal_shows_each_stage_with_its_share_and_what_remains(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TERM", "xterm")  # the tests' own may be one that cannot draw
     shown = Terminal()
     monkeypatch.setattr(sys, "stderr", shown)
     with stage("estimating") as report:
