@@ -178,7 +178,7 @@ def figures(run: Run, sizes: Sizes | None) -> dict[str, tuple[float, ...]]:
         e, variance = run.error[block][:, places], run.own[block][:, places] ** 2
         if sizes is not None:
             added = sum(getattr(sizes, k) ** 2 * run.parts[k][block][:, places] for k in KINDS)
-            variance = (sizes.own_moments if block == "moments" else sizes.own_motion) ** 2 * variance + added
+            variance = sizes.own(block) ** 2 * variance + added
         sd = np.sqrt(variance)
         if block == "coordinates":
             e = e - np.nanmean(e, axis=0)

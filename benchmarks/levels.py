@@ -12,15 +12,14 @@ import json
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import numpy as np
 
 import dynakin
 from dynakin.simulation.trial import simulate
+from recordings import DATA
 
-TURNS, FRAMES = 12, 101
-DATA = Path(os.environ.get("DYNAKIN_TEST_DATA", Path(__file__).parents[2] / "shared" / "data"))
+TURNS = 12
 
 
 def work() -> None:

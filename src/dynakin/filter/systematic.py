@@ -53,12 +53,16 @@ class Sizes:
         """The errors times a factor."""
         return replace(self, **{kind: factor * getattr(self, kind) for kind in KINDS})
 
+    def own(self, block: str) -> float:
+        """Factor on the filter's own deviations of a block."""
+        return self.own_moments if block == "moments" else self.own_motion
+
 
 LANDMARKS = Sizes(
     0.005, 0.003, np.radians(2.0), np.radians(0.8), np.radians(1.2), 0.15, own_motion=1.6, own_moments=1.6
 )
 """Joints that are found from markers on the skin."""
-SCALED = Sizes(0.002, 0.0016, np.radians(1.2), np.radians(0.8), np.radians(1.0), 0.095, 1.0, 0.55)
+SCALED = Sizes(0.002, 0.0016, np.radians(1.2), np.radians(0.8), np.radians(1.0), 0.095, own_moments=0.55)
 """Joints of a skeleton that was scaled to the person (.osim)."""
 
 
@@ -240,19 +244,14 @@ class Systematic:
 
     def added_over_time(self, data: xr.Dataset, *, late: bool) -> xr.Dataset:
         """The same of a recording: ``data`` with other ``coordinates_sd`` ... ``moments_sd``."""
-        variances = self.variances(self.over_time(data))
+        variances, own = self.variances(self.over_time(data)), self._own(late)
         order = ("time", "coordinate")
-        sd = {f"{block}_sd": data[f"{block}_sd"].transpose(*order).values for block in BLOCKS}
-        own = self._own(late)
-        return data.assign(
-            {f"{b}_sd": (order, np.hypot(own[b] * sd[f"{b}_sd"], np.sqrt(variances[b]))) for b in BLOCKS}
-        )
+        sd = {block: data[f"{block}_sd"].transpose(*order).values for block in BLOCKS}
+        return data.assign({f"{b}_sd": (order, np.hypot(own[b] * sd[b], np.sqrt(variances[b]))) for b in BLOCKS})
 
     def _own(self, late: bool) -> dict[str, float]:
         """By block the factor on the filter's own deviations."""
-        if not late:
-            return dict.fromkeys(BLOCKS, 1.0)
-        return dict.fromkeys(BLOCKS, self.sizes.own_motion) | {"moments": self.sizes.own_moments}
+        return {block: self.sizes.own(block) if late else 1.0 for block in BLOCKS}
 
 
 def _differences(values: list[Array]) -> tuple[Array, Array, Array]:

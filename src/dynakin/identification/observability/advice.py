@@ -78,7 +78,7 @@ def advice_in_words(
         return [*said, "Movements that would help are found by: dynakin model MODEL --identifiability --trial FILE."]
     motions = [words(e.name) for e in tried if e.name != "faster"]
     left_out = [words(n) for n in bench.coordinates if n not in bench.grounded and words(n) not in motions]
-    if not any(name not in bench.grounded for name in bench.coordinates):
+    if all(name in bench.grounded for name in bench.coordinates):
         said.append("No movement could be tried: all that the markers show would move the feet.")
     if left_out:
         said.append(

@@ -20,6 +20,7 @@ import scipy
 
 from dynakin.bindings import _core
 from dynakin.filter.augment import continuous_noise
+from dynakin.filter.contacts import carry
 from dynakin.filter.noise import process_variance, wrench_covariance
 from dynakin.filter.tracker import Tracker
 from dynakin.identification.observability.measured import MeasuredModel
@@ -73,10 +74,10 @@ class KnownMotion:
         self._moving, self._seen = sizes[1], slice(sizes[0], sizes[2])
         self._chain = chain[self._order]
         self._sd = np.sqrt(np.diag(measured.prior)[self._order])  # all that follows is in units of these
-        self._prior: Array = np.asarray(np.linalg.inv(self._scaled(measured.prior, self._order)))
+        self._prior = inverse(self._scaled(measured.prior, self._order))
         F, Q = transition(density, decay, variance, dt, int(chain.sum()) // 3)
         moving = self._order[: self._moving]
-        noise_info = np.linalg.inv(self._scaled(Q, moving))
+        noise_info = inverse(self._scaled(Q, moving))
         F = F[np.ix_(moving, moving)] * self._sd[: self._moving] / self._sd[: self._moving, None]
         self._process = (F.T @ noise_info @ F, -F.T @ noise_info, noise_info)
 
@@ -102,13 +103,13 @@ class KnownMotion:
 
         What moves is not known again at the beginning of each; the constants are.
         """
-        information: Array = self._prior
+        information = self._prior
         for k, motion in enumerate(motions):
             if k:
                 information = self._begun_again(information)
             information = self._after(motion, information)
         found = np.full(len(self._measured.names), np.nan)
-        found[self._order] = self._sd * np.sqrt(np.diag(np.linalg.inv(information)))
+        found[self._order] = self._sd * np.sqrt(np.diag(inverse(information)))
         return found
 
     def _after(self, motion: Known, information: Array) -> Array:
@@ -180,9 +181,8 @@ class KnownMotion:
     def _plate_weights(self, covariance: Array, reference_point: object) -> Array:
         """(r, 6) from the wrench about the ground origin to independent rows of variance 1."""
         initial = self._measured.initial
-        x, y, z = initial.plate_centre if reference_point == "auto" else np.asarray(reference_point, dtype=float)
-        shift = np.eye(6)  # from the reference point to the origin: m + p x f
-        shift[3:, :3] = [[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]]
+        point = initial.plate_centre if reference_point == "auto" else reference_point
+        shift = carry(np.asarray(point, dtype=float))
         used = np.flatnonzero(initial.spec.wrench_measured)
         root = np.linalg.cholesky((shift @ covariance @ shift.T)[np.ix_(used, used)])
         return np.asarray(np.linalg.solve(root, np.eye(6)[used]))
@@ -198,6 +198,11 @@ class KnownMotion:
         for name in blocks:
             found[self._measured.block(name)] = True
         return found
+
+
+def inverse(A: Array) -> Array:
+    """Covariance from information, or the other way round, by Cholesky."""
+    return np.asarray(scipy.linalg.cho_solve(scipy.linalg.cho_factor(A), np.eye(len(A))))
 
 
 def transition(density: Array, decay: Array, variance: Array, dt: float, free: int) -> tuple[Array, Array]:
