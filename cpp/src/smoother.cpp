@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <future>
+#include <utility>
 
 #include "dynakin/backward_pass.hpp"
 
@@ -30,9 +32,11 @@ Smoother::Smoother(Filter& filter, const Trial& trial, std::size_t stretch)
       checkpoints_((trial.frames + stretch_ - 1) / stretch_ + 1),
       decisions_(trial.frames),
       tape_(filter.model().state_size(), 0, filter.tape_sensors()),
-      pass_(filter.model(), smoothable(filter.settings()), filter.tape_rows()),
-      projection_(filter.model(), filter.settings()),
+      apart_(filter.model(), smoothable(filter.settings())),
+      forwards_(filter.model(), filter.settings(), apart_, filter.tape_rows()),
       measurement_(filter.model(), filter.settings()),
+      backwards_(filter.model(), apart_, filter.tape_rows()),
+      projection_(filter.model(), filter.settings()),
       kinematics_(filter.model()),
       dynamics_(filter.model()),
       x_(filter.state()) {}
@@ -97,21 +101,32 @@ Belief Smoother::belief_at(std::size_t k, const RunRecord& record) {
   return filter_.belief();
 }
 
-// From first to the last frame that is left.
-void Smoother::begin(std::size_t first, const RunRecord& record) {
-  if (left_ == trial_.frames || decisions_[left_].cut) pass_.end(belief_at(left_ - 1, record));
-  const bool cut = decisions_[first].cut;
-  Eigen::VectorXd moved = Eigen::VectorXd::Zero(x_.size());
-  for (std::size_t k = first + cut; k < left_; ++k)
+// Up to a frame that ends a stretch. Nothing of it is found by the look back through what comes after.
+void Smoother::replay(std::size_t end, const RunRecord& record, Stretch& out) {
+  out.first = end - 1;
+  while (out.first % stretch_ != 0 && !decisions_[out.first].cut) --out.first;
+  out.last.reset();
+  if (end == trial_.frames || decisions_[end].cut) {
+    out.last = belief_at(end - 1, record);
+    forwards_.end(*out.last);
+  }
+  const bool cut = decisions_[out.first].cut;
+  Eigen::VectorXd moved = Eigen::VectorXd::Zero(filter_.model().state_size());
+  for (std::size_t k = out.first + cut; k < end; ++k)
     if (decisions_[k].moved.size() > 0) moved += decisions_[k].moved;
-  pass_.start(cut ? restarted_ : checkpoints_[first / stretch_].belief, moved);
-  while (frames_.size() < left_ - first) frames_.emplace_back(filter_.model());
+  forwards_.start(cut ? restarted_ : checkpoints_[out.first / stretch_].belief, moved);
+  while (out.frames.size() < end - out.first) out.frames.emplace_back(filter_.model());
+  for (std::size_t k = out.first; k < end; ++k) {
+    FrameGivenConstants* const frame = &out.frames[k - out.first];
+    replay_frame(k, record, k == out.first ? nullptr : frame - 1, *frame);
+  }
+  out.end = end;
 }
 
 // The filter's update once more, given the constants: its rows come from where it linearised them.
-void Smoother::replay(std::size_t k, std::size_t first, const RunRecord& record) {
+void Smoother::replay_frame(std::size_t k, const RunRecord& record, const FrameGivenConstants* last,
+                            FrameGivenConstants& frame) {
   const bool cut = decisions_[k].cut;
-  GivenConstants::Frame& frame = frames_[k - first];
   const Decision& decided = cut ? nothing_ : decisions_[k];
   frame.decided = &decided;
   frame.dt = trial_.dt(k);
@@ -130,36 +145,41 @@ void Smoother::replay(std::size_t k, std::size_t first, const RunRecord& record)
   measurement_.expect(trial_.wrench_model(k, filter_.model().contacts(), how_));
   measurement_.linearise(decided.linearised.size() > 0 ? decided.linearised : frame.before,
                          trial_.markers_at(k, filter_.model().markers().size()), trial_.wrench_at(k));
-  pass_.step(measurement_.blocks(), k == first ? nullptr : &frames_[k - first - 1], frame);
+  forwards_.step(measurement_.blocks(), last, frame);
+}
+
+void Smoother::look_back(const Stretch& stretch, SmoothRecord& out, ContactRecord* contacts) {
+  if (stretch.last) backwards_.end(*stretch.last);
+  for (std::size_t k = stretch.end; k-- > stretch.first;) {
+    const FrameGivenConstants* const frame = &stretch.frames[k - stretch.first];
+    backwards_.look(*frame, x_);
+    if (filter_.settings().constraint == ConstraintKind::projection) {
+      if (!projection_.holds(x_)) backwards_.complete();
+      projection_.bound(x_, backwards_.covariance());
+    }
+    forward_kinematics(filter_.model(), x_, kinematics_);
+    subtree_dynamics(filter_.model(), x_, kinematics_, dynamics_);
+    out.report(k, x_, backwards_.covariance(), kinematics_, dynamics_, contacts);
+    backwards_.undo(*frame, k == stretch.first ? nullptr : frame - 1);
+  }
 }
 
 std::size_t Smoother::backward(const RunRecord& record, SmoothRecord& out, ContactRecord* contacts) {
   if (left_ == 0) return 0;
-  std::size_t first = left_ - 1;
-  while (first % stretch_ != 0 && !decisions_[first].cut) --first;
-  auto start = clock::now();
-  begin(first, record);
-  const double begun_us = us_since(start) / static_cast<double>(left_ - first);
-  for (std::size_t k = first; k < left_; ++k) {
-    start = clock::now();
-    replay(k, first, record);
-    out.backward_us[k] = begun_us + us_since(start);
+  const auto start = clock::now();
+  if (now_.end != left_) replay(left_, record, now_);
+  left_ = now_.first;
+  {
+    const AtWork other(left_ > 0 ? most_threads_ : 0);
+    std::future<void> replayed;
+    if (other) replayed = std::async(std::launch::async, [&] { replay(left_, record, before_); });
+    look_back(now_, out, contacts);
+    if (other) replayed.get();
   }
-  for (std::size_t k = left_; k-- > first;) {
-    start = clock::now();
-    const GivenConstants::Frame& frame = frames_[k - first];
-    pass_.look(frame, x_);
-    if (filter_.settings().constraint == ConstraintKind::projection) {
-      if (!projection_.holds(x_)) pass_.complete();
-      projection_.bound(x_, pass_.covariance());
-    }
-    forward_kinematics(filter_.model(), x_, kinematics_);
-    subtree_dynamics(filter_.model(), x_, kinematics_, dynamics_);
-    out.report(k, x_, pass_.covariance(), kinematics_, dynamics_, contacts);
-    pass_.undo(frame, k == first ? nullptr : &frames_[k - first - 1]);
-    out.backward_us[k] += us_since(start);
-  }
-  left_ = first;
+  const double us = us_since(start) / static_cast<double>(now_.end - now_.first);
+  std::fill(out.backward_us.begin() + static_cast<std::ptrdiff_t>(now_.first),
+            out.backward_us.begin() + static_cast<std::ptrdiff_t>(now_.end), us);
+  if (before_.end == left_) std::swap(now_, before_);
   if (left_ == 0) filter_.restore(checkpoints_.back());
   return left_;
 }

@@ -44,6 +44,16 @@ def test_the_same_run_gives_the_same_bits():
     assert_same(c.smoothed(), c.smoothed())
 
 
+@pytest.mark.parametrize("stretch", [1, 7, 0])
+@pytest.mark.parametrize("name", CASES)
+def test_a_second_thread_gives_the_bits_of_one(monkeypatch, name, stretch):
+    c, found = CASES[name](), []
+    for threads in ("1", "2"):
+        monkeypatch.setenv("OMP_NUM_THREADS", threads)
+        found.append(c.smoothed(stretch=stretch))
+    assert_same(*found)
+
+
 @pytest.mark.parametrize("name", CASES)
 def test_the_forward_run_is_that_of_run(name):
     c = CASES[name]()

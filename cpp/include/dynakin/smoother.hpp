@@ -2,22 +2,28 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <vector>
 
-#include "dynakin/given_constants.hpp"
+#include "dynakin/filter_given_constants.hpp"
 #include "dynakin/run.hpp"
+#include "dynakin/smoother_given_constants.hpp"
+#include "dynakin/threads.hpp"
 
 namespace dynakin {
 
 struct SmoothRecord : StateRecord {
   SmoothRecord(const Model& of, std::size_t frames) : StateRecord(of, frames, true), backward_us(frames) {}
 
-  std::vector<double> backward_us;  // all that smoothing adds to the run
+  // All that smoothing adds to the run in wall time, which the frames of a stretch share evenly.
+  std::vector<double> backward_us;
 };
 
 // The forward run keeps a checkpoint every so many frames, and of each frame what the filter decided. The way back
 // takes each stretch between two checkpoints forwards once more, now given the constants, so memory grows with the root
-// of the number of frames. Afterwards the filter stands where the run left it.
+// of the number of frames. While it looks back through one stretch another thread, where there is one (threads.hpp),
+// takes the stretch before forwards: the numbers are the same to the last bit. Afterwards the filter stands where the
+// run left it.
 class Smoother {
  public:
   // stretch: frames between checkpoints, 0: sqrt(frames). Throws std::invalid_argument where constraints are kept in a
@@ -33,13 +39,25 @@ class Smoother {
   std::size_t backward(const RunRecord& record, SmoothRecord& out, ContactRecord* contacts = nullptr);
 
  private:
+  // Frames between two checkpoints, or from or up to a cut, once more and given the constants.
+  struct Stretch {
+    std::size_t first = 0, end = 0;
+    std::optional<Belief> last;  // after it, where its constants are those of no later frame
+    std::vector<FrameGivenConstants> frames;
+  };
+
   Decision decision(std::size_t k, const Eigen::VectorXd& last) const;
   Eigen::VectorXd predicted(std::size_t k, double carried, Eigen::VectorXd x) const;
   Eigen::Map<const Eigen::VectorXd> state(std::size_t k, const RunRecord& record) const;
+  // These touch nothing that look_back does.
   Belief belief_at(std::size_t k, const RunRecord& record);
-  void begin(std::size_t first, const RunRecord& record);
-  void replay(std::size_t k, std::size_t first, const RunRecord& record);
+  void replay(std::size_t end, const RunRecord& record, Stretch& out);
+  void replay_frame(std::size_t k, const RunRecord& record, const FrameGivenConstants* last,
+                    FrameGivenConstants& frame);
+  void look_back(const Stretch& stretch, SmoothRecord& out, ContactRecord* contacts);
 
+  const AtWork working_;
+  const int most_threads_ = most_threads();
   Filter& filter_;
   Trial trial_;
   std::size_t stretch_, left_;
@@ -48,13 +66,17 @@ class Smoother {
   const Decision nothing_;
   Belief restarted_;  // after a frame with which everything started again
   FrameTape tape_;
-  std::vector<GivenConstants::Frame> frames_;
-  GivenConstants pass_;
-  Projection projection_;
+  GivenConstants apart_;
+  Stretch now_, before_;  // that is looked through, and that is replayed meanwhile
+  // For replay.
+  FilterGivenConstants forwards_;
   Measurement measurement_;
+  WrenchModel how_;
+  // For look_back.
+  SmootherGivenConstants backwards_;
+  Projection projection_;
   KinematicState kinematics_;
   DynamicState dynamics_;
-  WrenchModel how_;
   Eigen::VectorXd x_;
 };
 
