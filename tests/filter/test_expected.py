@@ -57,6 +57,7 @@ def make_believe(reasons: list[tuple[int, int]] = REASONS, shared_n: float = 700
         np.full((2, 2), [0.13, 0.05]),
         bears,
         np.where(bears, 1.0, 0.0),
+        np.where(bears.any(axis=1), 1.0, 0.0),
         np.tile(PRESSURE, (n, 1, 1)),
         np.tile(PRESSURE_COVARIANCE, (n, 1, 1, 1)),
     )

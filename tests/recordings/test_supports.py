@@ -257,3 +257,15 @@ def test_a_swing_alone_is_no_belt() -> None:
     velocity, time = np.tile([4.0, 0.0, 0.0], (100, 2, 1)), np.arange(100) / 100.0
     assert one_velocity(velocity[:20], low[:20], body[:20], time[:20]) is None
     np.testing.assert_allclose(one_velocity(velocity, low, body, time), [4.0, 0.0])
+
+
+def test_feet_that_take_turns_bear_all_of_the_weight() -> None:
+    feet = walk(6, 0.6, stance_s=0.52)
+    made = steps(lasting(6), feet, plates_of(feet))
+    soles = found(made).soles
+    bears = soles.stance.sum(axis=1) > 0.0
+    np.testing.assert_allclose(soles.share.sum(axis=1)[bears], soles.support[bears])
+    first, end = np.flatnonzero(bears)[[0, -1]]
+    inside = slice(first + round(PASSING_S * RATE_HZ), end - round(PASSING_S * RATE_HZ))
+    assert soles.stance.sum(axis=1)[inside].min() < 0.99  # not so by each foot's own rise and fall
+    np.testing.assert_allclose(soles.support[inside], 1.0)

@@ -159,8 +159,7 @@ def foot_prior(loads: FootLoads, k: int, weight: float, root: Array, alone: Flag
     seen: Flags = np.asarray(np.isfinite(soles.pressure[:, k]).all(axis=1))
     place = np.where(seen[:, None], soles.pressure[:, k], root * [1.0, 0.0, 1.0])
     spread_m2 = np.where(seen[:, None, None], soles.pressure_covariance[:, k], np.eye(2))
-    stance = soles.stance[:, k]
-    share = stance / np.maximum(soles.stance.sum(axis=1), 1.0)
+    stance, share = soles.stance[:, k], soles.share[:, k]
     to_root = root - place
     direction = np.concatenate([to_root / np.maximum(to_root[:, [1]], _LEAST_HEIGHT_M), np.zeros_like(root)], axis=1)
     direction[:, 1] = 1.0

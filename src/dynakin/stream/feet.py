@@ -201,7 +201,8 @@ class LiveFeet:
         since, left = time_s - self._since, time_s - self._touched
         weight = smooth_step(np.fmin((since + EARLY_S) / PASSING_S, 1.0 - left / AFTER_S))
         weight = np.where(self._marked, np.where(bears, weight, 0.0), 1.0)
-        return Soles(middle, half, (bears | ~self._marked)[None], weight[None], pressure, covariance)
+        support = np.minimum(weight.sum(keepdims=True), 1.0)
+        return Soles(middle, half, (bears | ~self._marked)[None], weight[None], support, pressure, covariance)
 
     def news(self) -> list[str]:
         """Sentences, each said once."""

@@ -26,9 +26,9 @@ LEAST_M = 0.10
 """Markers nearer to each other than that do not show a foot's length."""
 BRIDGED_S = 0.25
 """Gap in all of a foot's markers over which its sole is drawn on by a straight line."""
-EARLY_S, LATE_S = 0.02, 0.06
+EARLY_S, LATE_S = 0.02, 0.07
 """How long before a foot's markers are slow and low the plates are touched, and how long after they are left: means of
-the walks and the landing at hand, by their plates."""
+the walks and the landing at hand, by their plates, 0.01 s later at the end (`walking1`, `MH0222_BP06`)."""
 PASSING_S = 0.12
 """How long a foot takes to load and to unload: the double support of a walk, or the edges of a run's stance."""
 PRESSURE_REACH, ROLLED_M, FLAT_TILT_M = 0.55, 0.012, -0.006
@@ -39,6 +39,7 @@ ROLLED_SD, FLAT_SD, ACROSS_SD = 0.42, 0.52, 0.63
 """How far it may lie from there, as parts of half the sole's length once the foot has rolled, of that more while it is
 flat, where some mm of skin decide, and of half its width. Three times what the plates of these recordings show: a foot
 that is not of these keeps its say, and moments of a leg beside a plate are best so (`truth3d`)."""
+_LEAST_STANCE = 1e-9
 _UNSEEN_SD = 0.6  # of half the length, where a foot's markers do not show how it lies
 
 
@@ -52,6 +53,7 @@ class Soles:
         half_m: (F, 2) half its length and half its width.
         bears: (T, F) the foot may bear load.
         stance: (T, F) from 0 at touch-down to 1, and to 0 at toe-off.
+        support: (T,) the same of all feet together: it stays 1 while they take turns without flight.
         pressure: (T, F, 3) m, where its centre of pressure is expected, by how far the foot has rolled.
         pressure_covariance: (T, F, 2, 2) m^2 of that along X and Z of the ground.
     """
@@ -60,6 +62,7 @@ class Soles:
     half_m: Array
     bears: Flags
     stance: Array
+    support: Array
     pressure: Array
     pressure_covariance: Array
 
@@ -75,9 +78,11 @@ class Soles:
         middle, half = np.full((frames, F, 3), np.nan), np.tile([HALF_LENGTH_M, HALF_WIDTH_M], (F, 1))
         bears, stance = np.ones((frames, F), dtype=bool), np.ones((frames, F))
         pressure, covariance = middle.copy(), np.tile((_UNSEEN_SD * HALF_LENGTH_M) ** 2 * np.eye(2), (frames, F, 1, 1))
+        stood = np.full(frames, None in contacts)
         for k, foot in enumerate(contacts):
             if foot is None:
                 continue
+            stood |= foot.stands | ~foot.seen
             shape = _shape(foot, forward)
             half[k] = shape.half_m
             place = _drawn_on(shape.middle(foot.outline), rate)
@@ -88,7 +93,13 @@ class Soles:
             stance[:, k] = np.where(
                 foot.seen, stance_weights(foot.stances, rate, frames), 1.0
             )  # unseen: it may bear all
-        return cls(middle, half, bears, stance, pressure, covariance)
+        support = np.maximum(stance_weights(runs(stood), rate, frames), np.minimum(stance.sum(axis=1), 1.0))
+        return cls(middle, half, bears, stance, support, pressure, covariance)
+
+    @property
+    def share(self) -> Array:
+        """(T, F) part of the weight that each foot is expected to bear."""
+        return self.stance * (self.support / np.maximum(self.stance.sum(axis=1), _LEAST_STANCE))[:, None]
 
 
 def stance_weights(stances: Sequence[tuple[int, int]], rate: float, frames: int) -> Array:
