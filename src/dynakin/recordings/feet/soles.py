@@ -99,7 +99,7 @@ class Soles:
     @property
     def share(self) -> Array:
         """(T, F) part of the weight that each foot is expected to bear."""
-        return self.stance * (self.support / np.maximum(self.stance.sum(axis=1), _LEAST_STANCE))[:, None]
+        return np.asarray(self.stance * (self.support / np.maximum(self.stance.sum(axis=1), _LEAST_STANCE))[:, None])
 
 
 def stance_weights(stances: Sequence[tuple[int, int]], rate: float, frames: int) -> Array:
