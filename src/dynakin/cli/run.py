@@ -40,11 +40,12 @@ def run(
     ] = None,
 ) -> None:
     """Estimate coordinates, moments, lengths and masses from a recording, and write a report."""
-    from dynakin.cli.prepared import assumed, print_rows
-    from dynakin.cli.summary import end, print_summary
-    from dynakin.pipeline.stages import configure, prepare_case, run_case
-    from dynakin.results.files.folder import check_folder_writable, check_output_writable
-    from dynakin.validation.case import case_of
+    with stage("loading"):  # the libraries alone take seconds on a busy machine
+        from dynakin.cli.prepared import assumed, print_rows
+        from dynakin.cli.summary import end, print_summary
+        from dynakin.pipeline.stages import configure, prepare_case, run_case
+        from dynakin.results.files.folder import check_folder_writable, check_output_writable
+        from dynakin.validation.case import case_of
 
     config = configure(trial, given, options=True)
     check_output_writable(config.output)
@@ -57,7 +58,8 @@ def run(
         from dynakin.report.paper_figures.sensitivity import read_sensitivity  # Matplotlib: only who draws waits
 
         grid = read_sensitivity(sensitivity)
-    case = case_of(config)
+    with stage("reading the recording"):
+        case = case_of(config)
     with stage("measuring the person"):
         ready = prepare_case(case)
     print_rows(out(), assumed(next(iter(ready.values())), config))
