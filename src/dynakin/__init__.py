@@ -1,7 +1,9 @@
 """dynakin: how a person moves and what drives the movement, from markers and force plates, in one Kalman filter."""
 
-from importlib import import_module, metadata
-from typing import TYPE_CHECKING, Any
+from importlib import metadata
+from typing import TYPE_CHECKING
+
+from dynakin.lazy import loaded_when_asked
 
 if TYPE_CHECKING:
     from dynakin.errors import DynakinError
@@ -46,37 +48,28 @@ __all__ = [
     "run",
 ]
 
-_HOMES = {
-    "Bounds": "dynakin.settings.model",
-    "CalibratedModel": "dynakin.model.calibration.calibrated",
-    "DynakinError": "dynakin.errors",
-    "Estimate": "dynakin.results.estimate",
-    "Estimator": "dynakin.filter.estimator",
-    "GroundFrame": "dynakin.recordings.frame",
-    "ModelDefinition": "dynakin.model.definition",
-    "Noise": "dynakin.settings.noise",
-    "Priors": "dynakin.settings.model",
-    "Recording": "dynakin.recordings.recording",
-    "Result": "dynakin.pipeline.result",
-    "Sample": "dynakin.filter.samples",
-    "Subject": "dynakin.settings.subject",
-    "Tracker": "dynakin.filter.tracker",
-    "load_model": "dynakin.model.definition",
-    "load_opensim": "dynakin.model.opensim.definition",
-    "presets": "dynakin.settings",
-    "read": "dynakin.recordings.read",
-    "run": "dynakin.pipeline.stages",
-}
-
-
-def __getattr__(name: str) -> Any:
-    """A public name, from its module when it is first asked for: who reads recordings does not wait for the report."""
-    if name not in _HOMES:
-        raise AttributeError(f"module 'dynakin' has no attribute {name!r}")
-    home = import_module(_HOMES[name])
-    value = import_module(f"{_HOMES[name]}.{name}") if name == "presets" else getattr(home, name)
-    globals()[name] = value
-    return value
+__getattr__ = loaded_when_asked(
+    __name__,
+    {
+        "errors": ("DynakinError",),
+        "filter.estimator": ("Estimator",),
+        "filter.samples": ("Sample",),
+        "filter.tracker": ("Tracker",),
+        "model.calibration.calibrated": ("CalibratedModel",),
+        "model.definition": ("ModelDefinition", "load_model"),
+        "model.opensim.definition": ("load_opensim",),
+        "pipeline.result": ("Result",),
+        "pipeline.stages": ("run",),
+        "recordings.frame": ("GroundFrame",),
+        "recordings.read": ("read",),
+        "recordings.recording": ("Recording",),
+        "results.estimate": ("Estimate",),
+        "settings": ("presets",),
+        "settings.model": ("Bounds", "Priors"),
+        "settings.noise": ("Noise",),
+        "settings.subject": ("Subject",),
+    },
+)
 
 
 def __dir__() -> list[str]:

@@ -35,6 +35,7 @@ def loaded(program: str) -> set[str]:
         ("import dynakin; dynakin.read", (*DRAWING, *STATISTICS, *TABLES, *FILES, *CORE, "scipy.optimize")),
         ("import dynakin; dynakin.Estimator", (*DRAWING, *STATISTICS, *FILES)),
         ("import dynakin; dynakin.run; dynakin.Result", (*DRAWING, *STATISTICS, *FILES)),
+        ("import dynakin.cli.prepared, dynakin.cli.summary, dynakin.report.page", ("matplotlib", *STATISTICS, *FILES)),
     ],
 )
 def test_heavy_libraries_are_loaded_only_where_they_are_used(program: str, forbidden: tuple[str, ...]) -> None:
@@ -46,7 +47,7 @@ def test_the_help_of_every_command_loads_nothing_that_computes() -> None:
     found = loaded(f"from dynakin.cli.app import app\napp(['--help'], standalone_mode=False)\n{calls}")
     assert not found & {*DRAWING, *STATISTICS, *TABLES, *FILES, *CORE, *NUMBERS}
     layers = {name.split(".")[1] for name in found if name.startswith("dynakin.")}
-    assert layers <= {"cli", "settings", "errors", "files", "units", "elements", "arrays", "progress"}
+    assert layers <= {"cli", "settings", "errors", "files", "units", "elements", "arrays", "progress", "lazy"}
 
 
 def test_the_names_in_the_help_of_simulate_are_those_that_it_knows() -> None:

@@ -268,8 +268,8 @@ def test_every_output_has_a_deviation_in_the_files(smoothed: Estimate, tmp_path)
         assert (values > 0.0).all(), name
     knee = smoothed.coordinate_names.index("knee")
     np.testing.assert_allclose(
-        table.column("knee_moment"), smoothed.data["moments_sd"].values[:, knee], rtol=6e-4
-    )  # four digits
+        table.column("knee_moment"), smoothed.data["moments_sd"].values[:, knee], rtol=6e-3
+    )  # three digits
 
 
 def test_a_mass_that_the_plates_contradict_is_told_and_is_no_delay() -> None:

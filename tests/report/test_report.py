@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 
 from dynakin.report import insights as insights_module
+from dynakin.report.figure import new_axes, to_svg
 from dynakin.report.insights import Insight, in_short, insights
 from dynakin.report.labels import moment_note, short_marker_names
 from dynakin.report.page import SECTIONS, render_report
-from dynakin.report.plot import new_axes, thin, to_svg
+from dynakin.report.plot import thin
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import Estimate

@@ -40,12 +40,12 @@ def run(
     ] = None,
 ) -> None:
     """Estimate coordinates, moments, lengths and masses from a recording, and write a report."""
-    from dynakin.cli.prepared import assumed, print_rows
-    from dynakin.cli.summary import end, print_summary
-    from dynakin.pipeline.stages import configure, prepare_case, run_case
-    from dynakin.report.paper_figures.sensitivity import read_sensitivity
-    from dynakin.results.files.folder import check_folder_writable, check_output_writable
-    from dynakin.validation.case import case_of
+    with stage("loading"):  # the libraries alone take seconds on a busy machine
+        from dynakin.cli.prepared import assumed, print_rows
+        from dynakin.cli.summary import end, print_summary
+        from dynakin.pipeline.stages import configure, prepare_case, run_case
+        from dynakin.results.files.folder import check_folder_writable, check_output_writable
+        from dynakin.validation.case import case_of
 
     config = configure(trial, given, options=True)
     check_output_writable(config.output)
@@ -53,8 +53,13 @@ def run(
         raise typer.BadParameter("--sensitivity is a figure for papers, expected --figures FOLDER with it")
     if figures is not None:
         check_folder_writable(figures)
-    grid = None if sensitivity is None else read_sensitivity(sensitivity)
-    case = case_of(config)
+    grid = None
+    if sensitivity is not None:
+        from dynakin.report.paper_figures.sensitivity import read_sensitivity  # Matplotlib: only who draws waits
+
+        grid = read_sensitivity(sensitivity)
+    with stage("reading the recording"):
+        case = case_of(config)
     with stage("measuring the person"):
         ready = prepare_case(case)
     print_rows(out(), assumed(next(iter(ready.values())), config))

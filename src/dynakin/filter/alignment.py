@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -27,7 +28,7 @@ class InStep(NamedTuple):
     """A run over a recording whose plates are in step.
 
     Attributes:
-        tracker: as the last run left it. arrays: of that run, as `Tracker.run_late_arrays` gives them.
+        tracker: as the last run left it. arrays: of that run.
         shift_s: by which it took the plates earlier. notes: what there is to say of the plates' clock.
     """
 
@@ -45,16 +46,15 @@ def run_in_step(
     progress: Progress | None = None,
     feet: ContactLoads | None = None,
     passes: int = PASSES,
-    lag: int | None = 0,
+    run: Callable[..., dict[str, Array]] = Tracker.run_arrays,
 ) -> InStep:
-    """`Tracker.run_late_arrays`, again (``passes`` times at most) with the plates brought into step where they turn out
-    to lag.
+    """A run, again (``passes`` times at most) with the plates brought into step where they turn out to lag.
 
     Args:
-        tracker: at its start. lag: frames, as of `Tracker.run_late_arrays`.
+        tracker: at its start. run: takes a tracker and the arguments of `Tracker.run_arrays`, and gives what that does.
     """
     calibrated = tracker.calibrated
-    arrays, shift = tracker.run_late_arrays(lag, time, markers, wrench, progress, feet), 0.0
+    arrays, shift = run(tracker, time, markers, wrench, progress, feet), 0.0
     misfit = None
     for done in range(passes):
         delay = delay_of(calibrated, arrays["state"][-1], arrays["state_sd"][-1])
@@ -68,7 +68,7 @@ def run_in_step(
             return InStep(tracker, arrays, shift, [contradicted(shift + delay[0], misfit, fits)])
         shift, misfit = shift + delay[0], fits
         tracker = tracker.fresh()
-        arrays = tracker.run_late_arrays(lag, time, markers, taken, progress, feet and feet.in_step(time, shift))
+        arrays = run(tracker, time, markers, taken, progress, feet and feet.in_step(time, shift))
     delay = delay_of(calibrated, arrays["state"][-1], arrays["state_sd"][-1])
     return InStep(tracker, arrays, shift, in_words(shift, delay))
 

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -248,8 +249,14 @@ class Estimator:
         doubt = doubtful_mass(wrench, calibrated.weighed_kg, ground.load_ratio, calibrated.unseen_kg)
         return Prepared(recording, tracker, markers, wrench, ground, contacts, lag_s, doubt, tuple(unsmoothed))
 
-    def follow(self, ready: Prepared, progress: Progress | None = None) -> Tracked:
+    def follow(
+        self, ready: Prepared, progress: Progress | None = None, known: Callable[[Tracker], object] | None = None
+    ) -> Tracked:
         """The estimate of a recording that is prepared, once or again: `ready` does not change.
+
+        Args:
+            known: called with a tracker at its start as soon as the noise is known, before the last run: another
+                thread may work with it while the core does.
 
         Raises:
             RecordingError, DivergenceError: as in `run`.
@@ -268,9 +275,12 @@ class Estimator:
             shares = (ways * frames, 0, 0) if once else (frames, again, ways * frames)
             there, calibrating, back = _shares(progress, shares)
             passes = 0 if ready.doubt else PASSES
+            if known is not None and once:
+                known(ready.tracker.fresh())
+            to_look = partial(Tracker.run_arrays, deviations=False)
             tracker, arrays, shift, clock = run_in_step(
                 ready.tracker.fresh(), recording.time, markers, ready.wrench, there, on_feet, passes,
-                late if once else 0,
+                partial(_run_late, late) if once else to_look,
             )  # fmt: skip
             wrench = in_step(recording.time, ready.wrench, shift) if shift else ready.wrench
             on_feet = on_feet and on_feet.in_step(recording.time, shift)
@@ -278,10 +288,12 @@ class Estimator:
             found = calibrated_noise(tracker, arrays, trial, late=not lag_s, progress=calibrating) if adapt else None
             if adapt and found is None:
                 notes.append("Too few frames are followed to calibrate the noise on them: it is as declared.")
-            if not once and (found or late != 0):
+            if not once:
                 skin = following_skin(tracker, arrays, recording.time) if scaled else None
                 seen = markers if skin is None else markers - skin.shift_m
                 tracker = tracker.changed(found or tracker.noise)
+                if known is not None:
+                    known(tracker.fresh())
                 arrays = tracker.run_late_arrays(late, recording.time, seen, wrench, back, on_feet)
                 arrays = arrays if skin is None else skin.put_back(arrays)
         except ValueError as error:  # a frame that the core refuses, named by it
@@ -335,6 +347,10 @@ class Estimator:
             "priors": self.priors.model_dump(mode="json"),
             "bounds": self.bounds.model_dump(mode="json"),
         }
+
+
+def _run_late(late: int | None, tracker: Tracker, *trial: Any) -> dict[str, Array]:
+    return tracker.run_late_arrays(late, *trial)
 
 
 def _shares(progress: Progress | None, passes: Sequence[int]) -> list[Progress | None]:

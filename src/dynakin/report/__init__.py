@@ -4,10 +4,15 @@ other file.
 `save_figures` writes the paper's figures of a run as files of their own.
 """
 
-from dynakin.report.comparison_page import render_comparison
-from dynakin.report.page import render_report, write_report
-from dynakin.report.paper_figures.figures import save_figures, save_sensitivity_figure, save_sensitivity_figures
-from dynakin.report.paper_figures.sensitivity import Sensitivity, read_sensitivity
+from typing import TYPE_CHECKING
+
+from dynakin.lazy import loaded_when_asked
+
+if TYPE_CHECKING:
+    from dynakin.report.comparison_page import render_comparison
+    from dynakin.report.page import render_report, write_report
+    from dynakin.report.paper_figures.figures import save_figures, save_sensitivity_figure, save_sensitivity_figures
+    from dynakin.report.paper_figures.sensitivity import Sensitivity, read_sensitivity
 
 __all__ = [
     "Sensitivity",
@@ -19,3 +24,13 @@ __all__ = [
     "save_sensitivity_figures",
     "write_report",
 ]
+
+__getattr__ = loaded_when_asked(
+    __name__,
+    {
+        "comparison_page": ("render_comparison",),
+        "page": ("render_report", "write_report"),
+        "paper_figures.figures": ("save_figures", "save_sensitivity_figure", "save_sensitivity_figures"),
+        "paper_figures.sensitivity": ("Sensitivity", "read_sensitivity"),
+    },
+)

@@ -9,7 +9,6 @@ from html import escape
 
 import numpy as np
 import numpy.typing as npt
-from matplotlib.ticker import MaxNLocator
 
 from dynakin.arrays import runs
 from dynakin.report.plot import GRID, LIMIT, by_source, thin
@@ -25,6 +24,8 @@ _MARGIN = 0.08
 _MOST_POINTS = 240
 _UNSEEN = 3.0
 """Less than half of a screen's pixel, and a third of a line's width."""
+_STEPS = (1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0)
+_ROUNDING = 1e-10  # of a step
 _RARE = 2.0
 """Per cent of derived values and priors that may leave the panel at either end: a centre of pressure is far off where a
 foot sets down."""
@@ -143,16 +144,14 @@ def _range(lines: Sequence[Line], levels: Sequence[float], least: float) -> tupl
 
 def _axes(low: float, high: float, start: float, end: float, x: Place, y: Place, unit: str, x_label: str) -> str:
     parts = []
-    ticks = np.asarray(MaxNLocator(5).tick_values(low, high))
-    ticks = ticks[(ticks >= low) & (ticks <= high)]
+    ticks = round_levels(low, high, 5)
     levels = "".join(f"M{_LEFT} {int(y(np.array(tick)))}H{_RIGHT}" for tick in ticks)
     parts.append(f'<path d="{levels}" stroke="{GRID}" stroke-width="7"/>')
     parts += [
         f'<text x="{_LEFT - 30}" y="{int(y(np.array(tick))) + 28}" text-anchor="end">{text}</text>'
         for tick, text in zip(ticks, _labels(ticks), strict=True)
     ]
-    moments = np.asarray(MaxNLocator(6, steps=[1, 2, 2.5, 5, 10]).tick_values(start, end))
-    moments = moments[(moments >= start - 1e-9) & (moments <= end + 1e-9)]
+    moments = round_levels(start, end, 6, (1.0, 2.0, 2.5, 5.0))
     marks = "".join(f"M{int(x(np.array(at)))} {_BOTTOM}v30" for at in moments)
     parts.append(f'<path d="M{_LEFT} {_BOTTOM}H{_RIGHT}{marks}" stroke="#b8c0c8" stroke-width="7"/>')
     parts += [
@@ -163,6 +162,24 @@ def _axes(low: float, high: float, start: float, end: float, x: Place, y: Place,
     parts.append(f'<text x="{(_LEFT + _RIGHT) // 2}" y="{_HEIGHT - 70}" text-anchor="middle">{escape(x_label)}</text>')
     parts.append(f'<text transform="translate(65 {middle}) rotate(-90)" text-anchor="middle">{escape(unit)}</text>')
     return "".join(parts)
+
+
+def round_levels(low: float, high: float, most: int, steps: Sequence[float] = _STEPS) -> Array:
+    """Levels from ``low`` to ``high`` that are multiples of a round step, ``most`` of them and one at most, two at
+    least: Matplotlib's ``MaxNLocator``, which takes as long to load as the page to write.
+
+    Args:
+        steps: that count as round, from 1 to below 10.
+    """
+    wanted = (high - low) / most
+    scale = 10.0 ** np.floor(np.log10(wanted))
+    rounds = [ten * scale * step for ten in (0.1, 1.0, 10.0) for step in steps]
+    first = next(k for k, step in enumerate(rounds) if step >= wanted)
+    for step in rounds[first::-1]:
+        levels = step * np.arange(np.ceil(low / step - _ROUNDING), np.floor(high / step + _ROUNDING) + 1.0)
+        if len(levels) > 1:
+            break
+    return np.asarray(levels)
 
 
 def _labels(ticks: Array) -> list[str]:

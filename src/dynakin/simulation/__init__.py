@@ -1,12 +1,17 @@
 """Recordings with known truth: a subject, its motion and its sensors, built without any code of the
 filter."""
 
-from dynakin.simulation.bodies.subject import SimulatedSubject, draw_subject
-from dynakin.simulation.motions.registry import MOTIONS
-from dynakin.simulation.output import SimulatedTrial, save_trial
-from dynakin.simulation.sensors.sizes import SensorNoise, load_sensors
-from dynakin.simulation.trial import simulate, simulate_squat
-from dynakin.simulation.truth import Truth
+from typing import TYPE_CHECKING
+
+from dynakin.lazy import loaded_when_asked
+
+if TYPE_CHECKING:
+    from dynakin.simulation.bodies.subject import SimulatedSubject, draw_subject
+    from dynakin.simulation.motions.registry import MOTIONS
+    from dynakin.simulation.output import SimulatedTrial, save_trial
+    from dynakin.simulation.sensors.sizes import SensorNoise, load_sensors
+    from dynakin.simulation.trial import simulate, simulate_squat
+    from dynakin.simulation.truth import Truth
 
 __all__ = [
     "MOTIONS",
@@ -20,3 +25,15 @@ __all__ = [
     "simulate",
     "simulate_squat",
 ]
+
+__getattr__ = loaded_when_asked(
+    __name__,
+    {
+        "bodies.subject": ("SimulatedSubject", "draw_subject"),
+        "motions.registry": ("MOTIONS",),
+        "output": ("SimulatedTrial", "save_trial"),
+        "sensors.sizes": ("SensorNoise", "load_sensors"),
+        "trial": ("simulate", "simulate_squat"),
+        "truth": ("Truth",),
+    },
+)

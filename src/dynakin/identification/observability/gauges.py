@@ -201,7 +201,8 @@ def _least(B: Array) -> Array:
         # The solver stops at 1e-7 or so: what is nearly 0 is put to 0 by solving for the rest exactly.
         vector = B @ fit.x[:d]
         zero = np.abs(vector) < 1e-5
-        free = np.linalg.svd(B[zero])[2][np.linalg.matrix_rank(B[zero], tol=1e-6) :] if zero.any() else np.eye(d)
+        _, sizes, right = np.linalg.svd(B[zero])
+        free = right[int((sizes > 1e-6).sum()) :]
         exact = B @ (free.T @ np.linalg.lstsq((B @ free.T)[[k]], np.ones(1), rcond=None)[0])
         found[k] = exact if np.abs(exact - vector).max() < 1e-4 else vector
     return found

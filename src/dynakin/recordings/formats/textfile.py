@@ -92,6 +92,12 @@ def parse_row(cells: Sequence[str], names: Sequence[str], path: Path, line: int)
         cells, found = cells[:found:2], len(names)
     if found != len(names):
         raise RecordingError(f"{path}, line {line}: found {found} columns, expected {len(names)}")
+    try:
+        row = [float(cell) for cell in cells[:found]]  # nearly every row
+    except ValueError:
+        row = [np.inf]
+    if np.inf not in row and -np.inf not in row:
+        return row
     row = []
     for cell, name in zip(cells, names, strict=False):
         try:

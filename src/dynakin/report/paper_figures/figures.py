@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 
 from dynakin.errors import ConfigError, OutputError
 from dynakin.progress import stage
+from dynakin.report.figure import FILE_STYLE
 from dynakin.report.paper_figures.movement import (
     angles_figure,
     knee_moment_figure,
@@ -22,7 +23,6 @@ from dynakin.report.paper_figures.movement import (
 from dynakin.report.paper_figures.parameters import inertias_figure, lengths_and_masses_figure
 from dynakin.report.paper_figures.saving import FORMATS, save_each
 from dynakin.report.paper_figures.sensitivity import Sensitivity, read_sensitivity, sensitivity_figure
-from dynakin.report.plot import FILE_STYLE
 from dynakin.results.estimate import Estimate
 from dynakin.results.failures import Failures
 from dynakin.results.measures.facing import facing

@@ -15,8 +15,9 @@ from matplotlib.patches import Patch
 
 from dynakin.report.body import chain_of, marker_segments, painted
 from dynakin.report.chart import band_is_too_wide
+from dynakin.report.figure import draw_sourced
 from dynakin.report.labels import COMPONENT_LABELS, is_planar, moment_note
-from dynakin.report.plot import ESTIMATED, INK, MEASURED, QUIET, draw_sourced
+from dynakin.report.plot import ESTIMATED, INK, MEASURED, QUIET
 from dynakin.report.sections.repetitions import (
     KINDS,
     ONE_SD,

@@ -14,7 +14,7 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 from dynakin.progress import stage
-from dynakin.report.plot import FILE_STYLE
+from dynakin.report.figure import FILE_STYLE
 
 FORMATS = ("svg", "pdf", "png")
 _DPI = 300

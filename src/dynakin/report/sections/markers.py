@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from matplotlib.axes import Axes
 
 from dynakin.report.bars import Bar, value_bars
 from dynakin.report.body import marker_segments
 from dynakin.report.chart import Line, Panel, chart
 from dynakin.report.labels import short_marker_names
-from dynakin.report.plot import ESTIMATED, INK, MEASURED, QUIET, new_axes, to_svg
+from dynakin.report.plot import ESTIMATED, INK, MEASURED, QUIET
 from dynakin.report.sections.forces import DIRECTIONS
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.sides import values_of
@@ -17,6 +18,9 @@ from dynakin.report.styles import ESTIMATED_LINE, MEASURED_LINE, LineStyle
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import AXES
 from dynakin.results.naming import number, words
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 _AXIS_COLOURS = {"x": "#0072B2", "y": "#009E73", "z": "#CC79A7"}
 
@@ -119,6 +123,8 @@ def _rms_bars(title: str, rms: dict[str, float | None], most: float | None = Non
 
 def _plane_paths(key: str, names: list[str], measured: np.ndarray, estimated: np.ndarray) -> Panel:
     """Paths of the markers in the sagittal plane, (T, M, 2) m, each labelled where it starts."""
+    from dynakin.report.figure import new_axes, to_svg  # Matplotlib: only a planar model's page waits
+
     figure, axes = new_axes(4.3, 4.6)
     step = max(1, len(measured) // 400)
     for index in range(len(names)):

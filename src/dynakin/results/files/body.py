@@ -9,7 +9,7 @@ import numpy as np
 from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.results.estimate import AXES, COMPONENTS, Estimate
 from dynakin.results.files.motion import force_stem, write_sources
-from dynakin.results.files.storage import DIGITS, DIGITS_OF_LOADS, write_storage
+from dynakin.results.files.storage import DECIMALS_OF_LOADS, DIGITS, DIGITS_OF_LOADS, write_storage
 from dynakin.results.measures.angles import angle_columns
 from dynakin.results.measures.feet import foot_sources
 from dynakin.results.measures.pressure import foot_pressure
@@ -173,4 +173,7 @@ def _write(
     notes: list[str],
     digits: int = DIGITS_OF_LOADS,
 ) -> None:
-    write_storage(path, title, estimate.time, names, values, in_degrees=False, notes=notes, digits=digits)
+    decimals = DECIMALS_OF_LOADS if digits == DIGITS_OF_LOADS else None
+    write_storage(
+        path, title, estimate.time, names, values, in_degrees=False, notes=notes, digits=digits, decimals=decimals
+    )

@@ -7,7 +7,14 @@ from pathlib import Path
 import numpy as np
 
 from dynakin.results.estimate import AXES, COMPONENTS, Estimate
-from dynakin.results.files.storage import DIGITS, DIGITS_OF_LOADS, DIGITS_OF_SD, write_storage
+from dynakin.results.files.storage import (
+    DECIMALS_OF_LOADS,
+    DIGITS,
+    DIGITS_OF_LOADS,
+    DIGITS_OF_RATES,
+    DIGITS_OF_SD,
+    write_storage,
+)
 from dynakin.results.measures.feet import foot_sources
 from dynakin.results.measures.sources import ABSENT, NOTES, moment_sources
 
@@ -58,7 +65,8 @@ def _write_motion(estimate: Estimate, path: Path, title: str, variable: str, uni
     if held:
         notes.append(f"Left out, because no marker shows them: {', '.join(held)}.")
     values = _in_degrees(estimate, variable)[:, seen]
-    write_storage(path, title, estimate.time, names, values, in_degrees=True, notes=notes, digits=DIGITS)
+    digits = DIGITS if variable == "coordinates" else DIGITS_OF_RATES
+    write_storage(path, title, estimate.time, names, values, in_degrees=True, notes=notes, digits=digits)
 
 
 def _seen(estimate: Estimate) -> np.ndarray:
@@ -80,6 +88,7 @@ def write_moments(estimate: Estimate, path: Path) -> None:
             "moments_source.sto says of each whether it is measured, derived, a prior or absent (nan).",
         ],
         digits=DIGITS_OF_LOADS,
+        decimals=DECIMALS_OF_LOADS,
     )
 
 

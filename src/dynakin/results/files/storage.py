@@ -14,9 +14,13 @@ EXACT = 15
 """Significant digits that hold a double: of truth and recordings, which others compute from."""
 DIGITS = 8
 """Of an estimate: no coarser than the single precision of ``estimate.nc``, far below any deviation."""
+DIGITS_OF_RATES = 6
+"""Of speeds and accelerations: a millidegree a second of a hundred degrees, where deviations are whole ones."""
 DIGITS_OF_LOADS = 6
 """Of forces, moments and powers: 1 mN of a body's weight."""
-DIGITS_OF_SD = 4
+DECIMALS_OF_LOADS = 6
+"""Of these and the places beside them: less than 1 uN, 1 um is rounding, where nothing acts."""
+DIGITS_OF_SD = 3
 """Of a standard deviation, which itself is not known to two."""
 _TIME = "%.12g"
 
@@ -31,6 +35,7 @@ def write_storage(
     in_degrees: bool,
     notes: Sequence[str] = (),
     digits: int = EXACT,
+    decimals: int | None = None,
 ) -> None:
     """Write one table.
 
@@ -41,9 +46,9 @@ def write_storage(
         values: (T, N) in the units that the file is to carry; NaN is written as ``nan``, and so is infinity.
         in_degrees: OpenSim's header line; says in what the rotational columns are given.
         notes: lines of the header for people, ``;`` and ``=`` excluded since readers take ``key=value`` for settings.
-        digits: significant ones of the values.
+        digits: significant ones of the values. decimals: after which all is rounding, however small the value.
     """
-    values = finite(values)
+    values = finite(values) if decimals is None else np.round(finite(values), decimals) + 0.0  # no -0
     if values.shape != (len(time), len(names)):
         raise OutputError(
             f"{path.name}: values of shape {values.shape}, expected ({len(time)}, {len(names)}) for its names"

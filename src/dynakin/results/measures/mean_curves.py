@@ -194,9 +194,9 @@ def write_curves(path: Path, points: Iterable[CurvePoint]) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(names)
-        writer.writerows([_cell(getattr(point, name)) for name in names] for point in points)
+        writer.writerows([_cell(name, getattr(point, name)) for name in names] for point in points)
 
 
-def _cell(value: object) -> object:
-    """Numbers as in the motion files."""
-    return f"{value:.8g}" if isinstance(value, float) else value
+def _cell(name: str, value: object) -> object:
+    """Means to six digits, their spread over some repetitions to four."""
+    return f"{value:.{4 if name.startswith('sd') else 6}g}" if isinstance(value, float) else value

@@ -1,0 +1,27 @@
+"""The small panels of a page."""
+
+import numpy as np
+import pytest
+from matplotlib.ticker import MaxNLocator
+
+from dynakin.report.chart import round_levels
+
+MOMENTS = (1.0, 2.0, 2.5, 5.0)
+
+
+@pytest.mark.parametrize(("most", "steps"), [(5, None), (6, MOMENTS)])
+def test_levels_are_those_of_matplotlib(most: int, steps: tuple[float, ...] | None) -> None:
+    rng = np.random.default_rng(3)
+    locator = MaxNLocator(most, steps=None if steps is None else [*steps, 10])
+    for _ in range(2000):
+        low, size = 10.0 ** rng.uniform(-4.0, 4.0, 2) * [rng.choice([-1.0, 1.0]), 1.0]
+        high = low + max(size, 0.02 * abs(low))  # nearer to each other Matplotlib counts from an offset
+        expected = np.asarray(locator.tick_values(low, high))
+        inside = expected[(expected >= low) & (expected <= high)]
+        found = round_levels(low, high, most) if steps is None else round_levels(low, high, most, steps)
+        np.testing.assert_allclose(found, inside, rtol=1e-9, atol=1e-9 * size)
+
+
+def test_levels_at_both_ends_count() -> None:
+    np.testing.assert_allclose(round_levels(-0.5, 0.15, 5), [-0.45, -0.3, -0.15, 0.0, 0.15], atol=1e-15)
+    np.testing.assert_allclose(round_levels(0.0, 10.0, 6, MOMENTS), [0.0, 2.0, 4.0, 6.0, 8.0, 10.0])
