@@ -29,7 +29,7 @@ import numpy as np
 import dynakin
 from dynakin.filter.tracker import Tracker
 from dynakin.model.definition import load_model
-from dynakin.recordings.recording import Plate, Recording
+from dynakin.recordings.recording import Recording
 from dynakin.simulation.trial import simulate_squat
 from recordings import DATA
 
@@ -229,7 +229,9 @@ def _batch(label: str, command: list[str]) -> None:
     done = subprocess.run(command, capture_output=True, text=True)
     took = time.perf_counter() - began
     if done.returncode != 0:
-        raise SystemExit(f"{' '.join(command)}: exit code {done.returncode}\n{done.stdout[-2000:]}{done.stderr[-2000:]}")
+        raise SystemExit(
+            f"{' '.join(command)}: exit code {done.returncode}\n{done.stdout[-2000:]}{done.stderr[-2000:]}"
+        )
     print(f"| {label} | {TRIALS} | {took:.1f} | {took / TRIALS:.2f} | {1000 * took / TRIALS / 3600:.2f} |", flush=True)
 
 
