@@ -34,6 +34,7 @@ Smoother::Smoother(Filter& filter, const Trial& trial, std::size_t stretch)
       tape_(filter.model().state_size(), 0, filter.tape_sensors()),
       apart_(filter.model(), smoothable(filter.settings())),
       forwards_(filter.model(), filter.settings(), apart_, filter.tape_rows()),
+      dependence_(apart_, filter.tape_rows()),
       measurement_(filter.model(), filter.settings()),
       backwards_(filter.model(), apart_, filter.tape_rows()),
       projection_(filter.model(), filter.settings()),
@@ -109,6 +110,7 @@ void Smoother::replay(std::size_t end, const RunRecord& record, Stretch& out) {
   if (end == trial_.frames || decisions_[end].cut) {
     out.last = belief_at(end - 1, record);
     forwards_.end(*out.last);
+    dependence_.end();
   }
   const bool cut = decisions_[out.first].cut;
   Eigen::VectorXd moved = Eigen::VectorXd::Zero(filter_.model().state_size());
@@ -120,6 +122,7 @@ void Smoother::replay(std::size_t end, const RunRecord& record, Stretch& out) {
     FrameGivenConstants* const frame = &out.frames[k - out.first];
     replay_frame(k, record, k == out.first ? nullptr : frame - 1, *frame);
   }
+  dependence_.smooth({out.frames.data(), end - out.first});
   out.end = end;
 }
 
@@ -154,7 +157,7 @@ void Smoother::look_back(const Stretch& stretch, SmoothRecord& out, ContactRecor
     const FrameGivenConstants* const frame = &stretch.frames[k - stretch.first];
     backwards_.look(*frame, x_);
     if (filter_.settings().constraint == ConstraintKind::projection) {
-      if (!projection_.holds(x_)) backwards_.complete();
+      if (!projection_.holds(x_)) backwards_.complete(*frame);
       projection_.bound(x_, backwards_.covariance());
     }
     forward_kinematics(filter_.model(), x_, kinematics_);

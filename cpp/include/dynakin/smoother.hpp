@@ -7,6 +7,7 @@
 
 #include "dynakin/filter_given_constants.hpp"
 #include "dynakin/run.hpp"
+#include "dynakin/smoothed_dependence.hpp"
 #include "dynakin/smoother_given_constants.hpp"
 #include "dynakin/threads.hpp"
 
@@ -70,6 +71,7 @@ class Smoother {
   Stretch now_, before_;  // that is looked through, and that is replayed meanwhile
   // For replay.
   FilterGivenConstants forwards_;
+  SmoothedDependence dependence_;
   Measurement measurement_;
   WrenchModel how_;
   // For look_back.
