@@ -1,9 +1,10 @@
 #include "dynakin/smoother.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
-#include <future>
+#include <memory>
 #include <utility>
 
 #include "dynakin/backward_pass.hpp"
@@ -174,10 +175,17 @@ std::size_t Smoother::backward(const RunRecord& record, SmoothRecord& out, Conta
   left_ = now_.first;
   {
     const AtWork other(left_ > 0 ? most_threads_ : 0);
-    std::future<void> replayed;
-    if (other) replayed = std::async(std::launch::async, [&] { replay(left_, record, before_); });
+    std::future<void> other_thread;
+    const auto taken = std::make_shared<std::atomic<bool>>(false);
+    if (other)
+      other_thread = std::async(std::launch::async, [this, taken, &record] {
+        if (!taken->exchange(true)) replay(left_, record, before_);
+      });
     look_back(now_, out, contacts);
-    if (other) replayed.get();
+    if (other && taken->exchange(true))
+      other_thread.get();
+    else  // on a busy machine it may not have begun: it is not waited for
+      late_ = std::move(other_thread);
   }
   const double us = us_since(start) / static_cast<double>(now_.end - now_.first);
   std::fill(out.backward_us.begin() + static_cast<std::ptrdiff_t>(now_.first),

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <future>
 #include <optional>
 #include <vector>
 
@@ -80,6 +81,7 @@ class Smoother {
   KinematicState kinematics_;
   DynamicState dynamics_;
   Eigen::VectorXd x_;
+  std::future<void> late_;  // of a thread that has nothing left to do
 };
 
 }  // namespace dynakin
