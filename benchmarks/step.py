@@ -62,10 +62,12 @@ def smoothing(title: str, model: Definition, recording: dynakin.Recording) -> No
         found.setdefault(name, []).append(float(np.median(us)))
 
     for _ in range(ROUNDS):
-        arrays = start.fresh().run_smoothed_arrays(*data)
+        for threads, name in (("1", "smoothing adds"), ("2", "smoothing adds, 2 threads")):
+            os.environ["OMP_NUM_THREADS"] = threads
+            arrays = start.fresh().run_smoothed_arrays(*data)
+            note("step", arrays["step_us"])
+            note(name, arrays["backward_us"])
         rows = int(np.median(arrays["n_rows"]))
-        note("step", arrays["step_us"])
-        note("smoothing adds", arrays["backward_us"])
         note("its bare products", dynakin_bench.smoothing_products(moving, constants, rows, 60))
         for lag in LAGS:
             late = Tracker(start.calibrated, start.noise, start.estimate, lag)
@@ -79,7 +81,7 @@ def smoothing(title: str, model: Definition, recording: dynakin.Recording) -> No
     step = np.median(found["step"])
     print(f"{title}: {moving} moving states, {constants} constants, {rows} rows")
     for name, us in found.items():
-        print(f"  {name:24} {np.median(us):8.0f} us, {np.median(us) / step:5.2f} steps")
+        print(f"  {name:25} {np.median(us):8.0f} us, {np.median(us) / step:5.2f} steps")
 
 
 def one_step(tracker: Tracker, data: tuple[Array, Array, Array], k: int) -> float:

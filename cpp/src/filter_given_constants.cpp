@@ -3,32 +3,13 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 
+#include "given_transition.hpp"
 #include "mirror.hpp"
 
 namespace dynakin {
-namespace {
-
-// Columns of M, those of the coordinates, speeds and accelerations first: M F'.
-void by_transition(const Transition& how, const std::vector<int>& moving, int n, Eigen::MatrixXd& M) {
-  const double dt = how.step, half = 0.5 * dt * dt;
-  M.middleCols(0, n) += dt * M.middleCols(n, n) + half * M.middleCols(2 * n, n);
-  M.middleCols(n, n) += dt * M.middleCols(2 * n, n);
-  for (std::size_t j = 3 * n; j < moving.size(); ++j)
-    if (const double kept = how.kept(moving[j]); kept != 1.0) M.col(j) *= kept;
-}
-
-// F M by rows: a column at a time, which stays in the cache.
-template <class Column>
-void rows_by_transition(double dt, int n, Column&& x) {
-  x.segment(0, n) += dt * x.segment(n, n) + (0.5 * dt * dt) * x.segment(2 * n, n);
-  x.segment(n, n) += dt * x.segment(2 * n, n);
-}
-
-}  // namespace
-
 FilterGivenConstants::FilterGivenConstants(const Model& model, const FilterSettings& settings,
                                            const GivenConstants& apart, int max_rows)
-    : model_(model), settings_(settings), apart_(apart) {
+    : model_(model), settings_(settings), apart_(apart), how_(model) {
   const int d = apart.d(), c = apart.c(), chunk = chunk_rows(max_rows);
   c_ = c_now_ = Eigen::VectorXd::Zero(c);
   Ct_.setZero(c, c);
@@ -104,22 +85,20 @@ void FilterGivenConstants::predict(const Eigen::MatrixXd& S, const Eigen::Matrix
   const Decision& decided = *frame.decided;
   const int n = model_.n_free(), d = apart_.d();
   if (frame.first)
-    frame.how = Transition(model_);
+    how_ = Transition(model_);
   else
-    transition(model_, settings_, decided.carried, frame.dt, frame.how);
-  const Transition& how = frame.how;
+    transition(model_, settings_, decided.carried, frame.dt, how_);
+  frame.how.step = how_.step;
+  frame.how.kept = how_.kept(apart_.moving);
+  frame.how.variance = how_.variance(apart_.moving);
+  frame.how.shared = how_.shared;
   frame.S = S;
-  by_transition(how, apart_.moving, n, frame.S);
-  for (int j = 0; j < d; ++j) {
-    auto column = frame.S.col(j);
-    rows_by_transition(how.step, n, column);
-    for (int i = 3 * n; i < d; ++i) column(i) *= how.kept(apart_.moving[i]);
-  }
+  by_transition(frame.how, frame.S);
+  for (int j = 0; j < d; ++j) transition_of(frame.how, frame.S.col(j));
   mirror_lower(frame.S);
   frame.Vt = Vt;
-  by_transition(how, apart_.moving, n, frame.Vt);
-  rows_by_transition(how.step, n, shift_);
-  for (int i = 3 * n; i < d; ++i) shift_(i) *= how.kept(apart_.moving[i]);
+  by_transition(frame.how, frame.Vt);
+  transition_of(frame.how, shift_);
   const auto add_noise = [&](const Transition& noise) {
     for (int i = 0; i < d; ++i) frame.S(i, i) += noise.variance(apart_.moving[i]);
     for (int i = 0; i < n; ++i) {
@@ -132,7 +111,7 @@ void FilterGivenConstants::predict(const Eigen::MatrixXd& S, const Eigen::Matrix
       frame.S(n + i, 2 * n + i) += qd_qdd;
     }
   };
-  add_noise(how);
+  add_noise(how_);
   const RecoverySettings& sought = settings_.recovery;
   for (const int i : decided.forgotten) {
     const double sd = i < n ? sought.coordinate_sd : i < 2 * n ? sought.speed_sd : sought.acceleration_sd;
@@ -146,7 +125,7 @@ void FilterGivenConstants::predict(const Eigen::MatrixXd& S, const Eigen::Matrix
     Transition noise(model_);
     stir(model_, settings_, decided.stirred, decided.stirred_s, noise);
     add_noise(noise);
-    frame.how.variance += noise.variance;
+    frame.how.variance += noise.variance(apart_.moving);
     frame.how.shared += noise.shared;
   }
 }

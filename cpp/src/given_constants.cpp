@@ -3,6 +3,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 namespace dynakin {
 namespace {
@@ -13,33 +14,45 @@ constexpr double k_nothing = 1e-13;  // of a variance: what rounding leaves of o
 }  // namespace
 
 GivenConstants::GivenConstants(const Model& model, const FilterSettings& settings) {
-  const int n = model.state_size();
+  const int n = model.state_size(), free = model.n_free();
   std::vector<std::uint8_t> is_own(n, 0);
-  for (std::size_t m = 0; m < model.markers().size(); ++m) {
+  for (const auto& marker : model.markers()) {
     own.emplace_back();
-    for (const auto& columns : {model.markers()[m].column, model.markers()[m].soft_tissue})
+    for (const auto& columns : {marker.column, marker.soft_tissue})
       for (const int c : columns)
         if (c != k_none) {
           is_own[c] = 1;
           own.back().push_back(c);
         }
   }
-  place.assign(n, 0);
-  std::vector<int> of_markers;
-  for (int i = 0; i < n; ++i) {
-    const bool moves = i < 3 * model.n_free() || settings.process_variance(i) != 0.0 ||
-                       settings.process_density(i) != 0.0 || settings.decay_rate(i) != 0.0;
-    if (moves) {
-      if (!is_own[i]) wide.push_back(d());
-      place[i] = d();
-      moving.push_back(i);
-    } else {
-      (is_own[i] ? of_markers : constant).push_back(i);
+  for (const bool of_markers : {false, true}) {
+    for (int i = 0; i < n; ++i) {
+      if ((is_own[i] != 0) != of_markers) continue;
+      const bool moves = i < 3 * free || settings.process_variance(i) != 0.0 || settings.process_density(i) != 0.0 ||
+                         settings.decay_rate(i) != 0.0;
+      (moves ? moving : constant).push_back(i);
     }
+    if (of_markers) break;
+    wide = d();
+    wide_constants = c();
   }
-  wide_constants = c();
-  constant.insert(constant.end(), of_markers.begin(), of_markers.end());
+  place.assign(n, 0);
+  for (int k = 0; k < d(); ++k) place[moving[k]] = k;
   for (int k = 0; k < c(); ++k) place[constant[k]] = -1 - k;
+  for (std::size_t m = 0; m < own.size(); ++m) {
+    own_moving.emplace_back();
+    for (const int column : own[m])
+      if (place[column] >= 0) own_moving.back().push_back(place[column]);
+    std::set<int> places;
+    for (const int column : model.marker_columns(static_cast<int>(m))) {
+      const int at = place[column];
+      if (at >= 3 * free)
+        places.insert(at);
+      else if (at >= 0)
+        places.insert({at % free, free + at % free, 2 * free + at % free});
+    }
+    movers.emplace_back(places.begin(), places.end());
+  }
 }
 
 int chunk_rows(int max_rows) { return std::min(std::max(k_chunk_rows, 6), std::max(max_rows, 1)); }

@@ -20,8 +20,8 @@ inline void mirror_lower(Eigen::MatrixXd& P) {
 }
 
 // A + sign (X + X') of a symmetric A, X (n, n).
-template <class Matrix>
-void add_both(double sign, const Matrix& X, Eigen::MatrixXd& A) {
+template <class Matrix, class Symmetric>
+void add_both(double sign, const Matrix& X, Symmetric&& A) {
   const Eigen::Index n = A.rows();
   constexpr Eigen::Index tile = 8;
   using Tile = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, tile, tile>;

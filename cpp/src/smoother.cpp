@@ -1,9 +1,10 @@
 #include "dynakin/smoother.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <chrono>
 #include <cmath>
-#include <future>
+#include <memory>
 #include <utility>
 
 #include "dynakin/backward_pass.hpp"
@@ -34,6 +35,7 @@ Smoother::Smoother(Filter& filter, const Trial& trial, std::size_t stretch)
       tape_(filter.model().state_size(), 0, filter.tape_sensors()),
       apart_(filter.model(), smoothable(filter.settings())),
       forwards_(filter.model(), filter.settings(), apart_, filter.tape_rows()),
+      dependence_(apart_, filter.tape_rows()),
       measurement_(filter.model(), filter.settings()),
       backwards_(filter.model(), apart_, filter.tape_rows()),
       projection_(filter.model(), filter.settings()),
@@ -109,6 +111,7 @@ void Smoother::replay(std::size_t end, const RunRecord& record, Stretch& out) {
   if (end == trial_.frames || decisions_[end].cut) {
     out.last = belief_at(end - 1, record);
     forwards_.end(*out.last);
+    dependence_.end();
   }
   const bool cut = decisions_[out.first].cut;
   Eigen::VectorXd moved = Eigen::VectorXd::Zero(filter_.model().state_size());
@@ -120,6 +123,7 @@ void Smoother::replay(std::size_t end, const RunRecord& record, Stretch& out) {
     FrameGivenConstants* const frame = &out.frames[k - out.first];
     replay_frame(k, record, k == out.first ? nullptr : frame - 1, *frame);
   }
+  dependence_.smooth({out.frames.data(), end - out.first});
   out.end = end;
 }
 
@@ -154,7 +158,7 @@ void Smoother::look_back(const Stretch& stretch, SmoothRecord& out, ContactRecor
     const FrameGivenConstants* const frame = &stretch.frames[k - stretch.first];
     backwards_.look(*frame, x_);
     if (filter_.settings().constraint == ConstraintKind::projection) {
-      if (!projection_.holds(x_)) backwards_.complete();
+      if (!projection_.holds(x_)) backwards_.complete(*frame);
       projection_.bound(x_, backwards_.covariance());
     }
     forward_kinematics(filter_.model(), x_, kinematics_);
@@ -171,10 +175,17 @@ std::size_t Smoother::backward(const RunRecord& record, SmoothRecord& out, Conta
   left_ = now_.first;
   {
     const AtWork other(left_ > 0 ? most_threads_ : 0);
-    std::future<void> replayed;
-    if (other) replayed = std::async(std::launch::async, [&] { replay(left_, record, before_); });
+    std::future<void> other_thread;
+    const auto taken = std::make_shared<std::atomic<bool>>(false);
+    if (other)
+      other_thread = std::async(std::launch::async, [this, taken, &record] {
+        if (!taken->exchange(true)) replay(left_, record, before_);
+      });
     look_back(now_, out, contacts);
-    if (other) replayed.get();
+    if (other && taken->exchange(true))
+      other_thread.get();
+    else  // on a busy machine it may not have begun: it is not waited for
+      late_ = std::move(other_thread);
   }
   const double us = us_since(start) / static_cast<double>(now_.end - now_.first);
   std::fill(out.backward_us.begin() + static_cast<std::ptrdiff_t>(now_.first),

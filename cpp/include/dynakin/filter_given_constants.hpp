@@ -36,6 +36,7 @@ class FilterGivenConstants {
   // Where the stretch begins.
   Eigen::MatrixXd S_, Vt_;
   Eigen::VectorXd shift_;  // (d,) m less the whole filter's mean
+  Transition how_;         // to the present frame, of all states
   // Of the present frame's rows.
   std::vector<int> c_ends_, c_columns_;
   std::vector<double> c_values_, innovation_;

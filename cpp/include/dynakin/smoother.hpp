@@ -2,11 +2,13 @@
 #pragma once
 
 #include <cstddef>
+#include <future>
 #include <optional>
 #include <vector>
 
 #include "dynakin/filter_given_constants.hpp"
 #include "dynakin/run.hpp"
+#include "dynakin/smoothed_dependence.hpp"
 #include "dynakin/smoother_given_constants.hpp"
 #include "dynakin/threads.hpp"
 
@@ -70,6 +72,7 @@ class Smoother {
   Stretch now_, before_;  // that is looked through, and that is replayed meanwhile
   // For replay.
   FilterGivenConstants forwards_;
+  SmoothedDependence dependence_;
   Measurement measurement_;
   WrenchModel how_;
   // For look_back.
@@ -78,6 +81,7 @@ class Smoother {
   KinematicState kinematics_;
   DynamicState dynamics_;
   Eigen::VectorXd x_;
+  std::future<void> late_;  // of a thread that has nothing left to do
 };
 
 }  // namespace dynakin

@@ -16,31 +16,31 @@ class SmootherGivenConstants {
   void end(const Belief& last);
   // From a stretch's last frame to its first: the frame's state from all frames, and its covariance (n, n) of all pairs
   // of elements of which none is a marker's own, and of those that move the same marker. Other entries are of no
-  // meaning before complete().
+  // meaning before complete(). SmoothedDependence went through the stretch before.
   void look(const FrameGivenConstants& frame, Eigen::VectorXd& x);
   const Eigen::MatrixXd& covariance() const { return covariance_; }
-  void complete();
+  void complete(const FrameGivenConstants& frame);
   // Over the frame's update and what led to it. last: as of FilterGivenConstants::step.
   void undo(const FrameGivenConstants& frame, const FrameGivenConstants* last);
 
  private:
   using Frame = FrameGivenConstants;
+  void form(const Frame& frame);
   void undo_chunk(const Frame& frame, int from, int end);
-  void undo_transition(const Transition& how, const Frame* last);
+  void carry_back(const Transition& how, const Eigen::MatrixXd& S);
 
   const Model& model_;
   const GivenConstants& apart_;
   Eigen::MatrixXd Ct_;  // C', upper triangular
-  // The adjoints of m, S and V.
+  // The adjoints of m and S.
   Eigen::VectorXd lambda_;
-  Eigen::MatrixXd Lambda_, Wt_;
-  Eigen::MatrixXd P_, Yt_;  // (d, d) covariance given z from all frames, V' from all frames (c, d)
-  bool there_ = false;      // they are of the frame that is looked at
-  bool ended_ = false;      // no later frame has said anything yet
-  int since_ = 0;           // frames since they were not carried here from the frame after
-  double decayed_ = 1.0;    // least that was kept of an element on the way
-  Panels Z_panels_, D_panels_;
-  Eigen::MatrixXd G_, M_, X_, T_, Bt_, U_, Yw_, Pw_, Pwc_, covariance_;
+  Eigen::MatrixXd Lambda_;
+  Eigen::MatrixXd P_;   // (d, d) covariance given z from all frames, of the frame that is looked at
+  bool ended_ = false;  // no later frame has said anything yet
+  Panels panels_;
+  Eigen::MatrixXd B_, Bt_, T_, U_, X_, M_, dd_, dc_, covariance_;
+  std::vector<const double*> a_, b_;
+  Eigen::MatrixXd dots_;
 };
 
 }  // namespace dynakin
