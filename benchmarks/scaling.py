@@ -3,17 +3,17 @@
     OMP_NUM_THREADS=1 .venv/bin/python benchmarks/scaling.py [frames] [states] [trials] [--longest 16000]
 
 Each line is a process of its own, so that its peak of memory is its own. *Frames*: `squats1` forwards and backwards in
-turn, as long as asked, smoothed with all deviations, and live (one step at a time, nothing kept); power: of the time
-and of the memory above an empty run's, from the line before. *States*: `squats1` with fewer and more markers than it
-has: more are weighted means of those on a thigh or shank, with 0.5 mm of noise of their own. *Trials*: `dynakin batch`
-over simulated walks of 5 s, one and two workers at a time, and two of a Dask cluster on this machine.
+turn, as long as asked, smoothed with all deviations, and live (one step at a time, nothing kept), seconds of processor
+time with one thread; power: of the time and of the memory above an empty run's, from the line before. *States*:
+`squats1` with fewer and more markers than it has: more are weighted means of those on a thigh or shank, with 0.5 mm of
+noise of their own. *Trials*: `dynakin batch` over simulated walks of 5 s, one and two workers at a time, and two of a
+Dask cluster on this machine.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import multiprocessing
 import os
 import resource
 import subprocess
@@ -70,10 +70,20 @@ def alone(*what: object) -> dict[str, float]:
 
 def frames_table(longest: int) -> None:
     """Against frames."""
-    print("| model | frames | smoothed, s | ms a frame | power | memory, MB | power | live, ms a step | memory, MB |")
-    print("|---|---|---|---|---|---|---|---|---|")
+    heads = (
+        "model",
+        "frames",
+        "smoothed, s CPU",
+        "ms a frame",
+        "power",
+        "memory, MB",
+        "power",
+        "live, ms",
+        "memory, MB",
+    )
+    print(f"| {' | '.join(heads)} |\n{'|---' * len(heads)}|")
     for model, every in FRAMES.items():
-        empty, before = alone("frames", model, 10, "smoothed")["mb"], None
+        empty, last, before = alone("frames", model, 10, "smoothed")["mb"], None, None
         for frames in (n for n in every if model == "planar" or n <= longest):
             smoothed, live = alone("frames", model, frames, "smoothed"), alone("frames", model, frames, "live")
             now = (frames, smoothed["s"], smoothed["mb"] - empty)
@@ -255,6 +265,5 @@ def peak_mb() -> float:
 
 
 if __name__ == "__main__":
-    multiprocessing.freeze_support()
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     main()

@@ -7,6 +7,7 @@
 #include "mirror.hpp"
 
 namespace dynakin {
+
 FilterGivenConstants::FilterGivenConstants(const Model& model, const FilterSettings& settings,
                                            const GivenConstants& apart, int max_rows)
     : model_(model), settings_(settings), apart_(apart), how_(model) {

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <memory>
+#include <system_error>
 #include <utility>
 
 #include "dynakin/backward_pass.hpp"
@@ -177,14 +178,16 @@ std::size_t Smoother::backward(const RunRecord& record, SmoothRecord& out, Conta
     const AtWork other(left_ > 0 ? most_threads_ : 0);
     std::future<void> other_thread;
     const auto taken = std::make_shared<std::atomic<bool>>(false);
-    if (other)
-      other_thread = std::async(std::launch::async, [this, taken, &record] {
-        if (!taken->exchange(true)) replay(left_, record, before_);
-      });
+    if (other) try {
+        other_thread = std::async(std::launch::async, [this, taken, &record] {
+          if (!taken->exchange(true)) replay(left_, record, before_);
+        });
+      } catch (const std::system_error&) {  // the system has no thread left: one does it all
+      }
     look_back(now_, out, contacts);
-    if (other && taken->exchange(true))
+    if (other_thread.valid() && taken->exchange(true))
       other_thread.get();
-    else  // on a busy machine it may not have begun: it is not waited for
+    else  // on a busy machine it may not have begun: the next stretch is looked through without it
       late_ = std::move(other_thread);
   }
   const double us = us_since(start) / static_cast<double>(now_.end - now_.first);

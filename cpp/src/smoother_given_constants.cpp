@@ -7,6 +7,7 @@
 #include "mirror.hpp"
 
 namespace dynakin {
+
 SmootherGivenConstants::SmootherGivenConstants(const Model& model, const GivenConstants& apart, int max_rows)
     : model_(model), apart_(apart) {
   const int d = apart.d(), c = apart.c(), n = model.state_size(), chunk = chunk_rows(max_rows);

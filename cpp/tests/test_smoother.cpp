@@ -1,6 +1,7 @@
 #include "check.hpp"
 #include "dynakin/fixed_lag.hpp"
 #include "dynakin/smoother.hpp"
+#include "dynakin/threads.hpp"
 #include "models.hpp"
 
 using namespace dynakin;
@@ -146,4 +147,16 @@ TEST(smoothing_refuses_bounds_that_have_no_smoother) {
     Filter filter(model, settings, model.initial_state(), prior_for(model));
     check_refused([&] { FixedLag(filter, 3); }, name);
   }
+}
+
+TEST(no_more_threads_are_at_work_than_may_be) {
+  const AtWork first(1);
+  CHECK(static_cast<bool>(first));
+  CHECK(!AtWork(1));
+  {
+    const AtWork second(2);
+    CHECK(static_cast<bool>(second));
+    CHECK(!AtWork(2));
+  }
+  CHECK(static_cast<bool>(AtWork(2)));
 }

@@ -48,7 +48,7 @@ __all__ = [
     "run",
 ]
 
-__getattr__ = loaded_when_asked(
+__getattr__, __dir__ = loaded_when_asked(
     __name__,
     {
         "errors": ("DynakinError",),
@@ -70,7 +70,3 @@ __getattr__ = loaded_when_asked(
         "settings.subject": ("Subject",),
     },
 )
-
-
-def __dir__() -> list[str]:
-    return __all__

@@ -8,8 +8,10 @@ from importlib import import_module
 from typing import Any
 
 
-def loaded_when_asked(package: str, homes: Mapping[str, Sequence[str]]) -> Callable[[str], Any]:
-    """What a package needs for its ``__getattr__``.
+def loaded_when_asked(
+    package: str, homes: Mapping[str, Sequence[str]]
+) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
+    """What a package needs for its ``__getattr__`` and ``__dir__``.
 
     Args:
         homes: the package's modules, by their names within it, and the names that come from each.
@@ -23,4 +25,4 @@ def loaded_when_asked(package: str, homes: Mapping[str, Sequence[str]]) -> Calla
         setattr(sys.modules[package], name, value)
         return value
 
-    return get
+    return get, lambda: sorted(home_of)

@@ -34,6 +34,15 @@ def test_without_arguments_the_commands_are_listed(capsys: Said) -> None:
         assert command in said.out + said.err
 
 
+def test_who_stops_a_command_is_told_so(monkeypatch: pytest.MonkeyPatch, capsys: Said) -> None:
+    def stopped(*_: object, **__: object) -> None:
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("dynakin.pipeline.stages.configure", stopped)
+    assert main(["check", "trial.c3d"]) == 130
+    assert "stopped" in capsys.readouterr().err
+
+
 def test_installed_command_gives_its_exit_code(tmp_path: Path) -> None:
     code = "import sys; from dynakin.cli import main; sys.exit(main())"
     done = subprocess.run(

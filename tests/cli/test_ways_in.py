@@ -111,18 +111,6 @@ def test_settings_and_a_recording_that_was_read_give_the_same(
         dynakin.run(recording, modle="squat7", **KEYS)
 
 
-def test_what_fails_beside_the_estimate_is_named_like_any_late_stage(
-    trial: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def broken(tracker: object) -> None:
-        raise RuntimeError("no structure")
-
-    monkeypatch.setattr(stages, "structure_of", broken)
-    result = dynakin.run(trial / "markers.trc", forces=trial / "forces.mot", lag_s=0.0, **KEYS)
-    assert result.observability is None and np.isfinite(result.estimate.data["coordinates"]).all()
-    assert result.failures.messages() == ["Failed: observability of the constants: RuntimeError: no structure."]
-
-
 def test_a_result_as_a_researcher_takes_it(from_python: dynakin.Result) -> None:
     assert repr(from_python) == "<Result: <Estimate of markers: sagittal7, 501 frames, smoothed>>"
     assert repr(from_python.estimate.recording).startswith("<Recording markers: 501 frames, ")

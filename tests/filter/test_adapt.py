@@ -13,7 +13,6 @@ from dynakin.filter.adapt import LATE_SHARE, LEAST_FRAMES, Trial, calibrated_noi
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.noise import joint_groups
 from dynakin.filter.prepared import Prepared
-from dynakin.filter.tracker import Tracker
 from dynakin.model.definition import load_model
 from dynakin.recordings.feet.contact import UNMEASURED
 from dynakin.recordings.recording import Recording
@@ -69,16 +68,6 @@ def test_twice_the_noise_of_the_cameras_is_four_times_the_variance() -> None:
         noise, _ = found(planar(Noise()).prepare(standing(sd)))
         scales.append(noise.variance_scale)
     assert scales[1] / scales[0] == pytest.approx(4.0, rel=0.1)
-
-
-@pytest.mark.parametrize("noise", [Noise(adapt=False), Noise(adapt=True)])
-def test_the_noise_is_told_with_a_tracker_at_its_start(noise: Noise) -> None:
-    estimator, told = planar(noise), list[Tracker]()
-    ready = estimator.prepare(standing(0.001).window(0.0, 1.0), lag_s=0.0)
-    last = estimator.follow(ready, known=told.append).tracker
-    assert [tracker.noise for tracker in told] == [last.noise]
-    np.testing.assert_array_equal(told[0].state, ready.tracker.state)
-    assert (told[0].state != last.state).any()
 
 
 @pytest.fixture(scope="module")

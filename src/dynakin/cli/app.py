@@ -27,6 +27,7 @@ from dynakin.cli.tune import tune
 from dynakin.errors import DynakinError
 
 # Typer carries its own copy of click or uses click's, depending on its version; its own name leads to either.
+_STOPPED = 130  # as shells have it
 _USAGE_ERROR: type[Exception] = typer.BadParameter.__mro__[1]
 
 app = typer.Typer(
@@ -88,8 +89,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         print_error(f"{text}. See {command} --help.")
         return 2
     except (KeyboardInterrupt, typer.Abort):
+        code = _STOPPED
+    if code == _STOPPED:  # which typer may have made of a KeyboardInterrupt itself
         print_error("stopped")
-        return 130
     return code if isinstance(code, int) else 0
 
 

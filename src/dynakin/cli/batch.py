@@ -36,14 +36,15 @@ def batch(
     The exit code is 1 where some failed, or a filter lost the person. A batch that was stopped goes on where it was;
     those that failed are tried again.
     """
-    from dynakin.report.text_tables import table2_text
-    from dynakin.results.naming import plural
-    from dynakin.studies.batch.dataset import read_dataset
-    from dynakin.studies.batch.process import Options, belongs_to, run_batch, write_batch
-    from dynakin.studies.batch.subjects import identify_subjects, with_parameters
-    from dynakin.studies.engine.folder import ROWS, open_folder
-    from dynakin.studies.engine.journal import Journal
-    from dynakin.studies.engine.pools import open_pool
+    with stage("loading"):
+        from dynakin.report.text_tables import table2_text
+        from dynakin.results.naming import plural
+        from dynakin.studies.batch.dataset import read_dataset
+        from dynakin.studies.batch.process import Options, belongs_to, run_batch, write_batch
+        from dynakin.studies.batch.subjects import identify_subjects, with_parameters
+        from dynakin.studies.engine.folder import ROWS, open_folder
+        from dynakin.studies.engine.journal import Journal
+        from dynakin.studies.engine.pools import open_pool
 
     if backend == "threads":
         raise ConfigError("batch: --backend threads, expected processes or dask: a crash would take all trials with it")

@@ -11,6 +11,7 @@ from dynakin.cli.console import out
 from dynakin.cli.options import OF_A_MODEL, OF_THE_LABORATORY, OF_THE_PLATES, Given, with_settings
 from dynakin.errors import DynakinError, ModelError, RecordingError
 from dynakin.files import is_file
+from dynakin.progress import stage
 
 
 @with_settings("forces", *OF_A_MODEL, "parameters", *OF_THE_LABORATORY, *OF_THE_PLATES, "preset")
@@ -23,15 +24,17 @@ def check(
 
     Exit code 0 where `run` would run; 1 where it would refuse, with the line that it would refuse with.
     """
-    from dynakin.cli.check_rows import model_rows, nearest_sets, recording_rows, rehearsed, to_add
-    from dynakin.cli.prepared import print_rows
-    from dynakin.pipeline.stages import configure
-    from dynakin.validation.case import case_of
+    with stage("loading"):
+        from dynakin.cli.check_rows import model_rows, nearest_sets, recording_rows, rehearsed, to_add
+        from dynakin.cli.prepared import print_rows
+        from dynakin.pipeline.stages import configure
+        from dynakin.validation.case import case_of
 
     console = out()
     settings = configure(trial, given, {"output": Path()}, options=True)
     try:
-        case = case_of(settings)
+        with stage("reading the recording"):
+            case = case_of(settings)
     except (RecordingError, ModelError) as error:
         if not is_file(Path(trial)):
             raise

@@ -39,24 +39,26 @@ def compare(
     output: Annotated[Path | None, typer.Option("-o", "--output", help="Folder for tables and curves.")] = None,
 ) -> None:
     """Compare the filter with the table and the classical method, over one or many trials (the paper's Table II)."""
-    from dynakin.cli.compare_inputs import cases_of, chosen_trials, halves_of
-    from dynakin.cli.compare_tables import (
-        compare_cases,
-        described,
-        print_comparison,
-        print_held_out,
-        print_repetitions,
-        print_unseen,
-        settings_of,
-    )
-    from dynakin.report.comparison_page import render_comparison
-    from dynakin.validation.files import check_comparison_folder, save_comparison
-    from dynakin.validation.methods import Trial
+    with stage("loading"):
+        from dynakin.cli.compare_inputs import cases_of, chosen_trials, halves_of
+        from dynakin.cli.compare_tables import (
+            compare_cases,
+            described,
+            print_comparison,
+            print_held_out,
+            print_repetitions,
+            print_unseen,
+            settings_of,
+        )
+        from dynakin.report.comparison_page import render_comparison
+        from dynakin.validation.files import check_comparison_folder, save_comparison
+        from dynakin.validation.methods import Trial
 
     if output is not None:
         check_comparison_folder(output)
     chosen = chosen_trials(trials or [], identify_trial, test_trial, halved or not_seen)
-    cases = cases_of(chosen, forces or [], preset or [], cutoff, given)
+    with stage("reading the recordings"):
+        cases = cases_of(chosen, forces or [], preset or [], cutoff, given)
     console = out()
     tables: dict[str, Sequence[Any]] = {}
     more: dict[str, Any] = {"settings": settings_of(cases)}

@@ -249,14 +249,8 @@ class Estimator:
         doubt = doubtful_mass(wrench, calibrated.weighed_kg, ground.load_ratio, calibrated.unseen_kg)
         return Prepared(recording, tracker, markers, wrench, ground, contacts, lag_s, doubt, tuple(unsmoothed))
 
-    def follow(
-        self, ready: Prepared, progress: Progress | None = None, known: Callable[[Tracker], object] | None = None
-    ) -> Tracked:
+    def follow(self, ready: Prepared, progress: Progress | None = None) -> Tracked:
         """The estimate of a recording that is prepared, once or again: `ready` does not change.
-
-        Args:
-            known: called with a tracker at its start as soon as the noise is known, before the last run: another
-                thread may work with it while the core does.
 
         Raises:
             RecordingError, DivergenceError: as in `run`.
@@ -275,8 +269,6 @@ class Estimator:
             shares = (ways * frames, 0, 0) if once else (frames, again, ways * frames)
             there, calibrating, back = _shares(progress, shares)
             passes = 0 if ready.doubt else PASSES
-            if known is not None and once:
-                known(ready.tracker.fresh())
             to_look = partial(Tracker.run_arrays, deviations=False)
             tracker, arrays, shift, clock = run_in_step(
                 ready.tracker.fresh(), recording.time, markers, ready.wrench, there, on_feet, passes,
@@ -292,8 +284,6 @@ class Estimator:
                 skin = following_skin(tracker, arrays, recording.time) if scaled else None
                 seen = markers if skin is None else markers - skin.shift_m
                 tracker = tracker.changed(found or tracker.noise)
-                if known is not None:
-                    known(tracker.fresh())
                 arrays = tracker.run_late_arrays(late, recording.time, seen, wrench, back, on_feet)
                 arrays = arrays if skin is None else skin.put_back(arrays)
         except ValueError as error:  # a frame that the core refuses, named by it

@@ -263,7 +263,7 @@ def doubtful_mass(wrench: Array, mass_kg: float, load_ratio: float | None, unsee
         return None
     return (
         f"Warning: the plates carry {load:.1f} kg on average where the person weighs {mass_kg:.1f} kg "
-        f"({100.0 * abs(load - mass_kg) / mass_kg:.0f} % apart, expected within {100.0 * within:.0f} %): check the "
+        f"({100.0 * abs(load - mass_kg) / mass_kg:.1f} % apart, expected within {100.0 * within:.0f} %): check the "
         "mass. Forces, moments and inertia take the error on, and no delay of the plates is taken off, because a wrong "
         "mass looks like one."
     )

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from concurrent.futures import Future, ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from threading import Thread
 from typing import Any
 
 from dynakin.errors import ConfigError, DynakinError
 from dynakin.filter.prepared import Prepared
 from dynakin.filter.tracker import Tracker
-from dynakin.identification.observability.structure import Structure, structure_of
 from dynakin.identification.observability.trial import Identifiability, identifiability
 from dynakin.pipeline.result import Result
 from dynakin.progress import Progress, stage
@@ -143,10 +142,8 @@ def run_case(
     if ready is None:
         with stage("measuring the person"):
             ready = prepare_case(case)
-    structures: list[Future[Structure]] = []
-    with ThreadPoolExecutor(max_workers=1) as beside, stage("estimating", progress) as report:
-        # while the core works, which leaves the interpreter free: what does not wait for the estimate
-        beside.submit(_load_what_follows)
+    Thread(target=_load_what_follows, daemon=True).start()  # while the core works, which leaves the interpreter free
+    with stage("estimating", progress) as report:
         estimates, _, trackers = estimate_each(
             case.recording,
             case.setup,
@@ -155,13 +152,11 @@ def run_case(
             keep_lost=True,
             failures=failures,
             ready=ready,
-            known=(lambda tracker: structures.append(beside.submit(structure_of, tracker))) if observability else None,
         )
     if not keep_lost:
         for estimate in estimates.values():
             refuse_lost(estimate, keep)
-    structure = structures[0] if structures else None
-    return judged(case, estimates, {}, trackers, failures, observability=observability, structure=structure)
+    return judged(case, estimates, {}, trackers, failures, observability=observability)
 
 
 def _load_what_follows() -> None:
@@ -183,14 +178,12 @@ def judged(
     *,
     tolerant: bool = True,
     observability: bool = True,
-    structure: Future[Structure] | None = None,
 ) -> Result:
     """What follows the estimates of a trial (see `estimate_each`), each stage on its own: the comparison of all with
     the reference methods, and the observability of the constants of the first.
 
     Args:
-        failures: takes the stages that fail. tolerant: as `trial_of` takes it. structure: what the first's model and
-            noise can identify at all, where somebody works that out.
+        failures: takes the stages that fail. tolerant: as `trial_of` takes it.
     """
     estimates = {title: case.with_config(title, estimate) for title, estimate in estimates.items()}
     title, first = next(iter(estimates.items()))
@@ -203,7 +196,7 @@ def judged(
     observed: Identifiability | None = None
     if observability:
         with failures.stage("observability of the constants"):
-            observed, note = _observability(trackers[title], first, structure)
+            observed, note = _observability(trackers[title], first)
             if note:
                 first = replace(first, messages=[*first.messages, f"{_LEFT_OUT}: {note}"])
     return Result(first, initial, comparison, observed, case.config, failures)
@@ -212,15 +205,11 @@ def judged(
 _LEFT_OUT = "Observability of the constants is left out"
 
 
-def _observability(
-    tracker: Tracker, estimate: Estimate, structure: Future[Structure] | None
-) -> tuple[Identifiability | None, str]:
+def _observability(tracker: Tracker, estimate: Estimate) -> tuple[Identifiability | None, str]:
     """Observability of the constants in this recording, or why it is left out, which is no failure. Of a body that is
     fixed nowhere no other movements are tried: that takes as long as the estimate of a short trial."""
     try:
         with stage("looking at what is observed") as report:
-            known = None if structure is None else structure.result()
-            motions = not tracker.calibrated.feet
-            return identifiability(tracker, estimate, report, motions=motions, structure=known), ""
+            return identifiability(tracker, estimate, report, motions=not tracker.calibrated.feet), ""
     except DynakinError as error:  # a trial of a few frames, say
         return None, error.message

@@ -25,7 +25,7 @@ __all__ = [
     "write_report",
 ]
 
-__getattr__ = loaded_when_asked(
+__getattr__, __dir__ = loaded_when_asked(
     __name__,
     {
         "comparison_page": ("render_comparison",),

@@ -166,11 +166,13 @@ def _axes(low: float, high: float, start: float, end: float, x: Place, y: Place,
 
 def round_levels(low: float, high: float, most: int, steps: Sequence[float] = _STEPS) -> Array:
     """Levels from ``low`` to ``high`` that are multiples of a round step, ``most`` of them and one at most, two at
-    least: Matplotlib's ``MaxNLocator``, which takes as long to load as the page to write.
+    least (one where there is no range): Matplotlib's ``MaxNLocator``, which takes as long to load as the page to write.
 
     Args:
         steps: that count as round, from 1 to below 10.
     """
+    if not high > low:
+        return np.array([low])
     wanted = (high - low) / most
     scale = 10.0 ** np.floor(np.log10(wanted))
     rounds = [ten * scale * step for ten in (0.1, 1.0, 10.0) for step in steps]

@@ -26,7 +26,7 @@ __all__ = [
     "simulate_squat",
 ]
 
-__getattr__ = loaded_when_asked(
+__getattr__, __dir__ = loaded_when_asked(
     __name__,
     {
         "bodies.subject": ("SimulatedSubject", "draw_subject"),

@@ -3,7 +3,7 @@ table ("AT") and "classical" of a planar chain, inverse kinematics and dynamics 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 
@@ -157,7 +157,6 @@ def estimate_each(
     keep_lost: bool = False,
     failures: Failures | None = None,
     ready: Mapping[str, Prepared] | None = None,
-    known: Callable[[Tracker], object] | None = None,
 ) -> tuple[dict[str, Estimate], dict[str, str], dict[str, Tracker]]:
     """Run every preset.
 
@@ -165,7 +164,6 @@ def estimate_each(
         keep_lost: those that lost the person are estimates like the others. failures: takes what fails once an
             estimate is there (the angles that were asked for); not given: it is raised.
         ready: the trial as prepared for these presets (`Estimator.prepare`), where that has been done.
-        known: as of `Estimator.follow`, for each preset.
 
     Returns:
         By preset: the estimates, why others lost the person, and the trackers of all as they ended.
@@ -179,7 +177,7 @@ def estimate_each(
     for preset in setup.noise:
         estimator = setup.estimator(preset)
         made = (ready or {}).get(preset) or estimator.prepare(recording, static=static, lag_s=setup.lag_s)
-        estimate, trackers[preset] = estimator.follow(made, progress, known)
+        estimate, trackers[preset] = estimator.follow(made, progress)
         reason = None if keep_lost else why_lost(estimate)
         if reason is not None:
             lost[preset] = reason

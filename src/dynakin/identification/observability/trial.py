@@ -107,12 +107,7 @@ class Identifiability:
 
 
 def identifiability(
-    tracker: Tracker,
-    estimate: Estimate,
-    progress: Progress | None = None,
-    *,
-    motions: bool = True,
-    structure: Structure | None = None,
+    tracker: Tracker, estimate: Estimate, progress: Progress | None = None, *, motions: bool = True
 ) -> Identifiability:
     """Posterior of a trial's constants against their prior, and movements that would identify more.
 
@@ -120,9 +115,8 @@ def identifiability(
         tracker, estimate: as `Estimator.track` gave them.
         progress: called with (motions tried, in all).
         motions: whether to try any; all else follows from the estimate and the model alone.
-        structure: of this tracker's model and noise, where that is known already.
     """
-    structure, bench = structure or structure_of(tracker), Bench(tracker, estimate)
+    structure, bench = structure_of(tracker), Bench(tracker, estimate)
     shares = {p.name: share for p in estimate.parameters if (share := share_of(p)) is not None}
     tried: list[Excitation] | None = None
     gains: dict[str, dict[str, float]] = {}

@@ -27,8 +27,9 @@ LEAST_M = 0.10
 BRIDGED_S = 0.25
 """Gap in all of a foot's markers over which its sole is drawn on by a straight line."""
 EARLY_S, LATE_S = 0.02, 0.07
-"""How long before a foot's markers are slow and low the plates are touched, and how long after they are left: means of
-the walks and the landing at hand, by their plates, 0.01 s later at the end (`walking1`, `MH0222_BP06`)."""
+"""How long before a foot's markers are slow and low the plates are touched, and how long after they are left. By the
+plates of the walks and the landing at hand 0.02 and 0.06 s, their means; 0.07 s gives the better wrench where plates
+are withheld from `walking1` and `MH0222_BP06`."""
 PASSING_S = 0.12
 """How long a foot takes to load and to unload: the double support of a walk, or the edges of a run's stance."""
 PRESSURE_REACH, ROLLED_M, FLAT_TILT_M = 0.55, 0.012, -0.006
@@ -53,7 +54,8 @@ class Soles:
         half_m: (F, 2) half its length and half its width.
         bears: (T, F) the foot may bear load.
         stance: (T, F) from 0 at touch-down to 1, and to 0 at toe-off.
-        support: (T,) the same of all feet together: it stays 1 while they take turns without flight.
+        support: (T,) the same of all feet together: it stays 1 while they take turns without flight (live, where nobody
+            knows yet who comes next: their sum, 1 at most).
         pressure: (T, F, 3) m, where its centre of pressure is expected, by how far the foot has rolled.
         pressure_covariance: (T, F, 2, 2) m^2 of that along X and Z of the ground.
     """

@@ -129,9 +129,8 @@ def write_netcdf(estimate: Estimate, path: Path) -> None:
             if variable.dims[0] == "time":
                 encoding[key]["dtype"] = "float32"
             rounded[key] = variable.copy(data=values)
-    with h5netcdf.File(
-        path, "w"
-    ) as file:  # by its path xarray would ask Dask who else writes it, which takes 0.3 s where it is there
+    # By its path xarray would ask Dask who else writes it, which takes 0.3 s where it is there.
+    with h5netcdf.File(path, "w") as file:
         store = xr.backends.H5NetCDFStore(file)
         data.assign(rounded).dump_to_store(store, encoding=encoding)
 
