@@ -64,8 +64,9 @@ void Projection::restore(const Memory& memory) {
   last_ = memory.last;
 }
 
-ProjectionReport Projection::bound(Eigen::VectorXd& x, const Eigen::MatrixXd& P) {
+ProjectionReport Projection::bound(Eigen::VectorXd& x, const Eigen::MatrixXd& P, const MakeColumn& make) {
   ProjectionReport report;
+  make_ = &make;
   wanted_ = x;
   warm_start(P, x);
   Active worst;
@@ -83,13 +84,6 @@ ProjectionReport Projection::bound(Eigen::VectorXd& x, const Eigen::MatrixXd& P)
   report.active = k_;
   last_ = x;
   return report;
-}
-
-bool Projection::holds(const Eigen::VectorXd& x) const {
-  HalfSpace cut;
-  for (int b = 0; b < consistency_.size(); ++b)
-    if (consistency_.cut(b, x, cut)) return false;
-  return (x.array() >= settings_.lower.array()).all() && (x.array() <= settings_.upper.array()).all();
 }
 
 // x + P a (b - a x) / a' P a, and P without what it had along a. A row of which P leaves nothing open is left alone;
@@ -180,7 +174,7 @@ bool Projection::worst_violation(const Eigen::VectorXd& x, const Eigen::MatrixXd
 
 bool Projection::add(Active incoming, const Eigen::MatrixXd& P, Eigen::VectorXd& x) {
   incoming.multiplier = 0.0;
-  incoming.row.times(P, Pa_);
+  times(incoming.row, P, Pa_);
   const double aPa = incoming.row.dot(Pa_);
   if (!(aPa > 0.0)) return false;
   while (true) {
@@ -214,13 +208,19 @@ bool Projection::add(Active incoming, const Eigen::MatrixXd& P, Eigen::VectorXd&
 bool Projection::push(const Active& active, const Eigen::MatrixXd& P) {
   if (k_ == capacity_) return false;
   active_[k_] = active;
-  active.row.times(P, PN_.col(k_));
+  times(active.row, P, PN_.col(k_));
   for (int j = 0; j <= k_; ++j) gram_(k_, j) = gram_(j, k_) = active_[j].row.dot(PN_.col(k_));
   ++k_;
   if (factor()) return true;
   --k_;
   factor();
   return false;
+}
+
+void Projection::times(const HalfSpace& row, const Eigen::MatrixXd& P, Eigen::Ref<Eigen::VectorXd> out) const {
+  if (*make_)
+    for (int k = 0; k < row.size; ++k) (*make_)(row.index[k]);
+  row.times(P, out);
 }
 
 void Projection::drop(int k) {

@@ -159,8 +159,7 @@ void Smoother::look_back(const Stretch& stretch, SmoothRecord& out, ContactRecor
     const FrameGivenConstants* const frame = &stretch.frames[k - stretch.first];
     backwards_.look(*frame, x_);
     if (filter_.settings().constraint == ConstraintKind::projection) {
-      if (!projection_.holds(x_)) backwards_.complete(*frame);
-      projection_.bound(x_, backwards_.covariance());
+      projection_.bound(x_, backwards_.covariance(), [this, frame](int i) { backwards_.complete(*frame, i); });
     }
     forward_kinematics(filter_.model(), x_, kinematics_);
     subtree_dynamics(filter_.model(), x_, kinematics_, dynamics_);

@@ -25,6 +25,8 @@ SmootherGivenConstants::SmootherGivenConstants(const Model& model, const GivenCo
     most_own = std::max(most_own, apart.own[m].size());
     most = std::max({most, apart.movers[m].size(), model.marker_columns(static_cast<int>(m)).size()});
   }
+  d_ = y_ = lambda_;
+  c_.setZero(c);
   dots_.setZero(static_cast<Eigen::Index>(most_own), static_cast<Eigen::Index>(most));
   covariance_.setZero(n, n);
 }
@@ -96,13 +98,20 @@ void SmootherGivenConstants::look(const Frame& frame, Eigen::VectorXd& x) {
   }
 }
 
-void SmootherGivenConstants::complete(const Frame& frame) {
+void SmootherGivenConstants::complete(const Frame& frame, int column) {
   if (ended_) return;
-  form(frame);
-  const Eigen::MatrixXd dd = P_ + frame.Vt.transpose() * frame.Vt, dc = frame.Vt.transpose() * Ct_;
-  covariance_(apart_.moving, apart_.moving) = dd;
-  covariance_(apart_.moving, apart_.constant) = dc;
-  covariance_(apart_.constant, apart_.moving) = dc.transpose();
+  const int i = apart_.place[column];
+  if (i >= 0) {
+    y_.noalias() = Lambda_ * frame.S.col(i);
+    d_ = frame.S.col(i);
+    d_.noalias() -= frame.S * y_;
+    d_.noalias() += frame.Vt.transpose() * frame.Vt.col(i);
+    c_.noalias() = Ct_.transpose() * frame.Vt.col(i);
+    covariance_(apart_.constant, column) = c_;
+  } else {
+    d_.noalias() = frame.Vt.transpose() * Ct_.col(-1 - i);
+  }
+  covariance_(apart_.moving, column) = d_;
 }
 
 void SmootherGivenConstants::undo(const Frame& frame, const Frame* last) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <vector>
 
 #include "dynakin/consistency.hpp"
@@ -35,10 +36,10 @@ class Projection {
   void forget();
   // Equalities, then inequalities; what they do is written to the tape, if there is one.
   ProjectionReport apply(Eigen::VectorXd& x, Eigen::MatrixXd& P, FrameTape* tape = nullptr);
-  // Inequalities alone.
-  ProjectionReport bound(Eigen::VectorXd& x, const Eigen::MatrixXd& P);
-  // Whether bound() would leave x alone, and so not look at P beyond its diagonal.
-  bool holds(const Eigen::VectorXd& x) const;
+  // Inequalities alone. make: makes a column of P, where not all are there; each is asked for before it is used. The
+  // diagonal and what one segment's inertia shares are there.
+  using MakeColumn = std::function<void(int)>;
+  ProjectionReport bound(Eigen::VectorXd& x, const Eigen::MatrixXd& P, const MakeColumn& make = {});
   // What the next apply() depends on, besides its arguments.
   struct Memory {
     std::vector<Active> active;
@@ -54,6 +55,7 @@ class Projection {
   bool worst_violation(const Eigen::VectorXd& x, const Eigen::MatrixXd& P, Active& out) const;
   bool add(Active incoming, const Eigen::MatrixXd& P, Eigen::VectorXd& x);
   bool push(const Active& active, const Eigen::MatrixXd& P);
+  void times(const HalfSpace& row, const Eigen::MatrixXd& P, Eigen::Ref<Eigen::VectorXd> out) const;
   void drop(int k);
   bool factor();
   void fall_back(Eigen::VectorXd& x) const;
@@ -64,8 +66,9 @@ class Projection {
   int capacity_;
   int k_ = 0;  // active constraints
   bool fell_back_ = false;
-  Eigen::MatrixXd PN_;           // (n, capacity): P a of each active constraint
-  Eigen::MatrixXd gram_, chol_;  // N' P N and its factor
+  const MakeColumn* make_ = nullptr;  // during bound()
+  Eigen::MatrixXd PN_;                // (n, capacity): P a of each active constraint
+  Eigen::MatrixXd gram_, chol_;       // N' P N and its factor
   Eigen::VectorXd Pa_, step_, r_, wanted_, last_;
   const Eigen::VectorXd start_;
 };

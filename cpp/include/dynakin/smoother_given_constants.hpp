@@ -16,10 +16,10 @@ class SmootherGivenConstants {
   void end(const Belief& last);
   // From a stretch's last frame to its first: the frame's state from all frames, and its covariance (n, n) of all pairs
   // of elements of which none is a marker's own, and of those that move the same marker. Other entries are of no
-  // meaning before complete(). SmoothedDependence went through the stretch before.
+  // meaning but in a column that complete() made. SmoothedDependence went through the stretch before.
   void look(const FrameGivenConstants& frame, Eigen::VectorXd& x);
   const Eigen::MatrixXd& covariance() const { return covariance_; }
-  void complete(const FrameGivenConstants& frame);
+  void complete(const FrameGivenConstants& frame, int column);
   // Over the frame's update and what led to it. last: as of FilterGivenConstants::step.
   void undo(const FrameGivenConstants& frame, const FrameGivenConstants* last);
 
@@ -39,6 +39,7 @@ class SmootherGivenConstants {
   bool ended_ = false;  // no later frame has said anything yet
   Panels panels_;
   Eigen::MatrixXd B_, Bt_, T_, U_, X_, M_, dd_, dc_, covariance_;
+  Eigen::VectorXd d_, y_, c_;
   std::vector<const double*> a_, b_;
   Eigen::MatrixXd dots_;
 };
