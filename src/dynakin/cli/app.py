@@ -26,8 +26,8 @@ from dynakin.cli.simulate import simulate
 from dynakin.cli.tune import tune
 from dynakin.errors import DynakinError
 
-# Typer carries its own copy of click or uses click's, depending on its version; its own name leads to either.
 _STOPPED = 130  # as shells have it
+# Typer carries its own copy of click or uses click's, depending on its version; its own name leads to either.
 _USAGE_ERROR: type[Exception] = typer.BadParameter.__mro__[1]
 
 app = typer.Typer(

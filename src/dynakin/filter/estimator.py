@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -269,11 +268,13 @@ class Estimator:
             shares = (ways * frames, 0, 0) if once else (frames, again, ways * frames)
             there, calibrating, back = _shares(progress, shares)
             passes = 0 if ready.doubt else PASSES
-            to_look = partial(Tracker.run_arrays, deviations=False)
+
+            def first(own: Tracker, *trial: Any) -> dict[str, Array]:
+                return own.run_late_arrays(late, *trial) if once else own.run_arrays(*trial, deviations=False)
+
             tracker, arrays, shift, clock = run_in_step(
-                ready.tracker.fresh(), recording.time, markers, ready.wrench, there, on_feet, passes,
-                partial(_run_late, late) if once else to_look,
-            )  # fmt: skip
+                ready.tracker.fresh(), recording.time, markers, ready.wrench, there, on_feet, passes, first
+            )
             wrench = in_step(recording.time, ready.wrench, shift) if shift else ready.wrench
             on_feet = on_feet and on_feet.in_step(recording.time, shift)
             trial = Trial(recording.time, markers, wrench, on_feet)
@@ -337,10 +338,6 @@ class Estimator:
             "priors": self.priors.model_dump(mode="json"),
             "bounds": self.bounds.model_dump(mode="json"),
         }
-
-
-def _run_late(late: int | None, tracker: Tracker, *trial: Any) -> dict[str, Array]:
-    return tracker.run_late_arrays(late, *trial)
 
 
 def _shares(progress: Progress | None, passes: Sequence[int]) -> list[Progress | None]:

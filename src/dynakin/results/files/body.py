@@ -65,7 +65,8 @@ def write_mass_centre(estimate: Estimate, path: Path) -> None:
             names.append(prefix + AXES[k])
             columns.append(values[:, k])
     notes = [f"Whole-body centre of mass in m and its velocity in m/s, {estimate.ground.in_words}."]
-    _write(path, "Centre of mass", estimate, names, np.column_stack(columns), notes, DIGITS)
+    table = np.column_stack(columns)
+    write_storage(path, "Centre of mass", estimate.time, names, table, in_degrees=False, notes=notes, digits=DIGITS)
 
 
 def write_centre_of_pressure(estimate: Estimate, path: Path) -> None:
@@ -171,9 +172,16 @@ def _write(
     names: list[str],
     values: np.ndarray,
     notes: list[str],
-    digits: int = DIGITS_OF_LOADS,
 ) -> None:
-    decimals = DECIMALS_OF_LOADS if digits == DIGITS_OF_LOADS else None
+    """Loads, and the places beside them."""
     write_storage(
-        path, title, estimate.time, names, values, in_degrees=False, notes=notes, digits=digits, decimals=decimals
+        path,
+        title,
+        estimate.time,
+        names,
+        values,
+        in_degrees=False,
+        notes=notes,
+        digits=DIGITS_OF_LOADS,
+        decimals=DECIMALS_OF_LOADS,
     )
