@@ -26,7 +26,7 @@ QD = np.array([0.4, -0.1, 0.2, 0.5, -0.3, 0.6, 1.2, 0.4, -0.7, -1.5])
 QDD = np.array([1.0, 0.5, -1.0, 2.0, 1.0, -2.0, 5.0, -3.0, 2.0, 6.0])
 CONTACT = np.array([40.0, 500.0, -60.0, 30.0, -20.0, 90.0])
 """N, N m about the ground's origin, on the shank."""
-SIZES = (0.01, 0.02, 0.05, 0.06, 0.07, 0.3)
+SIZES = (0.01, 0.02, 0.05, 0.04, 0.06, 0.07, 0.3, 0.5)
 DECLARED = np.repeat([0.014, 0.018, 0.010], 4)
 
 
@@ -80,6 +80,7 @@ def calibrated() -> Any:
     model = spec()
     return SimpleNamespace(
         spec=model,
+        names=tuple(_core.Model(model).layout.names),
         plan=None,
         soft_tissue_m=DECLARED,
         marker_variance=np.zeros(12),
@@ -207,20 +208,53 @@ def test_a_pelvis_frame_that_is_turned_mixes_its_angles_and_leaves_the_moments_o
 def test_reported_deviations_hold_both_parts_and_a_scale_of_zero_leaves_the_filters_own() -> None:
     subject = Systematic(calibrated(), Noise(), Sizes(*SIZES))
     x = np.r_[Q, QD, QDD]
+    P = np.zeros((30, 30))
     own = {block: np.full(10, 0.02) for block in ("coordinates", "speeds", "accelerations", "moments")}
-    both = subject.added(own, x, CONTACT[None], ["shank"], late=True)
+    both = subject.added(own, x, P, CONTACT[None], ["shank"], late=True)
     external = np.zeros((3, 6))
     external[2] = CONTACT
-    parts = subject.parts(Q, QD, QDD, external)
+    parts = subject.parts(Q, QD, QDD, external) | {"inertia": dict.fromkeys(both, np.zeros(10))}  # none is estimated
     sizes = dict(zip(KINDS, SIZES, strict=True))
     for block, sd in both.items():
         total = 0.02**2 + sum(sizes[kind] ** 2 * parts[kind][block] for kind in KINDS)
         np.testing.assert_allclose(sd, np.sqrt(total))
     wider = Systematic(calibrated(), Noise(), replace(subject.sizes, own_motion=2.0, own_moments=3.0))
     for late, factors in ((True, (2.0, 3.0)), (False, (1.0, 1.0))):  # at once the filter's own stay
-        found = wider.added(own, x, CONTACT[None], ["shank"], late=late)
+        found = wider.added(own, x, P, CONTACT[None], ["shank"], late=late)
         for block, factor in zip(("speeds", "moments"), factors, strict=True):
             np.testing.assert_allclose(found[block] ** 2 - both[block] ** 2, (factor**2 - 1.0) * 0.02**2, atol=1e-12)
     nothing = subject.sizes.scaled(0.0)
-    none = Systematic(calibrated(), Noise(), nothing).added(own, x, CONTACT[None], ["shank"], late=True)
+    none = Systematic(calibrated(), Noise(), nothing).added(own, x, P, CONTACT[None], ["shank"], late=True)
     np.testing.assert_allclose(none["moments"], 0.02)
+
+
+def test_inertia_that_small_innovations_leave_open_is_known_by_the_declared_noise() -> None:
+    """A shank's mass and first moments of some covariance, against moments of bodies drawn from it."""
+    model = spec()
+    segments = model.segments
+    segments[2].inertia_estimated = [True] * 4 + [False] * 6
+    model.segments = segments
+    subject, core = calibrated(), _core.Model(model)
+    subject.spec, subject.names = model, tuple(core.layout.names)
+    subject.lower, subject.upper = np.full(34, -np.inf), np.full(34, np.inf)
+    sizes = Sizes(*np.zeros(7), inertia=0.5)
+    x = np.r_[Q, QD, QDD, core.initial_state()[30:]]
+    A = 0.1 * np.random.default_rng(4).normal(size=(4, 4))
+    P = np.zeros((34, 34))
+    P[30:, 30:] = A @ A.T
+    external = np.zeros((3, 6))
+    external[2] = CONTACT
+    h, own = 1e-3, {block: np.zeros(10) for block in ("coordinates", "speeds", "accelerations", "moments")}
+    change = [
+        (_core.joint_moments(core, x + h * np.r_[np.zeros(30), a], external) - _core.joint_moments(core, x, external))
+        / h
+        for a in A.T  # moments are linear in inertia
+    ]
+    variance = np.square(change).sum(axis=0)
+    found = Systematic(subject, Noise(variance_scale=0.2), sizes)
+    seen = found.added(own, x, P, CONTACT[None], ["shank"], late=True)
+    np.testing.assert_allclose(seen["moments"], 0.5 * np.sqrt((1.0 / 0.2 - 1.0) * variance), rtol=1e-6)
+    np.testing.assert_array_equal(seen["speeds"], 0.0)
+    for scale in (1.0, 3.0):  # what the filter has is all
+        declared = Systematic(subject, Noise(variance_scale=scale), sizes)
+        assert not declared.added(own, x, P, CONTACT[None], ["shank"], late=True)["moments"].any()

@@ -15,12 +15,13 @@ from dynakin.bindings import _core
 from dynakin.model.calibration.pose_start import bare
 
 Array = npt.NDArray[np.float64]
-Kind = Literal["hinge_centre", "ball_centre", "hinge_axes", "ball_axes", "root"]
-"""The centre of a joint with one or two axes (hinge) or three (ball) beside where it is on its bones; its axes turned
-on both of them; the root's frame turned in its bone."""
+Kind = Literal["hinge_centre", "ball_centre", "hinge_axes", "pair_axes", "ball_axes", "root"]
+"""The centre of a joint with one or two axes (hinge) or three (ball) beside where it is on its bones; its one axis, two
+or three turned on both of them; the root's frame turned in its bone."""
 Column = dict[str, float]
 
 _AXES = np.eye(3)
+_TURNED: dict[int, Kind] = {1: "hinge_axes", 2: "pair_axes", 3: "ball_axes"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -147,15 +148,14 @@ def _sources(spec: _core.ModelSpec, orientations: dict[str, Array]) -> list[tupl
                 ]
             continue
         R_J = orientations[segment.parent] @ segment.rotation
-        ball = len(joints[name]) >= 3
+        axes = min(len(joints[name]), 3)
         for e in _AXES[: 2 if planar else 3]:
             column = _along(name, "moved", R_J, e)
             for child in children:
                 column |= _along(child.name, "moved", R_B @ child.rotation, -e)
-            found.append(("ball_centre" if ball else "hinge_centre", column))
+            found.append(("ball_centre" if axes == 3 else "hinge_centre", column))
         if not planar:
-            kind: Kind = "ball_axes" if ball else "hinge_axes"
-            found += [(kind, _along(name, "turned", R_J, e) | _along(name, "behind", R_B, -e)) for e in _AXES]
+            found += [(_TURNED[axes], _along(name, "turned", R_J, e) | _along(name, "behind", R_B, -e)) for e in _AXES]
     return found
 
 

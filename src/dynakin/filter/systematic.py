@@ -1,8 +1,8 @@
-"""What the filter's covariance cannot know: joints beside where they are, and skin that follows them.
+"""What the filter's covariance cannot know: joints beside where they are, skin that follows them, and inertia that
+small innovations say nothing of.
 
-A consider covariance (Schmidt 1966): these errors are no states, and nothing is learned of them; their effect on what
-is reported is worked out afterwards and added to the filter's own variances ([derivations](derivations.md), section
-17).
+A consider covariance (Schmidt 1966): nothing is learned of these errors; their effect on what is reported is worked out
+afterwards and added to the filter's own variances ([derivations](derivations.md), section 17).
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from dynakin.settings.noise import Noise
 Array = npt.NDArray[np.float64]
 
 BLOCKS = ("coordinates", "speeds", "accelerations", "moments")
-KINDS = ("hinge_centre", "ball_centre", "hinge_axes", "ball_axes", "root", "skin")
+KINDS = ("hinge_centre", "ball_centre", "hinge_axes", "pair_axes", "ball_axes", "root", "skin", "inertia")
 
 
 @dataclass(frozen=True)
@@ -33,8 +33,12 @@ class Sizes:
 
     Attributes:
         hinge_centre, ball_centre: m, of the centre of a joint with one or two axes (knee, ankle), with three (hip).
-        hinge_axes, ball_axes: rad, of the turn of its axes. root: rad, of the turn of the pelvis' frame in the pelvis.
+        hinge_axes, pair_axes, ball_axes: rad, of the turn of a joint's one axis (knee), two (ankle and subtalar) or
+            three.
+        root: rad, of the turn of the pelvis' frame in the pelvis.
         skin: of the displacement of a marker that follows a joint's angle, as a fraction of the declared size.
+        inertia: of what a recording leaves open of inertia, as a fraction of its deviation by the declared noise, as
+            far as the noise that was found in the recording takes it for known.
         own_motion, own_moments: factors on the filter's own deviations of what later frames helped to estimate. What
             shows beside a model that is found from markers lasts and is shared by them, so that frames tell less than
             the filter counts; a scaled skeleton leaves less at the root than the declared residual.
@@ -43,9 +47,11 @@ class Sizes:
     hinge_centre: float
     ball_centre: float
     hinge_axes: float
+    pair_axes: float
     ball_axes: float
     root: float
     skin: float
+    inertia: float
     own_motion: float = 1.0
     own_moments: float = 1.0
 
@@ -59,10 +65,21 @@ class Sizes:
 
 
 LANDMARKS = Sizes(
-    0.005, 0.003, np.radians(2.0), np.radians(0.8), np.radians(1.2), 0.15, own_motion=1.6, own_moments=1.6
+    0.003,
+    0.003,
+    np.radians(2.0),
+    np.radians(6.0),
+    np.radians(0.8),
+    np.radians(1.2),
+    0.15,
+    1.0,
+    own_motion=1.6,
+    own_moments=1.5,
 )
 """Joints that are found from markers on the skin."""
-SCALED = Sizes(0.002, 0.0016, np.radians(1.2), np.radians(0.8), np.radians(1.0), 0.095, own_moments=0.55)
+SCALED = Sizes(
+    0.002, 0.0016, np.radians(1.2), np.radians(1.2), np.radians(0.8), np.radians(1.0), 0.095, 0.0, own_moments=0.55
+)
 """Joints of a skeleton that was scaled to the person (.osim)."""
 
 
@@ -118,6 +135,9 @@ class Systematic:
         gain, N = self._gain(x)
         self._B0 = gain @ N
         self._segments = {name: k for k, name in enumerate(segments)}
+        self._model = _core.Model(spec)
+        self._inertia = [k for k, name in enumerate(calibrated.names) if name.startswith("inertia/")]
+        self._unseen = max(1.0 / noise.variance_scale - 1.0, 0.0)  # noise that is larger than declared has it all
 
     def _displacements(self, jacobian: Array) -> Array:
         """(3 M, S): what each source does to the markers of the model as it is posed."""
@@ -158,7 +178,7 @@ class Systematic:
         direct = T[:, errors.placed] @ errors.sources
         moved = Tq @ B + Tv @ Bd + Ta @ Bdd + direct
         found: Parts = {}
-        for kind in KINDS[:-1]:
+        for kind in KINDS[:-2]:
             chosen = [k for k, own in enumerate(errors.kinds) if own == kind]
             outputs = (B - self._B0, Bd, Bdd, moved)  # of angles what changes with the posture: a zero is a definition
             found[kind] = self._labelled(*(np.square(values[:, chosen]).sum(axis=1) for values in outputs))
@@ -188,6 +208,12 @@ class Systematic:
         own = values * self._declared
         return np.hstack([np.sqrt(1.0 - COMMON) * own, np.sqrt(COMMON) * own @ self._members])
 
+    def _by_inertia(self, x: Array, covariance: Array, external: Array) -> Array:
+        """(C,) variances of moments by what is not known of inertia, beyond what the filter counts."""
+        inertia = np.ix_(self._inertia, self._inertia)
+        T = _core.moment_jacobian(self._model, x, external)[: self._count, self._inertia]
+        return np.asarray(self._unseen * np.einsum("ci,ij,cj->c", T, covariance[inertia], T))
+
     def _labelled(self, q: Array, qd: Array, qdd: Array, moments: Array) -> dict[str, Array]:
         found = {}
         for name, values in zip(BLOCKS, (q, qd, qdd), strict=False):
@@ -199,30 +225,34 @@ class Systematic:
         """`parts` of a recording: kind -> block -> (T, C). NaN around frames whose state or contacts are not numbers.
 
         Args:
-            data: as of `Estimate`, with ``state``, and ``foot_wrench`` of a model whose contacts have been used.
+            data: as of `Estimate`, with ``state``, ``final_covariance``, and ``foot_wrench`` of a model whose contacts
+                have been used.
         """
         time = np.asarray(data["time"].values)
         states = data["state"].transpose("time", "element").values
+        covariance = data["final_covariance"].values
         wrench, segments = np.zeros((len(time), 0, 6)), []
         if "foot_wrench" in data:
             wrench = np.nan_to_num(data["foot_wrench"].transpose("time", "foot", "component").values)
             segments = [str(name) for name in data["foot_segment"].values]
         chosen = _sampled(time)
-        each = [self._at(states[k], wrench[k], segments) for k in chosen]
+        each = [self._at(states[k], covariance, wrench[k], segments) for k in chosen]
         return {
             kind: {block: _between(time, time[chosen], np.array([p[kind][block] for p in each])) for block in BLOCKS}
             for kind in KINDS
         }
 
-    def _at(self, x: Array, wrench: Array, segments: Sequence[str]) -> Parts:
-        """`parts` of a state (n,) with wrenches (F, 6) of contacts on these segments."""
+    def _at(self, x: Array, covariance: Array, wrench: Array, segments: Sequence[str]) -> Parts:
+        """`parts` of a state (n,) and its covariance (n, n), with wrenches (F, 6) of contacts on these segments."""
         K = len(self._free)
         if not np.isfinite(x[: 3 * K]).all():
             return {kind: {block: np.full(self._count, np.nan) for block in BLOCKS} for kind in KINDS}
         external = np.zeros((len(self._segments), 6))
         for name, values in zip(segments, wrench, strict=True):
             external[self._segments[name]] += values
-        return self.parts(x[:K], x[K : 2 * K], x[2 * K : 3 * K], external)
+        still = np.zeros(K)
+        inertia = self._labelled(still, still, still, self._by_inertia(x, covariance, external))
+        return self.parts(x[:K], x[K : 2 * K], x[2 * K : 3 * K], external) | {"inertia": inertia}
 
     def variances(self, parts: Mapping[str, Mapping[str, Array]]) -> dict[str, Array]:
         """Sum of the parts at the sizes of this person: block -> (..., C)."""
@@ -232,14 +262,22 @@ class Systematic:
         }
 
     def added(
-        self, found: Mapping[str, Array], x: Array, wrench: Array, segments: Sequence[str], *, late: bool
+        self,
+        found: Mapping[str, Array],
+        x: Array,
+        covariance: Array,
+        wrench: Array,
+        segments: Sequence[str],
+        *,
+        late: bool,
     ) -> dict[str, Array]:
         """The filter's standard deviations of one frame (block -> (C,)) with these errors.
 
         Args:
-            x: (n,) state. wrench: (F, 6) of the contacts on these segments. late: whether later frames helped.
+            x: (n,) state, of covariance (n, n). wrench: (F, 6) of the contacts on these segments. late: whether later
+                frames helped.
         """
-        variances, own = self.variances(self._at(x, wrench, segments)), self._own(late)
+        variances, own = self.variances(self._at(x, covariance, wrench, segments)), self._own(late)
         return {block: np.hypot(own[block] * found[block], np.sqrt(variances[block])) for block in BLOCKS}
 
     def added_over_time(self, data: xr.Dataset, *, late: bool) -> xr.Dataset:

@@ -207,7 +207,8 @@ class Tracker:
             wrench = np.zeros((0, 6))
             if loads is not None:
                 wrench = _core.contact_moments(self.core_model, state, loads)["foot_wrench"]
-            found |= self.systematic.added(found, state, wrench, () if step is None else step.segments, late=late)
+            segments = () if step is None else step.segments
+            found |= self.systematic.added(found, state, covariance, wrench, segments, late=late)
         if step is not None:
             found["moments"] = np.where(step.sources == ABSENT, np.nan, found["moments"])
         return {name: Labelled(values, self._labels.on(name)) for name, values in found.items()}
