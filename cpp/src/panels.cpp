@@ -143,10 +143,26 @@ void Panels::add_product(const Eigen::Ref<const Eigen::VectorXd>& w, Eigen::Vect
 }
 
 void Panels::add_dots(Index from, const Eigen::VectorXd& x, Eigen::Ref<Eigen::VectorXd> y) const {
-  for (Index p = 0; p < count(); ++p) {
-    const Index first = p * height, rows = std::min(height, rows_ - first);
-    const Eigen::Map<const Eigen::Matrix<double, height, Eigen::Dynamic>> Z(panel(p) + from * height, height, y.size());
-    y.noalias() += Z.topRows(rows).transpose() * x.segment(first, rows);
+  using Part = Eigen::Matrix<double, 8, 1>;
+  using Column = Eigen::Matrix<double, height, 1>;
+  constexpr Index few = 16;  // columns whose sums stay near
+  Column part;
+  for (Index k = 0; k < y.size(); k += few) {
+    const Index columns = std::min(few, y.size() - k);
+    Part sums[few];
+    for (Part& sum : sums) sum.setZero();
+    for (Index p = 0; p < count(); ++p) {
+      const Index first = p * height, rows = std::min(height, rows_ - first);
+      part.setZero();
+      part.head(rows) = x.segment(first, rows);
+      const double* column = panel(p) + (from + k) * height;
+      for (Index c = 0; c < columns; ++c, column += height) {
+        const Eigen::Map<const Column> z(column);
+        sums[c] += z.segment<8>(0).cwiseProduct(part.segment<8>(0)) + z.segment<8>(8).cwiseProduct(part.segment<8>(8)) +
+                   z.segment<8>(16).cwiseProduct(part.segment<8>(16));
+      }
+    }
+    for (Index c = 0; c < columns; ++c) y(k + c) += sums[c].sum();
   }
 }
 

@@ -6,11 +6,8 @@
 #include "given_transition.hpp"
 
 namespace dynakin {
-namespace {
 
 using Eigen::Index;
-
-}  // namespace
 
 PastCovariance::PastCovariance(const Model& model, const FilterSettings& settings, int max_rows)
     : model_(model),
@@ -46,15 +43,21 @@ PastCovariance::PastCovariance(const Model& model, const FilterSettings& setting
 }
 
 void PastCovariance::start(const Eigen::MatrixXd& P) {
-  for (Index k = 0; k < apart_.d(); ++k) {
-    const double* const column = P.col(apart_.moving[k]).data();
-    for (Index j = 0; j < P.rows(); ++j) M_.at(k, j) = column[j];
-    for (Index j = 0; j <= k; ++j) P_.at(k, j) = column[apart_.moving[j]];
+  const double* columns[Panels::height];
+  for (Index p = 0; p < M_.count(); ++p) {
+    const Index first = p * Panels::height, rows = std::min(Panels::height, apart_.d() - first);
+    for (Index r = 0; r < rows; ++r) columns[r] = P.col(apart_.moving[first + r]).data();
+    double* to = M_.panel(p);
+    for (Index j = 0; j < P.rows(); ++j, to += Panels::height)
+      for (Index r = 0; r < rows; ++r) to[r] = columns[r][j];
+    for (Index j = 0; j < first + rows; ++j)
+      std::copy_n(M_.panel(p) + apart_.moving[j] * Panels::height, Panels::height, P_.panel(p) + j * Panels::height);
   }
 }
 
 void PastCovariance::learn(const FrameTape& tape, double dt, bool last) {
-  transition(model_, settings_, dt, dt, how_);
+  how_.step = dt;
+  how_.kept = (-dt * settings_.decay_rate.array()).exp();
   const Index n = model_.state_size();
   for (Index p = 0; p < M_.count(); ++p) {
     Eigen::Map<Eigen::Matrix<double, Panels::height, Eigen::Dynamic>> M(M_.panel(p), Panels::height, n);

@@ -15,7 +15,7 @@ namespace dynakin {
 // Allocates at construction.
 class PastCovariance {
  public:
-  // The model must outlive it. max_rows: of a tape.
+  // The model and the settings must outlive it. max_rows: of a tape.
   PastCovariance(const Model& model, const FilterSettings& settings, int max_rows);
 
   void start(const Eigen::MatrixXd& P);  // the past frame, as it was filtered
@@ -33,7 +33,7 @@ class PastCovariance {
   const Model& model_;
   const FilterSettings& settings_;
   const GivenConstants apart_;
-  Transition how_;
+  Transition how_;    // without its noise
   Panels M_, P_, U_;  // (d, n), (d, d) below its diagonal, (d, rows)
   // Of each panel, groups of columns that the covariance needs: of P, and of M in the end.
   std::vector<std::vector<Eigen::Index>> past_, present_;
