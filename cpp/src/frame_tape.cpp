@@ -66,7 +66,7 @@ void FrameTape::add_equality(const std::vector<int>& columns,
   ++chunk.end_block;
   const double root = std::sqrt(aPa);
   L(chunk.from, chunk.from) = root;
-  Z.set_column(chunk.from, Pa / root);
+  Z.set_column(chunk.from, 1.0 / root, Pa);
   w(chunk.from) = missing / root;
 }
 

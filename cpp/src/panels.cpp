@@ -102,9 +102,8 @@ void Panels::set(const Eigen::Ref<const Eigen::MatrixXd>& Z) {
   }
 }
 
-void Panels::set_column(Index k, const Eigen::Ref<const Eigen::VectorXd>& column) {
-  for (Index p = 0; p < count(); ++p)
-    std::copy_n(column.data() + p * height, std::min(height, rows_ - p * height), panel(p) + k * height);
+void Panels::set_column(Index k, double factor, const Eigen::Ref<const Eigen::VectorXd>& column) {
+  for (Index row = 0; row < rows_; ++row) at(row, k) = factor * column(row);
 }
 
 void Panels::copy(const Panels& other, Index columns) {

@@ -40,7 +40,7 @@ class Panels {
   void combine(Eigen::Index p, Eigen::Index at, const Rows& H, const Panels& M);
   // Z, the first columns of the panels.
   void set(const Eigen::Ref<const Eigen::MatrixXd>& Z);
-  void set_column(Eigen::Index k, const Eigen::Ref<const Eigen::VectorXd>& column);
+  void set_column(Eigen::Index k, double factor, const Eigen::Ref<const Eigen::VectorXd>& column);
   void copy(const Panels& other, Eigen::Index columns);
   void get(Eigen::Index from, Eigen::Ref<Eigen::MatrixXd> Z) const;  // Z's columns from there on
   void get_transposed(Eigen::Ref<Eigen::MatrixXd> Zt) const;         // Z', as many rows of it
