@@ -1,25 +1,11 @@
 #include "dynakin/backward_pass.hpp"
 
-#include <algorithm>
 #include <stdexcept>
+#include <string>
 
 #include "dynakin/process.hpp"
-#include "mirror.hpp"
 
 namespace dynakin {
-namespace {
-
-// out += A B. In panels of the inner dimension, so that Eigen's packed panels stay on the stack.
-template <class Out, class A, class B>
-void add_product(const A& a, const B& b, Out&& out) {
-  constexpr Eigen::Index panel = 32;
-  for (Eigen::Index k = 0; k < a.cols(); k += panel) {
-    const Eigen::Index w = std::min(panel, a.cols() - k);
-    out.noalias() += a.middleCols(k, w) * b.middleRows(k, w);
-  }
-}
-
-}  // namespace
 
 // The smoother undoes optimal gains; (7) restricts the gain, and a sigmoid bends the state between frames.
 const FilterSettings& smoothable(const FilterSettings& settings) {
@@ -31,27 +17,12 @@ const FilterSettings& smoothable(const FilterSettings& settings) {
   return settings;
 }
 
-BackwardPass::BackwardPass(const Model& model, const FilterSettings& settings, int max_rows, bool covariance)
-    : model_(model), settings_(smoothable(settings)), projection_(model, settings), covariance_(covariance) {
-  const int n = model.state_size();
-  lambda_.setZero(n);
-  y_.setZero(max_rows);
-  if (!covariance) return;
-  Lambda_.setZero(n, n);
-  LambdaP_.setZero(n, n);
-  G_.setZero(n, max_rows);
-  B_.setZero(n, max_rows);
-  T_.setZero(max_rows, max_rows);
-  touched_.reserve(n);
-  Au_.setZero(n, max_rows);
-  U_.setZero(n, n);
-}
-
-void BackwardPass::start() {
-  zero_ = true;
-  lambda_.setZero();
-  Lambda_.setZero();
-}
+BackwardPass::BackwardPass(const Model& model, const FilterSettings& settings, int max_rows)
+    : model_(model),
+      settings_(smoothable(settings)),
+      projection_(model, settings),
+      lambda_(Eigen::VectorXd::Zero(model.state_size())),
+      y_(Eigen::VectorXd::Zero(max_rows)) {}
 
 void BackwardPass::undo(const FrameTape& tape, double dt) {
   if (tape.cut) {  // the frames before know nothing of those after
@@ -59,82 +30,33 @@ void BackwardPass::undo(const FrameTape& tape, double dt) {
     return;
   }
   if (tape.pulled) lambda_ -= tape.pull;
-  for (std::size_t c = tape.ends.size(); c-- > 0;) {
-    const int from = c == 0 ? 0 : tape.ends[c - 1];
-    undo_chunk(tape, from, tape.ends[c] - from);
-    zero_ = false;
-  }
+  for (std::size_t c = tape.chunks.size(); c-- > 0;) undo_chunk(tape, tape.chunks[c]);
   if (tape.any_forgotten)
-    for (int i = 0; i < model_.state_size(); ++i) {
-      if (!tape.forgotten[i]) continue;
-      lambda_(i) = 0.0;
-      if (!covariance_) continue;
-      Lambda_.row(i).setZero();
-      Lambda_.col(i).setZero();
-    }
+    for (int i = 0; i < model_.state_size(); ++i)
+      if (tape.forgotten[i]) lambda_(i) = 0.0;
   transpose_transition(model_, settings_, dt, lambda_);
-  if (covariance_) transpose_transition(model_, settings_, dt, Lambda_);
 }
 
-// lambda - A'(w + Z lambda), and (1 - Z'A)' Lambda (1 - Z'A) + A'A = Lambda + A'B + B'A with
-// B = (1 + Z Lambda Z') A / 2 - Z Lambda. A and Z stand transposed on the tape.
-void BackwardPass::undo_chunk(const FrameTape& tape, int from, int rows) {
-  const auto At = tape.A.middleCols(from, rows);
-  const auto Zt = tape.Z.middleCols(from, rows);
-  auto y = y_.head(rows);
-  y = tape.w.segment(from, rows);
-  y.noalias() += Zt.transpose() * lambda_;
-  lambda_.noalias() -= At * y;
-  if (!covariance_) return;
-  auto Gt = G_.leftCols(rows);
-  auto Bt = B_.leftCols(rows);
-  auto T = T_.topLeftCorner(rows, rows);
-  Gt.setZero();
-  if (!zero_) add_product(Lambda_, Zt, Gt);
-  T.noalias() = Zt.transpose() * Gt;
-  T *= 0.5;
-  T.diagonal().array() += 0.5;
-  Bt = -Gt;
-  Bt.noalias() += At * T;
-  // A' B + B' A: most rows of A' are zero, as a marker moves with few states.
-  touched_.clear();
-  for (Eigen::Index i = 0; i < At.rows(); ++i) {
-    if (At.row(i).isZero(0.0)) continue;
-    Au_.row(static_cast<Eigen::Index>(touched_.size())).head(rows) = At.row(i);
-    touched_.push_back(static_cast<int>(i));
+// lambda - H' L^-T (w + Z lambda); Z stands transposed on the tape.
+void BackwardPass::undo_chunk(const FrameTape& tape, const FrameTape::Chunk& chunk) {
+  auto y = y_.head(chunk.rows);
+  y = tape.w.segment(chunk.from, chunk.rows);
+  tape.Z.add_dots(chunk.from, lambda_, y);
+  const auto L = tape.L.block(chunk.from, chunk.from, chunk.rows, chunk.rows);
+  L.transpose().triangularView<Eigen::Upper>().solveInPlace(y);
+  int row = 0;
+  for (int b = chunk.first_block; b < chunk.end_block; ++b) {
+    const Panels::Rows H = tape.rows_of(tape.blocks[b]);
+    const double* h = H.h;
+    for (const int column : H.columns)
+      for (Eigen::Index r = 0; r < H.rows; ++r) lambda_(column) -= *h++ * y(row + r);
+    row += static_cast<int>(H.rows);
   }
-  const auto some = static_cast<Eigen::Index>(touched_.size());
-  auto U = U_.topRows(some);
-  constexpr Eigen::Index width = 128;  // what Eigen packs stays on the stack
-  for (Eigen::Index c = 0; c < U.cols(); c += width) {
-    const Eigen::Index w = std::min(width, U.cols() - c);
-    U.middleCols(c, w).noalias() = Au_.topLeftCorner(some, rows) * Bt.middleRows(c, w).transpose();
-  }
-  for (Eigen::Index c = 0; c < U.cols(); ++c)
-    for (Eigen::Index k = some; k-- > 0 && touched_[k] >= c;) Lambda_(touched_[k], c) += U(k, c);
-  for (Eigen::Index k = 0; k < some; ++k) {
-    const Eigen::Index c = touched_[k], below = U.cols() - c;
-    Lambda_.col(c).tail(below) += U.row(k).tail(below).transpose();
-  }
-  mirror_lower(Lambda_);
 }
 
-void BackwardPass::smooth(const Eigen::VectorXd& x, const Eigen::MatrixXd& P, Eigen::VectorXd& x_smooth) const {
-  x_smooth = x;
-  x_smooth.noalias() -= P * lambda_;
-}
-
-void BackwardPass::smooth(const Eigen::MatrixXd& P, Eigen::MatrixXd& P_smooth) {
-  P_smooth = P;
-  if (zero_) return;
-  LambdaP_.setZero();
-  add_product(Lambda_, P, LambdaP_);
-  constexpr Eigen::Index panel = 32;
-  for (Eigen::Index k = 0; k < P.cols(); k += panel) {
-    const Eigen::Index w = std::min(panel, P.cols() - k);
-    P_smooth.triangularView<Eigen::Lower>() -= P.middleCols(k, w) * LambdaP_.middleRows(k, w);
-  }
-  mirror_lower(P_smooth);
+void BackwardPass::smooth(const Belief& filtered, Eigen::VectorXd& x) const {
+  x = filtered.x;
+  x.noalias() -= filtered.P * lambda_;
 }
 
 void BackwardPass::bound(Eigen::VectorXd& x, const Eigen::MatrixXd& P) {

@@ -12,7 +12,7 @@ Correction::Correction(const Model& of, const FilterSettings& with)
       gate(of),
       dx(Eigen::VectorXd::Zero(of.state_size())),
       scratch(dx),
-      update_(of.state_size(), with.chunk_rows, measurement.max_rows()) {}
+      update_(of.state_size(), measurement.max_rows()) {}
 
 void Correction::measure(const MarkerRef& markers, const Vector6& wrench) {
   measurement.admit_all();

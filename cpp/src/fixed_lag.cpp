@@ -8,10 +8,9 @@ namespace dynakin {
 FixedLag::FixedLag(Filter& filter, int lag)
     : filter_(filter),
       lag_(lag),
-      mean_(filter.model(), filter.settings(), filter.tape_rows(), false),
-      both_(filter.model(), filter.settings(), filter.tape_rows(), true),
-      x_(filter.state()),
-      P_(filter.covariance()) {
+      mean_(filter.model(), filter.settings(), filter.tape_rows()),
+      covariance_(filter.model(), filter.settings(), filter.tape_rows()),
+      x_(filter.state()) {
   if (lag < 1) throw std::invalid_argument("lag: expected 1 frame or more, found " + std::to_string(lag));
   ring_.reserve(static_cast<std::size_t>(lag) + 1);
   for (int k = 0; k <= lag; ++k)
@@ -55,19 +54,22 @@ void FixedLag::look_back(int by) {
     delay_ += back(k).dt;
   }
   const Belief& then = back(by).filtered;
-  mean_.smooth(then.x, then.P, x_);
+  mean_.smooth(then, x_);
   mean_.bound(x_, then.P);
   by_ = by;
   has_covariance_ = false;
 }
 
 const Eigen::MatrixXd& FixedLag::covariance() {
-  if (has_covariance_) return P_;
-  both_.start();
-  for (int k = 0; k < by_; ++k) both_.undo(back(k).tape, back(k).dt);
-  both_.smooth(back(by_).filtered.P, P_);
-  has_covariance_ = true;
-  return P_;
+  if (!has_covariance_) {
+    int known = by_;  // until which frame; those after everything started again say nothing
+    while (known > 0 && !back(known - 1).tape.cut) --known;
+    covariance_.start(back(by_).filtered.P);
+    for (int k = by_; k-- > known;) covariance_.learn(back(k).tape, back(k).dt, k == known);
+    covariance_.end(back(known).filtered.P);
+    has_covariance_ = true;
+  }
+  return covariance_.covariance();
 }
 
 }  // namespace dynakin

@@ -9,7 +9,8 @@
 namespace dynakin {
 
 // M F'
-inline void by_transition(const Transition& how, Eigen::MatrixXd& M) {
+template <class Matrix>
+void by_transition(const Transition& how, Matrix&& M) {
   const Eigen::Index n = how.shared.rows();
   const double dt = how.step, half = 0.5 * dt * dt;
   M.middleCols(0, n) += dt * M.middleCols(n, n) + half * M.middleCols(2 * n, n);

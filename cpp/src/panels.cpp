@@ -84,12 +84,30 @@ void Panels::combine(Index p, Index at, const Rows& H, const Eigen::MatrixXd& M,
   }
 }
 
+void Panels::combine(Index p, Index at, const Rows& H, const Panels& M) {
+  for (Index i = 0; i < height; i += k_part) {
+    const double* const from = M.panel(p) + i;
+    double* const to = panel(p) + at * height + i;
+    Index r = 0;
+    for (; r + 3 <= H.rows; r += 3) take_rows<3>(H, r, from, height, false, to + r * height);
+    for (; r < H.rows; ++r) take_rows<1>(H, r, from, height, false, to + r * height);
+  }
+}
+
 void Panels::set(const Eigen::Ref<const Eigen::MatrixXd>& Z) {
   for (Index p = 0; p < count(); ++p) {
     const Index first = p * height, rows = std::min(height, rows_ - first);
     double* const to = panel(p);
     for (Index k = 0; k < Z.cols(); ++k) std::copy_n(Z.data() + k * Z.outerStride() + first, rows, to + k * height);
   }
+}
+
+void Panels::set_column(Index k, double factor, const Eigen::Ref<const Eigen::VectorXd>& column) {
+  for (Index row = 0; row < rows_; ++row) at(row, k) = factor * column(row);
+}
+
+void Panels::copy(const Panels& other, Index columns) {
+  for (Index p = 0; p < count(); ++p) std::copy_n(other.panel(p), columns * height, panel(p));
 }
 
 void Panels::get(Index from, Eigen::Ref<Eigen::MatrixXd> Z) const {
@@ -123,19 +141,51 @@ void Panels::add_product(const Eigen::Ref<const Eigen::VectorXd>& w, Eigen::Vect
   }
 }
 
-void Panels::divide(const Eigen::Ref<const Eigen::MatrixXd>& L, Index columns) {
-  using Column = Eigen::Map<Eigen::Matrix<double, height, 1>>;
-  for (Index p = 0; p < count(); ++p) {
-    double* const z = panel(p);
-    for (Index first = 0; first < columns; first += width) {
-      take_product(z, L.data() + first, L.outerStride(), first, z + first * height, height);
-      for (Index k = first, end = std::min(first + width, columns); k < end; ++k) {
-        Column column(z + k * height);
-        for (Index l = first; l < k; ++l) column -= L(k, l) * Column(z + l * height);
-        column *= 1.0 / L(k, k);
+void Panels::add_dots(Index from, const Eigen::VectorXd& x, Eigen::Ref<Eigen::VectorXd> y) const {
+  using Part = Eigen::Matrix<double, 8, 1>;
+  using Column = Eigen::Matrix<double, height, 1>;
+  constexpr Index few = 16;  // columns whose sums stay near
+  Column part;
+  for (Index k = 0; k < y.size(); k += few) {
+    const Index columns = std::min(few, y.size() - k);
+    Part sums[few];
+    for (Part& sum : sums) sum.setZero();
+    for (Index p = 0; p < count(); ++p) {
+      const Index first = p * height, rows = std::min(height, rows_ - first);
+      part.setZero();
+      part.head(rows) = x.segment(first, rows);
+      const double* column = panel(p) + (from + k) * height;
+      for (Index c = 0; c < columns; ++c, column += height) {
+        const Eigen::Map<const Column> z(column);
+        sums[c] += z.segment<8>(0).cwiseProduct(part.segment<8>(0)) + z.segment<8>(8).cwiseProduct(part.segment<8>(8)) +
+                   z.segment<8>(16).cwiseProduct(part.segment<8>(16));
       }
     }
+    for (Index c = 0; c < columns; ++c) y(k + c) += sums[c].sum();
   }
+}
+
+void Panels::take_product(Index p, Index t, const Panels& U, const Panels& Z, Index from, Index depth) {
+  const Index row = t * width;
+  const double* const b = Z.panel(row / height) + from * height + row % height;
+  dynakin::take_product(U.panel(p), b, height, depth, panel(p) + row * height, height);
+}
+
+void Panels::divide(Index p, const Eigen::Ref<const Eigen::MatrixXd>& L, Index columns) {
+  using Column = Eigen::Map<Eigen::Matrix<double, height, 1>>;
+  double* const z = panel(p);
+  for (Index first = 0; first < columns; first += width) {
+    dynakin::take_product(z, L.data() + first, L.outerStride(), first, z + first * height, height);
+    for (Index k = first, end = std::min(first + width, columns); k < end; ++k) {
+      Column column(z + k * height);
+      for (Index l = first; l < k; ++l) column -= L(k, l) * Column(z + l * height);
+      column *= 1.0 / L(k, k);
+    }
+  }
+}
+
+void Panels::divide(const Eigen::Ref<const Eigen::MatrixXd>& L, Index columns) {
+  for (Index p = 0; p < count(); ++p) divide(p, L, columns);
 }
 
 void Panels::divide_back(const Eigen::Ref<const Eigen::MatrixXd>& U, Index columns) {
@@ -146,8 +196,8 @@ void Panels::divide_back(const Eigen::Ref<const Eigen::MatrixXd>& U, Index colum
       first = (end - 1) / width * width;
       const Index stride = U.outerStride();
       if (end < columns)
-        take_product(z + end * height, U.data() + end * stride + first, stride, columns - end, z + first * height,
-                     height);
+        dynakin::take_product(z + end * height, U.data() + end * stride + first, stride, columns - end,
+                              z + first * height, height);
       for (Index k = end; k-- > first;) {
         Column column(z + k * height);
         for (Index l = k + 1; l < end; ++l) column -= U(k, l) * Column(z + l * height);
@@ -165,7 +215,7 @@ void Panels::take_square(Index columns, Eigen::MatrixXd& P) const {
       const Index j = q * height;
       if (rows == height) {
         for (Index k = 0; k < height; k += width)
-          take_product(panel(p), panel(q) + k, height, columns, &P(i, j + k), P.outerStride());
+          dynakin::take_product(panel(p), panel(q) + k, height, columns, &P(i, j + k), P.outerStride());
         if (p != q) P.block<height, height>(j, i) = P.block<height, height>(i, j).transpose();
         continue;
       }
@@ -173,7 +223,7 @@ void Panels::take_square(Index columns, Eigen::MatrixXd& P) const {
       const Index wide = std::min(height, rows_ - j);
       edge.topLeftCorner(rows, wide) = P.block(i, j, rows, wide);
       for (Index k = 0; k < height; k += width)
-        take_product(panel(p), panel(q) + k, height, columns, edge.data() + k * height, height);
+        dynakin::take_product(panel(p), panel(q) + k, height, columns, edge.data() + k * height, height);
       P.block(i, j, rows, wide) = edge.topLeftCorner(rows, wide);
       if (p != q) P.block(j, i, wide, rows) = edge.topLeftCorner(rows, wide).transpose();
     }

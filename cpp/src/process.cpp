@@ -155,29 +155,12 @@ void decay(const Model& model, const FilterSettings& settings, double dt, Eigen:
       P(i, i) += decayed_noise(settings.process_density(i), settings.decay_rate(i), dt);
 }
 
-void transpose_transition(const Model& model, const FilterSettings& settings, double dt,
-                          Eigen::Ref<Eigen::VectorXd> x) {
+void transpose_transition(const Model& model, const FilterSettings& settings, double dt, Eigen::VectorXd& x) {
   const int n = model.n_free();
   x.segment(2 * n, n) += dt * x.segment(n, n) + 0.5 * dt * dt * x.segment(0, n);
   x.segment(n, n) += dt * x.segment(0, n);
   for (int i = 3 * n; i < model.state_size(); ++i)
     if (settings.decay_rate(i) != 0.0) x(i) *= std::exp(-settings.decay_rate(i) * dt);
-}
-
-void transpose_transition(const Model& model, const FilterSettings& settings, double dt, Eigen::MatrixXd& M) {
-  const int n = model.n_free();
-  const double half = 0.5 * dt * dt;
-  M.middleCols(2 * n, n) += dt * M.middleCols(n, n) + half * M.middleCols(0, n);
-  M.middleCols(n, n) += dt * M.middleCols(0, n);
-  M.middleRows(2 * n, n) += dt * M.middleRows(n, n) + half * M.middleRows(0, n);
-  M.middleRows(n, n) += dt * M.middleRows(0, n);
-  for (int i = 3 * n; i < model.state_size(); ++i) {
-    if (settings.decay_rate(i) == 0.0) continue;
-    const double kept = std::exp(-settings.decay_rate(i) * dt);
-    M.col(i) *= kept;
-    M.row(i) *= kept;
-  }
-  mirror_lower(M);
 }
 
 }  // namespace dynakin

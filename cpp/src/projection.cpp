@@ -12,6 +12,14 @@ constexpr int k_cut = -1;            // kind of a half space that keeps a segmen
 constexpr double rounding = 1e-9;    // of a standard deviation: not a violation
 constexpr double dependent = 1e-12;  // of a' P a: what is left of it when the other constraints hold
 
+// out = P a, of columns that may have to be made first.
+void times(const HalfSpace& row, const Eigen::MatrixXd& P, const Projection::MakeColumn& make,
+           Eigen::Ref<Eigen::VectorXd> out) {
+  if (make)
+    for (int k = 0; k < row.size; ++k) make(row.index[k]);
+  row.times(P, out);
+}
+
 }  // namespace
 
 Projection::Projection(const Model& model, const FilterSettings& settings)
@@ -28,6 +36,11 @@ Projection::Projection(const Model& model, const FilterSettings& settings)
   step_.setZero(n);
   wanted_.setZero(n);
   r_.setZero(capacity_);
+  for (const auto& a : settings.equality.rowwise()) {
+    equality_columns_.emplace_back();
+    for (int i = 0; i < n; ++i)
+      if (a(i) != 0.0) equality_columns_.back().push_back(i);
+  }
 }
 
 void Projection::forget() {
@@ -66,12 +79,11 @@ void Projection::restore(const Memory& memory) {
 
 ProjectionReport Projection::bound(Eigen::VectorXd& x, const Eigen::MatrixXd& P, const MakeColumn& make) {
   ProjectionReport report;
-  make_ = &make;
   wanted_ = x;
-  warm_start(P, x);
+  warm_start(P, make, x);
   Active worst;
   for (int round = 0; report.solved && worst_violation(x, P, worst); ++round)
-    report.solved = round < 8 * capacity_ && add(worst, P, x);
+    report.solved = round < 8 * capacity_ && add(worst, P, make, x);
   if (!report.solved) {
     x = wanted_;
     k_ = 0;
@@ -101,7 +113,7 @@ bool Projection::keep_equalities(Eigen::VectorXd& x, Eigen::MatrixXd& P, FrameTa
       all_hold = all_hold && std::abs(missing) <= rounding * size;
       continue;
     }
-    if (tape) tape->add_equality(a.transpose(), Pa_, aPa, missing);
+    if (tape) tape->add_equality(equality_columns_[static_cast<std::size_t>(r)], a.transpose(), Pa_, aPa, missing);
     x += Pa_ * (missing / aPa);
     for (Eigen::Index i = 0; i < x.size(); ++i) {
       // An element that the equality decides alone: nothing is left, rounding neither.
@@ -118,12 +130,12 @@ bool Projection::keep_equalities(Eigen::VectorXd& x, Eigen::MatrixXd& P, FrameTa
 
 // The bounds that were active before, less those that would hold the state back from where it wants to go anyway:
 // a state and multipliers that are optimal for these constraints alone, from which the dual method may go on.
-void Projection::warm_start(const Eigen::MatrixXd& P, Eigen::VectorXd& x) {
+void Projection::warm_start(const Eigen::MatrixXd& P, const MakeColumn& make, Eigen::VectorXd& x) {
   const int n = std::exchange(k_, 0);
   std::copy_n(active_.begin(), n, before_.begin());
   for (int k = 0; k < n; ++k) {
     const Active& old = before_[k];
-    if (old.kind != k_cut && old.row.dot(x) < old.row.bound) push(old, P);
+    if (old.kind != k_cut && old.row.dot(x) < old.row.bound) push(old, P, make);
   }
   while (k_ > 0) {
     auto u = r_.head(k_);
@@ -172,9 +184,9 @@ bool Projection::worst_violation(const Eigen::VectorXd& x, const Eigen::MatrixXd
   return any;
 }
 
-bool Projection::add(Active incoming, const Eigen::MatrixXd& P, Eigen::VectorXd& x) {
+bool Projection::add(Active incoming, const Eigen::MatrixXd& P, const MakeColumn& make, Eigen::VectorXd& x) {
   incoming.multiplier = 0.0;
-  times(incoming.row, P, Pa_);
+  times(incoming.row, P, make, Pa_);
   const double aPa = incoming.row.dot(Pa_);
   if (!(aPa > 0.0)) return false;
   while (true) {
@@ -199,28 +211,22 @@ bool Projection::add(Active incoming, const Eigen::MatrixXd& P, Eigen::VectorXd&
     if (!std::isinf(full)) x += t * step_;
     for (int k = 0; k < k_; ++k) active_[k].multiplier -= t * r(k);
     incoming.multiplier += t;
-    if (blocking < 0) return push(incoming, P);
+    if (blocking < 0) return push(incoming, P, make);
     drop(blocking);
   }
 }
 
 // False where there is no room, or where the row depends on those that are there.
-bool Projection::push(const Active& active, const Eigen::MatrixXd& P) {
+bool Projection::push(const Active& active, const Eigen::MatrixXd& P, const MakeColumn& make) {
   if (k_ == capacity_) return false;
   active_[k_] = active;
-  times(active.row, P, PN_.col(k_));
+  times(active.row, P, make, PN_.col(k_));
   for (int j = 0; j <= k_; ++j) gram_(k_, j) = gram_(j, k_) = active_[j].row.dot(PN_.col(k_));
   ++k_;
   if (factor()) return true;
   --k_;
   factor();
   return false;
-}
-
-void Projection::times(const HalfSpace& row, const Eigen::MatrixXd& P, Eigen::Ref<Eigen::VectorXd> out) const {
-  if (*make_)
-    for (int k = 0; k < row.size; ++k) (*make_)(row.index[k]);
-  row.times(P, out);
 }
 
 void Projection::drop(int k) {

@@ -85,7 +85,6 @@ void FilterSettings::check(const Model& model) const {
       fail("recovery", "holds " + std::to_string(value) + ", expected more than 0");
   if (!(recovery.unseen_sd > 0.0))
     fail("recovery", "unseen_sd is " + std::to_string(recovery.unseen_sd) + ", expected more than 0");
-  if (chunk_rows < 1) fail("chunk_rows", "is " + std::to_string(chunk_rows) + ", expected 1 or more");
 }
 
 }  // namespace dynakin

@@ -158,9 +158,8 @@ void Smoother::look_back(const Stretch& stretch, SmoothRecord& out, ContactRecor
   for (std::size_t k = stretch.end; k-- > stretch.first;) {
     const FrameGivenConstants* const frame = &stretch.frames[k - stretch.first];
     backwards_.look(*frame, x_);
-    if (filter_.settings().constraint == ConstraintKind::projection) {
+    if (filter_.settings().constraint == ConstraintKind::projection)
       projection_.bound(x_, backwards_.covariance(), [this, frame](int i) { backwards_.complete(*frame, i); });
-    }
     forward_kinematics(filter_.model(), x_, kinematics_);
     subtree_dynamics(filter_.model(), x_, kinematics_, dynamics_);
     out.report(k, x_, backwards_.covariance(), kinematics_, dynamics_, contacts);
@@ -177,12 +176,14 @@ std::size_t Smoother::backward(const RunRecord& record, SmoothRecord& out, Conta
     const AtWork other(left_ > 0 ? most_threads_ : 0);
     std::future<void> other_thread;
     const auto taken = std::make_shared<std::atomic<bool>>(false);
-    if (other) try {
+    if (other) {
+      try {
         other_thread = std::async(std::launch::async, [this, taken, &record] {
           if (!taken->exchange(true)) replay(left_, record, before_);
         });
       } catch (const std::system_error&) {  // the system has no thread left: one does it all
       }
+    }
     look_back(now_, out, contacts);
     if (other_thread.valid() && taken->exchange(true))
       other_thread.get();

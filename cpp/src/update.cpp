@@ -5,14 +5,10 @@
 #include <cmath>
 
 namespace dynakin {
-namespace {
 
 using Eigen::Index;
 
-}  // namespace
-
-JointUpdate::JointUpdate(int state_size, int tape_rows, int max_rows)
-    : tape_rows_(tape_rows), Z_(state_size, std::max(max_rows, 1)) {
+JointUpdate::JointUpdate(int state_size, int max_rows) : Z_(state_size, std::max(max_rows, 1)) {
   const Index capacity = Z_.max_columns();
   HP_.setZero(capacity, state_size);
   S_.setZero(capacity, capacity);
@@ -40,7 +36,7 @@ UpdateSums JointUpdate::apply(const std::vector<RowBlock>& blocks, Eigen::Matrix
   auto v = v_.head(rows);
   S.triangularView<Eigen::Lower>().solveInPlace(v);
   Z_.divide(S, rows);
-  if (tape_) record(blocks);
+  if (tape_) tape_->add_update(blocks, S, Z_, v);
   Z_.take_square(rows, P);
   Z_.add_product(v, dx);
   sums.nis = v.squaredNorm();
@@ -75,21 +71,6 @@ void JointUpdate::add_up(const std::vector<RowBlock>& blocks, int rows) {
     }
     S.block(at, at, block.rows, block.rows) += block.R.topLeftCorner(block.rows, block.rows);
     at += block.rows;
-  }
-}
-
-// In chunks of rows as if they had been taken one after the other, which gives the same Z and w, and for L the blocks
-// on the diagonal of S's factor.
-void JointUpdate::record(const std::vector<RowBlock>& blocks) {
-  const int n_blocks = static_cast<int>(blocks.size());
-  int first = 0, from = 0;
-  while (first < n_blocks) {
-    int end = first, rows = 0;
-    while (end < n_blocks && (rows == 0 || rows + blocks[end].rows <= tape_rows_)) rows += blocks[end++].rows;
-    if (rows > 0)
-      tape_->add_chunk(blocks, first, end, S_.block(from, from, rows, rows), Z_, from, v_.segment(from, rows));
-    first = end;
-    from += rows;
   }
 }
 

@@ -20,19 +20,6 @@ Eigen::MatrixXd after(const FilterSettings& settings, const Model& model, int fr
 
 }  // namespace
 
-TEST(chunks_of_any_size_give_the_same_estimate) {
-  for (const ModelSpec& spec : {planar_chain(), spatial_tree()}) {
-    const Model model(spec);
-    FilterSettings settings = settings_for(model);
-    settings.chunk_rows = 1000;
-    const Eigen::MatrixXd joint = after(settings, model, 5);
-    for (int rows : {1, 7, 28}) {
-      settings.chunk_rows = rows;
-      CHECK((after(settings, model, 5) - joint).cwiseAbs().maxCoeff() < 1e-9);
-    }
-  }
-}
-
 TEST(covariance_stays_symmetric_to_the_last_bit) {
   const Model model(spatial_tree());
   const Eigen::MatrixXd both = after(settings_for(model), model, 10);

@@ -1,5 +1,6 @@
 // Panels give what Eigen gives, whatever is left over in the last panel and of the last columns.
 #include <Eigen/Cholesky>
+#include <vector>
 
 #include "check.hpp"
 #include "dynakin/panels.hpp"
@@ -74,5 +75,33 @@ TEST(panels_combine_the_columns_of_sparse_rows) {
         panels.combine(p, 0, {used, h.data(), columns, 1, columns}, M, add);
     panels.get(0, found);
     CHECK((found - 2.0 * M * H.transpose()).norm() < 1e-13 * (1.0 + found.norm()));
+  });
+}
+
+TEST(panels_multiply_with_panels) {
+  static constexpr Eigen::Index depth = 5;
+  each_size([](int rows, int columns) {
+    const MatrixXd M = MatrixXd::Random(rows, columns), Z = MatrixXd::Random(columns, depth + 2);
+    const std::vector<int> at = {columns - 1, 0};
+    const MatrixXd h = MatrixXd::Random(depth, 2);
+    MatrixXd H = MatrixXd::Zero(depth, columns), found(rows, depth), less(rows, columns);
+    for (const int k : {0, 1}) H.col(at[k]) += h.col(k);
+    dynakin::Panels m(rows, columns), z(columns, depth + 2), u(rows, depth), one(rows, 1);
+    m.set(M);
+    z.set(Z);
+    for (Eigen::Index p = 0; p < m.count(); ++p) u.combine(p, 0, {at, h.data(), depth, 1, depth}, m);
+    u.get(0, found);
+    CHECK((found - M * H.transpose()).norm() < 1e-13 * (1.0 + found.norm()));
+    for (Eigen::Index p = 0; p < m.count(); ++p)
+      for (Eigen::Index t = 0; t < m.max_columns() / dynakin::Panels::width; ++t) m.take_product(p, t, u, z, 2, depth);
+    m.get(0, less);
+    CHECK((less - (M - found * Z.rightCols(depth).transpose())).norm() < 1e-13 * (1.0 + M.norm() * Z.norm()));
+    CHECK(m.at(rows - 1, 0) == less(rows - 1, 0));
+    const Eigen::VectorXd x = Eigen::VectorXd::Random(columns);
+    Eigen::VectorXd y = Eigen::VectorXd::Ones(depth);
+    z.add_dots(2, x, y);
+    CHECK((y - (Eigen::VectorXd::Ones(depth) + Z.rightCols(depth).transpose() * x)).norm() < 1e-12);
+    one.set_column(0, 2.0, M.col(0));
+    CHECK(one.at(rows - 1, 0) == 2.0 * M(rows - 1, 0));
   });
 }

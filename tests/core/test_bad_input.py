@@ -25,8 +25,8 @@ def put(array, where, value):
     return changed
 
 
-def make(x0=DATA.x0, P0=DATA.P0, chunk_rows=28, **changes):
-    return filter_of(SPEC, OPTIONS | changes, x0, P0, chunk_rows)
+def make(x0=DATA.x0, P0=DATA.P0, **changes):
+    return filter_of(SPEC, OPTIONS | changes, x0, P0)
 
 
 def symmetric(matrix, i, j, value):
@@ -58,12 +58,6 @@ SHORT = {k: OPTIONS[k][:-1] for k in ("process_variance", "marker_variance", "lo
 def test_wrong_settings_are_refused_by_name(key, value):
     with pytest.raises(ValueError, match="bounds|lower|upper" if key in ("lower", "upper") else key):
         make(**{key: value})
-
-
-@pytest.mark.parametrize("chunk_rows", [0, -3])
-def test_wrong_chunk_size_is_refused(chunk_rows):
-    with pytest.raises(ValueError, match="chunk_rows"):
-        make(chunk_rows=chunk_rows)
 
 
 @pytest.mark.parametrize(

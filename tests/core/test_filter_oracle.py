@@ -23,7 +23,6 @@ from support.oracle.inertia import all_possible
 from support.oracle.state import Layout
 
 FRAMES = 300
-CHUNKS = (1, 7, 28, 1000)
 CASES = {
     "paper: planar chain of 7": (lambda: planar_model(50, n_segments=7), {}),
     "planar tree": (lambda: planar_model(3), {}),
@@ -117,11 +116,10 @@ def test_trial_is_a_real_test(name):
         assert 0.01 < active < 1.0, active
 
 
-@pytest.mark.parametrize("chunk_rows", CHUNKS)
 @pytest.mark.parametrize("name", NAMES)
-def test_run_equals_the_oracle(name, chunk_rows):
+def test_run_equals_the_oracle(name):
     spec, data, options, expected = case(name)
-    f = filter_of(spec, options, data.x0, data.P0, chunk_rows)
+    f = filter_of(spec, options, data.x0, data.P0)
     out = data.run(f.run)
     near(out["state"], expected["state"], name="state")
     near(out["state_sd"], expected["state_sd"], scale=expected["state_sd"], name="state_sd")

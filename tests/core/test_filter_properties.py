@@ -86,10 +86,9 @@ def test_time_steps_of_any_length_in_one_run(spec):
 
 
 @each_spec
-@pytest.mark.parametrize("chunk_rows", [5, 28])
-def test_marker_order_does_not_matter(spec, chunk_rows):
+def test_marker_order_does_not_matter(spec):
     data, options = prepared(spec)
-    out, f = run(spec, data, options, chunk_rows=chunk_rows)
+    out, f = run(spec, data, options)
     order = np.random.default_rng(5).permutation(len(spec.markers))
     assert not np.array_equal(order, np.sort(order))
     other = copy.deepcopy(spec)
@@ -103,7 +102,7 @@ def test_marker_order_does_not_matter(spec, chunk_rows):
     options = options | {"marker_variance": options["marker_variance"][order]}
     for key in ("process_variance", "lower", "upper"):
         options[key] = options[key][there]
-    permuted, g = run(other, moved, options, chunk_rows=chunk_rows)
+    permuted, g = run(other, moved, options)
     np.testing.assert_allclose(permuted["state"], out["state"][:, there], rtol=1e-9, atol=1e-9)
     np.testing.assert_allclose(permuted["state_sd"], out["state_sd"][:, there], rtol=1e-9)
     np.testing.assert_allclose(permuted["nis"], out["nis"], rtol=1e-8, atol=1e-8)
@@ -195,10 +194,9 @@ def test_only_measured_axes_make_a_marker_missing():
 
 
 @each_spec
-@pytest.mark.parametrize("chunk_rows", [1, 28])
-def test_gain_constraint_lands_exactly_and_keeps_the_covariance_sound(spec, chunk_rows):
+def test_gain_constraint_lands_exactly_and_keeps_the_covariance_sound(spec):
     data, options = prepared(spec, 150)
-    f = filter_of(spec, options, data.x0, data.P0, chunk_rows)
+    f = filter_of(spec, options, data.x0, data.P0)
     landed = 0
     for k in range(150):
         report = f.step(0.01, data.markers[k], data.wrench[k])
@@ -265,8 +263,7 @@ def test_constraint_none_ignores_the_bounds(spec):
     assert not ignored["constrained"].any()
 
 
-@pytest.mark.parametrize("chunk_rows", [1, 28])
-def test_linear_case_is_the_plain_kalman_filter(chunk_rows):
+def test_linear_case_is_the_plain_kalman_filter():
     """One slide along Y with one marker: the equations of any textbook, three states."""
     slide = Axis("height", "translation", np.array([0.0, 1.0, 0.0]))
     cart = Segment("cart", "ground", axes=[slide], inertia=np.array([2.0, 0, 0, 0, 1, 1, 1, 0, 0, 0]))
@@ -285,7 +282,7 @@ def test_linear_case_is_the_plain_kalman_filter(chunk_rows):
     }
     rng = np.random.default_rng(6)
     x, P, H = np.array([0.1, 0.0, 0.0]), np.diag([0.01, 1.0, 10.0]), np.array([[1.0, 0.0, 0.0]])
-    f = filter_of(spec, options, x, P, chunk_rows)
+    f = filter_of(spec, options, x, P)
     for k in range(200):
         dt = 0.005 + 0.01 * rng.random()
         measured = 0.3 + 0.2 * np.sin(0.02 * k) + 0.002 * rng.normal()

@@ -2,12 +2,33 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from dynakin.bindings import _core
 from support.core.random_models import planar_model, spatial_model
 from support.core.smoother_cases import BOUNDED, case, impact, lost_and_found, walk
+from support.oracle.smoother import rauch_tung_striebel
+
+
+def started_again():
+    c = case(planar_model(50, n_segments=4), 31, 40, states="all", recovery=_core.RecoverySettings())
+    c.data.wrench[20] = 1e300
+    return c
+
+
+def equalities():
+    """One between coordinates, in each frame anew, and one between lengths."""
+    c = case(planar_model(50, n_segments=4), 31, 40, constraint="projection")
+    names = list(c.model.layout.names)
+    a = np.zeros((2, len(names)))
+    a[0, [names.index("q1"), names.index("q2")]] = 1.0, 1.0
+    a[1, [names.index("length/l0"), names.index("length/l1")]] = 1.0, -1.0
+    c.options |= {"equality": a, "equality_value": a @ c.data.x0 + [0.01, -0.004]}
+    return c
+
 
 CASES = {
     "planar": lambda: case(planar_model(50, n_segments=5), 31, 40),
@@ -16,6 +37,8 @@ CASES = {
     "bounds": BOUNDED["all blocks"],
     "lost and found": lost_and_found,
     "impact": impact,
+    "started again": started_again,
+    "equalities": equalities,
 }
 
 
@@ -44,6 +67,29 @@ def test_equals_the_full_smoother_on_the_data_until_now(name, lag):
         np.testing.assert_allclose(smoother.state_sd, sd, rtol=1e-10)
         # where bounds bind, the projection's own tolerance is 1e-9 of a standard deviation
         np.testing.assert_array_less(np.abs(smoother.state - full["smoothed_state"][there]) / sd, 1e-7)
+
+
+@pytest.mark.parametrize("lag", [1, 4, 12])
+@pytest.mark.parametrize("name", ["planar", "spatial, all blocks", "contacts"])
+def test_the_covariance_equals_rauch_tung_striebel(name, lag):
+    """Of all pairs of which none is a marker's own, and of those that move the same marker."""
+    c = CASES[name]()
+    frames = 30
+    *_, (_, smoother) = stepped(c, lag, frames)
+    w = walk(replace(c, data=c.data.first(frames)))
+    _, P = rauch_tung_striebel(w.x, w.P, w.x_predicted, w.P_predicted, [f.F for f in w.frames])
+    there = frames - 1 - lag
+    sd = np.sqrt(np.diag(P[there]))
+    needed = np.ones(P[there].shape, bool)
+    for block in ("markers", "soft_tissue"):
+        offset, size = c.model.layout.blocks.get(block, (0, 0))
+        needed[offset : offset + size] = needed[:, offset : offset + size] = False
+    for J in np.split(_core.marker_jacobian(c.model, smoother.state), len(c.spec.markers)):
+        moves = J.any(axis=0)
+        needed |= np.outer(moves, moves)
+    assert not needed.all()
+    found = smoother.covariance
+    np.testing.assert_allclose((found / np.outer(sd, sd))[needed], (P[there] / np.outer(sd, sd))[needed], atol=1e-9)
 
 
 @pytest.mark.parametrize("lag", [1, 6, 60])

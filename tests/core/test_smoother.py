@@ -48,10 +48,9 @@ def test_the_trials_are_real_tests(name):
 
 
 @each_case
-@pytest.mark.parametrize("chunk_rows", [1, 7, 28, 1000])
-def test_equals_one_dense_regression_over_all_frames(name, chunk_rows):
+def test_equals_one_dense_regression_over_all_frames(name):
     c, _, x, P = solved(name)
-    assert_equal(c.smoothed(chunk_rows=chunk_rows), x, P, 1e-10)
+    assert_equal(c.smoothed(), x, P, 1e-10)
 
 
 @each_case

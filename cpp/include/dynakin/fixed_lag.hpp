@@ -6,13 +6,14 @@
 
 #include "dynakin/backward_pass.hpp"
 #include "dynakin/filter.hpp"
+#include "dynakin/past_covariance.hpp"
 
 namespace dynakin {
 
 // Keeps what a filter did in the last frames. Its result equals that of a Smoother run over all frames until now,
 // except that inequalities are kept in the metric of the filtered covariance. Nothing is allocated after construction.
 // A state costs some products of matrix and vector for each frame of the lag; its covariance, which is worked out where
-// it is asked for, as many products of matrices.
+// it is asked for, half a step of the filter.
 class FixedLag {
  public:
   // The filter must outlive it, stands before the first frame and is stepped by nobody else. Throws
@@ -37,7 +38,7 @@ class FixedLag {
   long frames() const { return frames_; }
   // Whether the filter has gone far enough for there to be a frame at the lag.
   bool ready() const { return frames_ > lag_; }
-  // How far the frame that was looked at lies back, s; its state and covariance.
+  // How far the frame that was looked at lies back, s; its state, and its covariance as of PastCovariance.
   double delay() const { return delay_; }
   const Eigen::VectorXd& state() const { return x_; }
   const Eigen::MatrixXd& covariance();
@@ -56,9 +57,9 @@ class FixedLag {
   double delay_ = 0.0;
   bool has_covariance_ = false;  // of the frame that was looked at
   std::vector<Frame> ring_;
-  BackwardPass mean_, both_;
+  BackwardPass mean_;
+  PastCovariance covariance_;
   Eigen::VectorXd x_;
-  Eigen::MatrixXd P_;
 };
 
 }  // namespace dynakin

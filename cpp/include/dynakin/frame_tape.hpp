@@ -1,4 +1,4 @@
-// What one update did to mean and covariance, in the form that a backward pass undoes (docs/derivations.md, section 9).
+// What one update did to mean and covariance, in the form that a smoother takes (docs/derivations.md, section 9).
 #pragma once
 
 #include <Eigen/Core>
@@ -16,24 +16,38 @@ namespace dynakin {
 struct FrameTape {
   FrameTape(int state_size, int max_rows, std::size_t sensors = 0);
 
-  void clear();                          // a new frame
-  void clear_chunks() { ends.clear(); }  // an update begins anew: only its last linearisation counts
-  // After S = L L': Z = P H' L^-T, in the panels' columns from `from` on, and w = L^-1 v of the blocks from first to
-  // end - 1. A = L^-1 H is formed here.
-  void add_chunk(const std::vector<RowBlock>& blocks, int first, int end, const Eigen::Ref<const Eigen::MatrixXd>& L,
-                 const Panels& Z, int from, const Eigen::Ref<const Eigen::VectorXd>& w);
-  // The row a x = b, known for sure, with Pa = P a and missing = b - a x.
-  void add_equality(const Eigen::Ref<const Eigen::VectorXd, 0, Eigen::InnerStride<>>& a,
+  void clear();         // a new frame
+  void clear_chunks();  // an update begins anew: only its last linearisation counts
+  // All sensors' rows. After S = L L': the first columns of the panels are Z = P H' L^-T, and w = L^-1 v.
+  void add_update(const std::vector<RowBlock>& blocks, const Eigen::Ref<const Eigen::MatrixXd>& L, const Panels& Z,
+                  const Eigen::Ref<const Eigen::VectorXd>& w);
+  // The row a x = b, known for sure, with Pa = P a and missing = b - a x; columns: where a is not zero.
+  void add_equality(const std::vector<int>& columns,
+                    const Eigen::Ref<const Eigen::VectorXd, 0, Eigen::InnerStride<>>& a,
                     const Eigen::Ref<const Eigen::VectorXd>& Pa, double aPa, double missing);
   void forget(int i) {
     any_forgotten = true;
     forgotten[i] = 1;
   }
 
-  // A column a row of A and Z, so that a chunk is a block of whole columns.
-  Eigen::MatrixXd A, Z;
+  // Rows that were taken together: of Z and w, and the blocks that make them up. L is L.block(from, from, rows, rows).
+  struct Chunk {
+    int from, rows, first_block, end_block;
+  };
+  struct Block {
+    const std::vector<int>* columns;
+    int rows;
+    std::size_t at;  // of its H in entries, column by column
+  };
+  Panels::Rows rows_of(const Block& block) const {
+    return {*block.columns, entries.data() + block.at, block.rows, 1, block.rows};
+  }
+  std::vector<Chunk> chunks;  // the update, then one for each equality
+  std::vector<Block> blocks;
+  std::vector<double> entries;
+  Panels Z;
+  Eigen::MatrixXd L;
   Eigen::VectorXd w;
-  std::vector<int> ends;  // of the chunks, in rows
   bool any_forgotten = false;
   std::vector<std::uint8_t> forgotten;  // (n,) elements that were drawn anew before the update: the motion was held
   Eigen::VectorXd pull;  // (n,) N' u: binding inequalities and their multipliers, the mean moved by P N' u
@@ -49,7 +63,7 @@ struct FrameTape {
   bool fell_back = false;
 
  private:
-  int rows() const { return ends.empty() ? 0 : ends.back(); }
+  Chunk& new_chunk(int rows);
 };
 
 }  // namespace dynakin

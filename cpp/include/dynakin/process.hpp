@@ -39,8 +39,7 @@ void stir(const Model& model, const FilterSettings& settings, double times, doub
 // x <- f(x) over dt alone: where the state is expected to be then, whatever is measured meanwhile.
 void predict_mean(const Model& model, const FilterSettings& settings, double dt, Eigen::VectorXd& x);
 
-// x <- F' x, and M <- F' M F of a symmetric M: the backward pass of a smoother.
-void transpose_transition(const Model& model, const FilterSettings& settings, double dt, Eigen::Ref<Eigen::VectorXd> x);
-void transpose_transition(const Model& model, const FilterSettings& settings, double dt, Eigen::MatrixXd& M);
+// x <- F' x: the backward pass of a smoother.
+void transpose_transition(const Model& model, const FilterSettings& settings, double dt, Eigen::VectorXd& x);
 
 }  // namespace dynakin

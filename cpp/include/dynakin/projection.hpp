@@ -51,11 +51,10 @@ class Projection {
 
  private:
   bool keep_equalities(Eigen::VectorXd& x, Eigen::MatrixXd& P, FrameTape* tape);
-  void warm_start(const Eigen::MatrixXd& P, Eigen::VectorXd& x);
+  void warm_start(const Eigen::MatrixXd& P, const MakeColumn& make, Eigen::VectorXd& x);
   bool worst_violation(const Eigen::VectorXd& x, const Eigen::MatrixXd& P, Active& out) const;
-  bool add(Active incoming, const Eigen::MatrixXd& P, Eigen::VectorXd& x);
-  bool push(const Active& active, const Eigen::MatrixXd& P);
-  void times(const HalfSpace& row, const Eigen::MatrixXd& P, Eigen::Ref<Eigen::VectorXd> out) const;
+  bool add(Active incoming, const Eigen::MatrixXd& P, const MakeColumn& make, Eigen::VectorXd& x);
+  bool push(const Active& active, const Eigen::MatrixXd& P, const MakeColumn& make);
   void drop(int k);
   bool factor();
   void fall_back(Eigen::VectorXd& x) const;
@@ -66,9 +65,9 @@ class Projection {
   int capacity_;
   int k_ = 0;  // active constraints
   bool fell_back_ = false;
-  const MakeColumn* make_ = nullptr;  // during bound()
-  Eigen::MatrixXd PN_;                // (n, capacity): P a of each active constraint
-  Eigen::MatrixXd gram_, chol_;       // N' P N and its factor
+  std::vector<std::vector<int>> equality_columns_;  // of each equality, where its row is not zero
+  Eigen::MatrixXd PN_;                              // (n, capacity): P a of each active constraint
+  Eigen::MatrixXd gram_, chol_;                     // N' P N and its factor
   Eigen::VectorXd Pa_, step_, r_, wanted_, last_;
   const Eigen::VectorXd start_;
 };

@@ -46,7 +46,6 @@ struct FilterSettings {
   bool wrench_needs_markers = false;   // true: a wrench is not used in a frame without a marker that is believed
   double iterate_beyond = k_infinity;  // rad or m: a larger correction of a coordinate is linearised anew
   RecoverySettings recovery;
-  int chunk_rows = 28;  // rows of an update that are written to a tape, and undone, at a time
 
   // Throws std::invalid_argument naming the setting, what was found and what was expected.
   void check(const Model& model) const;

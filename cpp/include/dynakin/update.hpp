@@ -19,8 +19,7 @@ struct UpdateSums {
 
 class JointUpdate {
  public:
-  // tape_rows: of a chunk on the tape, whose panels stay on the stack where they are undone.
-  JointUpdate(int state_size, int tape_rows, int max_rows);
+  JointUpdate(int state_size, int max_rows);
 
   // Each update is also written to the tape, if there is one.
   void record_to(FrameTape* tape) { tape_ = tape; }
@@ -31,9 +30,7 @@ class JointUpdate {
  private:
   void gather(const std::vector<RowBlock>& blocks, const Eigen::MatrixXd& P);
   void add_up(const std::vector<RowBlock>& blocks, int rows);
-  void record(const std::vector<RowBlock>& blocks);
 
-  int tape_rows_;
   FrameTape* tape_ = nullptr;
   Panels Z_;            // (n, rows) P H', then P H' L^-T with S = L L'
   Eigen::MatrixXd HP_;  // (rows, n)

@@ -457,7 +457,7 @@ class RecoverySettings:
 class FilterSettings:
     """Noise, bounds and constraints of a Filter, SI units."""
 
-    def __init__(self, process_variance: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], marker_variance: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], wrench_covariance: Annotated[NDArray[numpy.float64], dict(shape=(6, 6), order='F')], reference_point: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C')], total_mass: float | None, total_mass_variance: float, lower: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], upper: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], constraint: str = 'gain', chunk_rows: int = 28, process_density: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')] | None = None, decay_rate: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')] | None = None, equality: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='F')] | None = None, equality_value: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')] | None = None, marker_gate: Sequence[float] | None = None, wrench_gate: Sequence[float] | None = None, wrench_needs_markers: bool = False, iterate_beyond: float = float('inf'), recovery: RecoverySettings | None = None) -> None: ...
+    def __init__(self, process_variance: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], marker_variance: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], wrench_covariance: Annotated[NDArray[numpy.float64], dict(shape=(6, 6), order='F')], reference_point: Annotated[NDArray[numpy.float64], dict(shape=(3), order='C')], total_mass: float | None, total_mass_variance: float, lower: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], upper: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')], constraint: str = 'gain', process_density: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')] | None = None, decay_rate: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')] | None = None, equality: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='F')] | None = None, equality_value: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')] | None = None, marker_gate: Sequence[float] | None = None, wrench_gate: Sequence[float] | None = None, wrench_needs_markers: bool = False, iterate_beyond: float = float('inf'), recovery: RecoverySettings | None = None) -> None: ...
 
     @property
     def process_variance(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C')]: ...
@@ -575,7 +575,7 @@ class FixedLag:
 
     def __init__(self, filter: Filter, lag: int) -> None:
         """
-        The filter stands before the first frame and is stepped by this object alone. Each step costs in proportion to the lag, and so, much more, do state_sd and covariance where they are asked for.
+        The filter stands before the first frame and is stepped by this object alone. Each step costs in proportion to the lag; so do state_sd and covariance, which are worked out where they are asked for: half a filter step for each frame of the lag.
         """
 
     def step(self, dt: float, markers: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], wrench: Annotated[NDArray[numpy.float64], dict(shape=(6), order='C')], wrench_covariance: Annotated[NDArray[numpy.float64], dict(shape=(6, 6), order='F')] | None = None, wrench_effects: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='F')] | None = None) -> StepReport:
@@ -605,4 +605,6 @@ class FixedLag:
 
     @property
     def covariance(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='F')]:
-        """its covariance (n, n)"""
+        """
+        its covariance (n, n): of all pairs of states of which none is a marker's own place or soft tissue, and of those that move the same marker; 0 elsewhere
+        """

@@ -53,7 +53,7 @@ void bind_filter(nb::module_& m) {
           [](FilterSettings* self, Eigen::VectorXd process_variance, Eigen::VectorXd marker_variance,
              const Matrix6& wrench_covariance, const Vector3& reference_point, std::optional<double> total_mass,
              double total_mass_variance, Eigen::VectorXd lower, Eigen::VectorXd upper, const std::string& constraint,
-             int chunk_rows, std::optional<Eigen::VectorXd> process_density, std::optional<Eigen::VectorXd> decay_rate,
+             std::optional<Eigen::VectorXd> process_density, std::optional<Eigen::VectorXd> decay_rate,
              std::optional<Eigen::MatrixXd> equality, std::optional<Eigen::VectorXd> equality_value,
              std::optional<GateLimits> marker_gate, std::optional<GateLimits> wrench_gate, bool wrench_needs_markers,
              double iterate_beyond, std::optional<RecoverySettings> recovery) {
@@ -77,15 +77,14 @@ void bind_filter(nb::module_& m) {
             s->wrench_needs_markers = wrench_needs_markers;
             s->iterate_beyond = iterate_beyond;
             if (recovery) s->recovery = *recovery;
-            s->chunk_rows = chunk_rows;
           },
           nb::arg("process_variance"), nb::arg("marker_variance"), nb::arg("wrench_covariance"),
           nb::arg("reference_point"), nb::arg("total_mass").none(), nb::arg("total_mass_variance"), nb::arg("lower"),
-          nb::arg("upper"), nb::arg("constraint") = "gain", nb::arg("chunk_rows") = FilterSettings{}.chunk_rows,
-          nb::arg("process_density") = nb::none(), nb::arg("decay_rate") = nb::none(), nb::arg("equality") = nb::none(),
-          nb::arg("equality_value") = nb::none(), nb::arg("marker_gate") = nb::none(),
-          nb::arg("wrench_gate") = nb::none(), nb::arg("wrench_needs_markers") = false,
-          nb::arg("iterate_beyond") = k_infinity, nb::arg("recovery") = nb::none())
+          nb::arg("upper"), nb::arg("constraint") = "gain", nb::arg("process_density") = nb::none(),
+          nb::arg("decay_rate") = nb::none(), nb::arg("equality") = nb::none(), nb::arg("equality_value") = nb::none(),
+          nb::arg("marker_gate") = nb::none(), nb::arg("wrench_gate") = nb::none(),
+          nb::arg("wrench_needs_markers") = false, nb::arg("iterate_beyond") = k_infinity,
+          nb::arg("recovery") = nb::none())
       .def_ro("process_variance", &FilterSettings::process_variance, nb::rv_policy::copy)
       .def_ro("marker_variance", &FilterSettings::marker_variance, nb::rv_policy::copy)
       .def_ro("wrench_covariance", &FilterSettings::wrench_covariance, nb::rv_policy::copy)

@@ -24,9 +24,11 @@ void check_ready(const FixedLag& lag) {
 void bind_fixed_lag(nb::module_& m) {
   nb::class_<FixedLag>(m, "FixedLag",
                        "Steps a Filter and smooths the frame that lies `lag` frames back, from all frames until now.")
-      .def(nb::init<Filter&, int>(), nb::arg("filter"), nb::arg("lag"), nb::keep_alive<1, 2>(),
-           "The filter stands before the first frame and is stepped by this object alone. Each step costs in "
-           "proportion to the lag, and so, much more, do state_sd and covariance where they are asked for.")
+      .def(
+          nb::init<Filter&, int>(), nb::arg("filter"), nb::arg("lag"), nb::keep_alive<1, 2>(),
+          "The filter stands before the first frame and is stepped by this object alone. Each step costs in "
+          "proportion to the lag; so do state_sd and covariance, which are worked out where they are asked for: half a "
+          "filter step for each frame of the lag.")
       .def(
           "step",
           [](FixedLag& lag, double dt, const Array2& markers, const Vector6& wrench,
@@ -61,5 +63,6 @@ void bind_fixed_lag(nb::module_& m) {
             check_ready(lag);
             return lag.covariance();
           },
-          "its covariance (n, n)");
+          "its covariance (n, n): of all pairs of states of which none is a marker's own place or soft tissue, and of "
+          "those that move the same marker; 0 elsewhere");
 }

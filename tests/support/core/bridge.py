@@ -56,11 +56,9 @@ def model_of(spec: Spec) -> _core.Model:
     return _core.Model(to_core(spec))
 
 
-def filter_of(spec: Spec, settings: dict[str, Any], x0: NDArray, P0: NDArray, chunk_rows: int = 28) -> _core.Filter:
+def filter_of(spec: Spec, settings: dict[str, Any], x0: NDArray, P0: NDArray) -> _core.Filter:
     """A core filter; ``settings`` are those of ``random_models.settings``."""
-    return _core.Filter(
-        model_of(spec), _core.FilterSettings(**settings, chunk_rows=chunk_rows), np.array(x0), np.array(P0)
-    )
+    return _core.Filter(model_of(spec), _core.FilterSettings(**settings), np.array(x0), np.array(P0))
 
 
 def close(actual: NDArray, expected: NDArray, relative: float) -> None:

@@ -36,8 +36,8 @@ class Case:
     def model(self) -> _core.Model:
         return model_of(self.spec)
 
-    def filter(self, chunk_rows: int = 28, **changes: Any) -> _core.Filter:
-        return filter_of(self.spec, self.options | changes, self.data.x0, self.data.P0, chunk_rows)
+    def filter(self, **changes: Any) -> _core.Filter:
+        return filter_of(self.spec, self.options | changes, self.data.x0, self.data.P0)
 
     def lagged(self, lag: int) -> dict[str, NDArray]:
         return self.data.run(self.filter().run_lagged, lag=lag)
