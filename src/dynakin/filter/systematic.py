@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import get_args
 
 import numpy as np
 import numpy.typing as npt
@@ -16,7 +17,7 @@ import xarray as xr
 from scipy.linalg import cho_factor, cho_solve
 
 from dynakin.bindings import _core
-from dynakin.filter.joint_errors import JointErrors, floats
+from dynakin.filter.joint_errors import JointErrors, Kind, floats
 from dynakin.filter.noise import marker_variance, soft_tissue_sd
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.settings.noise import Noise
@@ -24,7 +25,8 @@ from dynakin.settings.noise import Noise
 Array = npt.NDArray[np.float64]
 
 BLOCKS = ("coordinates", "speeds", "accelerations", "moments")
-KINDS = ("hinge_centre", "ball_centre", "hinge_axes", "pair_axes", "ball_axes", "root", "skin", "inertia")
+OF_JOINTS = get_args(Kind)
+KINDS = (*OF_JOINTS, "skin", "inertia")
 
 
 @dataclass(frozen=True)
@@ -65,20 +67,28 @@ class Sizes:
 
 
 LANDMARKS = Sizes(
-    0.003,
-    0.003,
-    np.radians(2.0),
-    np.radians(6.0),
-    np.radians(0.8),
-    np.radians(1.2),
-    0.15,
-    1.0,
+    hinge_centre=0.003,
+    ball_centre=0.003,
+    hinge_axes=np.radians(2.0),
+    pair_axes=np.radians(6.0),
+    ball_axes=np.radians(0.8),
+    root=np.radians(1.2),
+    skin=0.15,
+    inertia=1.0,
     own_motion=1.6,
     own_moments=1.5,
 )
 """Joints that are found from markers on the skin."""
 SCALED = Sizes(
-    0.002, 0.0016, np.radians(1.2), np.radians(1.2), np.radians(0.8), np.radians(1.0), 0.095, 0.0, own_moments=0.55
+    hinge_centre=0.002,
+    ball_centre=0.0016,
+    hinge_axes=np.radians(1.2),
+    pair_axes=np.radians(1.2),
+    ball_axes=np.radians(0.8),
+    root=np.radians(1.0),
+    skin=0.095,
+    inertia=0.0,
+    own_moments=0.55,
 )
 """Joints of a skeleton that was scaled to the person (.osim)."""
 
@@ -156,7 +166,7 @@ class Systematic:
         return -cho_solve(cho_factor(normal), (A * self._root_weight[:, None]).T), N
 
     def parts(self, q: Array, qd: Array, qdd: Array, external: Array | None = None) -> Parts:
-        """Variances by kind of error, of errors of size 1 (m, rad, declared size): block -> (C,).
+        """Variances by kind of error but inertia, of errors of size 1 (m, rad, declared size): block -> (C,).
 
         Args:
             q, qd, qdd: (K,) of the free coordinates. external: (S, 6) wrenches on the segments, about the ground's
@@ -178,7 +188,7 @@ class Systematic:
         direct = T[:, errors.placed] @ errors.sources
         moved = Tq @ B + Tv @ Bd + Ta @ Bdd + direct
         found: Parts = {}
-        for kind in KINDS[:-2]:
+        for kind in OF_JOINTS:
             chosen = [k for k, own in enumerate(errors.kinds) if own == kind]
             outputs = (B - self._B0, Bd, Bdd, moved)  # of angles what changes with the posture: a zero is a definition
             found[kind] = self._labelled(*(np.square(values[:, chosen]).sum(axis=1) for values in outputs))
@@ -210,6 +220,8 @@ class Systematic:
 
     def _by_inertia(self, x: Array, covariance: Array, external: Array) -> Array:
         """(C,) variances of moments by what is not known of inertia, beyond what the filter counts."""
+        if not self._unseen:
+            return np.zeros(self._count)
         inertia = np.ix_(self._inertia, self._inertia)
         T = _core.moment_jacobian(self._model, x, external)[: self._count, self._inertia]
         return np.asarray(self._unseen * np.einsum("ci,ij,cj->c", T, covariance[inertia], T))
