@@ -2,8 +2,6 @@
 
 #include <cmath>
 
-#include "mirror.hpp"
-
 namespace dynakin {
 namespace {
 
