@@ -70,14 +70,17 @@ def test_equals_the_full_smoother_on_the_data_until_now(name, lag):
 
 
 @pytest.mark.parametrize("lag", [1, 4, 12])
-@pytest.mark.parametrize("name", ["planar", "spatial, all blocks", "contacts"])
+@pytest.mark.parametrize("name", ["planar", "spatial, all blocks", "contacts", "started again", "equalities"])
 def test_the_covariance_equals_rauch_tung_striebel(name, lag):
     """Of all pairs of which none is a marker's own, and of those that move the same marker."""
     c = CASES[name]()
-    frames = 30
+    frames = 21 if name == "started again" else 30  # the cut is in the last one, so that every lag crosses it
     *_, (_, smoother) = stepped(c, lag, frames)
     w = walk(replace(c, data=c.data.first(frames)))
-    _, P = rauch_tung_striebel(w.x, w.P, w.x_predicted, w.P_predicted, [f.F for f in w.frames])
+    anew = [report.tracking == "restarted" for report in w.reports]
+    assert any(anew[frames - lag :]) == (name == "started again")
+    F = [f.F * (not cut) for f, cut in zip(w.frames, anew, strict=True)]  # nothing goes on over a cut
+    _, P = rauch_tung_striebel(w.x, w.P, w.x_predicted, w.P_predicted, F)
     there = frames - 1 - lag
     sd = np.sqrt(np.diag(P[there]))
     needed = np.ones(P[there].shape, bool)

@@ -156,7 +156,9 @@ def test_what_converged_is_told_from_what_was_never_taught(estimate: Estimate) -
     drift = estimate.data["state"] * (1.0 + 0.05 * estimate.data["time"] / 12.0)
     moving = replace(untaught, data=estimate.data.assign(state=drift))
     found = {insight.title: insight for insight in insights(moving, compute_metrics(moving))}
-    assert found["Lengths"].level == "warning" and "foot length" in found["Lengths"].text
+    moved = [insight for insight in found.values() if insight.text.startswith("Not settled")]
+    assert [insight.level for insight in moved] == ["warning"] and moved[0].title == "Constants"
+    assert "foot length" in moved[0].text and moved[0].advice
 
 
 def test_a_fit_that_only_follows_the_plates_is_told(estimate: Estimate) -> None:

@@ -36,7 +36,7 @@ def test_displacement_is_the_distance_from_the_mean_place(estimate: Estimate) ->
     made = moving(estimate, 0.003 + 0.010 * np.cos(phase), 0.004 + 0.010 * np.sin(phase))
     found = displacements(made, window)[KNEE]
     assert (found.rms, found.largest, found.offset) == pytest.approx((10.0, 10.0, 5.0))
-    assert (found.segment, found.declared, found.source) == ("thigh", 18.0, "published: knee")
+    assert (found.segment, found.expected, found.source) == ("thigh", 18.0, "published: knee")
 
 
 def test_a_marker_that_moves_too_far_is_named_with_both_sizes(estimate: Estimate) -> None:
@@ -44,7 +44,7 @@ def test_a_marker_that_moves_too_far_is_named_with_both_sizes(estimate: Estimate
     swing = np.sin(2.0 * np.pi * estimate.time / 2.0)
     assert soft_tissue(moving(estimate, 0.035 * swing, 0.0 * swing), window)["verdict"] == ""
     block = soft_tissue(moving(estimate, 0.052 * swing, 0.0 * swing), window)
-    assert block["verdict"].startswith("S1:RKNE moves 52 mm on the thigh (declared 18 mm): more than soft tissue does")
+    assert block["verdict"].startswith("S1:RKNE moves 52 mm on the thigh (skin 18 mm): more than soft tissue does")
     assert [name for name, marker in block["markers"].items() if marker["exceeds"]] == [KNEE]
 
 
@@ -58,18 +58,24 @@ def test_frames_without_the_marker_and_outside_the_window_do_not_count(estimate:
     assert displacements(made, gap)[KNEE].largest is None
 
 
-def test_a_block_of_soft_tissue_is_added_and_its_amplitude_is_the_declared_one(estimate: Estimate) -> None:
+@pytest.mark.parametrize(
+    ("declared_mm", "expected_mm", "by"),
+    [(11.0, 18.0, "published: knee"), (18.5, 18.5, "declared to the filter")],
+)
+def test_a_block_of_soft_tissue_is_added_and_the_larger_size_counts(
+    estimate: Estimate, declared_mm: float, expected_mm: float, by: str
+) -> None:
     still = moving(estimate, np.zeros(len(estimate.time)), np.zeros(len(estimate.time)))
-    swing = 0.03 * np.sin(2.0 * np.pi * estimate.time / 2.0)
+    swing = 0.038 * np.sin(2.0 * np.pi * estimate.time / 2.0)
     elements = [str(name) for name in still.data["element"].values] + [f"soft_tissue/{KNEE}/y"]
     state = np.column_stack([still.data["state"].values, swing])
     data = still.data.drop_vars(["state", "state_sd"]).drop_vars("element")
     data = data.assign_coords(element=elements).assign(state=(("time", "element"), state))
-    amplitude = np.where(data["marker"].values == KNEE, 0.011, 0.2)
+    amplitude = np.where(data["marker"].values == KNEE, 1e-3 * declared_mm, 0.2)
     made = replace(still, data=data.assign(soft_tissue_amplitude=xr.DataArray(amplitude, dims="marker")))
     found = displacements(made, (estimate.time >= 2.0) & (estimate.time < 12.0))[KNEE]
-    assert found.largest == pytest.approx(30.0) and found.declared == pytest.approx(11.0)
-    assert found.exceeds() and found.source == "declared to the filter"
+    assert found.largest == pytest.approx(38.0) and found.expected == pytest.approx(expected_mm)
+    assert found.exceeds() and found.source == by
 
 
 @pytest.mark.parametrize(("markers", "names"), [(OPENCAP, "opencap-all"), (PLUG_IN_GAIT, "plug-in-gait")])
@@ -91,5 +97,5 @@ def test_an_unknown_segment_declares_nothing(estimate: Estimate) -> None:
     assert published_amplitude_mm("HAT", "tail") is None
     parameters = [replace(p, segment="tail") if p.kind == "marker" else p for p in estimate.parameters]
     block = soft_tissue(replace(estimate, parameters=parameters), estimate.time >= 2.0)
-    assert block["markers"][KNEE]["declared_mm"] is None and not block["markers"][KNEE]["exceeds"]
+    assert block["markers"][KNEE]["expected_mm"] is None and not block["markers"][KNEE]["exceeds"]
     assert block["verdict"] == ""

@@ -50,6 +50,8 @@ def test_lost_frames_are_empty_and_out_of_the_figures() -> None:
     assert why_lost(estimate) is None  # 1.7 % of the frames
     (said,) = [message for message in estimate.messages if "lost" in message]
     assert said.startswith("Warning: the person was lost: 20 of 1201 frames") and "(5.00 to 5.19 s)" in said
+    first, second, third = estimate.marker_names[ARM]
+    assert said.endswith(f"or are refused, in most of these frames {first}, {second} and {third}.")
     metrics = compute_metrics(estimate)
     whole = compute_metrics(make_estimate(gaps=False))
     assert metrics["markers"]["rms_mm"] == pytest.approx(whole["markers"]["rms_mm"], rel=0.05)
@@ -99,11 +101,11 @@ def test_a_lost_trial_is_saved_only_where_asked(tmp_path: Path) -> None:
 
 def test_what_keeps_the_good_frames_is_said_where_it_is_and_where_there_are_any() -> None:
     estimate = without_lost(arm_off(slice(300, 500)))
-    with pytest.raises(LostError, match=r"nothing is saved \(--keep-lost saves the frames that are good\)$"):
+    with pytest.raises(LostError, match=r"nothing is saved \(--keep-lost saves the frames that are good\)\. Look"):
         refuse_lost(estimate, "--keep-lost")
-    with pytest.raises(LostError, match=r"at most; nothing is saved$"):
+    with pytest.raises(LostError, match=r"at most; nothing is saved\. Look"):
         refuse_lost(estimate)
-    with pytest.raises(LostError, match=r"at most; no frame is good, nothing is saved$"):
+    with pytest.raises(LostError, match=r"at most; no frame is good, nothing is saved\. Look"):
         refuse_lost(without_lost(arm_off(slice(None))), "--keep-lost")
 
 

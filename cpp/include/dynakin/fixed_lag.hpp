@@ -13,7 +13,7 @@ namespace dynakin {
 // Keeps what a filter did in the last frames. Its result equals that of a Smoother run over all frames until now,
 // except that inequalities are kept in the metric of the filtered covariance. Nothing is allocated after construction.
 // A state costs some products of matrix and vector for each frame of the lag; its covariance, which is worked out where
-// it is asked for, half a step of the filter.
+// it is asked for, half a step of the filter and more for each.
 class FixedLag {
  public:
   // The filter must outlive it, stands before the first frame and is stepped by nobody else. Throws

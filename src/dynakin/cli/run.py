@@ -42,7 +42,6 @@ def run(
     """Estimate coordinates, moments, lengths and masses from a recording, and write a report."""
     with stage("loading"):  # the libraries alone take seconds on a busy machine
         from dynakin.cli.prepared import assumed, print_rows
-        from dynakin.cli.summary import end, print_summary
         from dynakin.pipeline.stages import configure, prepare_case, run_case
         from dynakin.results.files.folder import check_folder_writable, check_output_writable
         from dynakin.validation.case import case_of
@@ -64,6 +63,8 @@ def run(
         ready = prepare_case(case)
     print_rows(out(), assumed(next(iter(ready.values())), config))
     result = run_case(case, ready=ready, keep_lost=keep_lost, keep="--keep-lost")
+    from dynakin.cli.summary import end, print_summary  # loaded beside the core, for the most part
+
     folder = result.save(config.output, keep_lost=keep_lost, check=False)
     failures = result.failures
     saved = len(failures.found)

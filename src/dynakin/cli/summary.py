@@ -18,6 +18,7 @@ from dynakin.results.measures.sources import MEANINGS, UNKNOWN
 from dynakin.results.measures.tracking import why_lost
 from dynakin.results.naming import listed, sentence
 from dynakin.results.records import NOT_SMOOTHED, doubts_mass
+from dynakin.settings.lag import in_words
 
 
 def print_summary(result: Result, folder: Path) -> None:
@@ -103,12 +104,16 @@ def _figures(estimate: Estimate, metrics: dict[str, Any]) -> Table:
         numbers=(1,),
         title=f"{estimate.recording.name}, {estimate.model_name}: {window['start_s']:g} to {window['end_s']:g} s",
     )
+    rows.add_row("frames estimated", in_words(estimate.lag_s), "")
+    refused = sorted({event.subject for event in estimate.events if event.kind == "gated"})
     markers, wrench, events = (metrics[block] or {} for block in ("markers", "wrench", "events"))
     rms = {name: value for name, value in markers.get("rms_mm", {}).items() if value is not None}
     if rms:
         worst = max(rms, key=lambda name: rms[name])
         rows.add_row("markers, mean RMS", f"{markers['mean_rms_mm']:.2f} mm", f"{len(rms)} markers")
-        rows.add_row("worst marker, RMS", f"{rms[worst]:.2f} mm", worst)
+        rows.add_row(
+            "worst marker, RMS", f"{rms[worst]:.2f} mm", worst + (", refused for a time" if worst in refused else "")
+        )
     for name, value in wrench.get("rms", {}).items():
         unit = "N" if name.startswith("f") else "N m"
         share = wrench["nrms_percent"][name]
@@ -126,13 +131,12 @@ def _figures(estimate: Estimate, metrics: dict[str, Any]) -> Table:
     moved = {name: m for name, m in moved.items() if m["max_mm"] is not None}
     if moved:
         most = max(moved, key=lambda name: moved[name]["max_mm"])
-        declared = moved[most]["declared_mm"]
-        size = "" if declared is None else f" (declared {declared:.0f} mm)"
+        expected = moved[most]["expected_mm"]
+        size = "" if expected is None else f" (skin {expected:.0f} mm)"
         rows.add_row("largest move on a segment", f"{moved[most]['max_mm']:.0f} mm", f"{most}{size}")
     gaps = events.get("missing_frames")
     if gaps is not None:
         rows.add_row("markers with gaps", str(len(gaps)), ", ".join(gaps))
-    refused = sorted({event.subject for event in estimate.events if event.kind == "gated"})
     if refused:
         rows.add_row("refused for a time", str(len(refused)), ", ".join(refused))
     resets = [event for event in estimate.events if event.kind == "reset"]

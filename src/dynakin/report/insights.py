@@ -281,17 +281,18 @@ def _speeds(estimate: Estimate, metrics: Metrics) -> Insight | None:
 def _constants(estimate: Estimate, metrics: Metrics) -> list[Insight]:
     """What became of lengths, masses and moments of inertia."""
     names = short_marker_names(estimate.marker_names)
-    found = []
-    for group in convergence(estimate):
+    found, groups = [], convergence(estimate)
+    if moving := [group for group in groups if group.verdict == "moving"]:
+        still = [parameter_label(p, names) for group in moving for p in group.moving]
+        verb = "was" if len(still) == 1 else "were"
+        text = f"Not settled: {listed(still)} {verb} still moving in the last quarter of the recording."
+        found.append(Insight("warning", "Constants", text, "A longer recording, or one with more repetitions."))
+    for group in groups:
         title, change = sentence(group.title), number(group.largest_change_percent, digits=2)
         shrunk = f"the standard deviations ended at {100.0 * group.sd_left:.0f} % of where they began"
         if group.verdict == "moving":
-            still = [parameter_label(p, names) for p in group.moving]
-            verb = "was" if len(still) == 1 else "were"
-            text = f"Not settled: {listed(still)} {verb} still moving in the last quarter of the recording."
-            advice = "A longer recording, or one with more repetitions."
-            found.append(Insight("warning", title, text, advice))
-        elif group.verdict == "untaught":
+            continue
+        if group.verdict == "untaught":
             source = "measured at the start" if group.title == "lengths" else "of the anthropometric table"
             text = (
                 f"These are the values {source}, not identified ones: none of {group.count} changed by more than "
@@ -366,8 +367,8 @@ def _soft_tissue(estimate: Estimate, metrics: Metrics) -> Insight | None:
             "segment bends (a trunk) and the angles of its joints are the less certain.",
         )
     most = max(moved, key=lambda name: moved[name])
-    declared = markers[most]["declared_mm"]
-    size = "" if declared is None else f" (declared {number(declared, 'mm', digits=2)})"
+    expected = markers[most]["expected_mm"]
+    size = "" if expected is None else f" (skin {number(expected, 'mm', digits=2)})"
     return Insight(
         "good",
         "Soft tissue",

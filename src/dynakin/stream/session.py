@@ -24,7 +24,7 @@ from dynakin.stream.start import begin, check_labels, quietest, recording_of, st
 
 _POLL_S = 0.005
 _ASK_S = 0.1  # how often sinks are asked for wishes, and the standing person is looked at
-_DEVIATIONS_S, _DELAYED_DEVIATIONS_S = 0.2, 1.0  # those of a lag take half a step for each of its frames
+_DEVIATIONS_S, _DELAYED_DEVIATIONS_S = 0.2, 1.0  # those of a lag take 0.6 steps for each of its frames
 _SPARSE_S = 0.05  # steps are never further apart than this because the computer is slow
 _CATCH_UP_S = 1.0  # with what came while the model was measured: that is left out too, but is no sign of slowness
 _MASS_KG = 70.0  # of a person of whom nothing is known, so that at least the movement is seen

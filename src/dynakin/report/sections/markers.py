@@ -104,11 +104,11 @@ def _displacements(page: Page) -> TextTable:
         (
             names.get(name, name),
             words(carriers.get(name, "")),
-            *(number(found[name][f"{key}_mm"], digits=2) for key in ("rms", "max", "declared")),
+            *(number(found[name][f"{key}_mm"], digits=2) for key in ("rms", "max", "expected")),
         )
         for name in sorted(found, key=lambda name: -(found[name]["max_mm"] or 0.0))
     ]
-    headings = ("marker", "segment", "RMS, mm", "largest, mm", "declared, mm")
+    headings = ("marker", "segment", "RMS, mm", "largest, mm", "skin, mm")
     return TextTable("Movement of each marker on its segment", headings, rows, (2, 3, 4), folded=True)
 
 

@@ -61,9 +61,14 @@ def write_trc(
     ]
     scaled = np.asarray(points, dtype=float).reshape(frames, 3 * count) * _PER_METRE[unit]
     missing = ~np.isfinite(scaled)
+    gaps = [bool(row.any()) for row in missing]
     number = f"%.{decimals - (3 if unit == 'mm' else 0)}f"
+    whole = "\t".join([number] * (3 * count))
     for index, row in enumerate(scaled.tolist()):
-        cells = ["" if blank else number % value for value, blank in zip(row, missing[index].tolist(), strict=True)]
+        if gaps[index]:
+            cells = ["" if blank else number % value for value, blank in zip(row, missing[index].tolist(), strict=True)]
+        else:
+            cells = [whole % tuple(row)]
         if missing[index, -1]:
             cells.append("")  # OpenSim takes a tab as the end of a cell and would miss an empty one at the end of a row
         lines.append("\t".join([str(index + 1), f"{time[index]:.12g}", *cells]))

@@ -26,32 +26,32 @@ FLOOR_MM = 3.0
 
 @dataclass(frozen=True)
 class MarkerDisplacement:
-    """Displacement of one marker on its segment over a window, mm; None where nothing is known or declared.
+    """Displacement of one marker on its segment over a window, mm; None where nothing is known.
 
     ``rms`` and ``largest`` are distances from the marker's mean place, ``offset`` that of its mean place from where it
-    was put at the start; ``declared`` is the size that ``source`` gives.
+    was put at the start; ``expected`` is the size of what skin does that ``source`` gives.
     """
 
     segment: str
     rms: float | None
     largest: float | None
     offset: float | None
-    declared: float | None
+    expected: float | None
     source: str
 
     def exceeds(self) -> bool:
         """Whether it moves more than soft tissue explains."""
-        if self.largest is None or self.declared is None:
+        if self.largest is None or self.expected is None:
             return False
-        return self.largest > EXCESS * max(self.declared, FLOOR_MM)
+        return self.largest > EXCESS * max(self.expected, FLOOR_MM)
 
 
 def displacements(estimate: Estimate, window: np.ndarray) -> dict[str, MarkerDisplacement]:
     """Displacement of each marker in use over the frames ``window`` (T,) bool in which it was measured.
 
     It is the movement of the marker's estimated place on its segment; with the paper's filter that also takes up what
-    the model cannot explain. A filter with a state block ``soft_tissue`` (``soft_tissue/NAME/x``, m) has that added,
-    and declares its amplitudes in the variable ``soft_tissue_amplitude`` (marker,), m, of the estimate's data.
+    the model cannot explain. A filter with a state block ``soft_tissue`` (``soft_tissue/NAME/x``, m) has that added.
+    What was declared to the filter is the variable ``soft_tissue_amplitude`` (marker,), m, of the estimate's data.
     """
     blocks = [state_paths(estimate, block) for block in ("marker", "soft_tissue")]
     initial = {p.name: p.initial for p in estimate.parameters}
@@ -62,7 +62,7 @@ def displacements(estimate: Estimate, window: np.ndarray) -> dict[str, MarkerDis
     for k, (name, site) in enumerate(marker_sites(estimate)):
         frames, segment = window & seen[:, k], segments.get(site, "")
         paths = [1000.0 * sum(b[site][axis] for b in blocks if axis in b.get(site, {})) for axis in _axes(blocks, site)]
-        size, source = _declared(estimate, k, name, segment)
+        size, source = _expected(estimate, k, name, segment)
         if not paths or not frames.any():
             found[name] = MarkerDisplacement(segment, None, None, None, size, source)
             continue
@@ -89,15 +89,15 @@ def soft_tissue(estimate: Estimate, window: np.ndarray) -> dict[str, Any]:
             "rms_mm": d.rms,
             "max_mm": d.largest,
             "offset_mm": d.offset,
-            "declared_mm": d.declared,
-            "declared_by": d.source,
+            "expected_mm": d.expected,
+            "expected_by": d.source,
             "exceeds": d.exceeds(),
         }
         for name, d in displacements(estimate, window).items()
     }
     return {
-        "what": "distance of each marker from its mean place on its segment over the window, mm, and the declared "
-        "size; offset_mm: its mean place from where it was put at the start",
+        "what": "distance of each marker from its mean place on its segment over the window, mm, and the size "
+        "that skin has there; offset_mm: its mean place from where it was put at the start",
         "markers": markers,
         "verdict": excess_in_words(markers),
     }
@@ -105,13 +105,13 @@ def soft_tissue(estimate: Estimate, window: np.ndarray) -> dict[str, Any]:
 
 def excess_in_words(markers: Mapping[str, Mapping[str, Any]], limit: int = 3) -> str:
     """One sentence on the markers of that block that move too far, the worst first; empty where all are within."""
-    excess = [(name, m["max_mm"], m["declared_mm"], m["segment"]) for name, m in markers.items() if m["exceeds"]]
+    excess = [(name, m["max_mm"], m["expected_mm"], m["segment"]) for name, m in markers.items() if m["exceeds"]]
     if not excess:
         return ""
     worst = sorted(excess, key=lambda entry: entry[1] - entry[2], reverse=True)
     parts = [
-        f"{name} moves {largest:.0f} mm on the {words(segment)} (declared {declared:.0f} mm)"
-        for name, largest, declared, segment in worst[:limit]
+        f"{name} moves {largest:.0f} mm on the {words(segment)} (skin {expected:.0f} mm)"
+        for name, largest, expected, segment in worst[:limit]
     ]
     more = f" and {len(worst) - limit} more" if len(worst) > limit else ""
     return f"{', '.join(parts)}{more}: more than soft tissue does, so the model does not fit there."
@@ -128,12 +128,16 @@ def marker_sites(estimate: Estimate) -> list[tuple[str, str]]:
     return [(name, plain.get(plain_name(name), name)) for name in names]
 
 
-def _declared(estimate: Estimate, index: int, marker: str, segment: str) -> tuple[float | None, str]:
-    """Size in mm and who says so: the filter's own declaration, else the published one."""
+def _expected(estimate: Estimate, index: int, marker: str, segment: str) -> tuple[float | None, str]:
+    """Size in mm and who says so: the published one, or what was declared to the filter where that is more. Less, as
+    for the pelvis in space, says how little its markers should give way beside others, not what skin does."""
+    sizes = []
+    if (published := published_amplitude_mm(marker, segment)) is not None:
+        sizes.append((published[0], f"published: {published[1]}"))
     if "soft_tissue_amplitude" in estimate.data:
-        return 1000.0 * float(estimate.data["soft_tissue_amplitude"].values[index]), "declared to the filter"
-    published = published_amplitude_mm(marker, segment)
-    return (None, "nothing declared") if published is None else (published[0], f"published: {published[1]}")
+        own = 1000.0 * float(estimate.data["soft_tissue_amplitude"].values[index])
+        sizes.append((own, "declared to the filter"))
+    return max(sizes, key=lambda size: size[0], default=(None, "nothing declared"))
 
 
 def _axes(blocks: list[dict[str, dict[str, np.ndarray]]], site: str) -> list[str]:

@@ -13,7 +13,7 @@ from dynakin.errors import LostError
 from dynakin.results.estimate import AXES, Estimate
 from dynakin.results.measures.soft_tissue import marker_sites, state_paths
 from dynakin.results.measures.sources import ABSENT
-from dynakin.results.naming import sentence
+from dynakin.results.naming import listed, sentence
 from dynakin.results.records import REFUSED, TRACKING, Tracking
 
 Array = npt.NDArray[np.float64]
@@ -78,7 +78,7 @@ def without_lost(estimate: Estimate) -> Estimate:
                 continue
             empty = ABSENT if text in _SOURCES else 0 if variable.dtype.kind in "iu" else np.nan
             data[name] = variable.where(~data["lost"], empty).astype(variable.dtype)
-    warnings = [f"Warning: {in_words(estimate.time, found)}"] if found.lost.any() else []
+    warnings = [f"Warning: {in_words(estimate, found)}"] if found.lost.any() else []
     return replace(estimate, data=data, messages=[*estimate.messages, *warnings], tracking=found)
 
 
@@ -87,8 +87,9 @@ def lost_share(found: Tracking) -> float:
     return float(np.sum(found.lost & found.measured) / max(int(found.measured.sum()), 1))
 
 
-def in_words(time: Array, found: Tracking) -> str:
-    """Which frames are lost, when, and by what it shows."""
+def in_words(estimate: Estimate, found: Tracking) -> str:
+    """Which frames are lost, when, by what it shows, and by which markers."""
+    time = estimate.time
     astray = found.lost & found.measured
     parts = [
         f"{int(found.lost.sum())} of {len(time)} frames are no estimate and left empty ({times(time, found.lost)})"
@@ -99,17 +100,25 @@ def in_words(time: Array, found: Tracking) -> str:
         parts.append(
             f"there markers lie up to {1000.0 * middle:.0f} mm from where the bones carry them, "
             f"{100.0 * np.mean(np.nansum(far > ASTRAY_M, axis=1) / np.isfinite(far).sum(axis=1)):.0f} % of them more "
-            f"than {1000.0 * ASTRAY_M:.0f} mm, or are refused"
+            f"than {1000.0 * ASTRAY_M:.0f} mm, or are refused{_mostly(estimate, found, astray)}"
         )
     if (found.lost & ~found.measured).any():
         parts.append("or no marker was seen")
     return f"the person was lost: {'; '.join(parts)}."
 
 
+def _mostly(estimate: Estimate, found: Tracking, frames: Mask) -> str:
+    """The markers that are astray or refused in half of these frames and more, the most often first; nothing where
+    they are more than a third of all, which names nobody."""
+    off = ((found.distance_m > ASTRAY_M) | found.refused)[frames].mean(axis=0)
+    names = [estimate.marker_names[k] for k in np.argsort(-off, kind="stable") if off[k] >= 0.5]
+    return f", in most of these frames {listed(names, 4)}" if 0 < len(names) <= ANY_ASTRAY * len(off) else ""
+
+
 def lost_in_words(estimate: Estimate) -> str:
     """`in_words` of an estimate; empty where nobody was lost."""
     found = estimate.tracking
-    return in_words(estimate.time, found) if found is not None and found.lost.any() else ""
+    return in_words(estimate, found) if found is not None and found.lost.any() else ""
 
 
 def times(time: Array, flags: Mask, limit: int = 4) -> str:
@@ -128,7 +137,7 @@ def why_lost(estimate: Estimate) -> str | None:
     if share <= MOST_LOST:
         return None
     return (
-        f"{in_words(estimate.time, found)[:-1]}. That is {100.0 * share:.0f} % of the frames with markers, expected "
+        f"{in_words(estimate, found)[:-1]}. That is {100.0 * share:.0f} % of the frames with markers, expected "
         f"{100.0 * MOST_LOST:.0f} % at most"
     )
 
@@ -146,7 +155,10 @@ def refuse_lost(estimate: Estimate, keep: str | None = None) -> None:
         where = estimate.recording.path or estimate.recording.name
         good = bool((found.measured & ~found.lost).any())
         hint = f" ({keep} saves the frames that are good)" if keep and good else ""
-        raise LostError(f"{where}: {reason}; {'' if good else 'no frame is good, '}nothing is saved{hint}")
+        raise LostError(
+            f"{where}: {reason}; {'' if good else 'no frame is good, '}nothing is saved{hint}. Look whether labels are "
+            "swapped, or the person bends a joint that this model does not have"
+        )
 
 
 def tracking_figures(estimate: Estimate) -> dict[str, Any] | None:
@@ -167,7 +179,7 @@ def tracking_figures(estimate: Estimate) -> dict[str, Any] | None:
         "distance_median_mm": float(1000.0 * np.median(rms)) if len(rms) else None,
         "distance_largest_mm": float(1000.0 * np.max(rms)) if len(rms) else None,
         "refused_largest_share": float(refused.max()),
-        "verdict": sentence(in_words(estimate.time, found)) if found.lost.any() else "",
+        "verdict": sentence(in_words(estimate, found)) if found.lost.any() else "",
     }
 
 
