@@ -20,13 +20,14 @@ from typing import Any
 
 import xarray as xr
 from corpus_references import Difference, Key, Theirs, differences, of_opensim, of_vicon
+from source_digest import source_digest
 
 from dynakin.errors import DynakinError
 from dynakin.recordings.beside import STANDING_WORDS, forces_beside, static_beside
 from dynakin.recordings.frame import find_laboratory_frame
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
-from recordings import DATA, _source, kept, put_between
+from recordings import DATA, kept, put_between
 
 MARKS = ("<!-- corpus: begin -->", "<!-- corpus: end -->")
 ANGLE_GOAL_DEG, MOMENT_GOAL = 5.0, 0.15
@@ -211,7 +212,7 @@ def main() -> None:
         for path in ([folder] if folder.is_file() else sorted(folder.rglob("*")))
         if path.suffix.casefold() in (".c3d", ".trc") and all(part in str(path) for part in asked.only)
     ]
-    source = _source()
+    source = source_digest()
     with ThreadPoolExecutor(asked.jobs) as pool:
         rows = [row for each in pool.map(lambda path: rows_of(path, source), paths) for row in each]
     lines = [*table(rows), "", *compared(rows)]

@@ -5,8 +5,9 @@
 
 A case is squat or walk with fullbody or an .osim (``truth3d``'s trials, in DIR: folders ``squat_s1_*`` with trial.trc,
 grf.mot, static.trc, model.osim, trial.json, truth.npz), or one of our own simulator (``own_squat``, ``own_gait``,
-``sagittal7``, ``squat7``). Each is filtered once without systematic errors and kept (build/intervals); what each kind
-of error of size 1 would add is worked out beside it, so that sizes are tried without filtering again.
+``sagittal7``, ``squat7``). Each is filtered once without systematic errors; what each kind of error of size 1 would add
+is worked out beside it, so that sizes are tried without filtering again. Both are kept in build/intervals by what they
+depend on: trial, noise, package and this file (--again: made anew).
 
 Groups and figures are truth3d's: angles with their mean error taken off, means over coordinates and seeds; deviation
 over error is the median of a group's angles and speeds. --choose searches the sizes of one kind of model over all cases
@@ -19,15 +20,16 @@ import argparse
 import json
 import pickle
 from collections.abc import Sequence
-from dataclasses import asdict, astuple, dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 
 import numpy as np
 from scipy.optimize import minimize
+from source_digest import source_digest
 
 import dynakin
-from dynakin.filter.systematic import BLOCKS, KINDS, LANDMARKS, SCALED, Sizes
+from dynakin.filter.systematic import BLOCKS, LANDMARKS, SCALED, Parts, Sizes, Systematic, reported, usual_sizes
 from dynakin.model.definition import load_model
 from dynakin.settings import presets
 from dynakin.settings.noise import Noise
@@ -38,6 +40,7 @@ TRUTH3D = ("squat/fullbody", "squat/osim", "walk/fullbody", "walk/osim")
 OWN = {"own_squat": ("fullbody", 10.0, 3.0), "own_gait": ("fullbody", 4.0, 0.5)}
 PLANAR = {"sagittal7": ("opencap", 15.0, 5.0), "squat7": ("plug-in-gait", 15.0, 5.0)}
 CASES = (*TRUTH3D, *OWN, *PLANAR)
+FILES = ("trial.trc", "grf.mot", "static.trc", "model.osim", "trial.json", "truth.npz")
 WINDOW_S = {"squat": (2.0, 1e9), "walk": (0.3, 3.1)}
 FLEXION = ("pelvis_tilt", "hip_flexion", "knee_angle", "ankle_angle", "lumbar_extension")
 OTHER = ("pelvis_list", "pelvis_rotation", "hip_adduction", "hip_rotation", "subtalar_angle", "lumbar_bending",
@@ -51,7 +54,7 @@ Array = np.ndarray
 @dataclass(frozen=True)
 class Run:
     """One estimate against the truth: by block errors (T, C), the filter's own deviations, and variances by kind of
-    error at size 1. Frames that have no truth or no value are NaN."""
+    error at size 1. Frames that have no truth or no value are NaN. ``late``: whether later frames helped."""
 
     case: str
     seed: int
@@ -59,28 +62,41 @@ class Run:
     names: tuple[str, ...]
     error: dict[str, Array]
     own: dict[str, Array]
-    parts: dict[str, dict[str, Array]]
+    parts: Parts
+    variance_scale: float
+    late: bool
 
 
-def runs_of(case: str, seed: int, folder: Path | None, noise: Noise, live: bool, again: bool) -> Run:
-    """As kept, else made."""
-    key = json.dumps([case, seed, live, noise.model_dump()], sort_keys=True)
-    kept = KEPT / f"{case.replace('/', '_')}_s{seed}_{sha256(key.encode()).hexdigest()[:10]}.pickle"
+def runs_of(case: str, seed: int, folder: Path | None, noise: Noise, live: bool, again: bool, source: str) -> Run:
+    """As kept, else made. ``source``: `source_digest`."""
+    trial = trial_of(case, seed, folder) if case in TRUTH3D else None
+    key = sha256(json.dumps([source, case, seed, live, noise.model_dump()], sort_keys=True).encode())
+    for file in (Path(__file__), *([trial / name for name in FILES] if trial else ())):
+        key.update(file.read_bytes())
+    kept = KEPT / f"{case.replace('/', '_')}_s{seed}_{key.hexdigest()[:10]}.pickle"
     if kept.exists() and not again:
         loaded: Run = pickle.loads(kept.read_bytes())
         return loaded
-    found = truth3d(case, seed, folder, noise, live) if case in TRUTH3D else own(case, seed, noise, live)
+    found = own(case, seed, noise, live) if trial is None else truth3d(case, seed, trial, noise, live)
     KEPT.mkdir(parents=True, exist_ok=True)
     kept.write_bytes(pickle.dumps(found))
     return found
 
 
-def truth3d(case: str, seed: int, folder: Path | None, noise: Noise, live: bool) -> Run:
-    """A trial of truth3d."""
-    motion, _, kind = case.partition("/")
+def trial_of(case: str, seed: int, folder: Path | None) -> Path:
+    """Folder of a trial of truth3d."""
     if folder is None:
         raise SystemExit(f"{case} needs --trials: the folder of truth3d's trials (CACHE/trials)")
-    trial = next(t for t in sorted(folder.glob(f"{motion}_s{seed}_*")) if plain(t))
+    stem = f"{case.partition('/')[0]}_s{seed}_"
+    found = [trial for trial in sorted(folder.glob(f"{stem}*")) if plain(trial)]
+    if not found:
+        raise SystemExit(f"{folder}: no trial {stem}* with all sources of error; truth3d.py makes it")
+    return found[0]
+
+
+def truth3d(case: str, seed: int, trial: Path, noise: Noise, live: bool) -> Run:
+    """A trial of truth3d."""
+    motion, _, kind = case.partition("/")
     subject = dynakin.Subject(mass_kg=json.loads((trial / "trial.json").read_text())["mass_kg"], height_m=1.7)
     recording = dynakin.read(trial / "trial.trc", trial / "grf.mot")
     if kind == "osim":
@@ -126,8 +142,8 @@ def against(
 ) -> Run:  # fmt: skip
     """Errors, deviations and parts over the window, of the coordinates that both have and that move."""
     data, tracker = tracked.estimate.data, tracked.tracker
-    systematic = dynakin.filter.systematic.Systematic(tracker.calibrated, tracker.noise)
-    parts = systematic.over_time(data)
+    sizes = replace(usual_sizes(tracker.calibrated), inertia=True)  # worked out where it is not in use, too
+    parts = Systematic(tracker.calibrated, tracker.noise, sizes).over_time(data)
     all_names = [str(n) for n in data["coordinate"].values]
     chosen = [n for n in all_names if n in names and n not in tracked.estimate.held]
     mine, theirs = [all_names.index(n) for n in chosen], [names.index(n) for n in chosen]
@@ -149,7 +165,9 @@ def against(
         tuple(chosen),
         error,
         {block: values(f"{block}_sd") for block in blocks},
-        {kind: {block: parts[kind][block][window][:, mine] for block in blocks} for kind in KINDS},
+        {kind: {block: part[block][window][:, mine] for block in blocks} for kind, part in parts.items()},
+        tracker.noise.variance_scale,
+        bool(tracked.estimate.config["lag_s"]),
     )
 
 
@@ -174,12 +192,11 @@ def figures(run: Run, sizes: Sizes | None) -> dict[str, tuple[float, ...]]:
     """By group: share inside 95 %, deviation over error, error and deviation (RMS; rad, rad/s, N m); None: the filter's
     own deviations."""
     found = {}
+    said = run.own
+    if sizes is not None:
+        said = reported(sizes, run.variance_scale, run.own, run.parts, late=run.late)
     for title, block, places in groups_of(run):
-        e, variance = run.error[block][:, places], run.own[block][:, places] ** 2
-        if sizes is not None:
-            added = sum(getattr(sizes, k) ** 2 * run.parts[k][block][:, places] for k in KINDS)
-            variance = sizes.own(block) ** 2 * variance + added
-        sd = np.sqrt(variance)
+        e, sd = run.error[block][:, places], said[block][:, places]
         if block == "coordinates":
             e = e - np.nanmean(e, axis=0)
         sd = np.where(np.isfinite(e), sd, np.nan)
@@ -223,11 +240,15 @@ def tell(runs: Sequence[Run], sizes: dict[str, Sizes]) -> None:
 
 def choose(runs: Sequence[Run], kind: str, start: dict[str, Sizes]) -> Sizes:
     """Sizes of one kind of model for which groups lie nearest to 94 % and 1.3, and none is far off."""
-    first = np.log(astuple(start[kind]))
+    names = [name for name, value in asdict(start[kind]).items() if not isinstance(value, bool)]
+    first = np.log([getattr(start[kind], name) for name in names])
     mine = [run for run in runs if run.sizes == kind]
 
+    def changed(theta: Array) -> Sizes:
+        return replace(start[kind], **dict(zip(names, np.exp(theta).tolist(), strict=True)))
+
     def loss(theta: Array) -> float:
-        rows = means(mine, start | {kind: Sizes(*np.exp(theta))})
+        rows = means(mine, start | {kind: changed(theta)})
         cost = 0.1 * float(np.mean((theta - first) ** 2))  # what the trials do not tell stays
         for groups in rows.values():
             for inside, ratio, *_ in groups.values():
@@ -235,7 +256,7 @@ def choose(runs: Sequence[Run], kind: str, start: dict[str, Sizes]) -> Sizes:
         return cost
 
     best = minimize(loss, first, method="Nelder-Mead", options={"maxfev": 300, "xatol": 0.02, "fatol": 1e-3})
-    return Sizes(*np.exp(best.x).tolist())
+    return changed(best.x)
 
 
 def main() -> None:
@@ -251,16 +272,17 @@ def main() -> None:
     asked = parser.parse_args()
     noise = presets.preset(asked.preset, {"systematic_scale": 0.0})
     cases = asked.cases or [case for case in CASES if asked.trials or case not in TRUTH3D]
+    source = source_digest()
     runs = [
-        runs_of(case, int(seed), asked.trials, noise, asked.live, asked.again)
+        runs_of(case, int(seed), asked.trials, noise, asked.live, asked.again, source)
         for case in cases
         for seed in asked.seeds.split(",")
     ]
     sizes = {"landmarks": LANDMARKS, "scaled": SCALED}
     for text in asked.sizes:
         kind, _, pairs = text.partition(":")
-        values = {key: float(value) for key, _, value in (pair.partition("=") for pair in pairs.split(","))}
-        sizes[kind] = replace(sizes[kind], **values)
+        values = dict(pair.split("=") for pair in pairs.split(","))
+        sizes[kind] = replace(sizes[kind], **{k: type(getattr(LANDMARKS, k))(float(v)) for k, v in values.items()})
     if asked.choose:
         sizes[asked.choose] = choose(runs, asked.choose, sizes)
     tell(runs, sizes)

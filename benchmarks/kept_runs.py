@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from source_digest import source_digest
 from withheld_judge import Found
 
 from dynakin.errors import DynakinError
@@ -18,7 +19,6 @@ from dynakin.pipeline.stages import configure
 from dynakin.recordings.recording import Recording
 from dynakin.validation.case import case_of
 from dynakin.validation.methods import estimate_each
-from recordings import _source as source_digest
 
 KEPT_STEMS = ("moment", "foot_")
 """How the variables of an estimate begin that are kept."""

@@ -212,7 +212,7 @@ def told(estimate: Estimate, judged: Array) -> None:
     share = 100 * len(on) / max(len(bounded), 1)
     print(f"| parameters on a bound | {len(on)} of {len(bounded)} ({share:.1f} %) | | 5 % |")
     moved = displacements(estimate, judged)
-    ratio = {n: d.rms / d.declared for n, d in moved.items() if d.rms is not None and d.declared}
+    ratio = {n: d.rms / d.expected for n, d in moved.items() if d.rms is not None and d.expected}
     worst = sorted(ratio, key=lambda n: -ratio[n])[:3]
     beyond = sum(value > 1.5 for value in ratio.values())
     print(

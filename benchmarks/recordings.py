@@ -26,6 +26,7 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 from recordings_references import JOINTS, SIDES, Array, Inverse, Reference, bodies_under, of_c3d, of_storage
+from source_digest import source_digest
 
 from dynakin.results.measures.sources import MEANINGS, MEASURED
 
@@ -185,15 +186,6 @@ class Run:
             return None
         with xr.open_dataset(file) as data:
             return data.load()
-
-
-def _source() -> str:
-    """Digest of the package, Python and compiled."""
-    digest = hashlib.sha256()
-    for path in sorted((ROOT / "src").rglob("*")):
-        if path.suffix in (".py", ".so", ".toml", ".csv"):
-            digest.update(path.read_bytes())
-    return digest.hexdigest()
 
 
 def run(trial: Trial, wanted: str, source: str) -> Run:
@@ -379,7 +371,7 @@ def main() -> None:
     parser.add_argument("--write", action="store_true", help=f"put the tables into {PAGE.relative_to(ROOT)}")
     asked = parser.parse_args()
     chosen = [t for t in TRIALS if not asked.names or any(part in t.name for part in asked.names)]
-    source = _source()
+    source = source_digest()
     with ThreadPoolExecutor(asked.jobs) as pool:
         runs = list(pool.map(lambda trial: run(trial, asked.model, source), chosen))
     lines = list(tables(runs))

@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
+import xarray as xr
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from dynakin.bindings import _core
+from dynakin.filter.joint_errors import JointErrors
 from dynakin.filter.systematic import _STEP_S, COMMON, KINDS, SKIN_ANGLE_RAD, Sizes, Systematic
 from dynakin.settings.noise import Noise
 
@@ -26,7 +28,7 @@ QD = np.array([0.4, -0.1, 0.2, 0.5, -0.3, 0.6, 1.2, 0.4, -0.7, -1.5])
 QDD = np.array([1.0, 0.5, -1.0, 2.0, 1.0, -2.0, 5.0, -3.0, 2.0, 6.0])
 CONTACT = np.array([40.0, 500.0, -60.0, 30.0, -20.0, 90.0])
 """N, N m about the ground's origin, on the shank."""
-SIZES = (0.01, 0.02, 0.05, 0.04, 0.06, 0.07, 0.3, 0.5)
+SIZES = (0.01, 0.02, 0.05, 0.04, 0.06, 0.07, 0.3)
 DECLARED = np.repeat([0.014, 0.018, 0.010], 4)
 
 
@@ -88,6 +90,7 @@ def calibrated() -> Any:
         recorded_markers=tuple(m.name for m in model.markers),
         lower=np.full(30, -np.inf),
         upper=np.full(30, np.inf),
+        held={},
     )
 
 
@@ -213,7 +216,7 @@ def test_reported_deviations_hold_both_parts_and_a_scale_of_zero_leaves_the_filt
     both = subject.added(own, x, P, CONTACT[None], ["shank"], late=True)
     external = np.zeros((3, 6))
     external[2] = CONTACT
-    parts = subject.parts(Q, QD, QDD, external) | {"inertia": dict.fromkeys(both, np.zeros(10))}  # none is estimated
+    parts = subject.parts(Q, QD, QDD, external)
     sizes = dict(zip(KINDS, SIZES, strict=True))
     for block, sd in both.items():
         total = 0.02**2 + sum(sizes[kind] ** 2 * parts[kind][block] for kind in KINDS)
@@ -228,8 +231,8 @@ def test_reported_deviations_hold_both_parts_and_a_scale_of_zero_leaves_the_filt
     np.testing.assert_allclose(none["moments"], 0.02)
 
 
-def test_inertia_that_small_innovations_leave_open_is_known_by_the_declared_noise() -> None:
-    """A shank's mass and first moments of some covariance, against moments of bodies drawn from it."""
+def with_inertia() -> tuple[Any, Array]:
+    """The model whose shank's mass and first moments are estimated, and its state."""
     model = spec()
     segments = model.segments
     segments[2].inertia_estimated = [True] * 4 + [False] * 6
@@ -237,23 +240,102 @@ def test_inertia_that_small_innovations_leave_open_is_known_by_the_declared_nois
     subject, core = calibrated(), _core.Model(model)
     subject.spec, subject.names = model, tuple(core.layout.names)
     subject.lower, subject.upper = np.full(34, -np.inf), np.full(34, np.inf)
-    sizes = Sizes(*np.zeros(7), inertia=0.5)
-    x = np.r_[Q, QD, QDD, core.initial_state()[30:]]
-    A = 0.1 * np.random.default_rng(4).normal(size=(4, 4))
-    P = np.zeros((34, 34))
-    P[30:, 30:] = A @ A.T
-    external = np.zeros((3, 6))
+    return subject, np.r_[Q, QD, QDD, core.initial_state()[30:]]
+
+
+def by_inertia(subject: Any, x: Array, root: Array) -> Array:
+    """(10,) variances of moments of bodies drawn with a covariance root root'."""
+    core, external, h = _core.Model(subject.spec), np.zeros((3, 6)), 1e-3
     external[2] = CONTACT
-    h, own = 1e-3, {block: np.zeros(10) for block in ("coordinates", "speeds", "accelerations", "moments")}
     as_it_is = _core.joint_moments(core, x, external)
     change = [  # moments are linear in inertia
-        (_core.joint_moments(core, x + h * np.r_[np.zeros(30), a], external) - as_it_is) / h for a in A.T
+        (_core.joint_moments(core, x + h * np.r_[np.zeros(30), a], external) - as_it_is) / h for a in root.T
     ]
-    variance = np.square(change).sum(axis=0)
+    return np.asarray(np.square(change).sum(axis=0))
+
+
+def test_inertia_that_small_innovations_leave_open_is_known_by_the_declared_noise() -> None:
+    """A shank's mass and first moments of some covariance, against moments of bodies drawn from it."""
+    subject, x = with_inertia()
+    root = 0.1 * np.random.default_rng(4).normal(size=(4, 4))
+    P = np.zeros((34, 34))
+    P[30:, 30:] = root @ root.T
+    variance = by_inertia(subject, x, root)
+    own = {block: np.zeros(10) for block in ("coordinates", "speeds", "accelerations")} | {"moments": np.sqrt(variance)}
+    sizes = Sizes(*np.zeros(7), own_moments=1.5)
     found = Systematic(subject, Noise(variance_scale=0.2), sizes)
-    seen = found.added(own, x, P, CONTACT[None], ["shank"], late=True)
-    np.testing.assert_allclose(seen["moments"], 0.5 * np.sqrt((1.0 / 0.2 - 1.0) * variance), rtol=1e-6)
-    np.testing.assert_array_equal(seen["speeds"], 0.0)
-    for scale in (1.0, 3.0):  # what the filter has is all
+    for late in (True, False):  # the factor on the filter's own counts nothing twice
+        seen = found.added(own, x, P, CONTACT[None], ["shank"], late=late)
+        np.testing.assert_allclose(seen["moments"], np.sqrt(variance / 0.2), rtol=1e-6)
+        np.testing.assert_array_equal(seen["speeds"], 0.0)
+    for scale in (0.5, 1.0, 3.0):  # the filter's own part has more of it
         declared = Systematic(subject, Noise(variance_scale=scale), sizes)
-        assert not declared.added(own, x, P, CONTACT[None], ["shank"], late=True)["moments"].any()
+        seen = declared.added(own, x, P, CONTACT[None], ["shank"], late=True)
+        np.testing.assert_allclose(seen["moments"], 1.5 * np.sqrt(variance), rtol=1e-6)
+    scaled = Systematic(subject, Noise(variance_scale=0.2), replace(sizes, inertia=False))
+    seen = scaled.added(own, x, P, CONTACT[None], ["shank"], late=False)
+    np.testing.assert_allclose(seen["moments"], np.sqrt(variance), rtol=1e-6)
+
+
+def test_the_scale_of_systematic_errors_is_that_of_joints_and_skin() -> None:
+    """What is not known of inertia has no usual size: another scale leaves it."""
+    subject, x = with_inertia()
+    subject.plan = SimpleNamespace()  # joints found from markers
+    P = np.zeros((34, 34))
+    P[30:, 30:] = 0.01 * np.eye(4)
+    own = {block: np.zeros(10) for block in ("coordinates", "speeds", "accelerations", "moments")}
+    said = [
+        Systematic(subject, Noise(variance_scale=0.2, systematic_scale=scale)).added(
+            own, x, P, CONTACT[None], ["shank"], late=False
+        )
+        for scale in (1e-9, 1.0, 2.0)
+    ]
+    expected = (1.0 / 0.2 - 1.0) * by_inertia(subject, x, 0.1 * np.eye(4))
+    np.testing.assert_allclose(said[0]["moments"], np.sqrt(expected), rtol=1e-6)
+    np.testing.assert_allclose(said[2]["speeds"], 2.0 * said[1]["speeds"], rtol=1e-9)
+    one, two = (np.square(each["moments"]) - expected for each in said[1:])
+    np.testing.assert_allclose(two, 4.0 * one, rtol=1e-6)
+
+
+def test_over_time_inertia_is_known_as_well_as_in_each_frame() -> None:
+    """Deviations that a recording halves from frame to frame: moments' are those of a session at that moment."""
+    subject, x = with_inertia()
+    A = 0.1 * np.random.default_rng(4).normal(size=(4, 4))
+    root = np.eye(34)
+    root[30:, 30:] = A
+    last, s = root @ root.T, 0.2
+    time = 0.2 * np.arange(4)
+    wider = 2.0 ** np.arange(4)[::-1]
+    sd = np.sqrt(np.diag(last)) * np.array([np.r_[np.ones(30), np.full(4, w / np.sqrt(s))] for w in wider])
+    data = xr.Dataset(
+        {
+            "state": (("time", "element"), np.tile(x, (4, 1))),
+            "state_sd": (("time", "element"), sd),  # constants' by the declared noise
+            "final_covariance": (("element", "element_"), last),
+            "foot_wrench": (("time", "foot", "component"), np.tile(CONTACT, (4, 1, 1))),
+        },
+        coords={"time": time, "foot_segment": ("foot", ["shank"])},
+    )
+    sizes = Sizes(*np.zeros(7))
+    found = Systematic(subject, Noise(variance_scale=s), sizes)
+    variance = by_inertia(subject, x, A)
+    expected = wider[:, None] ** 2 * variance / s
+    np.testing.assert_allclose(found.over_time(data)["inertia"]["moments"], expected, rtol=1e-6)
+    blocks = ("coordinates", "speeds", "accelerations", "moments")
+    data = data.assign({f"{block}_sd": (("time", "coordinate"), np.zeros((4, 10))) for block in blocks})
+    recorded = found.added_over_time(data, late=False)["moments_sd"].values
+    own = {block: np.zeros(10) for block in blocks}
+    for k, w in enumerate(wider):
+        scales = np.r_[np.ones(30), np.full(4, w)]
+        live = found.added(own, x, np.outer(scales, scales) * last, CONTACT[None], ["shank"], late=False)
+        np.testing.assert_allclose(recorded[k], live["moments"], rtol=1e-9)
+
+
+def test_a_joint_of_which_a_rotation_is_held_is_the_joint_that_it_was() -> None:
+    model = spec()
+    coordinates = model.coordinates
+    coordinates[8].locked = True  # the hip's turn about the thigh
+    model.coordinates = coordinates
+    seen = [set(JointErrors.of(model, np.zeros(10), held).kinds) for held in ((), ("turn",))]
+    assert "pair_axes" in seen[0] and "pair_axes" not in seen[1]
+    assert {"ball_axes", "ball_centre"} <= seen[1] and not {"ball_axes", "ball_centre"} & seen[0]

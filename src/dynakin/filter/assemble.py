@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-import xarray as xr
 
 from dynakin.arrays import finite
 from dynakin.bindings import _core
@@ -27,6 +26,9 @@ from dynakin.results.measures.facing import nearly_singular
 from dynakin.results.measures.sources import MEASURED
 from dynakin.results.records import Timing
 from dynakin.settings.noise import Noise
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = npt.NDArray[np.float64]
 
@@ -71,8 +73,8 @@ def assemble(
     if feet is not None:
         _widen_priors(data, prior_factor(used), feet.blind)
         data = data.isel(foot=[name != RESIDUAL for name in feet.names])
-    for name, covariance in zip(("initial_covariance", "final_covariance"), covariances, strict=True):
-        data[name] = (("element", "element_"), covariance)
+    names = ("initial_covariance", "final_covariance")
+    data.update({name: (("element", "element_"), P) for name, P in zip(names, covariances, strict=True)})
     noise = config.get("noise", {})
     declared = 1.0 / np.sqrt(variance_scales(initial.names, used))
     parameters = parameters_of(
@@ -118,11 +120,12 @@ def assemble(
 def _widen_priors(data: xr.Dataset, factor: float, blind: npt.NDArray[np.bool_]) -> None:
     """In place, by `prior_factor`: deviations of what rests on a contact that no plate measures; of the total wrench in
     frames (T,) in which no plate measures anything."""
+    import xarray as xr
+
     unmeasured = data["foot_contact"] == UNMEASURED
-    data["foot_wrench_sd"] = data["foot_wrench_sd"].where(~unmeasured, factor * data["foot_wrench_sd"])
     resting = (data["moment_source"] != MEASURED) & unmeasured.any("foot")
-    data["moments_sd"] = data["moments_sd"].where(~resting, factor * data["moments_sd"])
-    data["wrench_sd"] = data["wrench_sd"].where(xr.DataArray(~blind, dims="time"), factor * data["wrench_sd"])
+    where = {"foot_wrench_sd": unmeasured, "moments_sd": resting, "wrench_sd": xr.DataArray(blind, dims="time")}
+    data.update({name: data[name].where(~these, factor * data[name]) for name, these in where.items()})
 
 
 def _without_infinities(data: xr.Dataset) -> list[str]:
@@ -144,6 +147,8 @@ def _dataset(
     measured: tuple[Array, Array],
     feet: ContactLoads | None,
 ) -> xr.Dataset:
+    import xarray as xr  # while the core works it is loaded beside it
+
     spec = initial.spec
     axes = np.array(spec.markers[0].measured)
     modelled = np.array(spec.wrench_measured)

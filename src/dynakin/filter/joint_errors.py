@@ -3,7 +3,7 @@ own derivatives say what it does to markers and moments ([derivations](derivatio
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from copy import copy
 from dataclasses import dataclass
 from typing import Literal
@@ -43,17 +43,18 @@ class JointErrors:
     kinds: tuple[Kind, ...]
 
     @classmethod
-    def of(cls, spec: _core.ModelSpec, reference: Array) -> JointErrors:
+    def of(cls, spec: _core.ModelSpec, reference: Array, held: Collection[str] = ()) -> JointErrors:
         """Those of a model.
 
         Args:
             reference: (C,) posture in which the bones were found: there a misplaced joint displaces no bone but its
                 own.
+            held: coordinates that are locked because no marker shows them: a hip stays a joint with three axes.
         """
         spec = bare(copy(spec))
         orientations = _orientations(spec, reference)
         larger, added = _with_errors(spec)
-        found = _sources(spec, orientations)
+        found = _sources(spec, orientations, set(held))
         place = {name: k for k, name in enumerate(c.name for c in larger.coordinates if not c.locked)}
         sources = np.array([[column.get(name, 0.0) for _, column in found] for name in added])
         return cls(
@@ -131,7 +132,7 @@ def _names(segment: str, place: str) -> list[str]:
     return [f"{segment}_{place}_{axis}" for axis in "xyz"]
 
 
-def _sources(spec: _core.ModelSpec, orientations: dict[str, Array]) -> list[tuple[Kind, Column]]:
+def _sources(spec: _core.ModelSpec, orientations: dict[str, Array], held: set[str]) -> list[tuple[Kind, Column]]:
     """Unit errors along the ground's axes in the reference posture, by the errors' coordinates that they move."""
     planar = not all(spec.markers[0].measured)
     joints = _turning(spec)
@@ -148,7 +149,8 @@ def _sources(spec: _core.ModelSpec, orientations: dict[str, Array]) -> list[tupl
                 ]
             continue
         R_J = orientations[segment.parent] @ segment.rotation
-        axes = min(len(joints[name]), 3)
+        own = {axis.coordinate for axis in segment.axes if axis.kind == "rotation"}
+        axes = min(len(joints[name] | own & held), 3)
         for e in _AXES[: 2 if planar else 3]:
             column = _along(name, "moved", R_J, e)
             for child in children:

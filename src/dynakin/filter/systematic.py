@@ -1,5 +1,5 @@
 """What the filter's covariance cannot know: joints beside where they are, skin that follows them, and inertia that
-small innovations say nothing of.
+a recording leaves open.
 
 A consider covariance (Schmidt 1966): nothing is learned of these errors; their effect on what is reported is worked out
 afterwards and added to the filter's own variances ([derivations](derivations.md), section 17).
@@ -9,11 +9,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import get_args
+from typing import TYPE_CHECKING, get_args
 
 import numpy as np
 import numpy.typing as npt
-import xarray as xr
 from scipy.linalg import cho_factor, cho_solve
 
 from dynakin.bindings import _core
@@ -22,11 +21,15 @@ from dynakin.filter.noise import marker_variance, soft_tissue_sd
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.settings.noise import Noise
 
+if TYPE_CHECKING:
+    import xarray as xr
+
 Array = npt.NDArray[np.float64]
 
 BLOCKS = ("coordinates", "speeds", "accelerations", "moments")
 OF_JOINTS = get_args(Kind)
-KINDS = (*OF_JOINTS, "skin", "inertia")
+KINDS = (*OF_JOINTS, "skin")
+"""What `Sizes` has a size of. What is not known of inertia has none: it is in the filter's covariance."""
 
 
 @dataclass(frozen=True)
@@ -39,11 +42,12 @@ class Sizes:
             three.
         root: rad, of the turn of the pelvis' frame in the pelvis.
         skin: of the displacement of a marker that follows a joint's angle, as a fraction of the declared size.
-        inertia: of what a recording leaves open of inertia, as a fraction of its deviation by the declared noise, as
-            far as the noise that was found in the recording takes it for known.
         own_motion, own_moments: factors on the filter's own deviations of what later frames helped to estimate. What
             shows beside a model that is found from markers lasts and is shared by them, so that frames tell less than
-            the filter counts; a scaled skeleton leaves less at the root than the declared residual.
+            the filter counts; a scaled skeleton leaves less at the root than the declared residual, but speeds
+            in walks lie in their intervals in 82 to 84 % without the factor.
+        inertia: whether what a recording leaves open of inertia counts in moments at least by the declared noise, as in
+            `Estimate.parameters`, where the noise that was found in the recording takes it for better known.
     """
 
     hinge_centre: float
@@ -53,12 +57,12 @@ class Sizes:
     ball_axes: float
     root: float
     skin: float
-    inertia: float
     own_motion: float = 1.0
     own_moments: float = 1.0
+    inertia: bool = True
 
     def scaled(self, factor: float) -> Sizes:
-        """The errors times a factor."""
+        """The errors of joints and skin times a factor."""
         return replace(self, **{kind: factor * getattr(self, kind) for kind in KINDS})
 
     def own(self, block: str) -> float:
@@ -74,7 +78,6 @@ LANDMARKS = Sizes(
     ball_axes=np.radians(0.8),
     root=np.radians(1.2),
     skin=0.15,
-    inertia=1.0,
     own_motion=1.6,
     own_moments=1.5,
 )
@@ -87,8 +90,9 @@ SCALED = Sizes(
     ball_axes=np.radians(0.8),
     root=np.radians(1.0),
     skin=0.095,
-    inertia=0.0,
+    own_motion=1.2,
     own_moments=0.55,
+    inertia=False,
 )
 """Joints of a skeleton that was scaled to the person (.osim)."""
 
@@ -96,6 +100,30 @@ SCALED = Sizes(
 def usual_sizes(calibrated: CalibratedModel) -> Sizes:
     """By where the joints of a model come from."""
     return SCALED if calibrated.plan is None else LANDMARKS
+
+
+Parts = dict[str, dict[str, Array]]
+
+
+def reported(
+    sizes: Sizes, variance_scale: float, own: Mapping[str, Array], parts: Parts, *, late: bool
+) -> dict[str, Array]:
+    """Standard deviations that are reported: block -> (..., C).
+
+    Args:
+        variance_scale: of the noise of the filter. own: the filter's own deviations, by block. parts: variances as of
+            `Systematic.over_time`. late: whether later frames helped.
+    """
+    found = {}
+    for block, sd in own.items():
+        factor = sizes.own(block) if late else 1.0
+        variance = np.square(factor * sd)
+        for kind in KINDS:
+            variance = variance + getattr(sizes, kind) ** 2 * parts[kind][block]
+        if sizes.inertia:  # the filter's own part has so much of it already
+            variance = variance + max(1.0 - factor**2 * variance_scale, 0.0) * parts["inertia"][block]
+        found[block] = np.sqrt(variance)
+    return found
 
 
 SKIN_ANGLE_RAD = np.radians(50.0)
@@ -108,8 +136,6 @@ _STEP_S = 0.005
 """Step along the motion over which effects are differentiated."""
 _UNSEEN_SD = 0.5
 """Standard deviation, rad or m, of a coordinate before any marker is seen: keeps what no marker shows finite."""
-
-Parts = dict[str, dict[str, Array]]
 
 
 class Systematic:
@@ -126,7 +152,7 @@ class Systematic:
         self._free = np.array([k for k, c in enumerate(spec.coordinates) if not c.locked])
         self._count = len(spec.coordinates)
         reference = neutral(calibrated)
-        self._errors = JointErrors.of(spec, reference)
+        self._errors = JointErrors.of(spec, reference, calibrated.held)
         self._reference = reference[self._free]
         self._measured = np.array([marker.measured for marker in spec.markers]).ravel()
         sd = np.hypot(np.sqrt(marker_variance(calibrated, noise)), soft_tissue_sd(noise, calibrated.soft_tissue_m))
@@ -146,8 +172,10 @@ class Systematic:
         self._B0 = gain @ N
         self._segments = {name: k for k, name in enumerate(segments)}
         self._model = _core.Model(spec)
-        self._inertia = [k for k, name in enumerate(calibrated.names) if name.startswith("inertia/")]
-        self._unseen = max(1.0 / noise.variance_scale - 1.0, 0.0)  # noise that is larger than declared has it all
+        self._variance_scale = noise.variance_scale
+        least = min(self.sizes.own_moments, 1.0)  # the factor on the filter's own part, late or at once
+        open_ = self.sizes.inertia and least**2 * noise.variance_scale < 1.0
+        self._inertia = [k for k, name in enumerate(calibrated.names) if open_ and name.startswith("inertia/")]
 
     def _displacements(self, jacobian: Array) -> Array:
         """(3 M, S): what each source does to the markers of the model as it is posed."""
@@ -166,7 +194,7 @@ class Systematic:
         return -cho_solve(cho_factor(normal), (A * self._root_weight[:, None]).T), N
 
     def parts(self, q: Array, qd: Array, qdd: Array, external: Array | None = None) -> Parts:
-        """Variances by kind of error but inertia, of errors of size 1 (m, rad, declared size): block -> (C,).
+        """Variances by kind of error, of errors of size 1 (m, rad, declared size): block -> (C,).
 
         Args:
             q, qd, qdd: (K,) of the free coordinates. external: (S, 6) wrenches on the segments, about the ground's
@@ -219,12 +247,11 @@ class Systematic:
         return np.hstack([np.sqrt(1.0 - COMMON) * own, np.sqrt(COMMON) * own @ self._members])
 
     def _by_inertia(self, x: Array, covariance: Array, external: Array) -> Array:
-        """(C,) variances of moments by what is not known of inertia, beyond what the filter counts."""
-        if not self._unseen:
+        """(C,) variances of moments by inertia of this covariance (I, I)."""
+        if not self._inertia:
             return np.zeros(self._count)
-        inertia = np.ix_(self._inertia, self._inertia)
         T = _core.moment_jacobian(self._model, x, external)[: self._count, self._inertia]
-        return np.asarray(self._unseen * np.einsum("ci,ij,cj->c", T, covariance[inertia], T))
+        return np.asarray(np.einsum("ci,ij,cj->c", T, covariance, T))
 
     def _labelled(self, q: Array, qd: Array, qdd: Array, moments: Array) -> dict[str, Array]:
         found = {}
@@ -233,45 +260,42 @@ class Systematic:
             found[name][self._free] = values
         return found | {"moments": moments}
 
-    def over_time(self, data: xr.Dataset) -> dict[str, dict[str, Array]]:
-        """`parts` of a recording: kind -> block -> (T, C). NaN around frames whose state or contacts are not numbers.
+    def over_time(self, data: xr.Dataset) -> Parts:
+        """`parts` of a recording, and "inertia" by the declared noise: kind -> block -> (T, C). NaN around frames whose
+        state or contacts are not numbers.
 
         Args:
-            data: as of `Estimate`, with ``state``, ``final_covariance``, and ``foot_wrench`` of a model whose contacts
-                have been used.
+            data: as of `Estimate`, with ``state``, ``state_sd``, ``final_covariance``, and ``foot_wrench`` of a model
+                whose contacts have been used.
         """
         time = np.asarray(data["time"].values)
         states = data["state"].transpose("time", "element").values
-        covariance = data["final_covariance"].values
+        # how inertia hangs together is known at the end alone, how well it is known in each frame
+        sd = data["state_sd"].transpose("time", "element").values[:, self._inertia]
+        together = _correlation(data["final_covariance"].values[np.ix_(self._inertia, self._inertia)])
         wrench, segments = np.zeros((len(time), 0, 6)), []
         if "foot_wrench" in data:
             wrench = np.nan_to_num(data["foot_wrench"].transpose("time", "foot", "component").values)
             segments = [str(name) for name in data["foot_segment"].values]
         chosen = _sampled(time)
-        each = [self._at(states[k], covariance, wrench[k], segments) for k in chosen]
+        each = [self._at(states[k], sd[k, :, None] * together * sd[k], wrench[k], segments) for k in chosen]
         return {
             kind: {block: _between(time, time[chosen], np.array([p[kind][block] for p in each])) for block in BLOCKS}
-            for kind in KINDS
+            for kind in (*KINDS, "inertia")
         }
 
-    def _at(self, x: Array, covariance: Array, wrench: Array, segments: Sequence[str]) -> Parts:
-        """`parts` of a state (n,) and its covariance (n, n), with wrenches (F, 6) of contacts on these segments."""
+    def _at(self, x: Array, inertia: Array, wrench: Array, segments: Sequence[str]) -> Parts:
+        """`parts` of a state (n,), and "inertia" of this covariance (I, I), with wrenches (F, 6) of contacts on these
+        segments."""
         K = len(self._free)
         if not np.isfinite(x[: 3 * K]).all():
-            return {kind: {block: np.full(self._count, np.nan) for block in BLOCKS} for kind in KINDS}
+            return {kind: {b: np.full(self._count, np.nan) for b in BLOCKS} for kind in (*KINDS, "inertia")}
         external = np.zeros((len(self._segments), 6))
         for name, values in zip(segments, wrench, strict=True):
             external[self._segments[name]] += values
         still = np.zeros(K)
-        inertia = self._labelled(still, still, still, self._by_inertia(x, covariance, external))
-        return self.parts(x[:K], x[K : 2 * K], x[2 * K : 3 * K], external) | {"inertia": inertia}
-
-    def variances(self, parts: Mapping[str, Mapping[str, Array]]) -> dict[str, Array]:
-        """Sum of the parts at the sizes of this person: block -> (..., C)."""
-        return {
-            block: np.asarray(sum(getattr(self.sizes, kind) ** 2 * parts[kind][block] for kind in KINDS))
-            for block in BLOCKS
-        }
+        by_inertia = self._labelled(still, still, still, self._by_inertia(x, inertia, external))
+        return self.parts(x[:K], x[K : 2 * K], x[2 * K : 3 * K], external) | {"inertia": by_inertia}
 
     def added(
         self,
@@ -289,24 +313,30 @@ class Systematic:
             x: (n,) state, of covariance (n, n). wrench: (F, 6) of the contacts on these segments. late: whether later
                 frames helped.
         """
-        variances, own = self.variances(self._at(x, covariance, wrench, segments)), self._own(late)
-        return {block: np.hypot(own[block] * found[block], np.sqrt(variances[block])) for block in BLOCKS}
+        inertia = covariance[np.ix_(self._inertia, self._inertia)] / self._variance_scale
+        own = {block: found[block] for block in BLOCKS}
+        return reported(self.sizes, self._variance_scale, own, self._at(x, inertia, wrench, segments), late=late)
 
     def added_over_time(self, data: xr.Dataset, *, late: bool) -> xr.Dataset:
         """The same of a recording: ``data`` with other ``coordinates_sd`` ... ``moments_sd``."""
-        variances, own = self.variances(self.over_time(data)), self._own(late)
         order = ("time", "coordinate")
-        sd = {block: data[f"{block}_sd"].transpose(*order).values for block in BLOCKS}
-        return data.assign({f"{b}_sd": (order, np.hypot(own[b] * sd[b], np.sqrt(variances[b]))) for b in BLOCKS})
-
-    def _own(self, late: bool) -> dict[str, float]:
-        """By block the factor on the filter's own deviations."""
-        return {block: self.sizes.own(block) if late else 1.0 for block in BLOCKS}
+        own = {block: data[f"{block}_sd"].transpose(*order).values for block in BLOCKS}
+        sd = reported(self.sizes, self._variance_scale, own, self.over_time(data), late=late)
+        return data.assign({f"{block}_sd": (order, sd[block]) for block in BLOCKS})
 
 
 def _differences(values: list[Array]) -> tuple[Array, Array, Array]:
     before, now, after = values
     return now, (after - before) / (2.0 * _STEP_S), (after - 2.0 * now + before) / _STEP_S**2
+
+
+def _correlation(covariance: Array) -> Array:
+    """Of what is known for sure none with anything else."""
+    sd = np.sqrt(np.diag(covariance))
+    scale = np.divide(1.0, sd, out=np.zeros_like(sd), where=sd > 0.0)
+    found: Array = scale[:, None] * covariance * scale
+    np.fill_diagonal(found, 1.0)
+    return found
 
 
 def _sampled(time: Array) -> npt.NDArray[np.intp]:

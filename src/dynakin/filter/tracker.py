@@ -183,7 +183,7 @@ class Tracker:
         hold what the filter cannot know, too (`systematic`).
 
         Args:
-            delayed: those of `delayed` instead, once there is one; they take as long as half a step for each frame of
+            delayed: those of `delayed` instead, once there is one; they take as long as 0.6 steps for each frame of
                 the lag.
 
         Returns:

@@ -97,7 +97,8 @@ class Noise(Strict, use_attribute_docstrings=True):
     systematic_scale: NotNegative = 1.0
     """Size of what is wrong with joints and skin in the same way in all frames, over its usual size
     (`filter.systematic`): added to the standard deviations of angles, speeds, accelerations and moments when they are
-    reported, not in the filter, of models that are fixed nowhere. 0: the filter's own alone."""
+    reported, not in the filter, of models that are fixed nowhere. What is not known of inertia is no part of it: it
+    counts at least as the declared noise has it. 0: the filter's own alone, of inertia too."""
     soft_tissue_sd_fraction: NotNegative = scale(0.5, "of the declared size", "how far skin and flesh move")
     """Standard deviation of the displacement of skin and flesh under each marker, as a fraction of the size that its
     marker set declares; 0: none is estimated."""
