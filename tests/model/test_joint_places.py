@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 
 from dynakin.bindings import _core
 from dynakin.filter.estimator import Estimator
+from dynakin.model.calibration.checks import fixed_lengths
 from dynakin.model.schema import Length, ModelFile, Segment
 from support.made_in_space import RATE, definition, measured, recording_of, standing, states
 
@@ -92,3 +93,42 @@ def test_the_ankle_turns_about_an_axis_whose_outer_end_is_lower() -> None:
         turn = Rotation.from_matrix(_core.segment_poses(core, moved)[0][foot] @ before[foot].T).as_rotvec() / 0.1
         axis = before[shank].T @ turn * out  # towards the outer side
         assert np.rad2deg(np.arcsin(axis[1])) == pytest.approx(-10.0, abs=1e-6)
+
+
+def test_the_femur_rolls_back_on_the_tibia_on_both_sides_alike() -> None:
+    initial = measured()
+    names, core = list(initial.names), _core.Model(initial.spec)
+    k = names.index("length/knee_roll")
+    assert initial.x0[k] == 0.0 and initial.sd0[k] == pytest.approx(0.010)
+    for bent in np.radians([-10.0, 30.0, 90.0, 140.0]):
+        x = core.initial_state()
+        x[[names.index(f"knee_angle_{side}") for side in "rl"]] = bent
+        rolled = x.copy()
+        rolled[k] = 0.02
+        R, before = _core.segment_poses(core, x)
+        change = _core.segment_poses(core, rolled)[1] - before
+        for side in "rl":
+            shank = list(core.segment_names).index(f"shank_{side}")
+            np.testing.assert_allclose(change[shank], 0.02 * bent * R[shank, :, 0], atol=2e-4)
+
+
+def test_the_movement_finds_how_far_the_knee_rolls() -> None:
+    initial = measured()
+    time = np.arange(300) / RATE
+    bent = 1.6 * np.sin(np.pi * time / 3.0) ** 2
+    motion = {
+        f"{joint}_{side}": bent * share for side in "rl" for joint, share in (("knee_angle", 1.0), ("hip_flexion", 0.8))
+    }
+    x = states(initial, motion, 0.0, np.zeros(3), time)
+    x[:, list(initial.names).index("length/knee_roll")] = 0.012
+    trial = recording_of(initial, x, time, plates=False, noise_m=0.0005)
+    found = Estimator(definition(), vertical="+Y", estimate=["lengths"]).run(trial, static=standing())
+    values = {parameter.name: parameter.value for parameter in found.parameters}
+    assert values["length/knee_roll"] == pytest.approx(0.012, abs=0.003)
+
+
+def test_a_knee_that_no_marker_shows_does_not_roll() -> None:
+    model = definition().model
+    assert "knee_roll" not in fixed_lengths(model, set(), set())
+    assert "knee_roll" not in fixed_lengths(model, {"shank_r", "foot_r"}, set())  # the other knee shows it
+    assert "knee_roll" in fixed_lengths(model, {"shank_r", "foot_r", "shank_l", "foot_l"}, set())

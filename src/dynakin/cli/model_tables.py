@@ -64,7 +64,7 @@ def _tree(model: ModelFile) -> Tree:
 def _segment(segment: ModelSegment) -> str:
     lengths = " + ".join(term.length for term in segment.placement)
     at = f", placed by length {lengths}" if lengths else ""
-    axes = ", ".join(axis.coordinate for axis in segment.axes) or "fixed"
+    axes = ", ".join(dict.fromkeys(axis.coordinate for axis in segment.axes)) or "fixed"
     parts = f" [{', '.join(segment.parts)}{', both sides' if segment.both_sides else ''}]" if segment.parts else ""
     return f"{segment.name}{parts}: {axes}{at}"
 

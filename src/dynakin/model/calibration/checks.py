@@ -106,6 +106,8 @@ def fixed_lengths(model: ModelFile, bare: set[str], added: set[str]) -> frozense
                 fixed.add(length)
             else:
                 shown.add(length)
+        for length in {axis.scale for axis in segment.axes if axis.scale}:
+            (fixed if {segment.name, segment.parent} & bare else shown).add(length)
     return frozenset(name for name in fixed if name not in shown or not _estimated(model, name))
 
 

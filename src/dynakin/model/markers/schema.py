@@ -25,7 +25,7 @@ class Marker(Strict):
     centre: tuple[str, ...] = ()
     variance: Annotated[float, Field(gt=0.0)] | None = None  # m^2, R of the measurement
     soft_tissue_mm: Annotated[float, Field(ge=0.0)] = 10.0  # how far skin and flesh move here, at full squat
-    soft_tissue_in_space_mm: Annotated[float, Field(ge=0.0)] | None = None  # in models in space, where feet move
+    soft_tissue_in_space_mm: Annotated[float, Field(ge=0.0)] | None = None  # instead, of a model in space
     reason: str = ""
     landmark_only: bool = False  # virtual, or used for a joint centre only
     in_space: bool = False  # a measurement of models in space only; for planar ones as landmark_only
@@ -41,7 +41,8 @@ class Marker(Strict):
         return self
 
     def soft_tissue_m(self, planar: bool) -> float:
-        """Declared displacement (m): a planar model's foot is fixed in the ground, one in space bends at the toes."""
+        """Displacement (m) that is declared to the filter: the size at full squat, or that for models in space, whose
+        feet bend at the toes, and whose pelvis is held by its own markers."""
         in_space = self.soft_tissue_in_space_mm
         return 1e-3 * (self.soft_tissue_mm if planar or in_space is None else in_space)
 

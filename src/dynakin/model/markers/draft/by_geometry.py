@@ -8,7 +8,7 @@ from functools import cache
 
 import numpy as np
 import numpy.typing as npt
-from scipy.optimize import linear_sum_assignment
+import scipy
 
 from dynakin.model.markers.anatomy import anatomy, standing_at
 from dynakin.model.markers.draft.by_name import places
@@ -72,7 +72,9 @@ def fit_person(up: Array, named: Mapping[int, Node], forward: Array | None) -> S
             for _ in range(_TURNS):
                 scaled = _scaled(up, turn, size, origin, floor)
                 cost = _costs(scaled, at, sd, rare, anchors)
-                rows, columns = linear_sum_assignment(np.hstack([cost, np.full((len(up),) * 2, _NO_PLACE)]))
+                rows, columns = scipy.optimize.linear_sum_assignment(
+                    np.hstack([cost, np.full((len(up),) * 2, _NO_PLACE)])
+                )
                 hit = columns < len(nodes)
                 if np.count_nonzero(hit) < 4:
                     break
