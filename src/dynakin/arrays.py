@@ -1,8 +1,9 @@
-"""What all share of arrays: runs of true values, angles within a turn, and no infinities, which no file may have."""
+"""What all share of arrays: runs of true values, peaks, angles within a turn; no infinities, which no file may have."""
 
 from __future__ import annotations
 
 import math
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,25 @@ def runs(flags: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
     """Frames [first, end) of each stretch of true in ``flags`` (T,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], flags, [False]]).astype(int)))
     return [(int(first), int(end)) for first, end in edges.reshape(-1, 2)]
+
+
+def peaks(path: npt.NDArray[np.float64], prominence: float) -> list[int]:
+    """Where ``path`` (T,) is higher than on both sides, the middle of a flat top, and at least by ``prominence`` higher
+    than the lower of the two lowest points on the way to something higher, or to an end, on either side.
+
+    As `scipy.signal.find_peaks`, which takes half a second to load.
+    """
+    ends = np.flatnonzero(np.diff(path))  # the last frame of each flat stretch but the last
+    found = []
+    for before, end in pairwise(ends):
+        if path[before] < path[end] > path[end + 1]:
+            top = int(before + 1 + end) // 2
+            higher = np.concatenate([[-1], np.flatnonzero(path > path[top]), [len(path)]])
+            k = int(np.searchsorted(higher, top))
+            lowest = path[higher[k - 1] + 1 : top + 1].min(), path[top : higher[k]].min()
+            if path[top] - max(lowest) >= prominence:
+                found.append(top)
+    return found
 
 
 def wrapped(angles: npt.ArrayLike) -> npt.NDArray[np.float64]:

@@ -15,6 +15,7 @@ STATISTICS = ("scipy.signal", "scipy.stats")  # the slowest parts of SciPy
 TABLES = ("xarray", "pandas")
 FILES = ("ezc3d", "h5py", "h5netcdf", "joblib")
 CORE = ("dynakin.bindings._core",)
+SEARCHES = ("scipy.optimize",)
 NUMBERS = ("numpy", "scipy")
 
 LOADED = "import sys; print(*sys.modules)"
@@ -33,8 +34,10 @@ def loaded(program: str) -> set[str]:
         ("import dynakin", (*DRAWING, *STATISTICS, *TABLES, *FILES, *CORE, *NUMBERS, "pydantic", "rich")),
         ("import dynakin; dynakin.presets", (*DRAWING, *STATISTICS, *TABLES, *FILES, *CORE, *NUMBERS)),
         ("import dynakin; dynakin.read", (*DRAWING, *STATISTICS, *TABLES, *FILES, *CORE, "scipy.optimize")),
-        ("import dynakin; dynakin.Estimator", (*DRAWING, *STATISTICS, *FILES)),
-        ("import dynakin; dynakin.run; dynakin.Result", (*DRAWING, *STATISTICS, *FILES)),
+        ("import dynakin; dynakin.Estimator", (*DRAWING, *STATISTICS, *TABLES, *FILES, *SEARCHES)),
+        ("import dynakin; dynakin.run", (*DRAWING, *STATISTICS, *TABLES, *FILES, *SEARCHES)),
+        ("import dynakin; dynakin.Result", (*DRAWING, *STATISTICS, *FILES)),
+        ("import dynakin.cli.prepared, dynakin.validation.case", (*DRAWING, *STATISTICS, *TABLES, *FILES, *SEARCHES)),
         ("import dynakin.cli.prepared, dynakin.cli.summary, dynakin.report.page", ("matplotlib", *STATISTICS, *FILES)),
     ],
 )

@@ -38,7 +38,7 @@ def test_what_fails_after_the_estimate_is_named_and_the_rest_saved(
 ) -> None:
     squat.save(tmp_path / "trial")
     monkeypatch.setattr(stages, "trial_of", broken)
-    monkeypatch.setattr(stages, "identifiability", broken)
+    monkeypatch.setattr("dynakin.identification.observability.trial.identifiability", broken)
     monkeypatch.setattr(summary, "print_summary", broken)
     monkeypatch.setitem(figures.FIGURES, "figure5_angles", broken)
     trial = [str(tmp_path / "trial" / "markers.trc"), "--forces", str(tmp_path / "trial" / "forces.mot")]
@@ -72,7 +72,7 @@ def test_figures_that_cannot_be_written_are_refused_before_or_named_after(
     def full(*_: object, **__: object) -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr(stages, "identifiability", broken)
+    monkeypatch.setattr("dynakin.identification.observability.trial.identifiability", broken)
     monkeypatch.setitem(figures.FIGURES, "figure4_markers", full)
     assert main(["run", *trial, *SUBJECT, "-o", str(out), "--figures", str(tmp_path / "figures")]) == 1
     said = capsys.readouterr().err.splitlines()

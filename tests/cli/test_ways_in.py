@@ -12,7 +12,6 @@ import xarray as xr
 import dynakin
 from dynakin.cli.app import main
 from dynakin.errors import ConfigError, OutputError
-from dynakin.pipeline import stages
 from dynakin.report.paper_figures.figures import FIGURES
 from dynakin.results.files.folder import OUTPUT_FILES
 from dynakin.settings.settings import Settings
@@ -83,7 +82,7 @@ def test_a_batch_gives_the_same_folder(trial: Path, saved: Path) -> None:
 def test_settings_and_a_recording_that_was_read_give_the_same(
     trial: Path, from_python: dynakin.Result, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(stages, "identifiability", lambda *_, **__: None)
+    monkeypatch.setattr("dynakin.identification.observability.trial.identifiability", lambda *_, **__: None)
     recording = dynakin.read(trial / "markers.trc", forces=trial / "forces.mot")
     subject = dynakin.Subject(mass_kg=70.0, height_m=1.75)
     read = dynakin.run(recording, model="sagittal7", markers="opencap", subject=subject)

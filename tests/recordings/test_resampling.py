@@ -6,11 +6,13 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
+import scipy
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dynakin.errors import RecordingError
 from dynakin.recordings.resampling import CausalLowPass, low_pass, resample
+from dynakin.recordings.zero_lag import both_ways
 
 FINE = np.arange(4000) / 2000.0
 COARSE = np.arange(200) / 100.0
@@ -92,3 +94,13 @@ def test_zero_lag_filter_is_3_db_at_its_cutoff() -> None:
     np.testing.assert_allclose(found, tone(FINE, 10.0)[1000:3000] / np.sqrt(2), atol=2e-3)
     with pytest.raises(RecordingError, match="expected less than 1000 Hz"):
         low_pass(tone(FINE, 10.0), 2000.0, 1000.0)
+
+
+@pytest.mark.parametrize(("frames", "rate", "cutoff"), [(1400, 100.0, 6.0), (5000, 2000.0, 20.0), (7, 100.0, 2.0)])
+def test_zero_lag_filter_is_scipys(frames: int, rate: float, cutoff: float) -> None:
+    samples = 900.0 + np.cumsum(np.random.default_rng(0).normal(size=(frames, 3)), axis=0)
+    beyond = min(frames - 1, int(rate / cutoff))
+    expected = scipy.signal.sosfiltfilt(
+        scipy.signal.butter(2, cutoff, fs=rate, output="sos"), samples, axis=0, padlen=beyond
+    )
+    np.testing.assert_allclose(both_ways(samples, rate, cutoff, beyond), expected, rtol=1e-12)

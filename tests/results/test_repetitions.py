@@ -7,8 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy
 
 import dynakin
+from dynakin.arrays import peaks
 from dynakin.errors import ConfigError
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.results.estimate import Estimate
@@ -165,3 +167,12 @@ def test_contacts_of_a_real_walk_agree_with_the_plates(data_dir: Path) -> None:
         loaded = ground.vectors_to_ground(plate.force)[:, 1] > 20.0
         onset = recording.time[int(np.flatnonzero(loaded)[0])]
         assert min(abs(onset - contact) for contact in contacts) <= 0.06, plate.name
+
+
+@pytest.mark.parametrize("digits", [0, 1, 8])  # flat tops; as high as others; all different
+def test_peaks_are_scipys(digits: int) -> None:
+    rng = np.random.default_rng(digits)
+    for _ in range(100):
+        path = np.round(np.cumsum(rng.normal(size=rng.integers(3, 200))), digits)
+        expected, _ = scipy.signal.find_peaks(path, prominence=1.0)
+        assert peaks(path, 1.0) == expected.tolist()

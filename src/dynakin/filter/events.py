@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import numpy.typing as npt
-import xarray as xr
 
 from dynakin.arrays import runs
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.results.records import REFUSED, TRACKING, Event, EventKind, Parameter
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 
 def events_of(

@@ -7,12 +7,12 @@ from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
-import scipy
 
 from dynakin.arrays import runs
 from dynakin.bindings import _core
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.recording import rate_of
+from dynakin.recordings.zero_lag import both_ways
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -108,8 +108,8 @@ def _bridged(time: Array, markers: Array, axes: Flags, rate: float) -> tuple[Arr
 
 
 def _second_derivative(path: Array, rate: float) -> Array:
-    sos = scipy.signal.butter(2, CUTOFF_HZ / 0.802, fs=rate, output="sos")  # twice: -3 dB at the cut-off
-    smooth = scipy.signal.sosfiltfilt(sos, path, axis=0, padlen=min(len(path) - 1, round(rate / CUTOFF_HZ)))
+    beyond = min(len(path) - 1, round(rate / CUTOFF_HZ))
+    smooth = both_ways(path, rate, CUTOFF_HZ / 0.802, beyond)  # twice: -3 dB at the cut-off
     return np.asarray(np.gradient(np.gradient(smooth, 1.0 / rate, axis=0), 1.0 / rate, axis=0))
 
 

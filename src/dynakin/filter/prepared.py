@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 import numpy.typing as npt
-import xarray as xr
 
 from dynakin.filter.contacts import RESIDUAL, ContactLoads
 from dynakin.filter.labels import labels
@@ -67,6 +66,8 @@ class Prepared:
     def moment_figures(self) -> dict[str, Any]:
         """Which moments will be measured, derived, a prior and absent, and why, as `moment_figures` of an estimate;
         frames in which the filter will lose the person are not known yet."""
+        import xarray as xr  # the slowest library of all: what precedes the core does without
+
         calibrated = self.calibrated
         sources = ContactSources.of(calibrated).moments(self.contacts)
         if self.contacts is None:

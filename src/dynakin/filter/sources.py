@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-import xarray as xr
 
 from dynakin.bindings import _core
 from dynakin.filter.contacts import ContactLoads
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.contact import NO_CONTACT
 from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED, contact_sources
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Flags = npt.NDArray[np.bool_]
 Codes = npt.NDArray[np.uint8]
@@ -40,6 +43,9 @@ def with_sources(
         soles: segments on which the ground acts. held: coordinates that no marker shows, of which nothing is known.
         unmarked: those of ``soles`` that no marker shows: what they carry is absent, with all that lies before it.
     """
+    import xarray as xr  # as in `assemble`
+
+    found: dict[str, Any] = {}
     segments = [str(name) for name in data["joint_segment"].values]
     parents = data["joint_parent"].values
     moved = [segments.index(str(name)) for name in data["coordinate_segment"].values]
@@ -50,10 +56,9 @@ def with_sources(
         legs = np.zeros(len(segments), dtype=bool)
     else:
         contacts = _contacts(feet, undeclared, unmarked)
-        data = data.assign(foot_source=(("time", "foot"), contacts))
-        for name in ("foot_wrench", "foot_wrench_sd"):
-            if name in data:
-                data[name] = data[name].where(data["foot_source"] != ABSENT)
+        there = xr.DataArray(contacts != ABSENT, dims=("time", "foot"))
+        found["foot_source"] = (("time", "foot"), contacts)
+        found |= {name: data[name].where(there) for name in ("foot_wrench", "foot_wrench_sd") if name in data}
         joints = _behind(contacts, [segments.index(name) for name in feet.segments], parents)
         legs = _below_the_thighs([segments.index(name) for name in soles], parents)
         moments = data["moment_source"].transpose("time", "coordinate").values.copy()
@@ -63,18 +68,16 @@ def with_sources(
     moments[joints[:, moved] == ABSENT] = ABSENT
     moments[:, np.isin(data["coordinate"].values, list(held))] = ABSENT
     known, carried = moments != ABSENT, joints != ABSENT
-    found = data.assign(
-        moment_source=(("time", "coordinate"), moments.astype(np.uint8)),
-        joint_source=(("time", "joint"), joints.astype(np.uint8)),
-    )
-    unseen = xr.DataArray(np.isin(data["coordinate"].values, list(held)), dims="coordinate")
+    found["moment_source"] = (("time", "coordinate"), moments.astype(np.uint8))
+    found["joint_source"] = (("time", "joint"), joints.astype(np.uint8))
+    seen = xr.DataArray(~np.isin(data["coordinate"].values, list(held)), dims="coordinate")
     for name in ("coordinates_sd", "speeds_sd", "accelerations_sd"):
-        if name in found:
-            found[name] = found[name].where(~unseen)  # held where nobody sees it is not known for sure
+        if name in data:
+            found[name] = data[name].where(seen)  # held where nobody sees it is not known for sure
     for name in ("moments", "moments_sd"):
-        found[name] = found[name].where(xr.DataArray(known, dims=("time", "coordinate")))
-    found["joint_loads"] = found["joint_loads"].where(xr.DataArray(carried, dims=("time", "joint")))
-    return found
+        found[name] = data[name].where(xr.DataArray(known, dims=("time", "coordinate")))
+    found["joint_loads"] = data["joint_loads"].where(xr.DataArray(carried, dims=("time", "joint")))
+    return data.assign(found)  # all at once: each time takes 10 ms
 
 
 class ContactSources:

@@ -6,13 +6,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from threading import Thread
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from dynakin.errors import ConfigError, DynakinError
 from dynakin.filter.prepared import Prepared
 from dynakin.filter.tracker import Tracker
-from dynakin.identification.observability.trial import Identifiability, identifiability
-from dynakin.pipeline.result import Result
 from dynakin.progress import Progress, stage
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
@@ -23,6 +21,10 @@ from dynakin.settings.settings import Settings, read_keys
 from dynakin.settings.subject import Subject
 from dynakin.validation.case import Case, case_of
 from dynakin.validation.methods import Trial, estimate_each, trial_of, with_lost
+
+if TYPE_CHECKING:  # loaded while the core works
+    from dynakin.identification.observability.trial import Identifiability
+    from dynakin.pipeline.result import Result
 
 
 def run(
@@ -161,12 +163,18 @@ def run_case(
 
 def _load_what_follows() -> None:
     """Load what comes after an estimate; what cannot be loaded is said where it is used."""
-    import h5netcdf  # noqa: F401
-    import xarray as xr
-
-    import dynakin.report.page  # noqa: F401
+    import xarray as xr  # first: the estimate itself is one
 
     xr.Dataset(coords={"axis": ["x"]})  # its first one has xarray load Dask, where that is installed
+    import h5netcdf  # noqa: F401
+    import scipy.interpolate
+    import scipy.optimize  # noqa: F401
+
+    import dynakin.identification.observability.trial
+    import dynakin.pipeline.result  # noqa: F401
+    from dynakin.report.page import templates
+
+    templates()
 
 
 def judged(
@@ -185,6 +193,8 @@ def judged(
     Args:
         failures: takes the stages that fail. tolerant: as `trial_of` takes it.
     """
+    from dynakin.pipeline.result import Result
+
     estimates = {title: case.with_config(title, estimate) for title, estimate in estimates.items()}
     title, first = next(iter(estimates.items()))
     initial = list(trackers.values())[-1].calibrated
@@ -208,6 +218,8 @@ _LEFT_OUT = "Observability of the constants is left out"
 def _observability(tracker: Tracker, estimate: Estimate) -> tuple[Identifiability | None, str]:
     """Observability of the constants in this recording, or why it is left out, which is no failure. Of a body that is
     fixed nowhere no other movements are tried: that takes as long as the estimate of a short trial."""
+    from dynakin.identification.observability.trial import identifiability
+
     try:
         with stage("looking at what is observed") as report:
             return identifiability(tracker, estimate, report, motions=not tracker.calibrated.feet), ""

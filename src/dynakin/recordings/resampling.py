@@ -10,6 +10,7 @@ import scipy
 
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.recordings.recording import Array
+from dynakin.recordings.zero_lag import both_ways
 
 UNEVEN = 0.1
 """Part of a step by which a sample's time may be off an even rate: files round their times, and a lost sample moves
@@ -89,10 +90,8 @@ def low_pass(samples: Array, rate_hz: float, cutoff_hz: float, *, causal: bool =
     _check_cutoff(rate_hz, cutoff_hz)
     # Two passes of |H|^2 = 1/(1 + w^4), w warped, are -3 dB where w = (sqrt 2 - 1)^(1/4).
     warped = np.tan(np.pi * cutoff_hz / rate_hz) / (np.sqrt(2) - 1) ** 0.25
-    sos = scipy.signal.butter(2, np.arctan(warped) / np.pi * rate_hz, fs=rate_hz, output="sos")
-    return np.asarray(
-        scipy.signal.sosfiltfilt(sos, samples, axis=0, padlen=min(len(samples) - 1, int(rate_hz / cutoff_hz)))
-    )
+    beyond = min(len(samples) - 1, int(rate_hz / cutoff_hz))
+    return both_ways(samples, rate_hz, np.arctan(warped) / np.pi * rate_hz, beyond)
 
 
 def resample(samples: Array, time_in: Array, time_out: Array, *, causal: bool = False) -> Array:

@@ -207,14 +207,16 @@ def _simplified(across: Array, down: Array) -> tuple[Array, Array]:
     all stretches at once)."""
     if len(across) < 3:
         return across, down
+    points = across + 1j * down
     kept = np.zeros(len(across), dtype=bool)
     kept[[0, -1]] = True
     while True:
         corners = np.flatnonzero(kept)
-        stretch = np.minimum(np.searchsorted(corners, np.arange(len(across)), side="right"), len(corners) - 1) - 1
-        start, end = corners[stretch], corners[stretch + 1]
-        dx, dy = across[end] - across[start], down[end] - down[start]
-        away = np.abs((down - down[start]) * dx - (across - across[start]) * dy) / np.maximum(np.hypot(dx, dy), 1.0)
+        stretch = np.cumsum(kept) - 1
+        stretch[-1] -= 1
+        chords = np.diff(points[corners])
+        beside = ((points - points[corners][stretch]) * chords.conj()[stretch]).imag
+        away = np.abs(beside) / np.maximum(np.abs(chords), 1.0)[stretch]
         worst = np.maximum.reduceat(away, corners[:-1])
         far = (away > _UNSEEN) & (away == worst[stretch])
         if not far.any():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -49,14 +50,22 @@ SECTIONS: dict[str, tuple[Callable[[Page], Section | None], ...]] = {
 
 def render_page(template: str, **content: Any) -> str:
     """One of the templates, with the versions, which all pages have."""
-    environment = jinja2.Environment(
+    return templates().get_template(template).render(versions=versions(), **content)
+
+
+@cache
+def templates() -> jinja2.Environment:
+    """All templates of pages, compiled."""
+    found = jinja2.Environment(
         loader=jinja2.PackageLoader("dynakin.report", "templates"),
         autoescape=True,
         trim_blocks=True,
         lstrip_blocks=True,
         undefined=jinja2.StrictUndefined,
     )
-    return environment.get_template(template).render(versions=versions(), **content)
+    for name in found.list_templates(extensions=["j2"]):
+        found.get_template(name)
+    return found
 
 
 def render_report(estimate: Estimate, *, metrics: dict[str, Any] | None = None, comparison: Trial | None = None) -> str:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
-import xarray as xr
 
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Recording
 from dynakin.results.records import Event, Parameter, Timing, Tracking
 from dynakin.settings.lag import ALL_FRAMES
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 AXES = ("x", "y", "z")
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
@@ -66,7 +68,8 @@ class Estimate:
     (`dynakin.results.measures.sources`).
 
     Deviations (``*_sd``) of coordinates, speeds, accelerations and moments hold what the filter cannot know of joints
-    and skin (`filter.systematic`); an angle's zero is not in them. ``state_sd`` and covariances are the filter's own.
+    and skin (`filter.systematic`); an angle's zero is not in them. ``state_sd`` and covariances are the filter's own,
+    but for ``state_sd`` of constants, which is by the declared noise.
 
     ``lost`` (time,) is true in frames in which the filter lost the person: everything that was estimated there is NaN,
     but for ``state`` and ``state_sd``, which keep what the filter held.

@@ -9,14 +9,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
 import scipy
-import xarray as xr
 
 from dynakin.results.measures.consistency import CONSISTENT, INSIDE, Judgement, judge, mean_interval_95
 from dynakin.results.records import Parameter
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = npt.NDArray[np.float64]
 

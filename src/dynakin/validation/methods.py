@@ -6,10 +6,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-import xarray as xr
 
 from dynakin.errors import DynakinError, LostError, ModelError
 from dynakin.filter.prepared import Prepared
@@ -38,6 +38,9 @@ from dynakin.validation.reference.inverse_dynamics import (
 )
 from dynakin.validation.reference.methods import Lengths, Reference, reference_methods
 from dynakin.validation.setup import Setup
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -213,9 +216,9 @@ def trial_of(
     Raises:
         RecordingError: uneven time steps, or a cut-off that is not below half the rate; not with ``tolerant``.
     """
-    methods = [_filtered(preset, estimate) for preset, estimate in estimates.items()]
-    given = next(iter(estimates.values()))
-    first = facing(given)
+    turned = {preset: facing(estimate) for preset, estimate in estimates.items()}
+    methods = [_method(f"EKF ({preset})", "EKF", estimate.data) for preset, estimate in turned.items()]
+    given, first = next(iter(estimates.values())), next(iter(turned.values()))
     notes = how_estimated(estimates)
     try:
         methods += (
@@ -251,10 +254,6 @@ def how_estimated(estimates: Mapping[str, Estimate]) -> list[str]:
     if len({estimate.lag_s for estimate in estimates.values()}) < 2:
         return []
     return [f"EKF ({preset}): each frame {in_words(e.lag_s)}." for preset, e in estimates.items()]
-
-
-def _filtered(preset: str, estimate: Estimate) -> Method:
-    return _method(f"EKF ({preset})", "EKF", facing(estimate).data)
 
 
 def _method(name: str, kind: str, data: xr.Dataset) -> Method:

@@ -5,11 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-import xarray as xr
 
 from dynakin.results.estimate import COMPONENTS
 from dynakin.results.measures.adaptation import constant_groups
@@ -17,6 +16,9 @@ from dynakin.results.measures.sources import legs_of
 from dynakin.results.records import Parameter
 from dynakin.validation.methods import Trial
 from dynakin.validation.table2 import Spread, spread
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = npt.NDArray[np.float64]
 
@@ -56,6 +58,8 @@ def truth_rows(trials: Sequence[Trial]) -> list[TruthRow]:
     All methods over the same frames of each quantity: those that each of them has, moments only where they are
     measured for all. A filter has derived and prior moments too, which are harder, inverse dynamics none.
     """
+    import xarray as xr  # the slowest library of all, which reading a trial does without
+
     found: dict[tuple[str, str, str], list[float]] = {}
     for trial in trials:
         estimate = next(iter(trial.estimates.values()))
@@ -82,6 +86,8 @@ def truth_rows(trials: Sequence[Trial]) -> list[TruthRow]:
 
 def _where_all_say(trial: Trial) -> list[xr.Dataset]:
     """Data of each method, NaN where another method has nothing; one that nowhere has the quantity does not count."""
+    import xarray as xr
+
     found = [
         {
             name: m.data[name].transpose("time", "coordinate").values

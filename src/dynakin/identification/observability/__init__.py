@@ -7,11 +7,16 @@
 It stands apart from the chain, as `validation` does: it needs the core, the filter and the reference's base parameters.
 """
 
-from dynakin.identification.observability.advice import GAIN
-from dynakin.identification.observability.gauges import Gauge, Gauges
-from dynakin.identification.observability.measured import tracker_of
-from dynakin.identification.observability.structure import Structure, structure_of
-from dynakin.identification.observability.trial import BasePosterior, Identifiability, identifiability
+from typing import TYPE_CHECKING
+
+from dynakin.lazy import loaded_when_asked
+
+if TYPE_CHECKING:
+    from dynakin.identification.observability.advice import GAIN
+    from dynakin.identification.observability.gauges import Gauge, Gauges
+    from dynakin.identification.observability.measured import tracker_of
+    from dynakin.identification.observability.structure import Structure, structure_of
+    from dynakin.identification.observability.trial import BasePosterior, Identifiability, identifiability
 
 __all__ = [
     "GAIN",
@@ -24,3 +29,14 @@ __all__ = [
     "structure_of",
     "tracker_of",
 ]
+
+__getattr__, __dir__ = loaded_when_asked(
+    __name__,
+    {
+        "advice": ("GAIN",),
+        "gauges": ("Gauge", "Gauges"),
+        "measured": ("tracker_of",),
+        "structure": ("Structure", "structure_of"),
+        "trial": ("BasePosterior", "Identifiability", "identifiability"),
+    },
+)

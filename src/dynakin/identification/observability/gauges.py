@@ -134,16 +134,19 @@ def _count(vector: Array) -> int:
 
 
 def _cancelled(vectors: Array) -> list[Array]:
-    """What is left of each pair when one entry of both is cancelled, where that is less than either had."""
+    """What is left of each pair of rows when one entry of both is cancelled, where that is less than either had."""
     found = []
+    some = np.abs(vectors) > _NOTHING
+    count = some.sum(axis=1)
     for i, a in enumerate(vectors):
-        for b in vectors[:i]:
-            for k in np.flatnonzero((np.abs(a) > _NOTHING) & (np.abs(b) > _NOTHING)):
+        for j in np.flatnonzero((some[:i] & some[i]).any(axis=1)):
+            b = vectors[j]
+            for k in np.flatnonzero(some[i] & some[j]):
                 rest = a - a[k] / b[k] * b
                 size = np.abs(rest).max()
                 if size > 1e-5:  # else both are the same direction
                     rest = np.where(np.abs(rest) > _NOTHING * size, rest / size, 0.0)
-                    if _count(rest) <= max(_count(a), _count(b)):
+                    if _count(rest) <= max(count[i], count[j]):
                         found.append(rest)
     return found
 
@@ -176,33 +179,81 @@ def _echelon(null: Array, part: list[int]) -> Array:
 
 
 def _least(B: Array) -> Array:
-    """Combinations (c, c) of the columns of ``B`` (c, d), row k that of least 1-norm among those whose entry k is 1."""
+    """Combinations (c, c) of the columns of ``B`` (c, d), row k that of least 1-norm among those whose entry k is 1.
+
+    Entries that every measurement sees alike (a place and its skin) are one in the linear programmes, that which takes
+    least to be seen; what another of them is seen by is undone by it, or by what undoes it.
+    """
     c, d = B.shape
     if d == 1:
         return np.asarray(B[:, 0] / B)
-    eye = np.eye(c)
-    size = scipy.sparse.csc_array(np.block([[B, -eye], [-B, -eye]]))
+    alike = _alike(B)
+    share = alike.sum(axis=0)
+    stand_in = np.argmax(alike != 0.0, axis=0)
+    merged = (alike @ B).T
+    shortest, price = np.zeros((c, c)), np.full(c, np.inf)
+    for part in _parts(merged):
+        shortest[np.ix_(part, part)] = _programmes(_echelon(merged, part))
+        price[part] = np.abs(shortest[part]).sum(axis=1) - 1.0
+    found = np.zeros((c, c))
+    for k, by in enumerate(stand_in):
+        others = np.where(stand_in == by, np.abs(share), 0.0)
+        others[k] = 0.0
+        other = int(np.argmax(others))
+        if others[other] * price[by] > 1.0:
+            found[k, other] = -share[k] / share[other]
+        else:
+            found[k] = share[k] * shortest[by]
+            found[k, by] = 0.0
+        found[k, k] = 1.0
+    return found
+
+
+def _alike(B: Array) -> Array:
+    """(c, c) what entries count for where one stands for all that are seen alike, in its row; no entry counts for more
+    than that one."""
+    c = len(B)
+    Q = np.linalg.qr(B)[0]
+    seen = np.eye(c) - Q @ Q.T  # columns as the measurements have them, but for one map
+    alike = np.zeros((c, c))
+    left = np.ones(c, dtype=bool)
+    for k in np.argsort(-np.diag(seen), kind="stable"):
+        if left[k]:
+            share = seen[k] / seen[k, k]
+            same = left & (np.abs(seen - np.outer(seen[:, k], share)).max(axis=0) < _NOTHING)
+            alike[k, same] = share[same]
+            left &= ~same
+    return alike
+
+
+def _programmes(B: Array) -> Array:
+    """As `_least`, by a linear programme for each entry: B y = p - q, the sum of p and q, which are not negative, as
+    small as it can be."""
+    c, d = B.shape
+    if d == 1:
+        return np.asarray(B[:, 0] / B)
+    eye = scipy.sparse.eye_array(c)
+    parts = scipy.sparse.hstack([scipy.sparse.csc_array(B), -eye, eye], format="csc")
+    cost = np.concatenate([np.zeros(d), np.ones(2 * c)])
+    undone = scipy.optimize.LinearConstraint(parts, 0.0, 0.0)
     found = np.zeros((c, c))
     for k in range(c):
-        for method in ("highs", "highs-ipm"):  # the simplex method gives up on some of a whole body's
+        least = np.repeat([-np.inf, 0.0], [d, 2 * c])
+        most = np.full(d + 2 * c, np.inf)
+        least[d + k] = most[d + k] = 1.0
+        most[d + c + k] = 0.0
+        bounds = scipy.optimize.Bounds(least, most)
+        fit = scipy.optimize.milp(cost, constraints=undone, bounds=bounds)  # no integers, and half of `linprog`'s time
+        if fit.x is None:  # the simplex method gives up on some of a whole body's
             fit = scipy.optimize.linprog(
-                np.concatenate([np.zeros(d), np.ones(c)]),
-                A_ub=size,
-                b_ub=np.zeros(2 * c),
-                A_eq=np.concatenate([B[k], np.zeros(c)])[None],
-                b_eq=[1.0],
-                bounds=[(None, None)] * d + [(0.0, None)] * c,
-                method=method,
+                cost, A_eq=parts, b_eq=np.zeros(c), bounds=np.column_stack([least, most]), method="highs-ipm"
             )
-            if fit.x is not None:
-                break
-        else:
+        if fit.x is None:
             raise ModelError(f"identifiability: a sparse direction of {c} numbers was not found: {fit.message}")
         # The solver stops at 1e-7 or so: what is nearly 0 is put to 0 by solving for the rest exactly.
         vector = B @ fit.x[:d]
         zero = np.abs(vector) < 1e-5
-        _, sizes, right = np.linalg.svd(B[zero])
-        free = right[int((sizes > 1e-6).sum()) :]
-        exact = B @ (free.T @ np.linalg.lstsq((B @ free.T)[[k]], np.ones(1), rcond=None)[0])
+        wanted = np.append(np.zeros(zero.sum()), 1.0)
+        exact = B @ np.linalg.lstsq(np.vstack([B[zero], B[k]]), wanted, rcond=1e-6)[0]
         found[k] = exact if np.abs(exact - vector).max() < 1e-4 else vector
     return found

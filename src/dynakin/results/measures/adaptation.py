@@ -221,13 +221,15 @@ def convergence(estimate: Estimate) -> list[Convergence]:
 
 def _judge(estimate: Estimate, title: str, group: list[Parameter]) -> Convergence:
     moving, left, largest = [], [], 0.0
+    at = {str(name): k for k, name in enumerate(estimate.data["element"].values)}
+    states, deviations = (estimate.data[name].transpose("time", "element").values for name in ("state", "state_sd"))
     for p in group:
-        path = estimate.data["state"].sel(element=p.name).values
+        path = states[:, at[p.name]]
         late = path[3 * len(path) // 4 :]
         # smoothed, a constant that moves does so by the drift it was given
         if not estimate.smoothed and np.ptp(late) > MOVING * abs(p.initial) and not p.at_bound:
             moving.append(p)
-        sd = estimate.data["state_sd"].sel(element=p.name).values  # smoothed, its first is the posterior of all
+        sd = deviations[:, at[p.name]]  # smoothed, its first is the posterior of all
         first = p.prior_sd or float(sd[0])
         left.append(float(sd[-1]) / first if first > 0.0 else 1.0)
         largest = max(largest, abs(p.change_percent() or 0.0))

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-import xarray as xr
 
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
 from dynakin.results.estimate import COMPONENTS, Estimate
 from dynakin.results.measures import sources
 from dynakin.results.naming import plural
 from dynakin.units import GRAVITY_M_S2
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 ROUNDING = 1.0
 """N or N m at the root up to which nothing is left there."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, fields
+from operator import attrgetter
 from pathlib import Path
 
 import numpy as np
@@ -194,9 +195,13 @@ def write_curves(path: Path, points: Iterable[CurvePoint]) -> None:
     with path.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(names)
-        writer.writerows([_cell(name, getattr(point, name)) for name in names] for point in points)
-
-
-def _cell(name: str, value: object) -> object:
-    """Means to six digits, their spread over some repetitions to four."""
-    return f"{value:.{4 if name.startswith('sd') else 6}g}" if isinstance(value, float) else value
+        # Means to six digits, their spread over some repetitions to four.
+        forms = [f"%.{4 if name.startswith('sd') else 6}g" for name in names]
+        cells = attrgetter(*names)
+        writer.writerows(
+            [
+                form % value if isinstance(value, float) else value
+                for form, value in zip(forms, cells(point), strict=True)
+            ]
+            for point in points
+        )

@@ -9,9 +9,8 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-import scipy
 
-from dynakin.arrays import runs
+from dynakin.arrays import peaks, runs
 from dynakin.elements import element
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.recordings.frame import GroundFrame
@@ -156,7 +155,7 @@ def squats(time: Array, height: Array) -> list[Repetition]:
         return []
     path = np.where(known, path, path[known].max())  # a long gap is no squat
     travel, standing = float(np.ptp(path[known])), float(np.percentile(path[known], 95))
-    lows, _ = scipy.signal.find_peaks(-path, prominence=max(PROMINENCE * travel, LEAST_DEPTH_M))
+    lows = peaks(-path, max(PROMINENCE * travel, LEAST_DEPTH_M))
     tops = [0, *(int(a + np.argmax(path[a:b])) for a, b in pairwise(lows)), len(path) - 1]
     found = []
     for k, low in enumerate(lows):
@@ -164,11 +163,11 @@ def squats(time: Array, height: Array) -> list[Repetition]:
         if min(before.max(), after.max()) - path[low] < COMPLETE * (standing - path[low]):
             continue
         first = tops[k] + int(np.flatnonzero(before >= before.max() - EDGE * np.ptp(before))[-1])
-        last = int(low) + int(np.flatnonzero(after >= after.max() - EDGE * np.ptp(after))[0])
+        last = low + int(np.flatnonzero(after >= after.max() - EDGE * np.ptp(after))[0])
         if not known[first : last + 1].all():
             continue
         depth = float(min(before.max(), after.max()) - path[low])
-        at = (float(time[first]), float(time[last]), int(low), float(time[low]), depth)
+        at = (float(time[first]), float(time[last]), low, float(time[low]), depth)
         found.append(Repetition("squat", "both", first, last, *at))
     return found
 
@@ -205,8 +204,7 @@ def initial_contacts(time: Array, ahead: Array) -> list[list[int]]:
     found = []
     for first, end in runs(np.isfinite(path)):
         low = [float(path[first:end].min())]  # beyond the ends counts as low: a swing that is cut has its contact too
-        peaks, _ = scipy.signal.find_peaks(np.concatenate([low, path[first:end], low]), prominence=LEAST_STEP_M)
-        frames = [first + int(peak) - 1 for peak in peaks]
+        frames = [first + peak - 1 for peak in peaks(np.concatenate([low, path[first:end], low]), LEAST_STEP_M)]
         found.append([k for k in frames if min(time[k] - time[first], time[end - 1] - time[k]) > EDGE_S])
     return found
 

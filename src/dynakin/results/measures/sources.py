@@ -9,15 +9,17 @@ of the assumption. What a contact that nobody declared can reach is *absent* (Na
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
-import xarray as xr
 
 from dynakin.recordings.feet.contact import SHARED_PLATE, UNMEASURED
 from dynakin.results.estimate import Estimate
 from dynakin.results.naming import listed, sentence, words
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.uint8]

@@ -6,16 +6,19 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
-import xarray as xr
 
 from dynakin.bindings import _core
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.smoothing import MAX_GAP_S, even_step, fill_gaps, smooth
 from dynakin.results.measures.sources import ABSENT, MEASURED
 from dynakin.validation.reference.inverse_kinematics import fixed_model, inverse_kinematics
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = npt.NDArray[np.float64]
 
@@ -123,6 +126,8 @@ def with_plates(motion: RigidMotion, estimated: xr.Dataset) -> tuple[xr.Dataset,
     Returns:
         Data along the ground of ``estimated``, and sentences on gaps and on the residual at the root.
     """
+    import xarray as xr  # as in `reference_methods`
+
     external, sources = _on_segments(motion.model, estimated), None
     moments = motion.moments(external)
     if "moment_source" in estimated:

@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 import numpy.typing as npt
-import xarray as xr
 
 from dynakin.errors import ConfigError
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -19,6 +18,9 @@ from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.validation.reference.chain import Kinematics, PlanarChain
 from dynakin.validation.reference.classical import classical_angles, hinge_paths, landmark_paths
 from dynakin.validation.reference.regressor import IN_PLANE, table_dynamics
+
+if TYPE_CHECKING:
+    import xarray as xr
 
 Array = npt.NDArray[np.float64]
 Lengths = Literal["constant", "frame"]
@@ -70,6 +72,8 @@ def reference_methods(
         RecordingError: uneven time steps, or a cut-off that is not below half the rate.
         ConfigError: ``lengths`` is neither.
     """
+    import xarray as xr  # the slowest library of all, which reading a trial does without
+
     if lengths not in ("constant", "frame"):
         raise ConfigError(f"lengths is {lengths!r}, expected constant or frame")
     plan = initial.measured_plan()
