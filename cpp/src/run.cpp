@@ -4,6 +4,8 @@
 #include <chrono>
 #include <string>
 
+#include "dynakin/reports.hpp"
+
 namespace dynakin {
 
 namespace {
@@ -27,27 +29,31 @@ StateRecord::StateRecord(const Model& of, std::size_t frames, bool output_sd)
       wrench(frames * 6),
       wrench_sd(output_sd ? wrench.size() : 0),
       moments(frames * model.coordinates().size()),
-      moments_sd(output_sd ? moments.size() : 0) {
+      moments_sd(output_sd ? moments.size() : 0),
+      waiting(output_sd ? 8 : 0),
+      kinematics_(of),
+      dynamics_(of) {
   if (output_sd) deviation.emplace(model);
 }
 
-void StateRecord::report(std::size_t k, const Eigen::VectorXd& x, const Eigen::MatrixXd& P,
-                         const KinematicState& kinematics, const DynamicState& dynamics, ContactRecord* contacts) {
-  const std::size_t n = x.size(), m = kinematics.markers.size(), nc = model.coordinates().size();
+void StateRecord::report(std::size_t k, const Eigen::VectorXd& x, const Eigen::MatrixXd& P, ContactRecord* contacts) {
+  forward_kinematics(model, x, kinematics_);
+  subtree_dynamics(model, x, kinematics_, dynamics_);
+  const std::size_t n = x.size(), m = kinematics_.markers.size(), nc = model.coordinates().size();
   Eigen::Map<Eigen::VectorXd>(state.data() + k * n, x.size()) = x;
   Eigen::Map<Eigen::VectorXd>(state_sd.data() + k * n, x.size()) = P.diagonal().cwiseMax(0.0).cwiseSqrt();
-  for (std::size_t i = 0; i < m; ++i) Eigen::Map<Vector3>(markers.data() + 3 * (k * m + i)) = kinematics.markers[i];
-  Eigen::Map<Vector6>(wrench.data() + 6 * k) = dynamics.wrench.vector();
+  for (std::size_t i = 0; i < m; ++i) Eigen::Map<Vector3>(markers.data() + 3 * (k * m + i)) = kinematics_.markers[i];
+  Eigen::Map<Vector6>(wrench.data() + 6 * k) = dynamics_.wrench.vector();
   double* const moment = moments.data() + k * nc;
   double* const moment_sd = deviation ? moments_sd.data() + k * nc : nullptr;
   if (contacts)
-    contacts->report(k, x, kinematics, dynamics, deviation ? &P : nullptr, moment, moment_sd);
+    contacts->report(k, x, kinematics_, dynamics_, deviation ? &P : nullptr, moment, moment_sd);
   else
-    joint_moments(model, kinematics, dynamics, nullptr, Eigen::Map<Eigen::VectorXd>(moment, nc));
+    joint_moments(model, kinematics_, dynamics_, nullptr, Eigen::Map<Eigen::VectorXd>(moment, nc));
   if (!deviation) return;
-  deviation->markers(kinematics, P, markers_sd.data() + 3 * k * m);
-  deviation->wrench(kinematics, dynamics, P, wrench_sd.data() + 6 * k);
-  if (!contacts) deviation->moments(x, kinematics, dynamics, P, moment_sd);
+  deviation->markers(kinematics_, P, markers_sd.data() + 3 * k * m);
+  deviation->wrench(kinematics_, dynamics_, P, wrench_sd.data() + 6 * k);
+  if (!contacts) deviation->moments(x, kinematics_, dynamics_, P, moment_sd);
 }
 
 RunRecord::RunRecord(const Model& of, std::size_t frames, bool output_sd)
@@ -72,6 +78,7 @@ void run_frames(Filter& filter, const Trial& trial, std::size_t first, std::size
   const std::size_t m = 3 * filter.model().markers().size();
   filter.report_sensors(true);
   WrenchModel how;
+  Reports reports(record, contacts, end - first > 1);
   for (std::size_t k = first; k < end; ++k) {
     const auto start = clock::now();
     const StepReport report = step(filter, trial, k, how);
@@ -96,9 +103,9 @@ void run_frames(Filter& filter, const Trial& trial, std::size_t first, std::size
     keep(filter.sensors().innovation, record.innovation);
     keep(filter.sensors().innovation_sd, record.innovation_sd);
     keep(filter.sensors().test_ratio, record.test_ratio);
-    const Measurement& now = filter.evaluate();
-    record.report(k, filter.state(), filter.covariance(), now.kinematics(), now.dynamics(), contacts);
+    reports.add(k, filter.state(), filter.covariance());
   }
+  reports.end();
 }
 
 }  // namespace dynakin

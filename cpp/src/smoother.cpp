@@ -1,11 +1,8 @@
 #include "dynakin/smoother.hpp"
 
 #include <algorithm>
-#include <atomic>
 #include <chrono>
 #include <cmath>
-#include <memory>
-#include <system_error>
 #include <utility>
 
 #include "dynakin/backward_pass.hpp"
@@ -40,8 +37,6 @@ Smoother::Smoother(Filter& filter, const Trial& trial, std::size_t stretch)
       measurement_(filter.model(), filter.settings()),
       backwards_(filter.model(), apart_, filter.tape_rows()),
       projection_(filter.model(), filter.settings()),
-      kinematics_(filter.model()),
-      dynamics_(filter.model()),
       x_(filter.state()) {}
 
 void Smoother::forward(std::size_t first, std::size_t end, RunRecord& record, ContactRecord* contacts) {
@@ -153,16 +148,14 @@ void Smoother::replay_frame(std::size_t k, const RunRecord& record, const FrameG
   forwards_.step(measurement_.blocks(), last, frame);
 }
 
-void Smoother::look_back(const Stretch& stretch, SmoothRecord& out, ContactRecord* contacts) {
+void Smoother::look_back(const Stretch& stretch, Reports& reports) {
   if (stretch.last) backwards_.end(*stretch.last);
   for (std::size_t k = stretch.end; k-- > stretch.first;) {
     const FrameGivenConstants* const frame = &stretch.frames[k - stretch.first];
     backwards_.look(*frame, x_);
     if (filter_.settings().constraint == ConstraintKind::projection)
       projection_.bound(x_, backwards_.covariance(), [this, frame](int i) { backwards_.complete(*frame, i); });
-    forward_kinematics(filter_.model(), x_, kinematics_);
-    subtree_dynamics(filter_.model(), x_, kinematics_, dynamics_);
-    out.report(k, x_, backwards_.covariance(), kinematics_, dynamics_, contacts);
+    reports.add(k, x_, backwards_.covariance());
     backwards_.undo(*frame, k == stretch.first ? nullptr : frame - 1);
   }
 }
@@ -172,24 +165,11 @@ std::size_t Smoother::backward(const RunRecord& record, SmoothRecord& out, Conta
   const auto start = clock::now();
   if (now_.end != left_) replay(left_, record, now_);
   left_ = now_.first;
-  {
-    const AtWork other(left_ > 0 ? most_threads_ : 0);
-    std::future<void> other_thread;
-    const auto taken = std::make_shared<std::atomic<bool>>(false);
-    if (other) {
-      try {
-        other_thread = std::async(std::launch::async, [this, taken, &record] {
-          if (!taken->exchange(true)) replay(left_, record, before_);
-        });
-      } catch (const std::system_error&) {  // the system has no thread left: one does it all
-      }
-    }
-    look_back(now_, out, contacts);
-    if (other_thread.valid() && taken->exchange(true))
-      other_thread.get();
-    else  // on a busy machine it may not have begun: the next stretch is looked through without it
-      late_ = std::move(other_thread);
-  }
+  Reports reports(out, contacts, true, [this, &record] {
+    if (left_ > 0) replay(left_, record, before_);
+  });
+  look_back(now_, reports);
+  reports.end();
   const double us = us_since(start) / static_cast<double>(now_.end - now_.first);
   std::fill(out.backward_us.begin() + static_cast<std::ptrdiff_t>(now_.first),
             out.backward_us.begin() + static_cast<std::ptrdiff_t>(now_.end), us);

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 import pytest
 
@@ -51,6 +53,19 @@ def test_a_second_thread_gives_the_bits_of_one(monkeypatch, name, stretch):
     for threads in ("1", "2"):
         monkeypatch.setenv("OMP_NUM_THREADS", threads)
         found.append(c.smoothed(stretch=stretch))
+    assert_same(*found)
+
+
+@pytest.mark.parametrize("how", ["run", "run_lagged"])
+@pytest.mark.parametrize("name", CASES)
+def test_deviations_of_a_second_thread_are_those_of_one(monkeypatch, name, how):
+    c, found = CASES[name](), []
+    for threads in ("1", "2"):
+        monkeypatch.setenv("OMP_NUM_THREADS", threads)
+        f = c.filter()
+        more = {"output_sd": True} if how == "run" else {"lag": 5}
+        found.append(c.data.run(partial(getattr(f, how), **more)))
+    assert "markers_sd" in found[0] or "smoothed_markers_sd" in found[0]
     assert_same(*found)
 
 

@@ -5,6 +5,7 @@
 
 #include "dynakin/fixed_lag.hpp"
 #include "dynakin/run.hpp"
+#include "dynakin/threads.hpp"
 
 namespace dynakin {
 
@@ -20,13 +21,10 @@ class LaggedRun {
            ContactRecord* contacts = nullptr, ContactRecord* lagged_contacts = nullptr);
 
  private:
-  void report(std::size_t k, StateRecord& lagged, ContactRecord* contacts);
-
+  const AtWork working_;
   Filter& filter_;
   Trial trial_;
   FixedLag lag_;
-  KinematicState kinematics_;
-  DynamicState dynamics_;
 };
 
 }  // namespace dynakin

@@ -12,14 +12,20 @@
 
 namespace dynakin {
 
+// A frame that another thread is to report.
+struct WaitingFrame {
+  std::size_t k = 0;
+  Eigen::VectorXd x;
+  Eigen::MatrixXd P;
+};
+
 // What is said of the state in each frame: row-major arrays, a row a frame. The wrench is the body's own, without what
 // the plates are thought to add. Deviations of all but the state are empty where they are not asked for.
 struct StateRecord {
   StateRecord(const Model& model, std::size_t frames, bool output_sd);
 
   // Frame k; contacts: as in run_frames.
-  void report(std::size_t k, const Eigen::VectorXd& x, const Eigen::MatrixXd& P, const KinematicState& kinematics,
-              const DynamicState& dynamics, ContactRecord* contacts);
+  void report(std::size_t k, const Eigen::VectorXd& x, const Eigen::MatrixXd& P, ContactRecord* contacts);
 
   const Model& model;
   std::vector<double> state, state_sd;
@@ -27,6 +33,10 @@ struct StateRecord {
   std::vector<double> wrench, wrench_sd;    // (frames, 6)
   std::vector<double> moments, moments_sd;  // (frames, coordinates)
   std::optional<OutputDeviation> deviation;
+  std::vector<WaitingFrame> waiting;  // of Reports; a frame's covariance is the most that it keeps
+ private:
+  KinematicState kinematics_;
+  DynamicState dynamics_;
 };
 
 // The same of a run, with what it made of each frame.

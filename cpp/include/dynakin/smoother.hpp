@@ -2,11 +2,11 @@
 #pragma once
 
 #include <cstddef>
-#include <future>
 #include <optional>
 #include <vector>
 
 #include "dynakin/filter_given_constants.hpp"
+#include "dynakin/reports.hpp"
 #include "dynakin/run.hpp"
 #include "dynakin/smoothed_dependence.hpp"
 #include "dynakin/smoother_given_constants.hpp"
@@ -24,8 +24,8 @@ struct SmoothRecord : StateRecord {
 // The forward run keeps a checkpoint every so many frames, and of each frame what the filter decided. The way back
 // takes each stretch between two checkpoints forwards once more, now given the constants, so memory grows with the root
 // of the number of frames. While it looks back through one stretch another thread, where there is one (threads.hpp),
-// takes the stretch before forwards: the numbers are the same to the last bit. Afterwards the filter stands where the
-// run left it.
+// takes the stretch before forwards and then reports the frames that were found (reports.hpp): the numbers are the same
+// to the last bit. Afterwards the filter stands where the run left it.
 class Smoother {
  public:
   // stretch: frames between checkpoints, 0: sqrt(frames). Throws std::invalid_argument where constraints are kept in a
@@ -56,10 +56,9 @@ class Smoother {
   void replay(std::size_t end, const RunRecord& record, Stretch& out);
   void replay_frame(std::size_t k, const RunRecord& record, const FrameGivenConstants* last,
                     FrameGivenConstants& frame);
-  void look_back(const Stretch& stretch, SmoothRecord& out, ContactRecord* contacts);
+  void look_back(const Stretch& stretch, Reports& reports);
 
   const AtWork working_;
-  const int most_threads_ = most_threads();
   Filter& filter_;
   Trial trial_;
   std::size_t stretch_, left_;
@@ -78,10 +77,7 @@ class Smoother {
   // For look_back.
   SmootherGivenConstants backwards_;
   Projection projection_;
-  KinematicState kinematics_;
-  DynamicState dynamics_;
   Eigen::VectorXd x_;
-  std::future<void> late_;  // of a thread that has nothing left to do
 };
 
 }  // namespace dynakin

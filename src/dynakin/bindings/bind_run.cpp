@@ -8,6 +8,7 @@
 #include "contacts.hpp"
 #include "dynakin/lagged_run.hpp"
 #include "dynakin/smoother.hpp"
+#include "dynakin/threads.hpp"
 #include "module.hpp"
 #include "trial.hpp"
 
@@ -93,6 +94,7 @@ nb::dict run(Filter& filter, const Array1& time, const Array3& markers, const Ar
   const Trial trial = trial_of(filter, time, markers, wrench, wrench_covariance, wrench_effects);
   Feet feet(filter.model(), loads, trial.frames);
   RunRecord record(filter.model(), trial.frames, output_sd);
+  const AtWork working;
   for (std::size_t first = 0; first < trial.frames; first += k_stretch) {
     const std::size_t end = std::min(trial.frames, first + k_stretch);
     {
