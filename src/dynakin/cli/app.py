@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from collections.abc import Sequence
@@ -60,6 +61,11 @@ def _root(
     """How a person moves and what drives the movement, from markers and force plates."""
 
 
+_MORE_BEFORE_GARBAGE = 100_000
+"""New objects before Python looks for circles among them. By its own 700 it looks 500 times while libraries are loaded
+and results written, for a sixteenth of a short run."""
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run a command and give its exit code: 0, 1 where what came out may not be used, or 2 with one line on stderr for
     anything wrong with the input.
@@ -69,6 +75,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # The matrices outside the core are small: threads of BLAS only wait for each other, on a busy machine for minutes.
     if "OMP_NUM_THREADS" not in os.environ:
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    gc.set_threshold(_MORE_BEFORE_GARBAGE)
     words = list(sys.argv[1:] if arguments is None else arguments)
     if wrong := _without_value(words):
         print_error(wrong)

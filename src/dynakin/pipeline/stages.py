@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 from threading import Thread
@@ -23,6 +24,7 @@ from dynakin.validation.case import Case, case_of
 from dynakin.validation.methods import Trial, estimate_each, trial_of, with_lost
 
 if TYPE_CHECKING:  # loaded while the core works
+    from dynakin.identification.observability.structure import Structure
     from dynakin.identification.observability.trial import Identifiability
     from dynakin.pipeline.result import Result
 
@@ -144,7 +146,8 @@ def run_case(
     if ready is None:
         with stage("measuring the person"):
             ready = prepare_case(case)
-    Thread(target=_load_what_follows, daemon=True).start()  # while the core works, which leaves the interpreter free
+    beside = _Beside(next(iter(ready.values())).tracker if observability else None)
+    beside.start()
     with stage("estimating", progress) as report:
         estimates, _, trackers = estimate_each(
             case.recording,
@@ -158,23 +161,45 @@ def run_case(
     if not keep_lost:
         for estimate in estimates.values():
             refuse_lost(estimate, keep)
-    return judged(case, estimates, {}, trackers, failures, observability=observability)
+    return judged(case, estimates, {}, trackers, failures, observability=observability, structure=beside.structure)
 
 
-def _load_what_follows() -> None:
-    """Load what comes after an estimate; what cannot be loaded is said where it is used."""
-    import xarray as xr  # first: the estimate itself is one
+class _Beside(Thread):
+    """Loads what comes after an estimate, and looks at what the model can identify at all, while the core works, which
+    leaves the interpreter free. What fails here is said where it is used.
 
-    xr.Dataset(coords={"axis": ["x"]})  # its first one has xarray load Dask, where that is installed
-    import h5netcdf  # noqa: F401
-    import scipy.interpolate
-    import scipy.optimize  # noqa: F401
+    Args:
+        tracker: before the first frame; None: nothing is looked at.
+    """
 
-    import dynakin.identification.observability.trial
-    import dynakin.pipeline.result  # noqa: F401
-    from dynakin.report.page import templates
+    def __init__(self, tracker: Tracker | None) -> None:
+        super().__init__(daemon=True)
+        self._tracker = tracker
+        self._structure: Structure | None = None
 
-    templates()
+    def run(self) -> None:
+        """In a thread of its own."""
+        import xarray as xr  # first: the estimate itself is one
+
+        xr.Dataset(coords={"axis": ["x"]})  # its first one has xarray load Dask, where that is installed
+        import h5netcdf  # noqa: F401
+
+        import dynakin.pipeline.result
+        from dynakin.identification.observability.structure import structure_of
+        from dynakin.report.page import templates
+
+        templates()
+        if self._tracker is not None:
+            with suppress(DynakinError):
+                self._structure = structure_of(self._tracker)
+        import scipy.interpolate  # noqa: F401
+
+        import dynakin.identification.observability.trial  # noqa: F401
+
+    def structure(self) -> Structure | None:
+        """What the model can identify, once that is known; None: it could not be found."""
+        self.join()
+        return self._structure
 
 
 def judged(
@@ -186,12 +211,14 @@ def judged(
     *,
     tolerant: bool = True,
     observability: bool = True,
+    structure: Callable[[], Structure | None] = lambda: None,
 ) -> Result:
     """What follows the estimates of a trial (see `estimate_each`), each stage on its own: the comparison of all with
     the reference methods, and the observability of the constants of the first.
 
     Args:
         failures: takes the stages that fail. tolerant: as `trial_of` takes it.
+        structure: gives what the first's model can identify at all, where that has been looked at.
     """
     from dynakin.pipeline.result import Result
 
@@ -206,7 +233,7 @@ def judged(
     observed: Identifiability | None = None
     if observability:
         with failures.stage("observability of the constants"):
-            observed, note = _observability(trackers[title], first)
+            observed, note = _observability(trackers[title], first, structure)
             if note:
                 first = replace(first, messages=[*first.messages, f"{_LEFT_OUT}: {note}"])
     return Result(first, initial, comparison, observed, case.config, failures)
@@ -215,13 +242,16 @@ def judged(
 _LEFT_OUT = "Observability of the constants is left out"
 
 
-def _observability(tracker: Tracker, estimate: Estimate) -> tuple[Identifiability | None, str]:
+def _observability(
+    tracker: Tracker, estimate: Estimate, structure: Callable[[], Structure | None]
+) -> tuple[Identifiability | None, str]:
     """Observability of the constants in this recording, or why it is left out, which is no failure. Of a body that is
     fixed nowhere no other movements are tried: that takes as long as the estimate of a short trial."""
     from dynakin.identification.observability.trial import identifiability
 
     try:
         with stage("looking at what is observed") as report:
-            return identifiability(tracker, estimate, report, motions=not tracker.calibrated.feet), ""
+            motions = not tracker.calibrated.feet
+            return identifiability(tracker, estimate, report, motions=motions, structure=structure()), ""
     except DynakinError as error:  # a trial of a few frames, say
         return None, error.message

@@ -10,7 +10,16 @@ import pytest
 from dynakin import load_model
 from dynakin.bindings import _core
 from dynakin.identification.observability.element_words import gauge_in_words, gauges_in_words
-from dynakin.identification.observability.gauges import ZERO, Gauge, gauges_of, sparse_basis
+from dynakin.identification.observability.gauges import (
+    ZERO,
+    Gauge,
+    _echelon,
+    _least,
+    _parts,
+    _programmes,
+    gauges_of,
+    sparse_basis,
+)
 from dynakin.identification.observability.measured import MeasuredModel, tracker_of
 from support.identifiability import changed_model
 
@@ -108,6 +117,27 @@ def test_sparse_directions_are_found_in_a_mixed_null_space() -> None:
     assert sorted(tuple(np.flatnonzero(np.abs(v) > 1e-9)) for v in found) == [
         (3 * k, 3 * k + 2, 20 + k) for k in range(4)
     ]
+
+
+def test_entries_that_are_seen_alike_are_cancelled_as_by_a_programme_of_all() -> None:
+    """By their own like where that is cheap, by others where its weight is small; some of both in these."""
+    rng = np.random.default_rng(1)
+    ways = {"own": 0, "others": 0}
+    for _ in range(40):
+        seen = rng.standard_normal((int(rng.integers(1, 4)), 5)) * (rng.random(5) < 0.8)
+        again = rng.integers(0, 5, 3)
+        seen = np.hstack([seen, seen[:, again] * rng.choice([1.0, -0.5, 2.0, 0.01, 30.0], 3)])
+        null = np.linalg.svd(seen)[2][np.linalg.matrix_rank(seen) :]
+        for part in _parts(null):
+            B = _echelon(null, part)
+            found, expected = _least(B), _programmes(B)
+            np.testing.assert_allclose(np.abs(found).sum(axis=1), np.abs(expected).sum(axis=1), rtol=1e-5)
+            np.testing.assert_allclose(found @ (np.eye(len(B)) - B @ np.linalg.pinv(B)), 0.0, atol=1e-6)
+            np.testing.assert_allclose(np.diag(found), 1.0)
+            few = (np.abs(found) > 1e-9).sum(axis=1)
+            ways["own"] += int((few == 2).sum())
+            ways["others"] += int((few > 2).sum())
+    assert min(ways.values()) > 20
 
 
 def _plain(names: tuple[str, ...]) -> list[str]:

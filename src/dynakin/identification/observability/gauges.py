@@ -181,8 +181,9 @@ def _echelon(null: Array, part: list[int]) -> Array:
 def _least(B: Array) -> Array:
     """Combinations (c, c) of the columns of ``B`` (c, d), row k that of least 1-norm among those whose entry k is 1.
 
-    Entries that every measurement sees alike (a place and its skin) are one in the linear programmes, that which takes
-    least to be seen; what another of them is seen by is undone by it, or by what undoes it.
+    Entries that every measurement sees alike, but for a factor (a place and its skin), are merged into the one that is
+    seen best. An entry is then cancelled by the next best of its group, at the ratio of their weights, or by other
+    groups as the linear programme of the merged one says, whichever is less.
     """
     c, d = B.shape
     if d == 1:
@@ -210,8 +211,8 @@ def _least(B: Array) -> Array:
 
 
 def _alike(B: Array) -> Array:
-    """(c, c) what entries count for where one stands for all that are seen alike, in its row; no entry counts for more
-    than that one."""
+    """(c, c) weights: row k, of the entry that is seen best of those that are seen alike, holds what each of them is
+    worth beside it (1 or less; itself 1). Rows of the others are 0."""
     c = len(B)
     Q = np.linalg.qr(B)[0]
     seen = np.eye(c) - Q @ Q.T  # columns as the measurements have them, but for one map
@@ -233,9 +234,9 @@ def _programmes(B: Array) -> Array:
     if d == 1:
         return np.asarray(B[:, 0] / B)
     eye = scipy.sparse.eye_array(c)
-    parts = scipy.sparse.hstack([scipy.sparse.csc_array(B), -eye, eye], format="csc")
+    balance = scipy.sparse.hstack([scipy.sparse.csc_array(B), -eye, eye], format="csc")
     cost = np.concatenate([np.zeros(d), np.ones(2 * c)])
-    undone = scipy.optimize.LinearConstraint(parts, 0.0, 0.0)
+    balanced = scipy.optimize.LinearConstraint(balance, 0.0, 0.0)
     found = np.zeros((c, c))
     for k in range(c):
         least = np.repeat([-np.inf, 0.0], [d, 2 * c])
@@ -243,10 +244,10 @@ def _programmes(B: Array) -> Array:
         least[d + k] = most[d + k] = 1.0
         most[d + c + k] = 0.0
         bounds = scipy.optimize.Bounds(least, most)
-        fit = scipy.optimize.milp(cost, constraints=undone, bounds=bounds)  # no integers, and half of `linprog`'s time
+        fit = scipy.optimize.milp(cost, constraints=balanced, bounds=bounds)  # half of `linprog`'s time
         if fit.x is None:  # the simplex method gives up on some of a whole body's
             fit = scipy.optimize.linprog(
-                cost, A_eq=parts, b_eq=np.zeros(c), bounds=np.column_stack([least, most]), method="highs-ipm"
+                cost, A_eq=balance, b_eq=np.zeros(c), bounds=np.column_stack([least, most]), method="highs-ipm"
             )
         if fit.x is None:
             raise ModelError(f"identifiability: a sparse direction of {c} numbers was not found: {fit.message}")

@@ -107,7 +107,12 @@ class Identifiability:
 
 
 def identifiability(
-    tracker: Tracker, estimate: Estimate, progress: Progress | None = None, *, motions: bool = True
+    tracker: Tracker,
+    estimate: Estimate,
+    progress: Progress | None = None,
+    *,
+    motions: bool = True,
+    structure: Structure | None = None,
 ) -> Identifiability:
     """Posterior of a trial's constants against their prior, and movements that would identify more.
 
@@ -115,8 +120,9 @@ def identifiability(
         tracker, estimate: as `Estimator.track` gave them.
         progress: called with (motions tried, in all).
         motions: whether to try any; all else follows from the estimate and the model alone.
+        structure: `structure_of` the tracker or the one before the estimate, where that has been looked at.
     """
-    structure, bench = structure_of(tracker), Bench(tracker, estimate)
+    structure, bench = structure or structure_of(tracker), Bench(tracker, estimate)
     shares = {p.name: share for p in estimate.parameters if (share := share_of(p)) is not None}
     tried: list[Excitation] | None = None
     gains: dict[str, dict[str, float]] = {}
