@@ -12,7 +12,7 @@ from scipy.spatial.transform import Rotation
 from dynakin.bindings import _core
 from dynakin.filter.estimator import Estimator
 from dynakin.model.calibration.checks import fixed_lengths
-from dynakin.model.schema import Length, ModelFile, Segment
+from dynakin.model.schema import Length, ModelFile, Segment, kinds_of
 from support.made_in_space import RATE, definition, measured, recording_of, standing, states
 
 HIPS = ("hip_forward", "hip_up", "hip_outward")
@@ -22,6 +22,16 @@ def test_a_correction_of_zero_says_how_far_it_may_go() -> None:
     assert Length(name="out", value_m=0.0, sd_m=0.01).sd_m == 0.01
     with pytest.raises(ValidationError, match="expected sd_m"):
         Length(name="out", value_m=0.0)
+
+
+def test_a_coordinate_that_turns_anything_is_a_rotation_whatever_comes_last() -> None:
+    rolls = [
+        {"coordinate": "knee", "kind": "translation", "direction": [1.0, 0.0, 0.0]},
+        {"coordinate": "knee"},
+        {"coordinate": "slide", "kind": "translation"},
+    ]
+    for axes in (rolls, rolls[::-1]):
+        assert kinds_of([Segment(name="shank", axes=axes)]) == {"knee": "rotation", "slide": "translation"}
 
 
 def test_one_term_of_a_place_is_measured_at_most() -> None:

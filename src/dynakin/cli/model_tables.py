@@ -22,7 +22,7 @@ from dynakin.model.opensim.definition import OpenSimDefinition
 from dynakin.model.opensim.export import mass_of_run, of_definition, of_initial, read_values
 from dynakin.model.opensim.spec import free_coordinates, placements, used_scales
 from dynakin.model.opensim.write import write_osim
-from dynakin.model.schema import ModelFile
+from dynakin.model.schema import ModelFile, kinds_of
 from dynakin.model.schema import Segment as ModelSegment
 from dynakin.progress import stage
 from dynakin.recordings.read import read
@@ -71,7 +71,7 @@ def _segment(segment: ModelSegment) -> str:
 
 def _coordinates(model: ModelFile) -> Table:
     rows = table("coordinate", "limits", "unit", "meaning", numbers=(1,), title="Coordinates")
-    kinds = {axis.coordinate: axis.kind for segment in model.segments for axis in segment.axes}
+    kinds = kinds_of(model.segments)
     for coordinate in model.coordinates:
         rotation = kinds[coordinate.name] == "rotation"
         low, high = (np.degrees(v) if rotation else v for v in coordinate.limits)
@@ -244,7 +244,7 @@ def _opensim_coordinates(definition: OpenSimDefinition) -> Table:
     rows = table("coordinate", "limits", "unit", "meaning", numbers=(1,), title="Coordinates")
     free = {c.name for c in free_coordinates(definition.source)}
     for joint in definition.source.joints:
-        kinds = {axis.coordinate: axis.kind for axis in reversed(joint.axes)}
+        kinds = kinds_of([joint])
         for c in joint.coordinates:
             turn = kinds[c.name] == "rotation"
             low, high = (np.degrees(v) if turn else v for v in c.limits)

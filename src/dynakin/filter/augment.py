@@ -12,6 +12,7 @@ import numpy.typing as npt
 from dynakin.bindings import _core
 from dynakin.filter.noise import jerk_densities, joint_groups, plate_sd, soft_tissue_sd, soft_tissue_time_s
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.model.schema import kinds_of
 from dynakin.settings.model import QUANTITIES, Quantity
 from dynakin.settings.noise import Noise
 
@@ -132,7 +133,7 @@ def initial_covariance(initial: CalibratedModel, noise: Noise) -> Array:
 def continuous_noise(initial: CalibratedModel, noise: Noise, layout: _core.StateLayout) -> tuple[Array, Array]:
     """Density (n,) of the white noise that drives each element, and the rate (n,) 1/s at which it decays."""
     density, decay = np.zeros(layout.size), np.zeros(layout.size)
-    kinds = {axis.coordinate: axis.kind for segment in initial.spec.segments for axis in segment.axes}
+    kinds = kinds_of(initial.spec.segments)
     whole, groups = noise.variance_scale, joint_groups(initial)
     jerk = jerk_densities(noise, floating=bool(initial.feet))
     offset, size = layout.blocks["accelerations"]

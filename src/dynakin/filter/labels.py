@@ -11,6 +11,7 @@ from dynakin.bindings import _core
 from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.sources import moved_segments
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.model.schema import kinds_of
 from dynakin.results.estimate import AXES, COMPONENTS
 
 
@@ -23,7 +24,7 @@ def labels(
     found: dict[str, Any] = {
         "time": time,
         "coordinate": model.coordinate_names,
-        "coordinate_type": ("coordinate", _types(spec)),
+        "coordinate_type": ("coordinate", [kinds_of(spec.segments)[c.name] for c in spec.coordinates]),
         "coordinate_segment": ("coordinate", moved_segments(spec)),
         "marker": list(initial.recorded_markers),
         "axis": list(AXES),
@@ -57,12 +58,3 @@ def _joints(spec: _core.ModelSpec) -> tuple[list[str], list[int], list[str]]:
         names = segments
     parents = [segments.index(s.parent) if s.parent in segments else -1 for s in spec.segments]
     return names, parents, segments
-
-
-def _types(spec: _core.ModelSpec) -> list[str]:
-    """A coordinate is a rotation unless every axis that it moves is a translation."""
-    kinds: dict[str, set[str]] = {}
-    for segment in spec.segments:
-        for axis in segment.axes:
-            kinds.setdefault(axis.coordinate, set()).add(axis.kind)
-    return ["translation" if kinds[c.name] == {"translation"} else "rotation" for c in spec.coordinates]

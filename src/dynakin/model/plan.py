@@ -9,7 +9,7 @@ import numpy.typing as npt
 from scipy.linalg import block_diag
 
 from dynakin.model.inertia import INERTIA_NAMES, PLANAR_INERTIA, RigidBody
-from dynakin.model.schema import Interval, ModelFile, Segment
+from dynakin.model.schema import Interval, ModelFile, Segment, kinds_of
 from dynakin.model.state_priors import cluster_covariance, inertia_covariance, state_bounds, state_prior
 from dynakin.settings.model import Bounds, Priors
 
@@ -76,9 +76,6 @@ class ModelPlan:
                 found.add(segment.parent)
         return found
 
-    def _kinds(self) -> dict[str, str]:
-        return {axis.coordinate: axis.kind for segment in self.model.segments for axis in segment.axes}
-
     def _length_sd(self) -> dict[str, float]:
         return {length.name: length.sd_m for length in self.model.lengths if length.sd_m is not None}
 
@@ -86,8 +83,8 @@ class ModelPlan:
         """Standard deviation of every element that a state can have, by the core's name of it."""
         names = [site.name for site in self.sites]
         sd = state_prior(
-            self._kinds(), self.geometry.lengths, self._length_sd(), names, self.bodies, self.reach, priors,
-            self.worn_kg(priors),
+            kinds_of(self.model.segments), self.geometry.lengths, self._length_sd(), names, self.bodies, self.reach,
+            priors, self.worn_kg(priors),
         )  # fmt: skip
         if (together := self.joint_prior(priors)) is not None:
             sd |= dict(zip(together[0], np.sqrt(np.diag(together[1])).tolist(), strict=True))

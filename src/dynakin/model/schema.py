@@ -19,6 +19,7 @@ from dynakin.settings.strict import CoordinateName, Name, Strict, nearest
 Vector3 = Annotated[tuple[float, float, float], Field(description="three numbers")]
 LandmarkPair = tuple[str, str]
 Interval = tuple[float, float]
+Kind = Literal["rotation", "translation"]
 _MOST = 1000  # segments, lengths, coordinates: five times those of a whole body with fingers and vertebrae
 
 
@@ -26,7 +27,7 @@ class Axis(Strict):
     """One degree of freedom: ``scale * sum_k coefficients[k] q^k``, rad about or m along ``direction``."""
 
     coordinate: str
-    kind: Literal["rotation", "translation"] = "rotation"
+    kind: Kind = "rotation"
     direction: Vector3 = (0.0, 0.0, 1.0)
     coefficients: tuple[float, ...] = (0.0, 1.0)
     scale: str = ""
@@ -37,6 +38,16 @@ class Axis(Strict):
         if abs(norm - 1.0) > 1e-6:
             raise ValueError(f"direction has length {norm:.6g}, expected a unit vector")
         return self
+
+
+def kinds_of(joints: Iterable[Any]) -> dict[str, Kind]:
+    """What each coordinate does, of segments or joints with axes: one that turns anything is a rotation, whatever it
+    moves along besides (a knee that rolls)."""
+    found: dict[str, Kind] = {}
+    for axis in (axis for joint in joints for axis in joint.axes):
+        if found.get(axis.coordinate) != "rotation":
+            found[axis.coordinate] = axis.kind
+    return found
 
 
 class Placement(Strict):

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from dynakin.arrays import wrapped
 from dynakin.bindings import _core
+from dynakin.model.schema import kinds_of
 
 Array = npt.NDArray[np.float64]
 
@@ -52,7 +53,7 @@ def joint_coordinates(
     )  # fmt: skip
     known = [_core.ParameterSpec(p.name, p.value, estimated=False) for p in parameters]
     model = _core.Model(_core.ModelSpec("joint", used, known, [alone], markers))
-    kinds = {axis.coordinate: axis.kind for axis in segment.axes}
+    kinds = kinds_of([segment])
     turns = np.array([kinds[c.name] == "rotation" for c in free])
     places = np.array([target[0] @ point + target[1] for point in points])
     wide, none = np.full(len(free), np.inf), np.zeros(len(free))

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from dynakin.bindings import _core
 from dynakin.model.plan import Geometry, ModelPlan
+from dynakin.model.schema import kinds_of
 from dynakin.model.spec import to_core
 
 Array = npt.NDArray[np.float64]
@@ -34,7 +35,7 @@ def hold_unseen(plan: ModelPlan, postures: list[tuple[Array, Array]]) -> tuple[M
     """
     held: dict[str, str] = {}
     depth = _depths(plan)
-    kinds = {axis.coordinate: axis.kind for s in plan.model.segments for axis in s.axes}
+    kinds = kinds_of(plan.model.segments)
     model = _core.Model(to_core(plan))
     free = [c.name for c in model.spec.coordinates if not c.locked]
     loose = np.array([site.soft_tissue_m >= LOOSE_FROM_M for site in plan.sites])

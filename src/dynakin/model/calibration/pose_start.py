@@ -17,7 +17,7 @@ from dynakin.arrays import wrapped
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.model.calibration.joint_fit import joint_coordinates
-from dynakin.model.schema import Interval
+from dynakin.model.schema import Interval, kinds_of
 
 Array = npt.NDArray[np.float64]
 
@@ -144,7 +144,7 @@ class _Body:
         self.lower, self.upper = bounds.T
         self.rest = np.clip(self.x0[: self.n_free], self.lower, self.upper)
         order = {c.name: k for k, c in enumerate(free)}
-        kinds = {axis.coordinate: axis.kind for s in spec.segments for axis in s.axes}
+        kinds = kinds_of(spec.segments)
         self.turns = np.array([kinds[c.name] == "rotation" for c in free])
         self.paths, self.base = _paths(spec, order)
         self.roots = [k for k, s in enumerate(spec.segments) if s.parent == "ground"]

@@ -30,6 +30,7 @@ from dynakin.model.opensim.read import read_osim
 from dynakin.model.opensim.scales import scale_names
 from dynakin.model.opensim.sites import sites, skin_of
 from dynakin.model.opensim.spec import to_spec, unseen
+from dynakin.model.schema import kinds_of
 from dynakin.model.spec import in_layout
 from dynakin.model.state_priors import state_bounds, state_prior
 from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_laboratory_frame
@@ -169,7 +170,6 @@ class OpenSimDefinition:
         reach = reach_of(source)
         lengths = {parameter.name: 1.0 for parameter in spec.parameters}
         places = {marker.name: np.array(marker.location) for marker, _ in chosen}
-        kinds = {axis.coordinate: axis.kind for s in reversed(spec.segments) for axis in reversed(s.axes)}
         intervals = state_bounds(limits, lengths, {}, places, bodies, reach, bounds or Bounds())
         lower = in_layout(names, {name: pair[0] for name, pair in intervals.items()}, -np.inf)
         upper = in_layout(names, {name: pair[1] for name, pair in intervals.items()}, np.inf)
@@ -178,7 +178,7 @@ class OpenSimDefinition:
             f"inertia/{s.name}/{k}": v for s in spec.segments for k, v in zip(INERTIA_NAMES, s.inertia, strict=True)
         }
         skin = np.array([skin_of(marker.name, marker.body) for marker, _ in chosen])
-        known = priors or Priors()
+        kinds, known = kinds_of(spec.segments), priors or Priors()
         known = known.changed(marker_sd_m=float(np.hypot(known.marker_sd_m, fit.rms_m / np.sqrt(3.0))))
         return CalibratedModel(
             spec=spec,

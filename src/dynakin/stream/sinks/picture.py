@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from dynakin.bindings import _core
 from dynakin.filter.step import Labelled
+from dynakin.model.schema import kinds_of
 from dynakin.recordings.plates.ground_plate import level_pressure
 from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.stream.sinks.base import LiveFrame, Started, Status
@@ -116,12 +117,9 @@ def as_text(text: str) -> str:
 
 
 def rotations(spec: _core.ModelSpec) -> list[bool]:
-    """Of each coordinate whether it turns: unless every axis that it moves is a translation."""
-    kinds: dict[str, set[str]] = {}
-    for segment in spec.segments:
-        for axis in segment.axes:
-            kinds.setdefault(axis.coordinate, set()).add(axis.kind)
-    return [kinds.get(c.name) != {"translation"} for c in spec.coordinates]
+    """Of each coordinate whether it turns."""
+    kinds = kinds_of(spec.segments)
+    return [kinds.get(c.name) != "translation" for c in spec.coordinates]
 
 
 BLOCKS = (
