@@ -18,7 +18,7 @@ def runs(flags: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
 
 def peaks(path: npt.NDArray[np.float64], prominence: float) -> list[int]:
     """Where ``path`` (T,) is higher than on both sides, the middle of a flat top, and at least by ``prominence`` higher
-    than the lower of the two lowest points on the way to something higher, or to an end, on either side.
+    than the higher of the two lowest points on the way to something higher, or to an end, on either side.
 
     As `scipy.signal.find_peaks`, which takes half a second to load.
     """

@@ -11,8 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from dynakin.errors import RecordingError
-from dynakin.recordings.resampling import CausalLowPass, low_pass, resample
-from dynakin.recordings.zero_lag import both_ways
+from dynakin.recordings.resampling import CausalLowPass, both_ways, low_pass, resample
 
 FINE = np.arange(4000) / 2000.0
 COARSE = np.arange(200) / 100.0

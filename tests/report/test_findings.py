@@ -45,7 +45,7 @@ def test_markers_that_move_too_far_are_named_without_their_prefix(estimate: Esti
     assert found(estimate)["Soft tissue"].level == "good"
     swing = 0.06 * np.sin(np.pi * estimate.time)
     told = found(with_element(estimate, "marker/S1:RTHI/x", swing))["Soft tissue"]
-    assert told.level == "warning" and told.text.startswith("RTHI moves 60 mm on the thigh (skin 18 mm)")
+    assert told.level == "warning" and told.text.startswith("RTHI moves 60 mm on the thigh (usual 18 mm)")
     assert told.advice
 
 

@@ -44,7 +44,7 @@ def test_a_marker_that_moves_too_far_is_named_with_both_sizes(estimate: Estimate
     swing = np.sin(2.0 * np.pi * estimate.time / 2.0)
     assert soft_tissue(moving(estimate, 0.035 * swing, 0.0 * swing), window)["verdict"] == ""
     block = soft_tissue(moving(estimate, 0.052 * swing, 0.0 * swing), window)
-    assert block["verdict"].startswith("S1:RKNE moves 52 mm on the thigh (skin 18 mm): more than soft tissue does")
+    assert block["verdict"].startswith("S1:RKNE moves 52 mm on the thigh (usual 18 mm): more than soft tissue does")
     assert [name for name, marker in block["markers"].items() if marker["exceeds"]] == [KNEE]
 
 

@@ -104,13 +104,17 @@ def _figures(estimate: Estimate, metrics: dict[str, Any]) -> Table:
         numbers=(1,),
         title=f"{estimate.recording.name}, {estimate.model_name}: {window['start_s']:g} to {window['end_s']:g} s",
     )
-    rows.add_row("frames estimated", in_words(estimate.lag_s), "")
+    rows.add_row("each frame is estimated", in_words(estimate.lag_s), "")
     refused = sorted({event.subject for event in estimate.events if event.kind == "gated"})
     markers, wrench, events = (metrics[block] or {} for block in ("markers", "wrench", "events"))
     rms = {name: value for name, value in markers.get("rms_mm", {}).items() if value is not None}
     if rms:
         worst = max(rms, key=lambda name: rms[name])
-        rows.add_row("markers, mean RMS", f"{markers['mean_rms_mm']:.2f} mm", f"{len(rms)} markers")
+        rows.add_row(
+            "markers, mean RMS",
+            f"{markers['mean_rms_mm']:.2f} mm",
+            f"{len(rms)} markers; fit, not accuracy",
+        )
         rows.add_row(
             "worst marker, RMS", f"{rms[worst]:.2f} mm", worst + (", refused for a time" if worst in refused else "")
         )
@@ -132,7 +136,7 @@ def _figures(estimate: Estimate, metrics: dict[str, Any]) -> Table:
     if moved:
         most = max(moved, key=lambda name: moved[name]["max_mm"])
         expected = moved[most]["expected_mm"]
-        size = "" if expected is None else f" (skin {expected:.0f} mm)"
+        size = "" if expected is None else f" (usual {expected:.0f} mm)"
         rows.add_row("largest move on a segment", f"{moved[most]['max_mm']:.0f} mm", f"{most}{size}")
     gaps = events.get("missing_frames")
     if gaps is not None:
@@ -144,6 +148,8 @@ def _figures(estimate: Estimate, metrics: dict[str, Any]) -> Table:
         rows.add_row("motion lost or found again", str(len(resets)), f"first at {resets[0].time_s:.2f} s")
     timing = estimate.timing
     rows.add_row(
-        "time of a step, median", f"{timing.median_us:.0f} µs", f"{timing.realtime_factor:.0f} times real time"
+        "time of a step, median",
+        f"{timing.median_us:.0f} µs",
+        f"{timing.realtime_factor:.1f} times as fast as the movement",
     )
     return rows

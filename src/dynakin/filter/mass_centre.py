@@ -12,7 +12,7 @@ from dynakin.arrays import runs
 from dynakin.bindings import _core
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.recording import rate_of
-from dynakin.recordings.zero_lag import both_ways
+from dynakin.recordings.resampling import low_pass
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -108,8 +108,7 @@ def _bridged(time: Array, markers: Array, axes: Flags, rate: float) -> tuple[Arr
 
 
 def _second_derivative(path: Array, rate: float) -> Array:
-    beyond = min(len(path) - 1, round(rate / CUTOFF_HZ))
-    smooth = both_ways(path, rate, CUTOFF_HZ / 0.802, beyond)  # twice: -3 dB at the cut-off
+    smooth = low_pass(path, rate, CUTOFF_HZ)
     return np.asarray(np.gradient(np.gradient(smooth, 1.0 / rate, axis=0), 1.0 / rate, axis=0))
 
 

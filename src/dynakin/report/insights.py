@@ -29,6 +29,8 @@ FOLLOWING = 4.0
 # Calibrated variances this many times the declared ones are said: good trials with known truth have below 0.3, cameras
 # of 3 mm 5 to 6, with angles' deviations that are too small in one of four (docs/validation.md).
 NOISY = 2.0
+# A marker is named where it fits worse than half of all by this factor.
+STANDS_OUT = 3.0
 # A sensor that is refused for less than this, s, is a note.
 BRIEF_S = 0.1
 
@@ -45,9 +47,9 @@ ADVICE = {
     "follows, no smoother": "Take --preset default, which is smoothed: these settings follow single frames.",
     "conservative": "Nothing need be done. For narrower intervals fit the noise to your laboratory with dynakin tune, "
     "and give what it writes as --preset.",
-    "overconfident": "Look at the film whether {worst}, which fits worst, is loose, swapped or shifted, and leave it "
+    "overconfident": "Look at the film whether {worst} is loose, swapped or shifted, and leave it "
     "out if so. If none is, fit the noise to your laboratory with dynakin tune, and give what it writes as --preset.",
-    "overconfident, calibrated": "Look at the film whether {worst}, which fits worst, is loose, swapped or shifted, "
+    "overconfident, calibrated": "Look at the film whether {worst} is loose, swapped or shifted, "
     "and leave it out if so.",
     "overconfident, fixed scales": "The scales of this preset are another recording's: put adapt = true into its table "
     "[noise], so that this one finds its own.",
@@ -268,8 +270,11 @@ def _advice(name: str, estimate: Estimate) -> str:
 
 
 def _worst_marker(estimate: Estimate, metrics: Metrics) -> str:
+    """The one to look at; a good one that fits a little worse than the others is not named."""
     rms = {name: value for name, value in metrics["markers"]["rms_mm"].items() if value is not None}
-    return short_marker_names(estimate.marker_names)[max(rms, key=lambda name: rms[name])] if rms else "the marker"
+    if not rms or max(rms.values()) < STANDS_OUT * np.median(list(rms.values())):
+        return "a marker"
+    return f"{short_marker_names(estimate.marker_names)[max(rms, key=lambda name: rms[name])]}, which fits worst,"
 
 
 def _speeds(estimate: Estimate, metrics: Metrics) -> Insight | None:
@@ -368,11 +373,11 @@ def _soft_tissue(estimate: Estimate, metrics: Metrics) -> Insight | None:
         )
     most = max(moved, key=lambda name: moved[name])
     expected = markers[most]["expected_mm"]
-    size = "" if expected is None else f" (skin {number(expected, 'mm', digits=2)})"
+    size = "" if expected is None else f", where {number(expected, 'mm', digits=2)} is usual"
     return Insight(
         "good",
         "Soft tissue",
-        f"No marker moves further on its segment than skin does; furthest is {most} with "
+        f"No marker moves more than twice as far on its segment as is usual for skin there; furthest is {most} with "
         f"{number(moved[most], 'mm', digits=2)}{size}.",
     )
 

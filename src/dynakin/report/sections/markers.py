@@ -108,7 +108,7 @@ def _displacements(page: Page) -> TextTable:
         )
         for name in sorted(found, key=lambda name: -(found[name]["max_mm"] or 0.0))
     ]
-    headings = ("marker", "segment", "RMS, mm", "largest, mm", "skin, mm")
+    headings = ("marker", "segment", "RMS, mm", "largest, mm", "usual, mm")
     return TextTable("Movement of each marker on its segment", headings, rows, (2, 3, 4), folded=True)
 
 

@@ -14,6 +14,8 @@ from dynakin.results.records import Parameter
 # A constant has settled once all that it still moves is this share of its size at the start. The filter's own standard
 # deviation is no yardstick: where the data teach nothing it is wider than everything that happens.
 BAND = 0.01
+# A correction of a joint's place starts at 0 and has no size: this share of its prior's standard deviation instead.
+CORRECTION_BAND = 0.25
 # The misfit is judged as a running RMS over this time: shorter than a squat, longer than a jerk of it.
 RUNNING_S = 1.0
 # ... and against that of the second half of the recording, times this: misfits grow and shrink with the movement, by
@@ -75,9 +77,16 @@ def running_rms(values: np.ndarray, frames: int) -> np.ndarray:
         return np.sqrt(np.where(number > 0, np.maximum(power, 0.0) / number, np.nan))
 
 
+def band_of(p: Parameter) -> float:
+    """By how much a constant may still move, in its unit; 0 of what is known for sure or has no size."""
+    if p.initial == 0.0 and p.kind == "length":
+        return CORRECTION_BAND * (p.prior_sd or 0.0)
+    return BAND * abs(p.initial)
+
+
 def constant_groups(parameters: Sequence[Parameter]) -> dict[str, list[Parameter]]:
     """Estimated lengths, masses and moments of inertia; groups without any are left out."""
-    free = [p for p in parameters if p.estimated and p.initial != 0.0]
+    free = [p for p in parameters if p.estimated and band_of(p) > 0.0]
     inertial = [p for p in free if p.kind == "inertia"]
     groups = {
         "lengths": [p for p in free if p.kind == "length"],
@@ -129,8 +138,7 @@ def _group(estimate: Estimate, group: list[Parameter]) -> dict[str, Any]:
     elements = [str(name) for name in estimate.data["element"].values]
     state = estimate.data["state"].transpose("time", "element").values
     after = {
-        p.name: constant_settling(estimate.time, state[:, elements.index(p.name)], BAND * abs(p.initial)).after_s
-        for p in group
+        p.name: constant_settling(estimate.time, state[:, elements.index(p.name)], band_of(p)).after_s for p in group
     }
     moving = [name for name, value in after.items() if value is None]
     known = {name: value for name, value in after.items() if value is not None}
@@ -227,7 +235,7 @@ def _judge(estimate: Estimate, title: str, group: list[Parameter]) -> Convergenc
         path = states[:, at[p.name]]
         late = path[3 * len(path) // 4 :]
         # smoothed, a constant that moves does so by the drift it was given
-        if not estimate.smoothed and np.ptp(late) > MOVING * abs(p.initial) and not p.at_bound:
+        if not estimate.smoothed and np.ptp(late) > band_of(p) and not p.at_bound:
             moving.append(p)
         sd = deviations[:, at[p.name]]  # smoothed, its first is the posterior of all
         first = p.prior_sd or float(sd[0])

@@ -110,7 +110,7 @@ def excess_in_words(markers: Mapping[str, Mapping[str, Any]], limit: int = 3) ->
         return ""
     worst = sorted(excess, key=lambda entry: entry[1] - entry[2], reverse=True)
     parts = [
-        f"{name} moves {largest:.0f} mm on the {words(segment)} (skin {expected:.0f} mm)"
+        f"{name} moves {largest:.0f} mm on the {words(segment)} (usual {expected:.0f} mm)"
         for name, largest, expected, segment in worst[:limit]
     ]
     more = f" and {len(worst) - limit} more" if len(worst) > limit else ""
