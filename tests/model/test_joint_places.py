@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -11,8 +12,12 @@ from scipy.spatial.transform import Rotation
 
 from dynakin.bindings import _core
 from dynakin.filter.estimator import Estimator
+from dynakin.filter.parameters import parameters_of
 from dynakin.model.calibration.checks import fixed_lengths
 from dynakin.model.schema import Length, ModelFile, Segment, kinds_of
+from dynakin.report.insights import Insight, insights
+from dynakin.results.estimate import Estimate
+from dynakin.results.measures.metrics import compute_metrics
 from support.made_in_space import RATE, definition, measured, recording_of, standing, states
 
 HIPS = ("hip_forward", "hip_up", "hip_outward")
@@ -32,6 +37,15 @@ def test_a_coordinate_that_turns_anything_is_a_rotation_whatever_comes_last() ->
     ]
     for axes in (rolls, rolls[::-1]):
         assert kinds_of([Segment(name="shank", axes=axes)]) == {"knee": "rotation", "slide": "translation"}
+
+
+def test_limits_hold_the_value_that_a_length_starts_with() -> None:
+    assert Length(name="roll", value_m=0.0, sd_m=0.01, minimum_m=-0.005).limits == (-0.005, np.inf)
+    for value_m in (0.0, 0.04):
+        with pytest.raises(ValidationError, match=rf"value_m is {value_m:g}, expected from minimum_m \(0.01\)"):
+            Length(name="roll", value_m=value_m, sd_m=0.01, minimum_m=0.01, maximum_m=0.03)
+    with pytest.raises(ValidationError, match="expected with value_m"):
+        Length(name="thigh", between=("hip", "knee"), maximum_m=0.5)
 
 
 def test_one_term_of_a_place_is_measured_at_most() -> None:
@@ -110,6 +124,7 @@ def test_the_femur_rolls_back_on_the_tibia_on_both_sides_alike() -> None:
     names, core = list(initial.names), _core.Model(initial.spec)
     k = names.index("length/knee_roll")
     assert initial.x0[k] == 0.0 and initial.sd0[k] == pytest.approx(0.010)
+    assert (initial.lower[k], initial.upper[k]) == pytest.approx((-0.005, 0.030))
     for bent in np.radians([-10.0, 30.0, 90.0, 140.0]):
         x = core.initial_state()
         x[[names.index(f"knee_angle_{side}") for side in "rl"]] = bent
@@ -122,7 +137,8 @@ def test_the_femur_rolls_back_on_the_tibia_on_both_sides_alike() -> None:
             np.testing.assert_allclose(change[shank], 0.02 * bent * R[shank, :, 0], atol=2e-4)
 
 
-def test_the_movement_finds_how_far_the_knee_rolls() -> None:
+def squat_that_rolls(roll_m: float) -> Estimate:
+    """Both knees bent to 92 deg, whose femurs roll back by so much in a radian."""
     initial = measured()
     time = np.arange(300) / RATE
     bent = 1.6 * np.sin(np.pi * time / 3.0) ** 2
@@ -130,11 +146,41 @@ def test_the_movement_finds_how_far_the_knee_rolls() -> None:
         f"{joint}_{side}": bent * share for side in "rl" for joint, share in (("knee_angle", 1.0), ("hip_flexion", 0.8))
     }
     x = states(initial, motion, 0.0, np.zeros(3), time)
-    x[:, list(initial.names).index("length/knee_roll")] = 0.012
+    x[:, list(initial.names).index("length/knee_roll")] = roll_m
     trial = recording_of(initial, x, time, plates=False, noise_m=0.0005)
-    found = Estimator(definition(), vertical="+Y", estimate=["lengths"]).run(trial, static=standing())
-    values = {parameter.name: parameter.value for parameter in found.parameters}
-    assert values["length/knee_roll"] == pytest.approx(0.012, abs=0.003)
+    return Estimator(definition(), vertical="+Y", estimate=["lengths"]).run(trial, static=standing())
+
+
+def test_the_movement_finds_how_far_the_knee_rolls() -> None:
+    found = squat_that_rolls(0.012)
+    (roll,) = (parameter for parameter in found.parameters if parameter.name == "length/knee_roll")
+    assert roll.value == pytest.approx(0.012, abs=0.003) and not roll.at_bound
+    assert "knee roll" not in told_of_bounds(found).text
+
+
+@pytest.mark.parametrize(("roll_m", "bound_m"), [(-0.020, -0.005), (0.045, 0.030)])
+def test_a_knee_that_rolls_as_none_does_stops_at_the_bound_and_is_told(roll_m: float, bound_m: float) -> None:
+    found = squat_that_rolls(roll_m)
+    (roll,) = (parameter for parameter in found.parameters if parameter.name == "length/knee_roll")
+    assert roll.at_bound and roll.value == pytest.approx(bound_m, abs=0.0005)
+    told = told_of_bounds(found)
+    assert told.level == "warning" and re.search(r"lengths\): .*\bknee roll\b", told.text)
+    assert "knee roll length" not in told.text and "mass" not in told.advice
+
+
+def test_an_amount_that_the_last_frame_moved_off_its_bound_a_little_is_on_it() -> None:
+    initial = measured()
+    k, thigh = (list(initial.names).index(f"length/{name}") for name in ("knee_roll", "thigh"))
+    state, sd = initial.x0.copy(), initial.sd0
+    for off, expected in ((0.05, True), (0.2, False)):
+        for at in (k, thigh):
+            state[at] = initial.lower[at] + off * sd[at]
+        found = {p.name: p.at_bound for p in parameters_of(initial, state, sd, sd)}
+        assert found["length/knee_roll"] == expected and not found["length/thigh"]
+
+
+def told_of_bounds(found: Estimate) -> Insight:
+    return next(each for each in insights(found, compute_metrics(found)) if each.title == "Bounds")
 
 
 def test_a_knee_that_no_marker_shows_does_not_roll() -> None:

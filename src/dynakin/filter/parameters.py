@@ -13,6 +13,9 @@ Array = npt.NDArray[np.float64]
 
 _KINDS: dict[str, ParameterKind] = {"length": "length", "marker": "marker", "inertia": "inertia", "plates": "plates"}
 _INERTIA_UNITS = {"mass": "kg", "mx": "kg m", "my": "kg m", "mz": "kg m"}
+_NEAR = 0.1
+"""Standard deviations from its bound within which an amount that the movement finds (a length that starts at 0) is on
+it: what the data press there, the noise of the last frame may have moved off by as little."""
 _PLATE_UNITS = {"delay": "s", "fx": "N", "fy": "N", "fz": "N"}
 
 
@@ -34,8 +37,10 @@ def parameters_of(
         if word not in _KINDS:
             continue  # a coordinate, speed or acceleration
         kind = _KINDS[word]
+        amount = kind == "length" and initial.x0[k] == 0.0
         # the prior of a correction to a measured place is what skin hides of that place
-        unseen = skin.get(owner, 0.0) if kind == "length" and initial.x0[k] != 0.0 else 0.0
+        unseen = skin.get(owner, 0.0) if kind == "length" and not amount else 0.0
+        within = min(state[k] - initial.lower[k], initial.upper[k] - state[k])
         found.append(
             Parameter(
                 name=name,
@@ -48,7 +53,7 @@ def parameters_of(
                 table=_finite(initial.table[k]),
                 lower=_finite(initial.lower[k]),
                 upper=_finite(initial.upper[k]),
-                at_bound=bool(state[k] <= initial.lower[k] or state[k] >= initial.upper[k]),
+                at_bound=bool(within <= (_NEAR * sd[k] if amount else 0.0)),
                 estimated=True,
                 prior_sd=float(prior_sd[k]),
                 skin_sd=unseen,

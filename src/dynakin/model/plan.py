@@ -113,10 +113,14 @@ class ModelPlan:
         """Bounds of (9) by the core's names; speeds and accelerations have none."""
         limits = {c.name: c.limits for c in self.model.coordinates}
         places = {site.name: site.position for site in self.sites}
-        return state_bounds(
+        found = state_bounds(
             limits, self.geometry.lengths, self._length_sd(), places, self.bodies, self.reach, bounds,
             self.worn_kg(priors or Priors()),
         )  # fmt: skip
+        for length in self.model.lengths:
+            (lower, upper), (low, high) = found[f"length/{length.name}"], length.limits
+            found[f"length/{length.name}"] = (max(lower, low), min(upper, high))
+        return found
 
     def table_values(self) -> dict[str, float]:
         """What the table gives, by the core's names."""

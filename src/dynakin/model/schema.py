@@ -168,6 +168,8 @@ class Length(Strict):
     shared: bool = False  # the same for both sides: measured on each, the mean is taken
     value_m: Annotated[float, Field(ge=0.0)] | None = None  # zero: a correction of a measured place, with sd_m
     sd_m: Annotated[float, Field(gt=0.0)] | None = None  # how well it is known; not given: to a part of it (`Priors`)
+    minimum_m: float | None = None  # beyond which nobody's is: narrows the bounds that follow from sd_m
+    maximum_m: float | None = None
     estimated: bool = True
 
     @model_validator(mode="after")
@@ -176,7 +178,18 @@ class Length(Strict):
             raise ValueError("expected either between = [landmark, landmark] or value_m")
         if self.value_m == 0.0 and self.sd_m is None:
             raise ValueError("value_m is 0: expected sd_m, how far from zero it may be")
+        low, high = self.limits
+        if np.isfinite(self.limits).any() and self.value_m is None:
+            raise ValueError("minimum_m, maximum_m: expected with value_m; what is measured is bounded by its size")
+        if self.value_m is not None and not low <= self.value_m <= high:
+            raise ValueError(f"value_m is {self.value_m:g}, expected from minimum_m ({low:g}) to maximum_m ({high:g})")
         return self
+
+    @property
+    def limits(self) -> Interval:
+        """(lower, upper) in m that the file gives, infinite where none is given."""
+        low, high = self.minimum_m, self.maximum_m
+        return (-np.inf if low is None else low, np.inf if high is None else high)
 
     def pairs(self) -> tuple[LandmarkPair, ...]:
         """The landmarks between which it is measured: one pair, or one a side."""

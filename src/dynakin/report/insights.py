@@ -315,7 +315,8 @@ def _constants(estimate: Estimate, metrics: Metrics) -> list[Insight]:
 def _bounds(estimate: Estimate, metrics: Metrics) -> Insight | None:
     free = [p for p in estimate.parameters if p.estimated and p.lower is not None]
     names = short_marker_names(estimate.marker_names)
-    stuck = [parameter_label(p, names) for p in free if p.at_bound]
+    ending = [p for p in free if p.at_bound]
+    stuck = [parameter_label(p, names) for p in ending]
     passing = {n: entry for n, entry in metrics["bounds"]["parameters"].items() if not entry["at_end"]}
     for_a_time = ""
     if passing:
@@ -333,7 +334,9 @@ def _bounds(estimate: Estimate, metrics: Metrics) -> Insight | None:
         "Bounds",
         f"{len(stuck)} of {len(free)} estimated parameters end on a bound ({counts}): {listed(stuck)}. The data ask "
         f"for a value that the person cannot have, so the model does not fit there.{for_a_time}",
-        "Check the mass and the height, then the film for a marker of those segments off its place.",
+        "Check the mass and the height, then the film for a marker of those segments off its place."
+        if any(p.kind == "inertia" for p in ending)
+        else "Look in film and standing trial for a marker off its place on the segments that these belong to.",
     )
 
 
