@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from copy import deepcopy
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -187,22 +186,18 @@ class Result:
             "uncertainty.sto": motion_files.write_deviations,
             "markers.trc": write_markers,
             "parameters.json": write_parameters,
+            "estimate.nc": write_netcdf,
         }
         with stage("writing results and report") as report, replacing(folder, overwrite=overwrite) as made:
             in_all = len(files) + 2  # the page takes longest
-            with ThreadPoolExecutor(1) as beside:  # compression leaves the interpreter free
-                arrays = beside.submit(
-                    _written, made / "estimate.nc", failed, lambda path: write_netcdf(estimate, path)
-                )
-                for done, (name, write) in enumerate(files.items()):
-                    report(done, in_all)
-                    _written(made / name, failed, lambda path, write=write: write(estimate, path))  # type: ignore[misc]
-                with failed.stage("files of the body", writes=True):
-                    body_files.write_body_files(estimate, made)
-                report(len(files), in_all)
-                _written(made / "repetitions.csv", failed, self._write_repetitions)
-                write_config(estimate.config, made / "config.toml")
-                arrays.result()
+            for done, (name, write) in enumerate(files.items()):
+                report(done, in_all)
+                _written(made / name, failed, lambda path, write=write: write(estimate, path))  # type: ignore[misc]
+            with failed.stage("files of the body", writes=True):
+                body_files.write_body_files(estimate, made)
+            report(len(files), in_all)
+            _written(made / "repetitions.csv", failed, self._write_repetitions)
+            write_config(estimate.config, made / "config.toml")
             whole = replace(estimate, messages=[*estimate.messages, *failed.messages()])
             report(len(files) + 1, in_all)
             _written(
