@@ -63,9 +63,9 @@ def run(
         ready = prepare_case(case)
     print_rows(out(), assumed(next(iter(ready.values())), config))
     result = run_case(case, ready=ready, keep_lost=keep_lost, keep="--keep-lost")
+    folder = result.save(config.output, keep_lost=keep_lost, check=False)
     from dynakin.cli.summary import end, print_summary  # loaded beside the core, for the most part
 
-    folder = result.save(config.output, keep_lost=keep_lost, check=False)
     failures = result.failures
     saved = len(failures.found)
     with failures.stage("summary"):

@@ -171,8 +171,6 @@ class Result:
         )
 
     def _write(self, folder: Path, overwrite: bool) -> None:
-        from dynakin.report.page import write_report  # as above
-
         estimate, failed, metrics = self.estimate, self.failures, self.metrics()
         if self.settings is not None:
             estimate = replace(estimate, config=estimate.config | {"output": str(folder.absolute())})
@@ -203,13 +201,18 @@ class Result:
             _written(
                 made / "report.html",
                 failed,
-                lambda path: write_report(whole, path, metrics=metrics, comparison=self.comparison),
+                lambda path: self._write_page(whole, metrics, path),
             )
             said = {"messages": [*estimate.messages, *failed.messages()]}
             said["failures"] = [failure.stage for failure in failed.found]
             write_metrics(metrics | said, made / "metrics.json")
             if failed.found:
                 (made / LOG).write_text(failed.log(), encoding="utf-8", newline="\n")
+
+    def _write_page(self, estimate: Estimate, metrics: dict[str, Any], path: Path) -> None:
+        from dynakin.report.page import write_report  # as above
+
+        write_report(estimate, path, metrics=metrics, comparison=self.comparison)
 
     def _write_repetitions(self, path: Path) -> None:
         curves = estimate_curves(self.estimate) if self.comparison is None else self.comparison.curves()

@@ -166,7 +166,7 @@ def run_case(
 
 class _Beside(Thread):
     """Loads what comes after an estimate, and looks at what the model can identify at all, while the core works, which
-    leaves the interpreter free. What fails here is said where it is used.
+    leaves the interpreter free. What fails here is tried again where it is used, and said there.
 
     Args:
         tracker: before the first frame; None: nothing is looked at.
@@ -179,22 +179,22 @@ class _Beside(Thread):
 
     def run(self) -> None:
         """In a thread of its own."""
-        import xarray as xr  # first: the estimate itself is one
+        with suppress(Exception):
+            import xarray as xr  # first: the estimate itself is one
 
-        xr.Dataset(coords={"axis": ["x"]})  # its first one has xarray load Dask, where that is installed
-        import h5netcdf  # noqa: F401
+            xr.Dataset(coords={"axis": ["x"]})  # its first one has xarray load Dask, where that is installed
+            import h5netcdf  # noqa: F401
 
-        import dynakin.pipeline.result
-        from dynakin.identification.observability.structure import structure_of
-        from dynakin.report.page import templates
+            import dynakin.pipeline.result
+            from dynakin.identification.observability.structure import structure_of
+            from dynakin.report.page import templates
 
-        templates()
-        if self._tracker is not None:
-            with suppress(DynakinError):
+            templates()
+            if self._tracker is not None:
                 self._structure = structure_of(self._tracker)
-        import scipy.interpolate  # noqa: F401
+            import scipy.interpolate  # noqa: F401
 
-        import dynakin.identification.observability.trial  # noqa: F401
+            import dynakin.identification.observability.trial  # noqa: F401
 
     def structure(self) -> Structure | None:
         """What the model can identify, once that is known; None: it could not be found."""
