@@ -18,6 +18,7 @@ from dynakin.model.schema import Length, ModelFile, Segment, kinds_of
 from dynakin.report.insights import Insight, insights
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.metrics import compute_metrics
+from dynakin.results.naming import shown_unit
 from support.made_in_space import RATE, definition, measured, recording_of, standing, states
 
 HIPS = ("hip_forward", "hip_up", "hip_outward")
@@ -177,6 +178,14 @@ def test_an_amount_that_the_last_frame_moved_off_its_bound_a_little_is_on_it() -
             state[at] = initial.lower[at] + off * sd[at]
         found = {p.name: p.at_bound for p in parameters_of(initial, state, sd, sd)}
         assert found["length/knee_roll"] == expected and not found["length/thigh"]
+
+
+def test_what_a_knee_rolls_in_a_radian_has_its_own_unit() -> None:
+    initial = measured()
+    units = {p.name: p.unit for p in parameters_of(initial, initial.x0, initial.sd0, initial.sd0)}
+    assert (units["length/knee_roll"], units["length/thigh"]) == ("m/rad", "m")
+    assert shown_unit("m/rad") == (1000.0, "mm/rad") and shown_unit("m") == (1000.0, "mm")
+    assert shown_unit("kg m2") == (1.0, "kg m²")
 
 
 def told_of_bounds(found: Estimate) -> Insight:

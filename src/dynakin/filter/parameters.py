@@ -7,6 +7,7 @@ import numpy.typing as npt
 
 from dynakin.elements import element
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.model.schema import kinds_of
 from dynakin.results.records import Parameter, ParameterKind
 
 Array = npt.NDArray[np.float64]
@@ -31,6 +32,7 @@ def parameters_of(
     """
     segments = {marker.name: marker.segment for marker in initial.spec.markers}
     skin = length_skin_sd(initial, length_skin_fraction)
+    units = dict.fromkeys(_amounts_of_rolling(initial), "m/rad") | dict.fromkeys(initial.dimensionless, "1")
     found = []
     for k, name in enumerate(initial.names):
         word, owner, last = element(name)
@@ -46,7 +48,7 @@ def parameters_of(
                 name=name,
                 kind=kind,
                 segment=segments[owner] if kind == "marker" else "plates" if kind == "plates" else owner,
-                unit="1" if owner in initial.dimensionless else _unit(kind, last or owner),
+                unit=units.get(owner) or _unit(kind, last or owner),
                 value=float(state[k]),
                 sd=float(np.hypot(sd[k], unseen)),
                 initial=float(initial.x0[k]),
@@ -63,11 +65,18 @@ def parameters_of(
         if not length.estimated:
             value = float(length.value)
             name = f"length/{length.name}"
-            unit = "1" if length.name in initial.dimensionless else "m"
+            unit = units.get(length.name, "m")
             found.append(
                 Parameter(name, "length", length.name, unit, value, 0.0, value, None, None, None, False, False)
             )
     return found
+
+
+def _amounts_of_rolling(initial: CalibratedModel) -> set[str]:
+    """Lengths that scale how far a joint moves along as it turns."""
+    segments = initial.spec.segments
+    kinds, axes = kinds_of(segments), [axis for segment in segments for axis in segment.axes if axis.scale]
+    return {axis.scale for axis in axes if axis.kind == "translation" and kinds[axis.coordinate] == "rotation"}
 
 
 def length_skin_sd(initial: CalibratedModel, share: float) -> dict[str, float]:

@@ -26,7 +26,7 @@ from dynakin.results.files.config import plain, versions
 from dynakin.results.measures.facing import facing
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.measures.sources import UNKNOWN
-from dynakin.results.naming import listed, number, plural
+from dynakin.results.naming import listed, number, plural, shown_unit
 from dynakin.settings.lag import in_words
 from dynakin.validation.methods import Trial
 
@@ -170,7 +170,7 @@ def _parameter_rows(estimate: Estimate) -> list[dict[str, Any]]:
             {
                 "kind": p.kind,
                 "label": parameter_label(p, names),
-                "unit": "mm" if p.unit == "m" else p.unit.replace("m2", "m²"),
+                "unit": shown_unit(p.unit)[1],
                 "cells": [_cell(cell, p.unit) for cell in cells],
                 "at_bound": p.at_bound,
                 "estimated": p.estimated,
@@ -180,6 +180,7 @@ def _parameter_rows(estimate: Estimate) -> list[dict[str, Any]]:
 
 
 def _cell(value: float | None, unit: str) -> str:
-    if value is None or unit != "m":
+    factor, _ = shown_unit(unit)
+    if value is None or factor == 1.0:
         return number(value)
-    return f"{1000.0 * value:.1f}".replace("-0.0", "0.0").replace("-", "−")
+    return f"{factor * value:.1f}".replace("-0.0", "0.0").replace("-", "−")

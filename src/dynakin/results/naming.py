@@ -47,6 +47,13 @@ def number(value: float | None, unit: str = "", digits: int = 3) -> str:
     return f"{text} {unit}" if unit else text
 
 
+def shown_unit(unit: str) -> tuple[float, str]:
+    """Factor and unit in which a constant is shown: lengths in mm."""
+    if unit.partition("/")[0] == "m":
+        return 1000.0, f"m{unit}"
+    return 1.0, unit.replace("m2", "m²")
+
+
 def listed(items: list[str], limit: int = 6) -> str:
     """`a, b and c`; the rest of a long list only counted."""
     if len(items) > limit:

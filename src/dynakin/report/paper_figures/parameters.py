@@ -12,7 +12,7 @@ from dynakin.report.body import colours_of
 from dynakin.report.labels import signed_percent
 from dynakin.report.plot import LIMIT, QUIET, thin
 from dynakin.results.estimate import Estimate
-from dynakin.results.naming import number, words
+from dynakin.results.naming import number, shown_unit, words
 from dynakin.results.records import Parameter
 from dynakin.validation.methods import Trial
 
@@ -108,7 +108,7 @@ def _changes(axes: Axes, estimate: Estimate, parameters: list[Parameter]) -> Non
 
 def _label(p: Parameter) -> str:
     change = signed_percent(p.change_percent() or 0.0)
-    factor, unit = (1000.0, "mm") if p.unit == "m" else (1.0, p.unit.replace("m2", "m²"))
+    factor, unit = shown_unit(p.unit)
     band = number(2.0 * factor * p.sd, unit, digits=2)
     return f"{words(p.segment)} {number(factor * p.value)} ± {band} ({change})"
 

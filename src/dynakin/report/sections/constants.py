@@ -17,7 +17,7 @@ from dynakin.report.styles import BAND, BOUND_LINE, ESTIMATED_LINE
 from dynakin.report.text_tables import TextTable
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.posterior import JUDGEMENT_WORDS, KNOWN, NOTHING, group_of, posterior_in_words
-from dynakin.results.naming import number, sentence, words
+from dynakin.results.naming import number, sentence, shown_unit, words
 from dynakin.results.records import Parameter
 
 _KEY = (ESTIMATED_LINE, BOUND_LINE)
@@ -52,7 +52,7 @@ def mass_section(page: Page) -> Section:
 
 
 def _length_unit(p: Parameter) -> tuple[float, str]:
-    return (1.0, "") if p.unit == "1" else (1000.0, "mm")
+    return (1.0, "") if p.unit == "1" else shown_unit(p.unit)
 
 
 def _path(page: Page, p: Parameter, title: str, factor: float, unit: str) -> Panel:
@@ -164,7 +164,7 @@ def _label(p: Parameter, names: dict[str, str]) -> str:
 
 
 def _sizes(prior: float, after: float, unit: str) -> str:
-    factor, unit = (1000.0, "mm") if unit == "m" else (1.0, unit.replace("m2", "m²"))
+    factor, unit = shown_unit(unit)
     return f"{number(factor * prior, digits=2)} → {number(factor * after, unit, digits=2)}"
 
 
