@@ -21,10 +21,11 @@ def labels(
     """The coordinates of `Estimate.data`, for times (T,) s and the contacts that the moments are made with."""
     spec = initial.spec
     names, parents, segments = _joints(spec)
+    kinds = kinds_of(spec.segments)
     found: dict[str, Any] = {
         "time": time,
         "coordinate": model.coordinate_names,
-        "coordinate_type": ("coordinate", [kinds_of(spec.segments)[c.name] for c in spec.coordinates]),
+        "coordinate_type": ("coordinate", [kinds[c.name] for c in spec.coordinates]),
         "coordinate_segment": ("coordinate", moved_segments(spec)),
         "marker": list(initial.recorded_markers),
         "axis": list(AXES),

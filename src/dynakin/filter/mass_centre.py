@@ -11,6 +11,7 @@ import numpy.typing as npt
 from dynakin.arrays import runs
 from dynakin.bindings import _core
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.model.schema import kinds_of
 from dynakin.recordings.recording import rate_of
 from dynakin.recordings.resampling import low_pass
 
@@ -122,8 +123,8 @@ class CentreWeights:
         model = _core.Model(initial.spec)
         offset, size = model.layout.blocks["coordinates"]
         states = np.tile(initial.x0, (_POSTURES, 1))
-        turned = {axis.coordinate for s in initial.spec.segments for axis in s.axes if axis.kind == "rotation"}
-        turns = np.array([c.name in turned for c in initial.spec.coordinates if not c.locked])
+        kinds = kinds_of(initial.spec.segments)
+        turns = np.array([kinds.get(c.name) == "rotation" for c in initial.spec.coordinates if not c.locked])
         spread = np.random.default_rng(0).normal(0.0, _SPREAD_RAD, (_POSTURES, size)) * turns
         if initial.unseen_kg:
             root = {a.coordinate for s in initial.spec.segments if s.parent == "ground" for a in s.axes}

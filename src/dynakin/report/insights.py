@@ -292,11 +292,9 @@ def _constants(estimate: Estimate, metrics: Metrics) -> list[Insight]:
         verb = "was" if len(still) == 1 else "were"
         text = f"Not settled: {listed(still)} {verb} still moving in the last quarter of the recording."
         found.append(Insight("warning", "Constants", text, "A longer recording, or one with more repetitions."))
-    for group in groups:
+    for group in (group for group in groups if group not in moving):
         title, change = sentence(group.title), number(group.largest_change_percent, digits=2)
         shrunk = f"the standard deviations ended at {100.0 * group.sd_left:.0f} % of where they began"
-        if group.verdict == "moving":
-            continue
         if group.verdict == "untaught":
             source = "measured at the start" if group.title == "lengths" else "of the anthropometric table"
             text = (

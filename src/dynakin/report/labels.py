@@ -47,8 +47,7 @@ def parameter_label(parameter: Parameter, marker_names: dict[str, str]) -> str:
     """`inertia/thigh/mass` -> `thigh mass`, `marker/RKNE/x` -> `RKNE on the shank, x`."""
     _, owner, last = element(parameter.name)
     if parameter.kind == "length":
-        bare = parameter.unit == "1" or parameter.initial == 0.0  # a scale, or an amount such as knee_roll
-        return words(owner) if bare else f"{words(owner)} length"
+        return words(owner) if parameter.unit == "1" or parameter.is_correction else f"{words(owner)} length"
     if parameter.kind == "marker":
         return f"{marker_names.get(owner, owner)} on the {words(parameter.segment)}, {last}"
     last = last or owner

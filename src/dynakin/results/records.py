@@ -61,6 +61,11 @@ class Parameter:
         """``sd`` without ``skin_sd``: how sure the filter is of what it sees."""
         return math.sqrt(max(self.sd**2 - self.skin_sd**2, 0.0))
 
+    @property
+    def is_correction(self) -> bool:
+        """A length that starts at 0: a correction of a joint's place, or an amount such as ``knee_roll``."""
+        return self.kind == "length" and self.initial == 0.0
+
     def change_percent(self) -> float | None:
         """Change from the initial value in percent of its size; None where the initial value is zero."""
         if self.initial == 0.0 or not math.isfinite(self.initial):

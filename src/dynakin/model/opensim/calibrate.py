@@ -13,7 +13,7 @@ from dynakin.model.calibration.body import find_mass
 from dynakin.model.opensim.description import Marker, OpenSimModel
 from dynakin.model.opensim.sites import with_mass
 from dynakin.model.opensim.spec import free_coordinates
-from dynakin.model.schema import Interval
+from dynakin.model.schema import Interval, kinds_of
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.landmarks import DEFAULT_PAIRS, FacingPairs
 from dynakin.recordings.recording import Recording
@@ -30,11 +30,12 @@ _FEET = ("calcn", "foot", "calc", "talus")  # bodies that stand on the ground, t
 def limits_of(source: OpenSimModel) -> dict[str, Interval]:
     """Limits (rad or m) of the free coordinates; a turn that is clamped to a whole one or more has none, nor has the
     root of a body that is fixed nowhere: its ranges are those of the laboratory that the file was made in."""
-    turns = {axis.coordinate for joint in source.joints for axis in joint.axes if axis.kind == "rotation"}
+    kinds = kinds_of(source.joints)
     found = {}
     for c in free_coordinates(source):
         low, high = (-np.inf, np.inf) if c.name in source.floating else c.limits
-        found[c.name] = (-np.inf, np.inf) if c.name in turns and high - low > 2.0 * np.pi - _A_TURN else (low, high)
+        whole = kinds.get(c.name) == "rotation" and high - low > 2.0 * np.pi - _A_TURN
+        found[c.name] = (-np.inf, np.inf) if whole else (low, high)
     return found
 
 

@@ -79,7 +79,7 @@ def running_rms(values: np.ndarray, frames: int) -> np.ndarray:
 
 def band_of(p: Parameter) -> float:
     """By how much a constant may still move, in its unit; 0 of what is known for sure or has no size."""
-    if p.initial == 0.0 and p.kind == "length":
+    if p.is_correction:
         return CORRECTION_BAND * (p.prior_sd or 0.0)
     return BAND * abs(p.initial)
 
