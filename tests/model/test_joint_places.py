@@ -138,8 +138,8 @@ def test_the_femur_rolls_back_on_the_tibia_on_both_sides_alike() -> None:
             np.testing.assert_allclose(change[shank], 0.02 * bent * R[shank, :, 0], atol=2e-4)
 
 
-def squat_that_rolls(roll_m: float) -> Estimate:
-    """Both knees bent to 92 deg, whose femurs roll back by so much in a radian."""
+def squat_with(**amounts: float) -> Estimate:
+    """Both knees bent to 92 deg, with these amounts true of them."""
     initial = measured()
     time = np.arange(300) / RATE
     bent = 1.6 * np.sin(np.pi * time / 3.0) ** 2
@@ -147,21 +147,47 @@ def squat_that_rolls(roll_m: float) -> Estimate:
         f"{joint}_{side}": bent * share for side in "rl" for joint, share in (("knee_angle", 1.0), ("hip_flexion", 0.8))
     }
     x = states(initial, motion, 0.0, np.zeros(3), time)
-    x[:, list(initial.names).index("length/knee_roll")] = roll_m
+    for name, amount in amounts.items():
+        x[:, list(initial.names).index(f"length/{name}")] = amount
     trial = recording_of(initial, x, time, plates=False, noise_m=0.0005)
     return Estimator(definition(), vertical="+Y", estimate=["lengths"]).run(trial, static=standing())
 
 
 def test_the_movement_finds_how_far_the_knee_rolls() -> None:
-    found = squat_that_rolls(0.012)
+    found = squat_with(knee_roll=0.012)
     (roll,) = (parameter for parameter in found.parameters if parameter.name == "length/knee_roll")
     assert roll.value == pytest.approx(0.012, abs=0.003) and not roll.at_bound
     assert "knee roll" not in told_of_bounds(found).text
 
 
+def test_the_outer_end_of_a_knees_axis_may_lie_farther_forward_on_each_side_for_itself() -> None:
+    initial = measured()
+    names, core = list(initial.names), _core.Model(initial.spec)
+    for side, out in (("r", 1.0), ("l", -1.0)):
+        k, knee = names.index(f"length/knee_axis_{side}"), names.index(f"knee_angle_{side}")
+        assert initial.x0[k] == 0.0 and initial.sd0[k] == pytest.approx(0.05)
+        shank, thigh = (list(core.segment_names).index(f"{part}_{side}") for part in ("shank", "thigh"))
+        straight = core.initial_state()
+        straight[knee] = 0.0
+        turned = straight.copy()
+        turned[k] = 0.1
+        R, before = (_core.segment_poses(core, x)[0] for x in (turned, straight))
+        np.testing.assert_allclose(R, before, atol=1e-12)  # an axis, no turn of the shank
+        turned[knee] = 1e-6
+        bend = Rotation.from_matrix(_core.segment_poses(core, turned)[0][shank] @ R[shank].T).as_rotvec() / -1e-6
+        np.testing.assert_allclose(R[thigh].T @ bend, [np.sin(0.1) * out, 0.0, np.cos(0.1)], atol=1e-6)
+
+
+def test_the_movement_finds_how_the_knees_axes_are_turned() -> None:
+    found = squat_with(knee_axis_r=0.06, knee_axis_l=-0.04)
+    values = {parameter.name: parameter.value for parameter in found.parameters}
+    assert values["length/knee_axis_r"] == pytest.approx(0.06, abs=0.01)
+    assert values["length/knee_axis_l"] == pytest.approx(-0.04, abs=0.01)
+
+
 @pytest.mark.parametrize(("roll_m", "bound_m"), [(-0.020, -0.005), (0.045, 0.030)])
 def test_a_knee_that_rolls_as_none_does_stops_at_the_bound_and_is_told(roll_m: float, bound_m: float) -> None:
-    found = squat_that_rolls(roll_m)
+    found = squat_with(knee_roll=roll_m)
     (roll,) = (parameter for parameter in found.parameters if parameter.name == "length/knee_roll")
     assert roll.at_bound and roll.value == pytest.approx(bound_m, abs=0.0005)
     told = told_of_bounds(found)
@@ -180,11 +206,13 @@ def test_an_amount_that_the_last_frame_moved_off_its_bound_a_little_is_on_it() -
         assert found["length/knee_roll"] == expected and not found["length/thigh"]
 
 
-def test_what_a_knee_rolls_in_a_radian_has_its_own_unit() -> None:
+def test_amounts_have_units_of_their_own() -> None:
     initial = measured()
     units = {p.name: p.unit for p in parameters_of(initial, initial.x0, initial.sd0, initial.sd0)}
-    assert (units["length/knee_roll"], units["length/thigh"]) == ("m/rad", "m")
+    names = ("length/knee_roll", "length/knee_axis_r", "length/thigh")
+    assert tuple(units[name] for name in names) == ("m/rad", "rad", "m")
     assert shown_unit("m/rad") == (1000.0, "mm/rad") and shown_unit("m") == (1000.0, "mm")
+    assert shown_unit("rad") == (pytest.approx(57.29578), "deg")
     assert shown_unit("kg m2") == (1.0, "kg m²")
 
 
@@ -197,3 +225,8 @@ def test_a_knee_that_no_marker_shows_does_not_roll() -> None:
     assert "knee_roll" not in fixed_lengths(model, set(), set())
     assert "knee_roll" not in fixed_lengths(model, {"shank_r", "foot_r"}, set())  # the other knee shows it
     assert "knee_roll" in fixed_lengths(model, {"shank_r", "foot_r", "shank_l", "foot_l"}, set())
+
+
+def test_the_axis_of_a_knee_that_no_marker_shows_stays_where_it_is() -> None:
+    fixed = fixed_lengths(definition().model, {"shank_r", "foot_r"}, set())
+    assert "knee_axis_r" in fixed and "knee_axis_l" not in fixed

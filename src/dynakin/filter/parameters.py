@@ -32,7 +32,7 @@ def parameters_of(
     """
     segments = {marker.name: marker.segment for marker in initial.spec.markers}
     skin = length_skin_sd(initial, length_skin_fraction)
-    units = dict.fromkeys(_amounts_of_rolling(initial), "m/rad") | dict.fromkeys(initial.dimensionless, "1")
+    units = _units_of_amounts(initial) | dict.fromkeys(initial.dimensionless, "1")
     found = []
     for k, name in enumerate(initial.names):
         word, owner, last = element(name)
@@ -72,11 +72,12 @@ def parameters_of(
     return found
 
 
-def _amounts_of_rolling(initial: CalibratedModel) -> set[str]:
-    """Lengths that scale how far a joint moves along as it turns."""
-    segments = initial.spec.segments
-    kinds, axes = kinds_of(segments), [axis for segment in segments for axis in segment.axes if axis.scale]
-    return {axis.scale for axis in axes if axis.kind == "translation" and kinds[axis.coordinate] == "rotation"}
+def _units_of_amounts(initial: CalibratedModel) -> dict[str, str]:
+    """Of lengths that scale an axis of a joint that turns: how far it moves along in a radian, or is turned itself."""
+    kinds = kinds_of(initial.spec.segments)
+    axes = [axis for segment in initial.spec.segments for axis in segment.axes if axis.scale]
+    turning = [axis for axis in axes if kinds[axis.coordinate] == "rotation"]
+    return {a.scale: "m/rad" if a.kind == "translation" else "rad" for a in turning}
 
 
 def length_skin_sd(initial: CalibratedModel, share: float) -> dict[str, float]:

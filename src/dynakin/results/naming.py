@@ -48,9 +48,11 @@ def number(value: float | None, unit: str = "", digits: int = 3) -> str:
 
 
 def shown_unit(unit: str) -> tuple[float, str]:
-    """Factor and unit in which a constant is shown: lengths in mm."""
+    """Factor and unit in which a constant is shown: lengths in mm, angles in degrees."""
     if unit.partition("/")[0] == "m":
         return 1000.0, f"m{unit}"
+    if unit == "rad":
+        return float(np.rad2deg(1.0)), "deg"
     return 1.0, unit.replace("m2", "m²")
 
 

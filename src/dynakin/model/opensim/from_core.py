@@ -27,7 +27,7 @@ from dynakin.model.opensim.description import (
     OpenSimModel,
     Vector,
 )
-from dynakin.model.opensim.functions import IDENTITY, Function, joined, polynomial
+from dynakin.model.opensim.functions import IDENTITY, Function, is_constant, joined, polynomial
 from dynakin.model.schema import Interval
 
 
@@ -102,9 +102,9 @@ class _Tree:
         own: dict[str, Coordinate] = {}
         axes = []
         for axis in group:
-            coordinate = self._coordinate(axis.coordinate, child, own)
-            direction = _vector(axis.direction)
-            axes.append(JointAxis(_kind(axis), direction, coordinate, self._functions(axis)))
+            functions = self._functions(axis)
+            coordinate = None if is_constant(functions) else self._coordinate(axis.coordinate, child, own)
+            axes.append(JointAxis(_kind(axis), _vector(axis.direction), coordinate, functions))
         return Joint(
             name,
             "CustomJoint" if group else "WeldJoint",
@@ -143,12 +143,14 @@ def _kind(axis: _core.AxisSpec) -> Literal["rotation", "translation"]:
 
 
 def _groups(axes: list[_core.AxisSpec]) -> list[list[_core.AxisSpec]]:
-    """Runs of at most three translations and then at most three rotations; one empty run for a weld."""
+    """Runs of at most three translations and then at most three rotations, no two along one line, which OpenSim
+    refuses; one empty run for a weld."""
     groups: list[list[_core.AxisSpec]] = [[]]
     for axis in axes:
         kinds = [entry.kind for entry in groups[-1]]
-        full = kinds.count(axis.kind) == 3 or (axis.kind == "translation" and "rotation" in kinds)
-        if full:
+        alike = [entry.direction for entry in groups[-1] if entry.kind == axis.kind]
+        full = len(alike) == 3 or (axis.kind == "translation" and "rotation" in kinds)
+        if full or any(np.linalg.norm(np.cross(axis.direction, other)) < 1e-6 for other in alike):
             groups.append([])
         groups[-1].append(axis)
     return groups
