@@ -166,7 +166,7 @@ def foot_prior(loads: FootLoads, k: int, weight: float, root: Array, alone: Flag
     place = np.where(seen[:, None], soles.pressure[:, k], root * [1.0, 0.0, 1.0])
     spread_m2 = np.where(seen[:, None, None], soles.pressure_covariance[:, k], np.eye(2))
     stance, share = soles.stance[:, k], soles.share[:, k]
-    to_root = root + [0.0, PIVOT_M, 0.0] - place
+    to_root = root + np.array([0.0, PIVOT_M, 0.0]) - place
     direction = np.concatenate([to_root / np.maximum(to_root[:, [1]], _LEAST_HEIGHT_M), np.zeros_like(root)], axis=1)
     direction[:, 1] = 1.0
     load = weight * (PUSH_LEAST_SD + PUSH_SD * stance) / (PUSH_LEAST_SD + PUSH_SD)  # the weight, in full stance

@@ -21,7 +21,7 @@ EARLY_S, LATE_S = 0.02, 0.07
 accelerations do not say it. By the plates of the walks at hand it is 0.02 and 0.06 s on average, but -0.03 to 0.05 and
 -0.02 to 0.09 s from one to the other: how long a marker stays low depends on where on the foot it is."""
 DOWN_S, OFF_S = (-0.06, 0.04), (-0.03, 0.15)
-"""Where about the first and the last frame in which it is slow and low its touch-down and its toe-off are looked for."""
+"""Where its touch-down and toe-off are looked for, about the first and the last frame in which it is slow and low."""
 PASSING_S = 0.12
 """How long a foot takes to load and to unload where no other one takes or gives the load at that time (the edges of a
 run's stance), or one that goes on standing does."""
