@@ -4,11 +4,11 @@ passes from foot to foot."""
 from __future__ import annotations
 
 from collections.abc import Sequence
+from math import factorial
 from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
-from scipy.signal import savgol_coeffs
 
 from dynakin.arrays import runs
 from dynakin.recordings.feet.contact import FootContact
@@ -120,10 +120,11 @@ def _highest(of: Array | None, frame: int, around_s: tuple[float, float], rate: 
 
 
 def _derivative(path: Array, rate: float, order: int) -> Array:
-    """(T,) derivative of a path (T,) by a cubic through its neighbours; NaN at the ends and where one is missing."""
+    """(T,) derivative of a path (T,) by a cubic through its neighbours (Savitzky & Golay 1964); NaN at the ends and where one is missing."""
     half = max(2, round(_HALF_S * rate))
     found = np.full(len(path), np.nan)
     if len(path) > 2 * half:
-        weights = savgol_coeffs(2 * half + 1, 3, deriv=order, delta=1.0 / rate, use="dot")
+        cubic = np.vander(np.arange(-half, half + 1) / rate, 4, increasing=True)
+        weights = factorial(order) * np.linalg.pinv(cubic)[order]
         found[half:-half] = np.correlate(path, weights, mode="valid")
     return found
