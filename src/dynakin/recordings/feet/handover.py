@@ -120,7 +120,8 @@ def _highest(of: Array | None, frame: int, around_s: tuple[float, float], rate: 
 
 
 def _derivative(path: Array, rate: float, order: int) -> Array:
-    """(T,) derivative of a path (T,) by a cubic through its neighbours (Savitzky & Golay 1964); NaN at the ends and where one is missing."""
+    """(T,) derivative of a path (T,) by a cubic through its neighbours (Savitzky & Golay 1964); NaN at the ends and
+    where one is missing."""
     half = max(2, round(_HALF_S * rate))
     found = np.full(len(path), np.nan)
     if len(path) > 2 * half:
