@@ -10,7 +10,15 @@ import numpy as np
 import pytest
 
 from dynakin.filter.contacts import RESIDUAL, ContactLoads, carry
-from dynakin.filter.expected import UNDECLARED_SD, expected_loads, foot_prior, plate_errors
+from dynakin.filter.expected import (
+    HANDED_OVER_S,
+    PIVOT_M,
+    SHEAR_SD,
+    UNDECLARED_SD,
+    expected_loads,
+    foot_prior,
+    plate_errors,
+)
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, SHARED_PLATE, UNMEASURED
 from dynakin.recordings.feet.loads import MEASURED, OFF_PLATE, SHARED, SWING, UNKNOWN, FootLoads
 from dynakin.recordings.feet.soles import Soles
@@ -104,10 +112,11 @@ def test_what_is_expected_is_about_the_expected_centre_of_pressure() -> None:
     push = force[:, 1]
     assert push.mean() == pytest.approx(WEIGHT / 2, rel=0.01)  # of two feet that stand fully, half each
     assert push.std() == pytest.approx(0.45 * WEIGHT, rel=0.01)
-    direction = (ROOT - PRESSURE[1]) / (ROOT - PRESSURE[1])[1]
+    to_pivot = ROOT + np.array([0.0, PIVOT_M, 0.0]) - PRESSURE[1]
+    direction = to_pivot / to_pivot[1]
     np.testing.assert_allclose(force.mean(axis=0), direction * WEIGHT / 2, atol=2.0)
     shear = force[:, [0, 2]] - push[:, None] * direction[[0, 2]]
-    np.testing.assert_allclose(shear.std(axis=0), 0.12 * WEIGHT, rtol=0.01)
+    np.testing.assert_allclose(shear.std(axis=0), SHEAR_SD * WEIGHT, rtol=0.01)
     np.testing.assert_allclose(np.corrcoef(np.c_[shear, push].T), np.eye(3), atol=0.01)
     place = np.c_[moment_there[:, 2], -moment_there[:, 0]] / WEIGHT  # of a push of the weight, from what is expected
     np.testing.assert_allclose(place.mean(axis=0), 0.0, atol=3e-4)
@@ -125,6 +134,20 @@ def test_the_weight_is_divided_by_stance_and_a_foot_that_sets_down_is_surer() ->
     assert first.spread[0, 1, 1] == pytest.approx(0.15 * WEIGHT) and second.spread[0, 1, 1] == pytest.approx(
         0.45 * WEIGHT
     )
+
+
+def test_a_foot_that_hands_over_may_do_so_earlier_or_later() -> None:
+    """Its push is as unsure as a shift of its share by `HANDED_OVER_S` makes it, by differences."""
+    loads, rate = make_believe([(OFF_PLATE, OFF_PLATE)] * 21), 100.0
+    weight = np.linspace(1.0, 0.0, 21)
+    soles = replace(loads.soles, stance=np.stack([weight, 1.0 - weight], axis=1), rate=rate)
+    root, nothing = np.tile(ROOT, (21, 1)), np.zeros(21, bool)
+    still, passes = (
+        foot_prior(replace(loads, soles=own), 0, WEIGHT, root, nothing).spread[10, 1, 1]
+        for own in (replace(soles, rate=0.0), soles)
+    )
+    later = soles.share[10 - round(HANDED_OVER_S * rate), 0] - soles.share[10, 0]
+    assert passes == pytest.approx(np.hypot(still, WEIGHT * later), rel=1e-6)
 
 
 def test_codes_names_and_what_does_not_touch() -> None:

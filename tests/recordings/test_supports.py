@@ -10,8 +10,8 @@ import pytest
 from dynakin.arrays import runs
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.belt import one_velocity
+from dynakin.recordings.feet.handover import PASSING_S
 from dynakin.recordings.feet.loads import MEASURED, OFF_PLATE, SHARED, SWING, UNKNOWN, FootLoads
-from dynakin.recordings.feet.soles import PASSING_S
 from dynakin.recordings.plates.ground_plate import GroundPlate
 from support.made_steps import (
     FOOT_MARKERS,

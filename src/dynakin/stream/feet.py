@@ -25,8 +25,9 @@ from dynakin.recordings.feet.contact import (
     RESTS_S,
     SLOW_M_S,
 )
+from dynakin.recordings.feet.handover import EARLY_S, PASSING_S, smooth_step
 from dynakin.recordings.feet.loads import SHARED, FootLoads, divided
-from dynakin.recordings.feet.soles import EARLY_S, PASSING_S, FootShape, Soles, smooth_step
+from dynakin.recordings.feet.soles import FootShape, Soles
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import FLAT_FRAMES, GroundPlate, level_pressure
 from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N

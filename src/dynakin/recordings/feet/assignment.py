@@ -18,8 +18,9 @@ from dynakin.arrays import runs
 from dynakin.errors import ConfigError
 from dynakin.recordings.feet.contact import GAP_S, FootContact, foot_contacts
 from dynakin.recordings.feet.findings import exchanged, plate_findings
+from dynakin.recordings.feet.handover import EARLY_S, LATE_S
 from dynakin.recordings.feet.loads import FootLoads, divided
-from dynakin.recordings.feet.soles import EARLY_S, LATE_S, Soles
+from dynakin.recordings.feet.soles import Soles
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.ground_plate import GroundPlate

@@ -1,15 +1,15 @@
-"""Where the sole of each foot is, how large it is, and how the load may pass from foot to foot."""
+"""Where the sole of each foot is, how large it is, and where on it the load is expected."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import runs
 from dynakin.recordings.feet.contact import FootContact
+from dynakin.recordings.feet.handover import Span, spans_of, stance_weights, supported
 from dynakin.recordings.recording import Array
 
 Flags = npt.NDArray[np.bool_]
@@ -26,16 +26,15 @@ LEAST_M = 0.10
 """Markers nearer to each other than that do not show a foot's length."""
 BRIDGED_S = 0.25
 """Gap in all of a foot's markers over which its sole is drawn on by a straight line."""
-EARLY_S, LATE_S = 0.02, 0.07
-"""How long before a foot's markers are slow and low the plates are touched, and how long after they are left. By the
-plates of the walks and the landing at hand 0.02 and 0.06 s, their means; 0.07 s gives the better wrench where plates
-are withheld from `walking1` and `MH0222_BP06`."""
-PASSING_S = 0.12
-"""How long a foot takes to load and to unload: the double support of a walk, or the edges of a run's stance."""
 PRESSURE_REACH, ROLLED_M, FLAT_TILT_M = 0.55, 0.012, -0.006
 """The centre of pressure lies 0.55 of half the sole's length behind or before its middle once heel or toe are some
 12 mm above the other, measured from their lowest places: plates of `walking1`, `squats1` and `DJ1`; the walks of three
-other laboratories have 0.5 to 0.6 (0.7 of the simulated one in `truth3d`)."""
+other laboratories have 0.5 to 0.6 (0.7 of the simulated one in `truth3d`). `FLAT_TILT_M` is how much higher the toe's
+marker lies while the foot is flat, over their lowest places, where no stance shows it (`FootShape.flat_m`)."""
+STILL_M_S, STILL_S = 0.05, 0.1
+"""A foot is flat while heel and toe touch and neither rises against the other by more; a recording that has less of it
+says nothing. By its own tilt the expected place is off by 0.09, not 0.20 of half the sole's length (`walking1`), 0.21,
+not 0.34 (`squats1`)."""
 ROLLED_SD, FLAT_SD, ACROSS_SD = 0.42, 0.52, 0.63
 """How far it may lie from there, as parts of half the sole's length once the foot has rolled, of that more while it is
 flat, where some mm of skin decide, and of half its width. Three times what the plates of these recordings show: a foot
@@ -58,6 +57,7 @@ class Soles:
             knows yet who comes next: their sum, 1 at most).
         pressure: (T, F, 3) m, where its centre of pressure is expected, by how far the foot has rolled.
         pressure_covariance: (T, F, 2, 2) m^2 of that along X and Z of the ground.
+        rate: Hz, of the frames; 0 of a single one.
     """
 
     middle: Array
@@ -67,6 +67,7 @@ class Soles:
     support: Array
     pressure: Array
     pressure_covariance: Array
+    rate: float = 0.0
 
     @classmethod
     def of(cls, contacts: list[FootContact | None], forward: Array, rate: float, frames: int) -> Soles:
@@ -81,48 +82,37 @@ class Soles:
         bears, stance = np.ones((frames, F), dtype=bool), np.ones((frames, F))
         pressure, covariance = middle.copy(), np.tile((_UNSEEN_SD * HALF_LENGTH_M) ** 2 * np.eye(2), (frames, F, 1, 1))
         stood = np.full(frames, None in contacts)
+        spans: list[list[Span]] = [[] for _ in contacts]
         for k, foot in enumerate(contacts):
             if foot is None:
                 continue
             stood |= foot.stands | ~foot.seen
-            shape = _shape(foot, forward)
+            shape = _shape(foot, forward, rate)
+            spans[k] = spans_of(foot, shape.ends, rate)
             half[k] = shape.half_m
             place = _drawn_on(shape.middle(foot.outline), rate)
             ahead, covariance[:, k] = shape.rolled(foot.outline, foot.rise_m)
             middle[:, k] = np.stack([place[:, 0], foot.support_m, place[:, 1]], axis=1)
             pressure[:, k] = middle[:, k] + np.stack([ahead[:, 0], np.zeros(frames), ahead[:, 1]], axis=1)
             bears[:, k] = foot.bears(rate)
-            stance[:, k] = np.where(
-                foot.seen, stance_weights(foot.stances, rate, frames), 1.0
-            )  # unseen: it may bear all
-        support = np.maximum(stance_weights(runs(stood), rate, frames), np.minimum(stance.sum(axis=1), 1.0))
-        return cls(middle, half, bears, stance, support, pressure, covariance)
+        weights = stance_weights(spans, rate, frames)
+        for k, foot in enumerate(contacts):
+            if foot is not None:
+                stance[:, k] = np.where(foot.seen, weights[:, k], 1.0)  # unseen: it may bear all
+        together = stance_weights([supported(stood, spans, rate)], rate, frames)[:, 0]
+        support = np.maximum(together, np.minimum(stance.sum(axis=1), 1.0))
+        return cls(middle, half, bears, stance, support, pressure, covariance, rate if frames > 1 else 0.0)
 
     @property
     def share(self) -> Array:
         """(T, F) part of the weight that each foot is expected to bear."""
         return np.asarray(self.stance * (self.support / np.maximum(self.stance.sum(axis=1), _LEAST_STANCE))[:, None])
 
-
-def stance_weights(stances: Sequence[tuple[int, int]], rate: float, frames: int) -> Array:
-    """(T,) weights of stances, frames [first, end): each rises from 0 to 1 over `PASSING_S` from its touch-down and
-    falls to 0 as long before its toe-off; one that the recording cuts off does not rise, or fall, there."""
-    found = np.zeros(frames)
-    if frames < 2:
-        found[[first for first, _ in stances]] = 1.0
-        return found
-    at = np.arange(frames)
-    for first, end in stances:
-        up = np.inf if first == 0 else (at - first) / rate + EARLY_S
-        down = np.inf if end == frames else (end - 1 - at) / rate + LATE_S
-        found = np.maximum(found, smooth_step(np.minimum(up, down) * np.ones(frames) / PASSING_S))
-    return found
-
-
-def smooth_step(part: Array) -> Array:
-    """From 0 at 0 to 1 at 1, level at both ends."""
-    x = np.clip(part, 0.0, 1.0)
-    return np.asarray(x * x * (3.0 - 2.0 * x))
+    @property
+    def passing(self) -> Array:
+        """(T, F) 1/s: how fast that changes; 0 of a single frame."""
+        share = self.share
+        return np.abs(np.gradient(share, axis=0)) * self.rate if len(share) > 1 else np.zeros_like(share)
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,12 +124,14 @@ class FootShape:
         ahead, aside: where its middle lies: that part of the way from the one to the other, that far to the right of it
             over that way.
         half_m: (2,) half its length and half its width.
+        flat_m: how much higher the back's marker is than the front's, both over their lowest places, when it is flat.
     """
 
     ends: tuple[int, int] | None
     ahead: float
     aside: float
     half_m: Array
+    flat_m: float = FLAT_TILT_M
 
     @classmethod
     def of(cls, points: Array, forward: Array) -> FootShape:
@@ -185,7 +177,7 @@ class FootShape:
         along = points[:, front] - points[:, back]
         with np.errstate(invalid="ignore"):
             along = along / np.linalg.norm(along, axis=1, keepdims=True)
-            at = np.tanh((rise[:, back] - rise[:, front] - FLAT_TILT_M) / ROLLED_M)
+            at = np.tanh((rise[:, back] - rise[:, front] - self.flat_m) / ROLLED_M)
         known = np.isfinite(at) & np.isfinite(along).all(axis=1)
         along, at = np.where(known[:, None], along, 0.0), np.where(known, at, 0.0)
         sd = half * np.where(known, ROLLED_SD + FLAT_SD * (1.0 - at**2), _UNSEEN_SD)
@@ -195,10 +187,22 @@ class FootShape:
         return PRESSURE_REACH * half * at[:, None] * along, covariance
 
 
-def _shape(foot: FootContact, forward: Array) -> FootShape:
+def _shape(foot: FootContact, forward: Array, rate: float) -> FootShape:
     seen = np.isfinite(foot.outline).all(axis=(1, 2))
     flat = seen & foot.stands if (seen & foot.stands).any() else seen
-    return FootShape.of(foot.outline[flat], forward)
+    shape = FootShape.of(foot.outline[flat], forward)
+    return shape if shape.ends is None else replace(shape, flat_m=_flat_tilt(foot, shape.ends, rate))
+
+
+def _flat_tilt(foot: FootContact, ends: tuple[int, int], rate: float) -> float:
+    """By how much (m) the marker at the back of a foot is higher than that at its front while it is flat."""
+    tilt = foot.rise_m[:, ends[0]] - foot.rise_m[:, ends[1]]
+    if len(tilt) < 2:
+        return FLAT_TILT_M
+    with np.errstate(invalid="ignore"):
+        still = np.abs(np.gradient(tilt)) * rate < STILL_M_S
+    flat = foot.touching[:, ends].all(axis=1) & still
+    return float(np.median(tilt[flat])) if np.count_nonzero(flat) >= STILL_S * rate else FLAT_TILT_M
 
 
 def _mean(points: Array) -> Array:

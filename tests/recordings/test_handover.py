@@ -1,0 +1,95 @@
+"""When stances take their load and give it up, and how it passes from foot to foot."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from dynakin.recordings.feet.contact import FootContact
+from dynakin.recordings.feet.handover import (
+    BOTH_S,
+    EARLY_S,
+    LATE_S,
+    PASSING_S,
+    Span,
+    spans_of,
+    stance_weights,
+    supported,
+)
+
+RATE_HZ, FRAMES = 100.0, 200
+
+
+def smooth(path: np.ndarray, frames: int = 5) -> np.ndarray:
+    """As soft as skin is: a Hann window."""
+    window = np.hanning(2 * frames + 3)
+    return np.convolve(np.pad(path, len(window), mode="edge"), window / window.sum(), "same")[
+        len(window) : -len(window)
+    ]
+
+
+def a_step(down: int, off: int, first: int, end: int, belt_m_s: float = 0.0) -> FootContact:
+    """A heel that falls at 0.6 m/s until frame ``down`` and lies still, a toe that lies still until frame ``off`` and
+    leaves forward and up; markers are slow and low in frames [first, end). Markers: back, front."""
+    at = np.arange(FRAMES) / RATE_HZ
+    heel = smooth(0.6 * np.maximum(down / RATE_HZ - at, 0.0))
+    gone = np.maximum(at - off / RATE_HZ, 0.0)
+    ahead, up = smooth(8.0 * gone**1.5), smooth(2.0 * gone**1.5)
+    stands = (np.arange(FRAMES) >= first) & (np.arange(FRAMES) < end)
+    outline = np.zeros((FRAMES, 2, 2))
+    outline[:, 1, 0] = 0.2 + ahead
+    outline[..., 0] += belt_m_s * at[:, None]
+    blank: Any = np.zeros(FRAMES, bool)
+    return FootContact(
+        outline, np.stack([heel, up], axis=1), ~blank, np.zeros((FRAMES, 0), bool), np.zeros(FRAMES),
+        np.tile([belt_m_s, 0.0], (FRAMES, 1)), np.tile(stands[:, None], (1, 2)), stands, ((first, end),), blank, blank,
+        blank,
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("belt_m_s", [0.0, -1.3])
+@pytest.mark.parametrize("early", [-2, 0, 4])
+def test_accelerations_say_when_whatever_the_thresholds_say(early: int, belt_m_s: float) -> None:
+    """The same touch-down and toe-off where a marker is slow and low some hundredths earlier or later."""
+    (span,) = spans_of(a_step(50, 120, 50 - early, 113 + early, belt_m_s), (0, 1), RATE_HZ)
+    assert span.on == pytest.approx(50, abs=2) and span.off == pytest.approx(120, abs=4)
+
+
+def test_where_nothing_shows_it_fixed_delays_are_taken() -> None:
+    step = a_step(50, 120, 52, 113)
+    for foot, ends in ((step, None), (replace(step, rise_m=np.full((FRAMES, 2), np.nan)), (0, 1))):
+        (span,) = spans_of(foot, ends, RATE_HZ)
+        assert span.on == 52 - EARLY_S * RATE_HZ and span.off == 112 + LATE_S * RATE_HZ
+    (cut,) = spans_of(a_step(50, 120, 0, FRAMES), (0, 1), RATE_HZ)
+    assert cut.on == -np.inf and cut.off == np.inf
+
+
+def test_one_foot_takes_what_the_other_gives() -> None:
+    """In a double support of a walk the two weights are one together, and half each in its middle; where the feet stand
+    together for longer than a walk does they are not."""
+    right, left = Span(0, 60, -np.inf, 62.0), Span(50, 140, 48.0, 130.0)
+    weights = stance_weights([[right], [left]], RATE_HZ, FRAMES)
+    both = slice(48, 63)
+    np.testing.assert_allclose(weights[both].sum(axis=1), 1.0)
+    np.testing.assert_allclose(weights[55], 0.5)
+    assert (np.diff(weights[both, 1]) > 0.0).all() and weights[47, 1] == 0.0 and weights[62, 1] == 1.0
+    shortest = stance_weights([[right], [replaced(left, on=60.0)]], RATE_HZ, FRAMES)
+    assert shortest[60 + round(BOTH_S[0] * RATE_HZ), 1] == 1.0 > shortest[63, 1]
+    longer = stance_weights([[replaced(right, off=100.0)], [left]], RATE_HZ, FRAMES)
+    assert longer[48 + round(PASSING_S * RATE_HZ), 1] == 1.0 and longer[70, 0] == 1.0
+
+
+def replaced(span: Span, **changed: float) -> Span:
+    return span._replace(**changed)
+
+
+def test_all_feet_together_stand_from_the_first_load_to_the_last() -> None:
+    stood = np.zeros(FRAMES, bool)
+    stood[20:120] = True
+    spans = [[Span(20, 70, 17.0, 75.0)], [Span(60, 120, 58.0, 127.0)]]
+    assert supported(stood, spans, RATE_HZ) == [Span(20, 120, 17.0, 127.0)]
+    (unseen,) = supported(stood, [[], []], RATE_HZ)
+    assert unseen.on == 20 - EARLY_S * RATE_HZ and unseen.off == 119 + LATE_S * RATE_HZ
