@@ -1,5 +1,5 @@
-"""What the filter's covariance cannot know: joints beside where they are, skin that follows them, and inertia that
-a recording leaves open.
+"""What the filter's covariance cannot know: joints beside where they are, skin that follows them, bodies' centres of
+mass, inertia that a recording leaves open, and how lively the movement is.
 
 A consider covariance (Schmidt 1966): nothing is learned of these errors; their effect on what is reported is worked out
 afterwards and added to the filter's own variances ([derivations](derivations.md), section 17).
@@ -28,7 +28,7 @@ Array = npt.NDArray[np.float64]
 
 BLOCKS = ("coordinates", "speeds", "accelerations", "moments")
 OF_JOINTS = get_args(Kind)
-KINDS = (*OF_JOINTS, "skin")
+KINDS = (*OF_JOINTS, "skin", "mass_centre")
 """What `Sizes` has a size of. What is not known of inertia has none: it is in the filter's covariance."""
 
 
@@ -42,10 +42,9 @@ class Sizes:
             three.
         root: rad, of the turn of the pelvis' frame in the pelvis.
         skin: of the displacement of a marker that follows a joint's angle, as a fraction of the declared size.
-        own_motion, own_moments: factors on the filter's own deviations of what later frames helped to estimate. What
-            shows beside a model that is found from markers lasts and is shared by them, so that frames tell less than
-            the filter counts; a scaled skeleton leaves less at the root than the declared residual, but speeds
-            in walks lie in their intervals in 82 to 84 % without the factor.
+        mass_centre: m, of the centre of mass of each body beside where the model has it.
+        own_moving: what the factor on the filter's own variance of speeds and accelerations grows by with the
+            movement's liveliness (`OWN_LATE`).
         inertia: whether what a recording leaves open of inertia counts in moments at least by the declared noise, as in
             `Estimate.parameters`, where the noise that was found in the recording takes it for better known.
     """
@@ -57,41 +56,37 @@ class Sizes:
     ball_axes: float
     root: float
     skin: float
-    own_motion: float = 1.0
-    own_moments: float = 1.0
+    mass_centre: float
+    own_moving: float
     inertia: bool = True
 
     def scaled(self, factor: float) -> Sizes:
         """The errors of joints and skin times a factor."""
         return replace(self, **{kind: factor * getattr(self, kind) for kind in KINDS})
 
-    def own(self, block: str) -> float:
-        """Factor on the filter's own deviations of a block."""
-        return self.own_moments if block == "moments" else self.own_motion
-
 
 LANDMARKS = Sizes(
-    hinge_centre=0.003,
-    ball_centre=0.003,
+    hinge_centre=0.0042,
+    ball_centre=0.005,
     hinge_axes=np.radians(2.0),
-    pair_axes=np.radians(6.0),
-    ball_axes=np.radians(0.8),
-    root=np.radians(1.2),
-    skin=0.15,
-    own_motion=1.6,
-    own_moments=1.5,
+    pair_axes=np.radians(5.0),
+    ball_axes=np.radians(0.4),
+    root=np.radians(0.5),
+    skin=0.12,
+    mass_centre=0.02,
+    own_moving=0.15,
 )
 """Joints that are found from markers on the skin."""
 SCALED = Sizes(
-    hinge_centre=0.002,
+    hinge_centre=0.0014,
     ball_centre=0.0016,
-    hinge_axes=np.radians(1.2),
-    pair_axes=np.radians(1.2),
+    hinge_axes=np.radians(1.3),
+    pair_axes=np.radians(1.3),
     ball_axes=np.radians(0.8),
-    root=np.radians(1.0),
-    skin=0.095,
-    own_motion=1.2,
-    own_moments=0.55,
+    root=np.radians(0.9),
+    skin=0.08,
+    mass_centre=0.003,
+    own_moving=0.06,
     inertia=False,
 )
 """Joints of a skeleton that was scaled to the person (.osim)."""
@@ -102,26 +97,49 @@ def usual_sizes(calibrated: CalibratedModel) -> Sizes:
     return SCALED if calibrated.plan is None else LANDMARKS
 
 
+Own = dict[str, tuple[float, float]]
+OWN_LATE: Own = {"coordinates": (1.0, 0.0), "speeds": (0.25, 1.0), "accelerations": (0.25, 1.0), "moments": (0.25, 0.0)}
+"""Factor on the filter's own variance of a block where later frames helped: the first number, and the second times
+`Sizes.own_moving` and the movement's `liveliness`. One density of jerk serves all movements: of the smoothed variance
+of a speed half is what such jerk leaves unseen, of an acceleration five sixths, and a calm movement has none of it, a
+lively one more."""
+OWN_AT_ONCE: Own = {
+    "coordinates": (1.0, 0.0),
+    "speeds": (0.25, 0.4),
+    "accelerations": (0.25, 0.4),
+    "moments": (0.1, 0.15),
+}
+"""The same without later frames; the second number is by itself."""
+
+
+def liveliness(acceleration: Array, sd: Array) -> Array:
+    """(...,) mean square of accelerations (..., K) over the filter's own deviations of them, of what moves."""
+    moves = sd > 0.0
+    ratio = np.divide(acceleration, sd, out=np.zeros_like(sd), where=moves)
+    return np.asarray(np.square(ratio).sum(axis=-1) / np.maximum(moves.sum(axis=-1), 1))
+
+
 Parts = dict[str, dict[str, Array]]
 
 
 def reported(
-    sizes: Sizes, variance_scale: float, own: Mapping[str, Array], parts: Parts, *, late: bool
+    sizes: Sizes, variance_scale: float, own: Mapping[str, Array], parts: Parts, lively: Array, *, late: bool
 ) -> dict[str, Array]:
     """Standard deviations that are reported: block -> (..., C).
 
     Args:
         variance_scale: of the noise of the filter. own: the filter's own deviations, by block. parts: variances as of
-            `Systematic.over_time`. late: whether later frames helped.
+            `Systematic.over_time`. lively: (...,) as of `liveliness`. late: whether later frames helped.
     """
     found = {}
     for block, sd in own.items():
-        factor = sizes.own(block) if late else 1.0
-        variance = np.square(factor * sd)
+        still, moving = (OWN_LATE if late else OWN_AT_ONCE)[block]
+        factor = still + moving * (sizes.own_moving if late else 1.0) * lively[..., None]
+        variance = factor * np.square(sd)
         for kind in KINDS:
             variance = variance + getattr(sizes, kind) ** 2 * parts[kind][block]
         if sizes.inertia:  # the filter's own part has so much of it already
-            variance = variance + max(1.0 - factor**2 * variance_scale, 0.0) * parts["inertia"][block]
+            variance = variance + np.maximum(1.0 - factor * variance_scale, 0.0) * parts["inertia"][block]
         found[block] = np.sqrt(variance)
     return found
 
@@ -173,9 +191,9 @@ class Systematic:
         self._segments = {name: k for k, name in enumerate(segments)}
         self._model = _core.Model(spec)
         self._variance_scale = noise.variance_scale
-        least = min(self.sizes.own_moments, 1.0)  # the factor on the filter's own part, late or at once
-        open_ = self.sizes.inertia and least**2 * noise.variance_scale < 1.0
-        self._inertia = [k for k, name in enumerate(calibrated.names) if open_ and name.startswith("inertia/")]
+        self._inertia = [
+            k for k, name in enumerate(calibrated.names) if self.sizes.inertia and name.startswith("inertia/")
+        ]
 
     def _displacements(self, jacobian: Array) -> Array:
         """(3 M, S): what each source does to the markers of the model as it is posed."""
@@ -221,6 +239,9 @@ class Systematic:
             outputs = (B - self._B0, Bd, Bdd, moved)  # of angles what changes with the posture: a zero is a definition
             found[kind] = self._labelled(*(np.square(values[:, chosen]).sum(axis=1) for values in outputs))
         found["skin"] = self._labelled(*self._skin(q, qd, qdd, (G, Gd, Gdd), (Tq, Tv, Ta)))
+        still = np.zeros_like(q)
+        displaced = T[:, errors.first_moments] * errors.masses
+        found["mass_centre"] = self._labelled(still, still, still, np.square(displaced).sum(axis=1))
         return found
 
     def _skin(
@@ -315,14 +336,24 @@ class Systematic:
         """
         inertia = covariance[np.ix_(self._inertia, self._inertia)] / self._variance_scale
         own = {block: found[block] for block in BLOCKS}
-        return reported(self.sizes, self._variance_scale, own, self._at(x, inertia, wrench, segments), late=late)
+        K = len(self._free)
+        lively = liveliness(x[2 * K : 3 * K], own["accelerations"][self._free])
+        parts = self._at(x, inertia, wrench, segments)
+        return reported(self.sizes, self._variance_scale, own, parts, lively, late=late)
 
     def added_over_time(self, data: xr.Dataset, *, late: bool) -> xr.Dataset:
         """The same of a recording: ``data`` with other ``coordinates_sd`` ... ``moments_sd``."""
         order = ("time", "coordinate")
         own = {block: data[f"{block}_sd"].transpose(*order).values for block in BLOCKS}
-        sd = reported(self.sizes, self._variance_scale, own, self.over_time(data), late=late)
+        sd = reported(self.sizes, self._variance_scale, own, self.over_time(data), self.lively(data), late=late)
         return data.assign({f"{block}_sd": (order, sd[block]) for block in BLOCKS})
+
+    def lively(self, data: xr.Dataset) -> Array:
+        """(T,) `liveliness` of a recording, by its states and the filter's own ``accelerations_sd``."""
+        K = len(self._free)
+        states = data["state"].transpose("time", "element").values
+        sd = data["accelerations_sd"].transpose("time", "coordinate").values[:, self._free]
+        return liveliness(states[:, 2 * K : 3 * K], sd)
 
 
 def _differences(values: list[Array]) -> tuple[Array, Array, Array]:
