@@ -17,11 +17,13 @@ from dynakin.bindings import _core
 from dynakin.filter.joint_errors import JointErrors
 from dynakin.filter.systematic import (
     _STEP_S,
+    BLOCKS,
     COMMON,
     KINDS,
     OWN_AT_ONCE,
     OWN_LATE,
     SKIN_ANGLE_RAD,
+    SPEEDS_STILL,
     Sizes,
     Systematic,
     liveliness,
@@ -40,7 +42,7 @@ CONTACT = np.array([40.0, 500.0, -60.0, 30.0, -20.0, 90.0])
 """N, N m about the ground's origin, on the shank."""
 SIZES = (0.01, 0.02, 0.05, 0.04, 0.06, 0.07, 0.3, 0.015)
 MOVING = 0.1
-NONE = Sizes(*np.zeros(len(SIZES)), own_moving=MOVING)
+NONE = Sizes(*np.zeros(len(SIZES)), own_speeds=MOVING)
 DECLARED = np.repeat([0.014, 0.018, 0.010], 4)
 
 
@@ -248,28 +250,28 @@ def test_liveliness_is_the_mean_square_of_accelerations_over_their_deviations_of
 
 def test_reported_deviations_hold_both_parts_and_a_scale_of_zero_leaves_the_filters_own() -> None:
     """Its own part times what the movement makes of it."""
-    subject = Systematic(calibrated(), Noise(), Sizes(*SIZES, own_moving=MOVING))
+    subject = Systematic(calibrated(), Noise(), Sizes(*SIZES, own_speeds=MOVING))
     x = np.r_[Q, QD, QDD]
     P = np.zeros((30, 30))
-    own = {block: np.full(10, 0.02) for block in OWN_LATE} | {"accelerations": np.full(10, 2.0)}
+    own = {block: np.full(10, 0.02) for block in BLOCKS} | {"accelerations": np.full(10, 2.0)}
     external = np.zeros((3, 6))
     external[2] = CONTACT
     parts = subject.parts(Q, QD, QDD, external)
     sizes = dict(zip(KINDS, SIZES, strict=True))
     lively = np.mean(QDD**2) / 4.0
     nothing = Systematic(calibrated(), Noise(), subject.sizes.scaled(0.0))
-    for late, laws, moving in ((True, OWN_LATE, MOVING), (False, OWN_AT_ONCE, 1.0)):
+    for late, laws in ((True, OWN_LATE | {"speeds": (SPEEDS_STILL, MOVING)}), (False, OWN_AT_ONCE)):
         both = subject.added(own, x, P, CONTACT[None], ["shank"], late=late)
         alone = nothing.added(own, x, P, CONTACT[None], ["shank"], late=late)
-        for block, (still, rising) in laws.items():
-            factor = still + rising * moving * lively
+        for block, (still, moving) in laws.items():
+            factor = still + moving * lively
             added = sum(sizes[kind] ** 2 * parts[kind][block] for kind in KINDS)
             np.testing.assert_allclose(alone[block], np.sqrt(factor) * own[block])
             np.testing.assert_allclose(both[block], np.sqrt(factor * own[block] ** 2 + added))
 
 
 def test_a_calm_movement_is_known_better_than_a_lively_one() -> None:
-    own = {block: np.ones(10) for block in OWN_LATE}
+    own = {block: np.ones(10) for block in BLOCKS}
     subject = Systematic(calibrated(), Noise(), NONE)
     for late in (True, False):
         calm, lively = (

@@ -32,6 +32,22 @@ KINDS = (*OF_JOINTS, "skin", "mass_centre")
 """What `Sizes` has a size of. What is not known of inertia has none: it is in the filter's covariance."""
 
 
+Own = dict[str, tuple[float, float]]
+OWN_LATE: Own = {"coordinates": (1.0, 0.0), "accelerations": (0.12, 0.04), "moments": (0.25, 0.0)}
+"""Factor on the filter's own variance of a block where later frames helped: the first number, and the second times the
+movement's `liveliness`. One density of jerk serves all movements: in theory half of a speed's variance is what such
+jerk leaves unseen, and five sixths of an acceleration's; a calm movement has none of it, a lively one more. Speeds have
+`SPEEDS_STILL` and `Sizes.own_speeds`."""
+SPEEDS_STILL = 0.25
+OWN_AT_ONCE: Own = {
+    "coordinates": (1.0, 0.0),
+    "speeds": (SPEEDS_STILL, 0.4),
+    "accelerations": (SPEEDS_STILL, 0.4),
+    "moments": (0.08, 0.17),
+}
+"""The same without later frames."""
+
+
 @dataclass(frozen=True)
 class Sizes:
     """Standard deviations of the errors, of each component; where they come from is in docs/derivations.md.
@@ -43,8 +59,8 @@ class Sizes:
         root: rad, of the turn of the pelvis' frame in the pelvis.
         skin: of the displacement of a marker that follows a joint's angle, as a fraction of the declared size.
         mass_centre: m, of the centre of mass of each body beside where the model has it.
-        own_moving: what the factor on the filter's own variance of speeds and accelerations grows by with the
-            movement's liveliness (`OWN_LATE`).
+        own_speeds: what the factor on the filter's own variance of smoothed speeds grows by with the movement's
+            liveliness (`OWN_LATE`).
         inertia: whether what a recording leaves open of inertia counts in moments at least by the declared noise, as in
             `Estimate.parameters`, where the noise that was found in the recording takes it for better known.
     """
@@ -57,12 +73,16 @@ class Sizes:
     root: float
     skin: float
     mass_centre: float
-    own_moving: float
+    own_speeds: float
     inertia: bool = True
 
     def scaled(self, factor: float) -> Sizes:
         """The errors of joints and skin times a factor."""
         return replace(self, **{kind: factor * getattr(self, kind) for kind in KINDS})
+
+    def late(self) -> Own:
+        """`OWN_LATE` with that of speeds."""
+        return OWN_LATE | {"speeds": (SPEEDS_STILL, self.own_speeds)}
 
 
 LANDMARKS = Sizes(
@@ -74,7 +94,7 @@ LANDMARKS = Sizes(
     root=np.radians(0.5),
     skin=0.12,
     mass_centre=0.02,
-    own_moving=0.15,
+    own_speeds=0.17,
 )
 """Joints that are found from markers on the skin."""
 SCALED = Sizes(
@@ -86,7 +106,7 @@ SCALED = Sizes(
     root=np.radians(0.9),
     skin=0.08,
     mass_centre=0.003,
-    own_moving=0.06,
+    own_speeds=0.06,
     inertia=False,
 )
 """Joints of a skeleton that was scaled to the person (.osim)."""
@@ -95,21 +115,6 @@ SCALED = Sizes(
 def usual_sizes(calibrated: CalibratedModel) -> Sizes:
     """By where the joints of a model come from."""
     return SCALED if calibrated.plan is None else LANDMARKS
-
-
-Own = dict[str, tuple[float, float]]
-OWN_LATE: Own = {"coordinates": (1.0, 0.0), "speeds": (0.25, 1.0), "accelerations": (0.25, 1.0), "moments": (0.25, 0.0)}
-"""Factor on the filter's own variance of a block where later frames helped: the first number, and the second times
-`Sizes.own_moving` and the movement's `liveliness`. One density of jerk serves all movements: of the smoothed variance
-of a speed half is what such jerk leaves unseen, of an acceleration five sixths, and a calm movement has none of it, a
-lively one more."""
-OWN_AT_ONCE: Own = {
-    "coordinates": (1.0, 0.0),
-    "speeds": (0.25, 0.4),
-    "accelerations": (0.25, 0.4),
-    "moments": (0.1, 0.15),
-}
-"""The same without later frames; the second number is by itself."""
 
 
 def liveliness(acceleration: Array, sd: Array) -> Array:
@@ -131,10 +136,11 @@ def reported(
         variance_scale: of the noise of the filter. own: the filter's own deviations, by block. parts: variances as of
             `Systematic.over_time`. lively: (...,) as of `liveliness`. late: whether later frames helped.
     """
+    factors = sizes.late() if late else OWN_AT_ONCE
     found = {}
     for block, sd in own.items():
-        still, moving = (OWN_LATE if late else OWN_AT_ONCE)[block]
-        factor = still + moving * (sizes.own_moving if late else 1.0) * lively[..., None]
+        still, moving = factors[block]
+        factor = still + moving * lively[..., None]
         variance = factor * np.square(sd)
         for kind in KINDS:
             variance = variance + getattr(sizes, kind) ** 2 * parts[kind][block]
