@@ -29,7 +29,17 @@ from scipy.optimize import minimize
 from source_digest import source_digest
 
 import dynakin
-from dynakin.filter.systematic import BLOCKS, LANDMARKS, SCALED, Parts, Sizes, Systematic, reported, usual_sizes
+from dynakin.filter.systematic import (
+    BLOCKS,
+    LANDMARKS,
+    SCALED,
+    Parts,
+    Sizes,
+    Systematic,
+    measured_beside,
+    reported,
+    usual_sizes,
+)
 from dynakin.model.definition import load_model
 from dynakin.settings import presets
 from dynakin.settings.noise import Noise
@@ -54,7 +64,8 @@ Array = np.ndarray
 @dataclass(frozen=True)
 class Run:
     """One estimate against the truth: by block errors (T, C), the filter's own deviations, and variances by kind of
-    error at size 1; (T,) liveliness of the movement. Frames that have no truth or no value are NaN. ``late``: whether
+    error at size 1; (T,) liveliness of the movement; (T, C) moments that are measured
+    while some foot stands beside the plates. Frames that have no truth or no value are NaN. ``late``: whether
     later frames helped."""
 
     case: str
@@ -65,6 +76,7 @@ class Run:
     own: dict[str, Array]
     parts: Parts
     lively: Array
+    beside: Array | None
     variance_scale: float
     late: bool
 
@@ -148,7 +160,7 @@ def against(
     data, tracker = tracked.estimate.data, tracked.tracker
     sizes = replace(usual_sizes(tracker.calibrated), inertia=True)  # worked out where it is not in use, too
     systematic = Systematic(tracker.calibrated, tracker.noise, sizes)
-    parts = systematic.over_time(data)
+    parts, beside = systematic.over_time(data), measured_beside(data)
     all_names = [str(n) for n in data["coordinate"].values]
     chosen = [n for n in all_names if n in names and n not in tracked.estimate.held]
     mine, theirs = [all_names.index(n) for n in chosen], [names.index(n) for n in chosen]
@@ -172,6 +184,7 @@ def against(
         {block: values(f"{block}_sd") for block in blocks},
         {kind: {block: part[block][window][:, mine] for block in blocks} for kind, part in parts.items()},
         systematic.lively(data)[window],
+        None if beside is None else beside[window][:, mine],
         tracker.noise.variance_scale,
         bool(tracked.estimate.config["lag_s"]),
     )
@@ -200,7 +213,7 @@ def figures(run: Run, sizes: Sizes | None) -> dict[str, tuple[float, ...]]:
     found = {}
     said = run.own
     if sizes is not None:
-        said = reported(sizes, run.variance_scale, run.own, run.parts, run.lively, late=run.late)
+        said = reported(sizes, run.variance_scale, run.own, run.parts, run.lively, run.beside, late=run.late)
     for title, block, places in groups_of(run):
         e, sd = run.error[block][:, places], said[block][:, places]
         if block == "coordinates":

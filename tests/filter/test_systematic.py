@@ -27,6 +27,8 @@ from dynakin.filter.systematic import (
     Sizes,
     Systematic,
     liveliness,
+    measured_beside,
+    reported,
 )
 from dynakin.settings.noise import Noise
 
@@ -41,8 +43,8 @@ QDD = np.array([1.0, 0.5, -1.0, 2.0, 1.0, -2.0, 5.0, -3.0, 2.0, 6.0])
 CONTACT = np.array([40.0, 500.0, -60.0, 30.0, -20.0, 90.0])
 """N, N m about the ground's origin, on the shank."""
 SIZES = (0.01, 0.02, 0.05, 0.04, 0.06, 0.07, 0.3, 0.015)
-MOVING = 0.1
-NONE = Sizes(*np.zeros(len(SIZES)), own_speeds=MOVING)
+MOVING, BESIDE = 0.1, 2.0
+NONE = Sizes(*np.zeros(len(SIZES)), own_speeds=MOVING, own_beside=BESIDE)
 DECLARED = np.repeat([0.014, 0.018, 0.010], 4)
 
 
@@ -250,7 +252,7 @@ def test_liveliness_is_the_mean_square_of_accelerations_over_their_deviations_of
 
 def test_reported_deviations_hold_both_parts_and_a_scale_of_zero_leaves_the_filters_own() -> None:
     """Its own part times what the movement makes of it."""
-    subject = Systematic(calibrated(), Noise(), Sizes(*SIZES, own_speeds=MOVING))
+    subject = Systematic(calibrated(), Noise(), Sizes(*SIZES, own_speeds=MOVING, own_beside=BESIDE))
     x = np.r_[Q, QD, QDD]
     P = np.zeros((30, 30))
     own = {block: np.full(10, 0.02) for block in BLOCKS} | {"accelerations": np.full(10, 2.0)}
@@ -280,6 +282,23 @@ def test_a_calm_movement_is_known_better_than_a_lively_one() -> None:
         )
         assert (calm["speeds"] < 1.0).all() and (lively["speeds"] > 1.0).all()
         np.testing.assert_allclose(calm["coordinates"], 1.0)
+
+
+def test_measured_moments_count_more_where_some_foot_stands_beside_the_plates() -> None:
+    """Late ones alone; a recording on plates has none of them."""
+    contact, source = np.array([[1, 1], [1, 2]]), np.array([[0, 0], [0, 1]])
+    axes = ("time", "foot"), ("time", "coordinate")
+    data = xr.Dataset({"foot_contact": (axes[0], contact), "moment_source": (axes[1], source)})
+    beside = measured_beside(data)
+    np.testing.assert_array_equal(beside, source == 0)
+    assert measured_beside(data.isel(time=[0])) is None
+    own = {"speeds": np.ones((2, 2)), "moments": np.ones((2, 2))}
+    parts = {kind: {block: np.zeros((2, 2)) for block in own} for kind in (*KINDS, "inertia")}
+    late, at_once = (reported(NONE, 1.0, own, parts, np.zeros(2), beside, late=late) for late in (True, False))
+    still = OWN_LATE["moments"][0]
+    np.testing.assert_allclose(late["moments"] ** 2, [[BESIDE, BESIDE], [BESIDE, still]])
+    np.testing.assert_allclose(at_once["moments"] ** 2, OWN_AT_ONCE["moments"][0])
+    np.testing.assert_allclose(late["speeds"] ** 2, SPEEDS_STILL)
 
 
 def with_inertia() -> tuple[Any, Array]:

@@ -19,6 +19,8 @@ from dynakin.bindings import _core
 from dynakin.filter.joint_errors import JointErrors, Kind, floats
 from dynakin.filter.noise import marker_variance, soft_tissue_sd
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.recordings.feet.contact import UNMEASURED
+from dynakin.results.measures.sources import MEASURED
 from dynakin.settings.noise import Noise
 
 if TYPE_CHECKING:
@@ -61,6 +63,8 @@ class Sizes:
         mass_centre: m, of the centre of mass of each body beside where the model has it.
         own_speeds: what the factor on the filter's own variance of smoothed speeds grows by with the movement's
             liveliness (`OWN_LATE`).
+        own_beside: factor on the filter's own variance of smoothed moments that are measured in a recording in which
+            some foot stands beside the plates: what plates do not see they do not correct.
         inertia: whether what a recording leaves open of inertia counts in moments at least by the declared noise, as in
             `Estimate.parameters`, where the noise that was found in the recording takes it for better known.
     """
@@ -74,6 +78,7 @@ class Sizes:
     skin: float
     mass_centre: float
     own_speeds: float
+    own_beside: float
     inertia: bool = True
 
     def scaled(self, factor: float) -> Sizes:
@@ -95,6 +100,7 @@ LANDMARKS = Sizes(
     skin=0.12,
     mass_centre=0.02,
     own_speeds=0.17,
+    own_beside=2.25,
 )
 """Joints that are found from markers on the skin."""
 SCALED = Sizes(
@@ -107,6 +113,7 @@ SCALED = Sizes(
     skin=0.08,
     mass_centre=0.003,
     own_speeds=0.06,
+    own_beside=0.25,
     inertia=False,
 )
 """Joints of a skeleton that was scaled to the person (.osim)."""
@@ -128,19 +135,29 @@ Parts = dict[str, dict[str, Array]]
 
 
 def reported(
-    sizes: Sizes, variance_scale: float, own: Mapping[str, Array], parts: Parts, lively: Array, *, late: bool
+    sizes: Sizes,
+    variance_scale: float,
+    own: Mapping[str, Array],
+    parts: Parts,
+    lively: Array,
+    beside: npt.NDArray[np.bool_] | None = None,
+    *,
+    late: bool,
 ) -> dict[str, Array]:
     """Standard deviations that are reported: block -> (..., C).
 
     Args:
         variance_scale: of the noise of the filter. own: the filter's own deviations, by block. parts: variances as of
-            `Systematic.over_time`. lively: (...,) as of `liveliness`. late: whether later frames helped.
+            `Systematic.over_time`. lively: (...,) as of `liveliness`. beside: (..., C) moments of `Sizes.own_beside`.
+            late: whether later frames helped.
     """
     factors = sizes.late() if late else OWN_AT_ONCE
     found = {}
     for block, sd in own.items():
         still, moving = factors[block]
         factor = still + moving * lively[..., None]
+        if late and beside is not None and block == "moments":
+            factor = np.where(beside, sizes.own_beside, factor)
         variance = factor * np.square(sd)
         for kind in KINDS:
             variance = variance + getattr(sizes, kind) ** 2 * parts[kind][block]
@@ -351,7 +368,8 @@ class Systematic:
         """The same of a recording: ``data`` with other ``coordinates_sd`` ... ``moments_sd``."""
         order = ("time", "coordinate")
         own = {block: data[f"{block}_sd"].transpose(*order).values for block in BLOCKS}
-        sd = reported(self.sizes, self._variance_scale, own, self.over_time(data), self.lively(data), late=late)
+        found = self.over_time(data), self.lively(data), measured_beside(data)
+        sd = reported(self.sizes, self._variance_scale, own, *found, late=late)
         return data.assign({f"{block}_sd": (order, sd[block]) for block in BLOCKS})
 
     def lively(self, data: xr.Dataset) -> Array:
@@ -360,6 +378,13 @@ class Systematic:
         states = data["state"].transpose("time", "element").values
         sd = data["accelerations_sd"].transpose("time", "coordinate").values[:, self._free]
         return liveliness(states[:, 2 * K : 3 * K], sd)
+
+
+def measured_beside(data: xr.Dataset) -> npt.NDArray[np.bool_] | None:
+    """(T, C) moments that are measured in a recording in which some foot stands beside the plates; None: none does."""
+    if "foot_contact" not in data or not (data["foot_contact"].values == UNMEASURED).any():
+        return None
+    return np.asarray(data["moment_source"].transpose("time", "coordinate").values == MEASURED)
 
 
 def _differences(values: list[Array]) -> tuple[Array, Array, Array]:
