@@ -1,6 +1,6 @@
 """Do the stated deviations hold the truth? Coverage and deviation over error by group, and a choice of their sizes.
 
-    OMP_NUM_THREADS=1 .venv/bin/python benchmarks/intervals.py [CASE...] [--trials DIR] [--seeds 1,2] [--live]
+    OMP_NUM_THREADS=1 .venv/bin/python benchmarks/intervals.py [CASE...] [--trials DIR] [--seeds 1,2] [--lag S]
         [--preset FILE] [--sizes landmarks:centre=0.008,hinge=0.1] [--choose landmarks] [--again]
 
 A case is squat or walk with fullbody or an .osim (``truth3d``'s trials, in DIR: folders ``squat_s1_*`` with trial.trc,
@@ -29,7 +29,17 @@ from scipy.optimize import minimize
 from source_digest import source_digest
 
 import dynakin
-from dynakin.filter.systematic import BLOCKS, LANDMARKS, SCALED, Parts, Sizes, Systematic, reported, usual_sizes
+from dynakin.filter.systematic import (
+    BLOCKS,
+    LANDMARKS,
+    SCALED,
+    Parts,
+    Sizes,
+    Systematic,
+    measured_beside,
+    reported,
+    usual_sizes,
+)
 from dynakin.model.definition import load_model
 from dynakin.settings import presets
 from dynakin.settings.noise import Noise
@@ -54,7 +64,9 @@ Array = np.ndarray
 @dataclass(frozen=True)
 class Run:
     """One estimate against the truth: by block errors (T, C), the filter's own deviations, and variances by kind of
-    error at size 1. Frames that have no truth or no value are NaN. ``late``: whether later frames helped."""
+    error at size 1; (T,) liveliness of the movement; (T, C) moments that are measured
+    while some foot stands beside the plates. Frames that have no truth or no value are NaN. ``late``: whether
+    later frames helped."""
 
     case: str
     seed: int
@@ -63,21 +75,25 @@ class Run:
     error: dict[str, Array]
     own: dict[str, Array]
     parts: Parts
+    lively: Array
+    beside: Array | None
     variance_scale: float
     late: bool
 
 
-def runs_of(case: str, seed: int, folder: Path | None, noise: Noise, live: bool, again: bool, source: str) -> Run:
+def runs_of(
+    case: str, seed: int, folder: Path | None, noise: Noise, lag_s: float | None, again: bool, source: str
+) -> Run:
     """As kept, else made. ``source``: `source_digest`."""
     trial = trial_of(case, seed, folder) if case in TRUTH3D else None
-    key = sha256(json.dumps([source, case, seed, live, noise.model_dump()], sort_keys=True).encode())
+    key = sha256(json.dumps([source, case, seed, lag_s, noise.model_dump()], sort_keys=True).encode())
     for file in (Path(__file__), *([trial / name for name in FILES] if trial else ())):
         key.update(file.read_bytes())
     kept = KEPT / f"{case.replace('/', '_')}_s{seed}_{key.hexdigest()[:10]}.pickle"
     if kept.exists() and not again:
         loaded: Run = pickle.loads(kept.read_bytes())
         return loaded
-    found = own(case, seed, noise, live) if trial is None else truth3d(case, seed, trial, noise, live)
+    found = own(case, seed, noise, lag_s) if trial is None else truth3d(case, seed, trial, noise, lag_s)
     KEPT.mkdir(parents=True, exist_ok=True)
     kept.write_bytes(pickle.dumps(found))
     return found
@@ -94,7 +110,7 @@ def trial_of(case: str, seed: int, folder: Path | None) -> Path:
     return found[0]
 
 
-def truth3d(case: str, seed: int, trial: Path, noise: Noise, live: bool) -> Run:
+def truth3d(case: str, seed: int, trial: Path, noise: Noise, lag_s: float | None) -> Run:
     """A trial of truth3d."""
     motion, _, kind = case.partition("/")
     subject = dynakin.Subject(mass_kg=json.loads((trial / "trial.json").read_text())["mass_kg"], height_m=1.7)
@@ -105,9 +121,9 @@ def truth3d(case: str, seed: int, trial: Path, noise: Noise, live: bool) -> Run:
         definition = load_model("fullbody", subject=subject, markers="opencap")
         static = dynakin.read(trial / "static.trc")
     given = np.load(trial / "truth.npz", allow_pickle=True)
-    truth = {"coordinates": given["q"], "speeds": given["u"], "moments": given["tau"]}
+    truth = dict(zip(BLOCKS, (given[name] for name in ("q", "u", "a", "tau")), strict=True))
     window = (given["t"] >= WINDOW_S[motion][0]) & (given["t"] <= WINDOW_S[motion][1])
-    tracked = dynakin.Estimator(definition, noise).track(recording, static=static, lag_s=0.0 if live else None)
+    tracked = dynakin.Estimator(definition, noise).track(recording, static=static, lag_s=lag_s)
     return against(case, seed, tracked, [str(n) for n in given["names"]], truth, window)
 
 
@@ -119,7 +135,7 @@ def plain(trial: Path) -> bool:
     return not (made["without"] or made["one_plate"] or made["dropouts"])
 
 
-def own(case: str, seed: int, noise: Noise, live: bool) -> Run:
+def own(case: str, seed: int, noise: Noise, lag_s: float | None) -> Run:
     """A trial of our own simulator."""
     subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
     if case in PLANAR:
@@ -130,7 +146,7 @@ def own(case: str, seed: int, noise: Noise, live: bool) -> Run:
     trial = simulate(model, motion, seed, seconds, markers=markers if model == "fullbody" else None)
     static = None if motion == "squat" else simulate(model, "squat", seed, 5.0, markers=markers).recording
     definition = load_model(model, subject=subject, markers=markers)
-    tracked = dynakin.Estimator(definition, noise).track(trial.recording, static=static, lag_s=0.0 if live else None)
+    tracked = dynakin.Estimator(definition, noise).track(trial.recording, static=static, lag_s=lag_s)
     truth = {block: trial.truth.data[block].transpose("time", "coordinate").values for block in BLOCKS}
     names = [str(n) for n in trial.truth.data["coordinate"].values]
     return against(case, seed, tracked, names, truth, trial.recording.time >= start)
@@ -143,7 +159,8 @@ def against(
     """Errors, deviations and parts over the window, of the coordinates that both have and that move."""
     data, tracker = tracked.estimate.data, tracked.tracker
     sizes = replace(usual_sizes(tracker.calibrated), inertia=True)  # worked out where it is not in use, too
-    parts = Systematic(tracker.calibrated, tracker.noise, sizes).over_time(data)
+    systematic = Systematic(tracker.calibrated, tracker.noise, sizes)
+    parts, beside = systematic.over_time(data), measured_beside(data)
     all_names = [str(n) for n in data["coordinate"].values]
     chosen = [n for n in all_names if n in names and n not in tracked.estimate.held]
     mine, theirs = [all_names.index(n) for n in chosen], [names.index(n) for n in chosen]
@@ -166,6 +183,8 @@ def against(
         error,
         {block: values(f"{block}_sd") for block in blocks},
         {kind: {block: part[block][window][:, mine] for block in blocks} for kind, part in parts.items()},
+        systematic.lively(data)[window],
+        None if beside is None else beside[window][:, mine],
         tracker.noise.variance_scale,
         bool(tracked.estimate.config["lag_s"]),
     )
@@ -194,7 +213,7 @@ def figures(run: Run, sizes: Sizes | None) -> dict[str, tuple[float, ...]]:
     found = {}
     said = run.own
     if sizes is not None:
-        said = reported(sizes, run.variance_scale, run.own, run.parts, late=run.late)
+        said = reported(sizes, run.variance_scale, run.own, run.parts, run.lively, run.beside, late=run.late)
     for title, block, places in groups_of(run):
         e, sd = run.error[block][:, places], said[block][:, places]
         if block == "coordinates":
@@ -264,7 +283,7 @@ def main() -> None:
     parser.add_argument("cases", nargs="*", metavar="CASE", help=", ".join(CASES) + "; all where none is given")
     parser.add_argument("--trials", type=Path, help="folder of truth3d's trials")
     parser.add_argument("--seeds", default="1,2")
-    parser.add_argument("--live", action="store_true")
+    parser.add_argument("--lag", type=float, metavar="SECONDS", help="0: at once; all frames where not given")
     parser.add_argument("--preset", default="default")
     parser.add_argument("--sizes", action="append", default=[], metavar="MODEL:KEY=VALUE,...")
     parser.add_argument("--choose", choices=("landmarks", "scaled"))
@@ -274,7 +293,7 @@ def main() -> None:
     cases = asked.cases or [case for case in CASES if asked.trials or case not in TRUTH3D]
     source = source_digest()
     runs = [
-        runs_of(case, int(seed), asked.trials, noise, asked.live, asked.again, source)
+        runs_of(case, int(seed), asked.trials, noise, asked.lag, asked.again, source)
         for case in cases
         for seed in asked.seeds.split(",")
     ]

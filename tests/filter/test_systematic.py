@@ -15,7 +15,21 @@ from scipy.spatial.transform import Rotation
 
 from dynakin.bindings import _core
 from dynakin.filter.joint_errors import JointErrors
-from dynakin.filter.systematic import _STEP_S, COMMON, KINDS, SKIN_ANGLE_RAD, Sizes, Systematic
+from dynakin.filter.systematic import (
+    _STEP_S,
+    BLOCKS,
+    COMMON,
+    KINDS,
+    OWN_AT_ONCE,
+    OWN_LATE,
+    SKIN_ANGLE_RAD,
+    SPEEDS_STILL,
+    Sizes,
+    Systematic,
+    liveliness,
+    measured_beside,
+    reported,
+)
 from dynakin.settings.noise import Noise
 
 Array = npt.NDArray[np.float64]
@@ -28,7 +42,9 @@ QD = np.array([0.4, -0.1, 0.2, 0.5, -0.3, 0.6, 1.2, 0.4, -0.7, -1.5])
 QDD = np.array([1.0, 0.5, -1.0, 2.0, 1.0, -2.0, 5.0, -3.0, 2.0, 6.0])
 CONTACT = np.array([40.0, 500.0, -60.0, 30.0, -20.0, 90.0])
 """N, N m about the ground's origin, on the shank."""
-SIZES = (0.01, 0.02, 0.05, 0.04, 0.06, 0.07, 0.3)
+SIZES = (0.01, 0.02, 0.05, 0.04, 0.06, 0.07, 0.3, 0.015)
+MOVING, BESIDE = 0.1, 2.0
+NONE = Sizes(*np.zeros(len(SIZES)), own_speeds=MOVING, own_beside=BESIDE)
 DECLARED = np.repeat([0.014, 0.018, 0.010], 4)
 
 
@@ -208,27 +224,81 @@ def test_a_pelvis_frame_that_is_turned_mixes_its_angles_and_leaves_the_moments_o
     assert np.sqrt(parts["moments"][9]) < 1.0
 
 
+def test_a_centre_of_mass_beside_its_place_is_that_of_bodies_that_are_changed() -> None:
+    external = np.zeros((3, 6))
+    external[2] = CONTACT
+    x = np.r_[Q, QD, QDD]
+    as_it_is = _core.joint_moments(_core.Model(spec()), x, external)
+    expected = np.zeros(10)
+    for k in range(3):
+        for axis in range(3):
+            model = spec()
+            segments = model.segments
+            inertia = np.array(segments[k].inertia)
+            inertia[1 + axis] += 1e-3 * inertia[0]  # m times m: the first moment of a centre 1 mm off
+            segments[k].inertia = inertia
+            model.segments = segments
+            expected += np.square((_core.joint_moments(_core.Model(model), x, external) - as_it_is) / 1e-3)
+    parts = systematic().parts(Q, QD, QDD, external)["mass_centre"]
+    np.testing.assert_allclose(np.sqrt(parts["moments"]), np.sqrt(expected), rtol=1e-6)
+    assert not any(parts[block].any() for block in ("coordinates", "speeds", "accelerations"))
+
+
+def test_liveliness_is_the_mean_square_of_accelerations_over_their_deviations_of_what_moves() -> None:
+    acceleration, sd = np.array([[2.0, 3.0, 5.0], [0.0, 0.0, 1.0]]), np.array([[1.0, 3.0, 0.0], [1.0, 1.0, 0.0]])
+    np.testing.assert_allclose(liveliness(acceleration, sd), [(4.0 + 1.0) / 2.0, 0.0])
+    assert liveliness(np.ones(3), np.zeros(3)) == 0.0
+
+
 def test_reported_deviations_hold_both_parts_and_a_scale_of_zero_leaves_the_filters_own() -> None:
-    subject = Systematic(calibrated(), Noise(), Sizes(*SIZES))
+    """Its own part times what the movement makes of it."""
+    subject = Systematic(calibrated(), Noise(), Sizes(*SIZES, own_speeds=MOVING, own_beside=BESIDE))
     x = np.r_[Q, QD, QDD]
     P = np.zeros((30, 30))
-    own = {block: np.full(10, 0.02) for block in ("coordinates", "speeds", "accelerations", "moments")}
-    both = subject.added(own, x, P, CONTACT[None], ["shank"], late=True)
+    own = {block: np.full(10, 0.02) for block in BLOCKS} | {"accelerations": np.full(10, 2.0)}
     external = np.zeros((3, 6))
     external[2] = CONTACT
     parts = subject.parts(Q, QD, QDD, external)
     sizes = dict(zip(KINDS, SIZES, strict=True))
-    for block, sd in both.items():
-        total = 0.02**2 + sum(sizes[kind] ** 2 * parts[kind][block] for kind in KINDS)
-        np.testing.assert_allclose(sd, np.sqrt(total))
-    wider = Systematic(calibrated(), Noise(), replace(subject.sizes, own_motion=2.0, own_moments=3.0))
-    for late, factors in ((True, (2.0, 3.0)), (False, (1.0, 1.0))):  # at once the filter's own stay
-        found = wider.added(own, x, P, CONTACT[None], ["shank"], late=late)
-        for block, factor in zip(("speeds", "moments"), factors, strict=True):
-            np.testing.assert_allclose(found[block] ** 2 - both[block] ** 2, (factor**2 - 1.0) * 0.02**2, atol=1e-12)
-    nothing = subject.sizes.scaled(0.0)
-    none = Systematic(calibrated(), Noise(), nothing).added(own, x, P, CONTACT[None], ["shank"], late=True)
-    np.testing.assert_allclose(none["moments"], 0.02)
+    lively = np.mean(QDD**2) / 4.0
+    nothing = Systematic(calibrated(), Noise(), subject.sizes.scaled(0.0))
+    for late, laws in ((True, OWN_LATE | {"speeds": (SPEEDS_STILL, MOVING)}), (False, OWN_AT_ONCE)):
+        both = subject.added(own, x, P, CONTACT[None], ["shank"], late=late)
+        alone = nothing.added(own, x, P, CONTACT[None], ["shank"], late=late)
+        for block, (still, moving) in laws.items():
+            factor = still + moving * lively
+            added = sum(sizes[kind] ** 2 * parts[kind][block] for kind in KINDS)
+            np.testing.assert_allclose(alone[block], np.sqrt(factor) * own[block])
+            np.testing.assert_allclose(both[block], np.sqrt(factor * own[block] ** 2 + added))
+
+
+def test_a_calm_movement_is_known_better_than_a_lively_one() -> None:
+    own = {block: np.ones(10) for block in BLOCKS}
+    subject = Systematic(calibrated(), Noise(), NONE)
+    for late in (True, False):
+        calm, lively = (
+            subject.added(own, np.r_[Q, QD, scale * QDD], np.zeros((30, 30)), CONTACT[None], ["shank"], late=late)
+            for scale in (0.0, 10.0)
+        )
+        assert (calm["speeds"] < 1.0).all() and (lively["speeds"] > 1.0).all()
+        np.testing.assert_allclose(calm["coordinates"], 1.0)
+
+
+def test_measured_moments_count_more_where_some_foot_stands_beside_the_plates() -> None:
+    """Late ones alone; a recording on plates has none of them."""
+    contact, source = np.array([[1, 1], [1, 2]]), np.array([[0, 0], [0, 1]])
+    axes = ("time", "foot"), ("time", "coordinate")
+    data = xr.Dataset({"foot_contact": (axes[0], contact), "moment_source": (axes[1], source)})
+    beside = measured_beside(data)
+    np.testing.assert_array_equal(beside, source == 0)
+    assert measured_beside(data.isel(time=[0])) is None
+    own = {"speeds": np.ones((2, 2)), "moments": np.ones((2, 2))}
+    parts = {kind: {block: np.zeros((2, 2)) for block in own} for kind in (*KINDS, "inertia")}
+    late, at_once = (reported(NONE, 1.0, own, parts, np.zeros(2), beside, late=late) for late in (True, False))
+    still = OWN_LATE["moments"][0]
+    np.testing.assert_allclose(late["moments"] ** 2, [[BESIDE, BESIDE], [BESIDE, still]])
+    np.testing.assert_allclose(at_once["moments"] ** 2, OWN_AT_ONCE["moments"][0])
+    np.testing.assert_allclose(late["speeds"] ** 2, SPEEDS_STILL)
 
 
 def with_inertia() -> tuple[Any, Array]:
@@ -262,19 +332,19 @@ def test_inertia_that_small_innovations_leave_open_is_known_by_the_declared_nois
     P[30:, 30:] = root @ root.T
     variance = by_inertia(subject, x, root)
     own = {block: np.zeros(10) for block in ("coordinates", "speeds", "accelerations")} | {"moments": np.sqrt(variance)}
-    sizes = Sizes(*np.zeros(7), own_moments=1.5)
-    found = Systematic(subject, Noise(variance_scale=0.2), sizes)
+    found = Systematic(subject, Noise(variance_scale=0.2), NONE)
     for late in (True, False):  # the factor on the filter's own counts nothing twice
         seen = found.added(own, x, P, CONTACT[None], ["shank"], late=late)
         np.testing.assert_allclose(seen["moments"], np.sqrt(variance / 0.2), rtol=1e-6)
         np.testing.assert_array_equal(seen["speeds"], 0.0)
-    for scale in (0.5, 1.0, 3.0):  # the filter's own part has more of it
-        declared = Systematic(subject, Noise(variance_scale=scale), sizes)
-        seen = declared.added(own, x, P, CONTACT[None], ["shank"], late=True)
-        np.testing.assert_allclose(seen["moments"], 1.5 * np.sqrt(variance), rtol=1e-6)
-    scaled = Systematic(subject, Noise(variance_scale=0.2), replace(sizes, inertia=False))
-    seen = scaled.added(own, x, P, CONTACT[None], ["shank"], late=False)
-    np.testing.assert_allclose(seen["moments"], np.sqrt(variance), rtol=1e-6)
+    for late, laws in ((True, OWN_LATE), (False, OWN_AT_ONCE)):
+        factor = laws["moments"][0]
+        wide = Systematic(subject, Noise(variance_scale=1.5 / factor), NONE)  # the filter's own part has more of it
+        seen = wide.added(own, x, P, CONTACT[None], ["shank"], late=late)
+        np.testing.assert_allclose(seen["moments"], np.sqrt(factor * variance), rtol=1e-6)
+        scaled = Systematic(subject, Noise(variance_scale=0.2), replace(NONE, inertia=False))
+        seen = scaled.added(own, x, P, CONTACT[None], ["shank"], late=late)
+        np.testing.assert_allclose(seen["moments"], np.sqrt(factor * variance), rtol=1e-6)
 
 
 def test_the_scale_of_systematic_errors_is_that_of_joints_and_skin() -> None:
@@ -290,7 +360,7 @@ def test_the_scale_of_systematic_errors_is_that_of_joints_and_skin() -> None:
         )
         for scale in (1e-9, 1.0, 2.0)
     ]
-    expected = (1.0 / 0.2 - 1.0) * by_inertia(subject, x, 0.1 * np.eye(4))
+    expected = (1.0 / 0.2 - OWN_AT_ONCE["moments"][0]) * by_inertia(subject, x, 0.1 * np.eye(4))
     np.testing.assert_allclose(said[0]["moments"], np.sqrt(expected), rtol=1e-6)
     np.testing.assert_allclose(said[2]["speeds"], 2.0 * said[1]["speeds"], rtol=1e-9)
     one, two = (np.square(each["moments"]) - expected for each in said[1:])
@@ -316,8 +386,7 @@ def test_over_time_inertia_is_known_as_well_as_in_each_frame() -> None:
         },
         coords={"time": time, "foot_segment": ("foot", ["shank"])},
     )
-    sizes = Sizes(*np.zeros(7))
-    found = Systematic(subject, Noise(variance_scale=s), sizes)
+    found = Systematic(subject, Noise(variance_scale=s), NONE)
     variance = by_inertia(subject, x, A)
     expected = wider[:, None] ** 2 * variance / s
     np.testing.assert_allclose(found.over_time(data)["inertia"]["moments"], expected, rtol=1e-6)

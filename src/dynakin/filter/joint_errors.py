@@ -1,5 +1,6 @@
 """A model whose joints may be misplaced and turned: each error is a coordinate that stands still, so that the core's
-own derivatives say what it does to markers and moments ([derivations](derivations.md), section 17)."""
+own derivatives say what it does to markers and moments ([derivations](derivations.md), section 17). Its bodies' centres
+of mass may be displaced too: their first moments are states."""
 
 from __future__ import annotations
 
@@ -13,6 +14,7 @@ import numpy.typing as npt
 
 from dynakin.bindings import _core
 from dynakin.model.calibration.pose_start import bare
+from dynakin.model.inertia import INERTIA_NAMES
 
 Array = npt.NDArray[np.float64]
 Kind = Literal["hinge_centre", "ball_centre", "hinge_axes", "pair_axes", "ball_axes", "root"]
@@ -21,6 +23,7 @@ or three turned on both of them; the root's frame turned in its bone."""
 Column = dict[str, float]
 
 _AXES = np.eye(3)
+_FIRST = ("mx", "my", "mz")
 _TURNED: dict[int, Kind] = {1: "hinge_axes", 2: "pair_axes", 3: "ball_axes"}
 
 
@@ -29,11 +32,12 @@ class JointErrors:
     """Errors of a model's joints, as coordinates of a larger model.
 
     Attributes:
-        model: the original's coordinates first, then those of the errors; nothing else is estimated.
+        model: the original's coordinates first, then those of the errors; of the rest first moments alone are states.
         free: (K,) places of the original's free coordinates among the larger model's.
         placed: (E,) places of the errors' coordinates among the same.
         sources: (E, S) how far each of these is moved by a unit of each source of error: m a m, rad a rad.
         kinds: (S,) what each source is.
+        first_moments: (3 B,) places in the state of first moments, three a body. masses: (3 B,) kg, of their bodies.
     """
 
     model: _core.Model
@@ -41,6 +45,8 @@ class JointErrors:
     placed: npt.NDArray[np.intp]
     sources: Array
     kinds: tuple[Kind, ...]
+    first_moments: npt.NDArray[np.intp]
+    masses: Array
 
     @classmethod
     def of(cls, spec: _core.ModelSpec, reference: Array, held: Collection[str] = ()) -> JointErrors:
@@ -57,12 +63,17 @@ class JointErrors:
         found = _sources(spec, orientations, set(held))
         place = {name: k for k, name in enumerate(c.name for c in larger.coordinates if not c.locked)}
         sources = np.array([[column.get(name, 0.0) for _, column in found] for name in added])
+        model = _core.Model(larger)
+        at = {name: k for k, name in enumerate(model.layout.names)}
+        bodies = [segment for segment in larger.segments if any(segment.inertia_estimated)]
         return cls(
-            _core.Model(larger),
+            model,
             np.array([place[c.name] for c in spec.coordinates if c.name in place], dtype=np.intp),
             np.array([place[name] for name in added], dtype=np.intp),
             sources.reshape(len(added), len(found)),
             tuple(kind for kind, _ in found),
+            np.array([at[f"inertia/{body.name}/{name}"] for body in bodies for name in _FIRST], dtype=np.intp),
+            np.repeat([float(body.inertia[0]) for body in bodies], len(_FIRST)),
         )
 
     def state(self, q: Array, qd: Array, qdd: Array) -> Array:
@@ -71,9 +82,11 @@ class JointErrors:
         Args:
             q, qd, qdd: (K,) of the original's free coordinates.
         """
-        x = np.zeros((3, len(self.free) + len(self.placed)))
-        x[:, self.free] = q, qd, qdd
-        return x.ravel()
+        x = np.array(self.model.initial_state())
+        moving = x[: 3 * (len(self.free) + len(self.placed))].reshape(3, -1)
+        moving[:] = 0.0
+        moving[:, self.free] = q, qd, qdd
+        return x
 
 
 def floats(segment: _core.SegmentSpec) -> bool:
@@ -124,6 +137,7 @@ def _with_errors(spec: _core.ModelSpec) -> tuple[_core.ModelSpec, list[str]]:
             axes[:0] = errors(name, "turned", "rotation") if inner else []
         axes[:0] = errors(name, "moved", "translation") if inner else []
         segment.axes = axes
+        segment.inertia_estimated = [segment.inertia[0] > 0.0 and each in _FIRST for each in INERTIA_NAMES]
     larger.segments, larger.coordinates = segments, coordinates
     return larger, added
 

@@ -1,5 +1,5 @@
-"""What the filter's covariance cannot know: joints beside where they are, skin that follows them, and inertia that
-a recording leaves open.
+"""What the filter's covariance cannot know: joints beside where they are, skin that follows them, bodies' centres of
+mass, inertia that a recording leaves open, and how lively the movement is.
 
 A consider covariance (Schmidt 1966): nothing is learned of these errors; their effect on what is reported is worked out
 afterwards and added to the filter's own variances ([derivations](derivations.md), section 17).
@@ -19,6 +19,8 @@ from dynakin.bindings import _core
 from dynakin.filter.joint_errors import JointErrors, Kind, floats
 from dynakin.filter.noise import marker_variance, soft_tissue_sd
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.recordings.feet.contact import UNMEASURED
+from dynakin.results.measures.sources import MEASURED
 from dynakin.settings.noise import Noise
 
 if TYPE_CHECKING:
@@ -28,8 +30,24 @@ Array = npt.NDArray[np.float64]
 
 BLOCKS = ("coordinates", "speeds", "accelerations", "moments")
 OF_JOINTS = get_args(Kind)
-KINDS = (*OF_JOINTS, "skin")
+KINDS = (*OF_JOINTS, "skin", "mass_centre")
 """What `Sizes` has a size of. What is not known of inertia has none: it is in the filter's covariance."""
+
+
+Own = dict[str, tuple[float, float]]
+OWN_LATE: Own = {"coordinates": (1.0, 0.0), "accelerations": (0.12, 0.04), "moments": (0.25, 0.0)}
+"""Factor on the filter's own variance of a block where later frames helped: the first number, and the second times the
+movement's `liveliness`. One density of jerk serves all movements: in theory half of a speed's variance is what such
+jerk leaves unseen, and five sixths of an acceleration's; a calm movement has none of it, a lively one more. Speeds have
+`SPEEDS_STILL` and `Sizes.own_speeds`."""
+SPEEDS_STILL = 0.25
+OWN_AT_ONCE: Own = {
+    "coordinates": (1.0, 0.0),
+    "speeds": (SPEEDS_STILL, 0.4),
+    "accelerations": (SPEEDS_STILL, 0.4),
+    "moments": (0.08, 0.17),
+}
+"""The same without later frames."""
 
 
 @dataclass(frozen=True)
@@ -42,10 +60,11 @@ class Sizes:
             three.
         root: rad, of the turn of the pelvis' frame in the pelvis.
         skin: of the displacement of a marker that follows a joint's angle, as a fraction of the declared size.
-        own_motion, own_moments: factors on the filter's own deviations of what later frames helped to estimate. What
-            shows beside a model that is found from markers lasts and is shared by them, so that frames tell less than
-            the filter counts; a scaled skeleton leaves less at the root than the declared residual, but speeds
-            in walks lie in their intervals in 82 to 84 % without the factor.
+        mass_centre: m, of the centre of mass of each body beside where the model has it.
+        own_speeds: what the factor on the filter's own variance of smoothed speeds grows by with the movement's
+            liveliness (`OWN_LATE`).
+        own_beside: factor on the filter's own variance of smoothed moments that are measured in a recording in which
+            some foot stands beside the plates: what plates do not see they do not correct.
         inertia: whether what a recording leaves open of inertia counts in moments at least by the declared noise, as in
             `Estimate.parameters`, where the noise that was found in the recording takes it for better known.
     """
@@ -57,41 +76,44 @@ class Sizes:
     ball_axes: float
     root: float
     skin: float
-    own_motion: float = 1.0
-    own_moments: float = 1.0
+    mass_centre: float
+    own_speeds: float
+    own_beside: float
     inertia: bool = True
 
     def scaled(self, factor: float) -> Sizes:
         """The errors of joints and skin times a factor."""
         return replace(self, **{kind: factor * getattr(self, kind) for kind in KINDS})
 
-    def own(self, block: str) -> float:
-        """Factor on the filter's own deviations of a block."""
-        return self.own_moments if block == "moments" else self.own_motion
+    def late(self) -> Own:
+        """`OWN_LATE` with that of speeds."""
+        return OWN_LATE | {"speeds": (SPEEDS_STILL, self.own_speeds)}
 
 
 LANDMARKS = Sizes(
-    hinge_centre=0.003,
-    ball_centre=0.003,
+    hinge_centre=0.0042,
+    ball_centre=0.005,
     hinge_axes=np.radians(2.0),
-    pair_axes=np.radians(6.0),
-    ball_axes=np.radians(0.8),
-    root=np.radians(1.2),
-    skin=0.15,
-    own_motion=1.6,
-    own_moments=1.5,
+    pair_axes=np.radians(5.0),
+    ball_axes=np.radians(0.4),
+    root=np.radians(0.5),
+    skin=0.12,
+    mass_centre=0.02,
+    own_speeds=0.17,
+    own_beside=2.25,
 )
 """Joints that are found from markers on the skin."""
 SCALED = Sizes(
-    hinge_centre=0.002,
+    hinge_centre=0.0014,
     ball_centre=0.0016,
-    hinge_axes=np.radians(1.2),
-    pair_axes=np.radians(1.2),
+    hinge_axes=np.radians(1.3),
+    pair_axes=np.radians(1.3),
     ball_axes=np.radians(0.8),
-    root=np.radians(1.0),
-    skin=0.095,
-    own_motion=1.2,
-    own_moments=0.55,
+    root=np.radians(0.9),
+    skin=0.08,
+    mass_centre=0.003,
+    own_speeds=0.06,
+    own_beside=0.25,
     inertia=False,
 )
 """Joints of a skeleton that was scaled to the person (.osim)."""
@@ -102,26 +124,45 @@ def usual_sizes(calibrated: CalibratedModel) -> Sizes:
     return SCALED if calibrated.plan is None else LANDMARKS
 
 
+def liveliness(acceleration: Array, sd: Array) -> Array:
+    """(...,) mean square of accelerations (..., K) over the filter's own deviations of them, of what moves."""
+    moves = sd > 0.0
+    ratio = np.divide(acceleration, sd, out=np.zeros_like(sd), where=moves)
+    return np.asarray(np.square(ratio).sum(axis=-1) / np.maximum(moves.sum(axis=-1), 1))
+
+
 Parts = dict[str, dict[str, Array]]
 
 
 def reported(
-    sizes: Sizes, variance_scale: float, own: Mapping[str, Array], parts: Parts, *, late: bool
+    sizes: Sizes,
+    variance_scale: float,
+    own: Mapping[str, Array],
+    parts: Parts,
+    lively: Array,
+    beside: npt.NDArray[np.bool_] | None = None,
+    *,
+    late: bool,
 ) -> dict[str, Array]:
     """Standard deviations that are reported: block -> (..., C).
 
     Args:
         variance_scale: of the noise of the filter. own: the filter's own deviations, by block. parts: variances as of
-            `Systematic.over_time`. late: whether later frames helped.
+            `Systematic.over_time`. lively: (...,) as of `liveliness`. beside: (..., C) moments of `Sizes.own_beside`.
+            late: whether later frames helped.
     """
+    factors = sizes.late() if late else OWN_AT_ONCE
     found = {}
     for block, sd in own.items():
-        factor = sizes.own(block) if late else 1.0
-        variance = np.square(factor * sd)
+        still, moving = factors[block]
+        factor = still + moving * lively[..., None]
+        if late and beside is not None and block == "moments":
+            factor = np.where(beside, sizes.own_beside, factor)
+        variance = factor * np.square(sd)
         for kind in KINDS:
             variance = variance + getattr(sizes, kind) ** 2 * parts[kind][block]
         if sizes.inertia:  # the filter's own part has so much of it already
-            variance = variance + max(1.0 - factor**2 * variance_scale, 0.0) * parts["inertia"][block]
+            variance = variance + np.maximum(1.0 - factor * variance_scale, 0.0) * parts["inertia"][block]
         found[block] = np.sqrt(variance)
     return found
 
@@ -173,9 +214,9 @@ class Systematic:
         self._segments = {name: k for k, name in enumerate(segments)}
         self._model = _core.Model(spec)
         self._variance_scale = noise.variance_scale
-        least = min(self.sizes.own_moments, 1.0)  # the factor on the filter's own part, late or at once
-        open_ = self.sizes.inertia and least**2 * noise.variance_scale < 1.0
-        self._inertia = [k for k, name in enumerate(calibrated.names) if open_ and name.startswith("inertia/")]
+        self._inertia = [
+            k for k, name in enumerate(calibrated.names) if self.sizes.inertia and name.startswith("inertia/")
+        ]
 
     def _displacements(self, jacobian: Array) -> Array:
         """(3 M, S): what each source does to the markers of the model as it is posed."""
@@ -221,6 +262,9 @@ class Systematic:
             outputs = (B - self._B0, Bd, Bdd, moved)  # of angles what changes with the posture: a zero is a definition
             found[kind] = self._labelled(*(np.square(values[:, chosen]).sum(axis=1) for values in outputs))
         found["skin"] = self._labelled(*self._skin(q, qd, qdd, (G, Gd, Gdd), (Tq, Tv, Ta)))
+        still = np.zeros_like(q)
+        displaced = T[:, errors.first_moments] * errors.masses
+        found["mass_centre"] = self._labelled(still, still, still, np.square(displaced).sum(axis=1))
         return found
 
     def _skin(
@@ -315,14 +359,32 @@ class Systematic:
         """
         inertia = covariance[np.ix_(self._inertia, self._inertia)] / self._variance_scale
         own = {block: found[block] for block in BLOCKS}
-        return reported(self.sizes, self._variance_scale, own, self._at(x, inertia, wrench, segments), late=late)
+        K = len(self._free)
+        lively = liveliness(x[2 * K : 3 * K], own["accelerations"][self._free])
+        parts = self._at(x, inertia, wrench, segments)
+        return reported(self.sizes, self._variance_scale, own, parts, lively, late=late)
 
     def added_over_time(self, data: xr.Dataset, *, late: bool) -> xr.Dataset:
         """The same of a recording: ``data`` with other ``coordinates_sd`` ... ``moments_sd``."""
         order = ("time", "coordinate")
         own = {block: data[f"{block}_sd"].transpose(*order).values for block in BLOCKS}
-        sd = reported(self.sizes, self._variance_scale, own, self.over_time(data), late=late)
+        found = self.over_time(data), self.lively(data), measured_beside(data)
+        sd = reported(self.sizes, self._variance_scale, own, *found, late=late)
         return data.assign({f"{block}_sd": (order, sd[block]) for block in BLOCKS})
+
+    def lively(self, data: xr.Dataset) -> Array:
+        """(T,) `liveliness` of a recording, by its states and the filter's own ``accelerations_sd``."""
+        K = len(self._free)
+        states = data["state"].transpose("time", "element").values
+        sd = data["accelerations_sd"].transpose("time", "coordinate").values[:, self._free]
+        return liveliness(states[:, 2 * K : 3 * K], sd)
+
+
+def measured_beside(data: xr.Dataset) -> npt.NDArray[np.bool_] | None:
+    """(T, C) moments that are measured in a recording in which some foot stands beside the plates; None: none does."""
+    if "foot_contact" not in data or not (data["foot_contact"].values == UNMEASURED).any():
+        return None
+    return np.asarray(data["moment_source"].transpose("time", "coordinate").values == MEASURED)
 
 
 def _differences(values: list[Array]) -> tuple[Array, Array, Array]:

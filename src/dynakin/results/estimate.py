@@ -67,9 +67,9 @@ class Estimate:
     several of them divide the load is assumed, and 3 where it is absent (NaN); where they are missing all is measured
     (`dynakin.results.measures.sources`).
 
-    Deviations (``*_sd``) of coordinates, speeds, accelerations and moments hold what the filter cannot know of joints
-    and skin (`filter.systematic`); an angle's zero is not in them. ``state_sd`` and covariances are the filter's own,
-    but for ``state_sd`` of constants, which is by the declared noise.
+    Deviations (``*_sd``) of coordinates, speeds, accelerations and moments hold what the filter cannot know of joints,
+    skin and centres of mass (`filter.systematic`); an angle's zero is not in them. ``state_sd`` and covariances are the
+    filter's own, but for ``state_sd`` of constants, which is by the declared noise.
 
     ``lost`` (time,) is true in frames in which the filter lost the person: everything that was estimated there is NaN,
     but for ``state`` and ``state_sd``, which keep what the filter held.
