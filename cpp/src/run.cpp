@@ -5,10 +5,14 @@
 #include <string>
 
 #include "dynakin/reports.hpp"
+#include "dynakin/threads.hpp"
 
 namespace dynakin {
 
 namespace {
+
+// States from which a share of an update takes longer than to wake who does it.
+constexpr int k_worth_sharing = 200;
 
 StepReport step(Filter& filter, const Trial& trial, std::size_t frame, WrenchModel& how) {
   try {
@@ -75,13 +79,24 @@ RunRecord::RunRecord(const Model& of, std::size_t frames, Said what, bool of_sen
       tracking(frames),
       constraints_met(frames) {}
 
+Helped::Helped(Filter& filter, bool beside)
+    : filter_(filter), helper_(beside && filter.model().state_size() >= k_worth_sharing) {
+  filter_.share_with(&helper_);
+}
+
 void run_frames(Filter& filter, const Trial& trial, std::size_t first, std::size_t end, RunRecord& record,
                 ContactRecord* contacts) {
   using clock = std::chrono::steady_clock;
   const std::size_t m = 3 * filter.model().markers().size();
   filter.report_sensors(record.sensors);
   WrenchModel how;
-  Reports reports(record, contacts, end - first > 1);
+  std::optional<AtWork> other;
+  std::optional<Helped> helped;
+  if (end - first > 1) {  // else whoever goes frame by frame sees to that
+    other.emplace(most_threads());
+    helped.emplace(filter, static_cast<bool>(*other));
+  }
+  Reports reports(record, contacts, helped && *other);
   for (std::size_t k = first; k < end; ++k) {
     const auto start = clock::now();
     const StepReport report = step(filter, trial, k, how);

@@ -57,8 +57,22 @@ struct RunRecord : StateRecord {
   std::vector<std::uint8_t> tracking, constraints_met;
 };
 
-// Frames first to end - 1; frame 0 is an update only, the others step by the difference of their times. With contacts, moments (and their deviations) are those that the feet's wrenches leave. Throws
-// DivergenceError naming the frame and its time.
+// A filter's helper as long as this lives, where there may be one (threads.hpp) and the model is large enough.
+class Helped {
+ public:
+  Helped(Filter& filter, bool beside);
+  ~Helped() { filter_.share_with(nullptr); }
+  Helped(const Helped&) = delete;
+  Helped& operator=(const Helped&) = delete;
+
+ private:
+  Filter& filter_;
+  Helper helper_;
+};
+
+// Frames first to end - 1; frame 0 is an update only, the others step by the difference of their times. With contacts,
+// moments (and their deviations) are those that the feet's wrenches leave. Throws DivergenceError naming the frame and
+// its time.
 void run_frames(Filter& filter, const Trial& trial, std::size_t first, std::size_t end, RunRecord& record,
                 ContactRecord* contacts = nullptr);
 
