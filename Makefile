@@ -35,6 +35,7 @@ $(VENV)/.env: | prerequisites
 
 $(VENV)/.built: $(VENV)/.env $(CORE)
 	$(BIN)/python -m pip install --quiet --no-build-isolation --editable .
+	@$(BIN)/python -m compileall -q src  # as an install does that is not editable: else each start may compile all
 	@touch $@
 
 $(VENV)/.dev: $(VENV)/.built

@@ -3,18 +3,21 @@
 #include <algorithm>
 
 #include "dynakin/reports.hpp"
+#include "dynakin/threads.hpp"
 
 namespace dynakin {
 
 LaggedRun::LaggedRun(Filter& filter, const Trial& trial, int lag) : filter_(filter), trial_(trial), lag_(filter, lag) {}
 
-void LaggedRun::run(std::size_t first, std::size_t end, RunRecord& record, StateRecord& lagged, ContactRecord* contacts,
-                    ContactRecord* lagged_contacts) {
+void LaggedRun::run(std::size_t first, std::size_t end, RunRecord& record, StateRecord& lagged,
+                    ContactRecord* contacts) {
   const auto lag = static_cast<std::size_t>(lag_.lag());
-  Reports reports(lagged, lagged_contacts, true);
+  const AtWork other(most_threads());
+  const Helped helped(filter_, static_cast<bool>(other));
+  Reports reports(lagged, contacts, static_cast<bool>(other));
   for (std::size_t k = first; k < end; ++k) {
     lag_.open(trial_.dt(k));
-    run_frames(filter_, trial_, k, k + 1, record, contacts);
+    run_frames(filter_, trial_, k, k + 1, record);
     lag_.close();
     if (!lag_.ready()) continue;
     lag_.look_back(lag_.lag());

@@ -118,16 +118,18 @@ void Panels::get(Index from, Eigen::Ref<Eigen::MatrixXd> Z) const {
   }
 }
 
-void Panels::get_transposed(Eigen::Ref<Eigen::MatrixXd> Zt) const {
+void Panels::get_transposed(Index p, Eigen::Ref<Eigen::MatrixXd> Zt) const {
   using Wide = Eigen::Matrix<double, height, Eigen::Dynamic>;
-  for (Index p = 0; p < count(); ++p) {
-    const Index first = p * height, rows = std::min(height, rows_ - first);
-    const Eigen::Map<const Wide> Z(panel(p), height, Zt.rows());
-    for (Index k = 0; k < Zt.rows(); k += width) {  // a tile and its mirror image stay in the cache
-      const Index w = std::min(width, Zt.rows() - k);
-      Zt.block(k, first, w, rows) = Z.block(0, k, rows, w).transpose();
-    }
+  const Index first = p * height, rows = std::min(height, rows_ - first);
+  const Eigen::Map<const Wide> Z(panel(p), height, Zt.rows());
+  for (Index k = 0; k < Zt.rows(); k += width) {  // a tile and its mirror image stay in the cache
+    const Index w = std::min(width, Zt.rows() - k);
+    Zt.block(k, first, w, rows) = Z.block(0, k, rows, w).transpose();
   }
+}
+
+void Panels::get_transposed(Eigen::Ref<Eigen::MatrixXd> Zt) const {
+  for (Index p = 0; p < count(); ++p) get_transposed(p, Zt);
 }
 
 void Panels::add_product(const Eigen::Ref<const Eigen::VectorXd>& w, Eigen::VectorXd& x) const {
@@ -207,27 +209,29 @@ void Panels::divide_back(const Eigen::Ref<const Eigen::MatrixXd>& U, Index colum
   }
 }
 
-void Panels::take_square(Index columns, Eigen::MatrixXd& P) const {
+void Panels::take_square(Index p, Index columns, Eigen::MatrixXd& P) const {
   Square edge;
-  for (Index p = 0; p < count(); ++p) {
-    const Index i = p * height, rows = std::min(height, rows_ - i);
-    for (Index q = 0; q <= p; ++q) {
-      const Index j = q * height;
-      if (rows == height) {
-        for (Index k = 0; k < height; k += width)
-          dynakin::take_product(panel(p), panel(q) + k, height, columns, &P(i, j + k), P.outerStride());
-        if (p != q) P.block<height, height>(j, i) = P.block<height, height>(i, j).transpose();
-        continue;
-      }
-      edge.setZero();
-      const Index wide = std::min(height, rows_ - j);
-      edge.topLeftCorner(rows, wide) = P.block(i, j, rows, wide);
+  const Index i = p * height, rows = std::min(height, rows_ - i);
+  for (Index q = 0; q <= p; ++q) {
+    const Index j = q * height;
+    if (rows == height) {
       for (Index k = 0; k < height; k += width)
-        dynakin::take_product(panel(p), panel(q) + k, height, columns, edge.data() + k * height, height);
-      P.block(i, j, rows, wide) = edge.topLeftCorner(rows, wide);
-      if (p != q) P.block(j, i, wide, rows) = edge.topLeftCorner(rows, wide).transpose();
+        dynakin::take_product(panel(p), panel(q) + k, height, columns, &P(i, j + k), P.outerStride());
+      if (p != q) P.block<height, height>(j, i) = P.block<height, height>(i, j).transpose();
+      continue;
     }
+    edge.setZero();
+    const Index wide = std::min(height, rows_ - j);
+    edge.topLeftCorner(rows, wide) = P.block(i, j, rows, wide);
+    for (Index k = 0; k < height; k += width)
+      dynakin::take_product(panel(p), panel(q) + k, height, columns, edge.data() + k * height, height);
+    P.block(i, j, rows, wide) = edge.topLeftCorner(rows, wide);
+    if (p != q) P.block(j, i, wide, rows) = edge.topLeftCorner(rows, wide).transpose();
   }
+}
+
+void Panels::take_square(Index columns, Eigen::MatrixXd& P) const {
+  for (Index p = 0; p < count(); ++p) take_square(p, columns, P);
 }
 
 }  // namespace dynakin

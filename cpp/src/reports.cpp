@@ -8,8 +8,6 @@ namespace dynakin {
 Reports::Reports(StateRecord& record, ContactRecord* contacts, bool beside, std::function<void()> first)
     : record_(record), contacts_(contacts) {
   if (!beside || !record.deviation) return;
-  other_.emplace(most_threads());
-  if (!*other_) return;
   open_ = true;
   try {
     thread_ = std::thread([this, begun = begun_, first = std::move(first)] {
@@ -99,7 +97,6 @@ void Reports::close() {
     else  // on a busy machine it may not have begun
       thread_.detach();
   }
-  other_.reset();
 }
 
 }  // namespace dynakin

@@ -5,10 +5,14 @@
 #include <string>
 
 #include "dynakin/reports.hpp"
+#include "dynakin/threads.hpp"
 
 namespace dynakin {
 
 namespace {
+
+// States from which a share of an update takes longer than to wake who does it.
+constexpr int k_worth_sharing = 200;
 
 StepReport step(Filter& filter, const Trial& trial, std::size_t frame, WrenchModel& how) {
   try {
@@ -20,28 +24,30 @@ StepReport step(Filter& filter, const Trial& trial, std::size_t frame, WrenchMod
 
 }  // namespace
 
-StateRecord::StateRecord(const Model& of, std::size_t frames, bool output_sd)
+StateRecord::StateRecord(const Model& of, std::size_t frames, Said what)
     : model(of),
+      said(what),
       state(frames * model.state_size()),
       state_sd(state.size()),
-      markers(frames * 3 * model.markers().size()),
-      markers_sd(output_sd ? markers.size() : 0),
-      wrench(frames * 6),
-      wrench_sd(output_sd ? wrench.size() : 0),
-      moments(frames * model.coordinates().size()),
-      moments_sd(output_sd ? moments.size() : 0),
-      waiting(output_sd ? 8 : 0),
+      markers(said == Said::state ? 0 : frames * 3 * model.markers().size()),
+      markers_sd(said == Said::deviations ? markers.size() : 0),
+      wrench(said == Said::state ? 0 : frames * 6),
+      wrench_sd(said == Said::deviations ? wrench.size() : 0),
+      moments(said == Said::state ? 0 : frames * model.coordinates().size()),
+      moments_sd(said == Said::deviations ? moments.size() : 0),
+      waiting(said == Said::deviations ? 8 : 0),
       kinematics_(of),
       dynamics_(of) {
-  if (output_sd) deviation.emplace(model);
+  if (said == Said::deviations) deviation.emplace(model);
 }
 
 void StateRecord::report(std::size_t k, const Eigen::VectorXd& x, const Eigen::MatrixXd& P, ContactRecord* contacts) {
-  forward_kinematics(model, x, kinematics_);
-  subtree_dynamics(model, x, kinematics_, dynamics_);
   const std::size_t n = x.size(), m = kinematics_.markers.size(), nc = model.coordinates().size();
   Eigen::Map<Eigen::VectorXd>(state.data() + k * n, x.size()) = x;
   Eigen::Map<Eigen::VectorXd>(state_sd.data() + k * n, x.size()) = P.diagonal().cwiseMax(0.0).cwiseSqrt();
+  if (said == Said::state) return;
+  forward_kinematics(model, x, kinematics_);
+  subtree_dynamics(model, x, kinematics_, dynamics_);
   for (std::size_t i = 0; i < m; ++i) Eigen::Map<Vector3>(markers.data() + 3 * (k * m + i)) = kinematics_.markers[i];
   Eigen::Map<Vector6>(wrench.data() + 6 * k) = dynamics_.wrench.vector();
   double* const moment = moments.data() + k * nc;
@@ -56,29 +62,41 @@ void StateRecord::report(std::size_t k, const Eigen::VectorXd& x, const Eigen::M
   if (!contacts) deviation->moments(x, kinematics_, dynamics_, P, moment_sd);
 }
 
-RunRecord::RunRecord(const Model& of, std::size_t frames, bool output_sd)
-    : StateRecord(of, frames, output_sd),
-      markers_predicted(markers.size()),
-      wrench_predicted(wrench.size()),
-      innovation(markers.size() + wrench.size()),
+RunRecord::RunRecord(const Model& of, std::size_t frames, Said what, bool of_sensors)
+    : StateRecord(of, frames, what),
+      sensors(of_sensors),
+      markers_predicted(sensors ? frames * 3 * of.markers().size() : 0),
+      wrench_predicted(sensors ? frames * 6 : 0),
+      innovation(markers_predicted.size() + wrench_predicted.size()),
       innovation_sd(innovation.size()),
-      test_ratio(frames * (of.markers().size() + 1)),
+      test_ratio(sensors ? frames * (of.markers().size() + 1) : 0),
       nis(frames),
       log_likelihood(frames),
       step_us(frames),
       rows(frames),
       constrained(frames),
-      verdicts(test_ratio.size()),
+      verdicts(frames * (of.markers().size() + 1)),
       tracking(frames),
       constraints_met(frames) {}
+
+Helped::Helped(Filter& filter, bool beside)
+    : filter_(filter), helper_(beside && filter.model().state_size() >= k_worth_sharing) {
+  filter_.share_with(&helper_);
+}
 
 void run_frames(Filter& filter, const Trial& trial, std::size_t first, std::size_t end, RunRecord& record,
                 ContactRecord* contacts) {
   using clock = std::chrono::steady_clock;
   const std::size_t m = 3 * filter.model().markers().size();
-  filter.report_sensors(true);
+  filter.report_sensors(record.sensors);
   WrenchModel how;
-  Reports reports(record, contacts, end - first > 1);
+  std::optional<AtWork> other;
+  std::optional<Helped> helped;
+  if (end - first > 1) {  // else whoever goes frame by frame sees to that
+    other.emplace(most_threads());
+    helped.emplace(filter, static_cast<bool>(*other));
+  }
+  Reports reports(record, contacts, helped && *other);
   for (std::size_t k = first; k < end; ++k) {
     const auto start = clock::now();
     const StepReport report = step(filter, trial, k, how);
@@ -95,14 +113,16 @@ void run_frames(Filter& filter, const Trial& trial, std::size_t first, std::size
     std::transform(filter.verdicts().begin(), filter.verdicts().end(),
                    record.verdicts.begin() + static_cast<std::ptrdiff_t>(k * filter.verdicts().size()),
                    [](Verdict verdict) { return static_cast<std::uint8_t>(verdict); });
-    std::copy_n(filter.predicted().data(), m, record.markers_predicted.data() + k * m);
-    std::copy_n(filter.predicted().data() + m, 6, record.wrench_predicted.data() + 6 * k);
-    const auto keep = [k](const Eigen::VectorXd& numbers, std::vector<double>& all) {
-      std::copy(numbers.begin(), numbers.end(), all.begin() + static_cast<std::ptrdiff_t>(k) * numbers.size());
-    };
-    keep(filter.sensors().innovation, record.innovation);
-    keep(filter.sensors().innovation_sd, record.innovation_sd);
-    keep(filter.sensors().test_ratio, record.test_ratio);
+    if (record.sensors) {
+      std::copy_n(filter.predicted().data(), m, record.markers_predicted.data() + k * m);
+      std::copy_n(filter.predicted().data() + m, 6, record.wrench_predicted.data() + 6 * k);
+      const auto keep = [k](const Eigen::VectorXd& numbers, std::vector<double>& all) {
+        std::copy(numbers.begin(), numbers.end(), all.begin() + static_cast<std::ptrdiff_t>(k) * numbers.size());
+      };
+      keep(filter.sensors().innovation, record.innovation);
+      keep(filter.sensors().innovation_sd, record.innovation_sd);
+      keep(filter.sensors().test_ratio, record.test_ratio);
+    }
     reports.add(k, filter.state(), filter.covariance());
   }
   reports.end();

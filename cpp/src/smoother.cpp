@@ -40,6 +40,8 @@ Smoother::Smoother(Filter& filter, const Trial& trial, std::size_t stretch)
       x_(filter.state()) {}
 
 void Smoother::forward(std::size_t first, std::size_t end, RunRecord& record, ContactRecord* contacts) {
+  const AtWork other(most_threads());
+  const Helped helped(filter_, static_cast<bool>(other));
   filter_.record_to(&tape_);
   for (std::size_t k = first; k < end; ++k) {
     if (k % stretch_ == 0) filter_.save(checkpoints_[k / stretch_]);
@@ -165,7 +167,8 @@ std::size_t Smoother::backward(const RunRecord& record, SmoothRecord& out, Conta
   const auto start = clock::now();
   if (now_.end != left_) replay(left_, record, now_);
   left_ = now_.first;
-  Reports reports(out, contacts, true, [this, &record] {
+  const AtWork other(most_threads());
+  Reports reports(out, contacts, static_cast<bool>(other), [this, &record] {
     if (left_ > 0) replay(left_, record, before_);
   });
   look_back(now_, reports);

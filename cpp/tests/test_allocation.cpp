@@ -50,6 +50,8 @@ void check_no_allocation(const dynakin::ModelSpec& spec) {
   auto markers = markers_at(model, x);
   const Vector6 wrench = Vector6::Constant(10.0);
   Filter filter(model, settings, x, prior_for(model));
+  Helper helper(true);
+  filter.share_with(&helper);
   WrenchModel how = wrench_model_for(model);
   for (int k = 0; k < 20; ++k) {
     if (k == 10) markers.col(1).setConstant(std::nan(""));

@@ -15,7 +15,7 @@ STATISTICS = ("scipy.signal", "scipy.stats")  # the slowest parts of SciPy
 TABLES = ("xarray", "pandas")
 FILES = ("ezc3d", "h5py", "h5netcdf", "joblib")
 CORE = ("dynakin.bindings._core",)
-SEARCHES = ("scipy.optimize",)
+SEARCHES = ("scipy.optimize", "scipy.spatial")
 NUMBERS = ("numpy", "scipy")
 
 LOADED = "import sys; print(*sys.modules)"

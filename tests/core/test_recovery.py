@@ -405,7 +405,7 @@ def test_given_no_frames_for_a_while_when_they_come_again_then_the_motion_is_fou
     time = data.time[kept] + np.where(kept < END, 0.0, gap_s - 0.01 * (END - BEGIN))
     f = filter_of(spec, options_of(spec), data.x0, data.P0)
     given = {name: values[kept] for name, values in data.given.items()}
-    out = f.run_smoothed(time, data.markers[kept], data.wrench[kept], output_sd=True, **given)
+    out = f.run_smoothed(time, data.markers[kept], data.wrench[kept], outputs=True, **given)
     tracking, clean = np.asarray(out["tracking"]), undisturbed(spec.name)
     assert tracking[BEGIN] == FOUND and not np.delete(tracking, BEGIN).any()
     error = motion_error(spec, {"state": out["state"]}, data.truth[kept])

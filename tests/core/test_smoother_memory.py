@@ -73,7 +73,7 @@ def test_deviations_of_a_second_thread_are_those_of_one(monkeypatch, name, how):
 def test_the_forward_run_is_that_of_run(name):
     c = CASES[name]()
     f, g = c.filter(), c.filter()
-    both, alone = c.data.run(f.run_smoothed), c.data.run(g.run)
+    both, alone = c.data.run(f.run_smoothed, outputs=True), c.data.run(g.run, output_sd=True)
     assert_same({key: both[key] for key in alone}, alone)
     np.testing.assert_array_equal(f.covariance, g.covariance)
     for _ in range(5):  # also in what they remember

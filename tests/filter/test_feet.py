@@ -65,7 +65,7 @@ def estimate_of(data: Trial, feet: ContactLoads | None, smooth: bool = False) ->
     core = filter_of(SPEC, chosen, data.x0, data.P0)
     loads = None if feet is None else feet.core()
     if smooth:
-        arrays = smoothed(core.run_smoothed(data.time, data.markers, data.wrench, output_sd=True, feet=loads))
+        arrays = smoothed(core.run_smoothed(data.time, data.markers, data.wrench, outputs=True, feet=loads))
     else:
         arrays = core.run(data.time, data.markers, data.wrench, output_sd=True, feet=loads)
     layout, spec = Layout(SPEC), to_core(SPEC)

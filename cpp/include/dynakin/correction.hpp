@@ -24,6 +24,7 @@ struct Correction {
   // that has been linearised at x. The sums are those of the first step: of the innovation as it was predicted.
   void iterate(const MarkerRef& markers, const Vector6& wrench, int most);
   void record_to(FrameTape* to);
+  void share_with(Helper* helper) { update_.share_with(helper); }
 
   const Model& model;
   const FilterSettings& settings;

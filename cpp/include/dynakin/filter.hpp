@@ -57,6 +57,8 @@ class Filter {
   // From now on each update also writes what it did, to a tape of tape_rows(); nullptr: no longer. One listener at a
   // time.
   void record_to(FrameTape* tape) { correction_.record_to(tape); }
+  // From now on updates share their largest products with it; nullptr: no longer. No bit of them changes.
+  void share_with(Helper* helper) { correction_.share_with(helper); }
   int tape_rows() const { return correction_.measurement.max_rows() + static_cast<int>(settings_.equality.rows()); }
   std::size_t tape_sensors() const { return correction_.measurement.blocks().size(); }
   // Of the last predict: see Recovery::carry_on.

@@ -16,9 +16,9 @@ class LaggedRun {
   LaggedRun(Filter& filter, const Trial& trial, int lag);
 
   // Frames first to end - 1, in as many calls as one likes, the last of which ends the trial. record: as of run_frames;
-  // lagged: of the frames as they are seen later. contacts: as in run_frames, of either.
+  // lagged: of the frames as they are seen later. contacts: as in run_frames, of lagged.
   void run(std::size_t first, std::size_t end, RunRecord& record, StateRecord& lagged,
-           ContactRecord* contacts = nullptr, ContactRecord* lagged_contacts = nullptr);
+           ContactRecord* contacts = nullptr);
 
  private:
   const AtWork working_;

@@ -42,8 +42,11 @@ class Panels {
   void set(const Eigen::Ref<const Eigen::MatrixXd>& Z);
   void set_column(Eigen::Index k, double factor, const Eigen::Ref<const Eigen::VectorXd>& column);
   void copy(const Panels& other, Eigen::Index columns);
-  void get(Eigen::Index from, Eigen::Ref<Eigen::MatrixXd> Z) const;  // Z's columns from there on
-  void get_transposed(Eigen::Ref<Eigen::MatrixXd> Zt) const;         // Z', as many rows of it
+  // Z's columns from there on
+  void get(Eigen::Index from, Eigen::Ref<Eigen::MatrixXd> Z) const;
+  // Z', as many rows of it: the columns of one panel, or all.
+  void get_transposed(Eigen::Index p, Eigen::Ref<Eigen::MatrixXd> Zt) const;
+  void get_transposed(Eigen::Ref<Eigen::MatrixXd> Zt) const;
   // Z <- Z L^-T, L (columns, columns) lower triangular, stored with max_columns() rows at least; of one panel, or all.
   void divide(Eigen::Index p, const Eigen::Ref<const Eigen::MatrixXd>& L, Eigen::Index columns);
   void divide(const Eigen::Ref<const Eigen::MatrixXd>& L, Eigen::Index columns);
@@ -57,7 +60,9 @@ class Panels {
   // `depth` columns of U and those of Z from there on.
   void take_product(Eigen::Index p, Eigen::Index t, const Panels& U, const Panels& Z, Eigen::Index from,
                     Eigen::Index depth);
-  // P - Z Z', symmetric to the bit; the lower triangle of P is read, both are written.
+  // P - Z Z', symmetric to the bit; the lower triangle of P is read, both are written. Of the rows of one panel up to
+  // the diagonal, with their mirror image, or of all.
+  void take_square(Eigen::Index p, Eigen::Index columns, Eigen::MatrixXd& P) const;
   void take_square(Eigen::Index columns, Eigen::MatrixXd& P) const;
 
  private:

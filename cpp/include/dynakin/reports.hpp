@@ -11,14 +11,13 @@
 #include <thread>
 
 #include "dynakin/run.hpp"
-#include "dynakin/threads.hpp"
 
 namespace dynakin {
 
 // Of one thread, which adds and ends.
 class Reports {
  public:
-  // beside: whether another thread helps, if there may be one and the record has deviations. It does `first` before;
+  // beside: whether another thread may help, which it does if the record has deviations. It does `first` before;
   // where it does not, or has not begun when the reports end, nobody does.
   Reports(StateRecord& record, ContactRecord* contacts, bool beside, std::function<void()> first = {});
   ~Reports();
@@ -38,7 +37,6 @@ class Reports {
 
   StateRecord& record_;
   ContactRecord* const contacts_;
-  std::optional<AtWork> other_;
   std::thread thread_;
   const std::shared_ptr<std::atomic<bool>> begun_ = std::make_shared<std::atomic<bool>>(false);
   std::mutex reporting_;  // whoever reports: there is one place to do it

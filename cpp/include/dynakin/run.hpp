@@ -19,15 +19,19 @@ struct WaitingFrame {
   Eigen::MatrixXd P;
 };
 
-// What is said of the state in each frame: row-major arrays, a row a frame. The wrench is the body's own, without what
-// the plates are thought to add. Deviations of all but the state are empty where they are not asked for.
+// The state with its deviations; markers, wrench and moments too; their deviations too.
+enum class Said { state, outputs, deviations };
+
+// What is said of the state in each frame: row-major arrays, a row a frame; what is not said is empty. The wrench is
+// the body's own, without what the plates are thought to add.
 struct StateRecord {
-  StateRecord(const Model& model, std::size_t frames, bool output_sd);
+  StateRecord(const Model& model, std::size_t frames, Said said);
 
   // Frame k; contacts: as in run_frames.
   void report(std::size_t k, const Eigen::VectorXd& x, const Eigen::MatrixXd& P, ContactRecord* contacts);
 
   const Model& model;
+  const Said said;
   std::vector<double> state, state_sd;
   std::vector<double> markers, markers_sd;  // (frames, markers, 3)
   std::vector<double> wrench, wrench_sd;    // (frames, 6)
@@ -41,8 +45,10 @@ struct StateRecord {
 
 // The same of a run, with what it made of each frame.
 struct RunRecord : StateRecord {
-  RunRecord(const Model& model, std::size_t frames, bool output_sd = false);
+  // sensors: whether to say what was expected of each sensor, which takes the gate longer.
+  RunRecord(const Model& model, std::size_t frames, Said said = Said::outputs, bool sensors = true);
 
+  const bool sensors;
   std::vector<double> markers_predicted, wrench_predicted;    // before the frame is used
   std::vector<double> innovation, innovation_sd, test_ratio;  // SensorReport's
   std::vector<double> nis, log_likelihood, step_us;
@@ -51,9 +57,22 @@ struct RunRecord : StateRecord {
   std::vector<std::uint8_t> tracking, constraints_met;
 };
 
-// Frames first to end - 1, with a report on the sensors; frame 0 is an update only, the others step by the difference
-// of their times. With contacts, moments (and their deviations) are those that the feet's wrenches leave. Throws
-// DivergenceError naming the frame and its time.
+// A filter's helper as long as this lives, where there may be one (threads.hpp) and the model is large enough.
+class Helped {
+ public:
+  Helped(Filter& filter, bool beside);
+  ~Helped() { filter_.share_with(nullptr); }
+  Helped(const Helped&) = delete;
+  Helped& operator=(const Helped&) = delete;
+
+ private:
+  Filter& filter_;
+  Helper helper_;
+};
+
+// Frames first to end - 1; frame 0 is an update only, the others step by the difference of their times. With contacts,
+// moments (and their deviations) are those that the feet's wrenches leave. Throws DivergenceError naming the frame and
+// its time.
 void run_frames(Filter& filter, const Trial& trial, std::size_t first, std::size_t end, RunRecord& record,
                 ContactRecord* contacts = nullptr);
 

@@ -15,7 +15,7 @@
 namespace dynakin {
 
 struct SmoothRecord : StateRecord {
-  SmoothRecord(const Model& of, std::size_t frames) : StateRecord(of, frames, true), backward_us(frames) {}
+  SmoothRecord(const Model& of, std::size_t frames) : StateRecord(of, frames, Said::deviations), backward_us(frames) {}
 
   // All that smoothing adds to the run in wall time, which the frames of a stretch share evenly.
   std::vector<double> backward_us;

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "dynakin/frame_tape.hpp"
+#include "dynakin/helper.hpp"
 #include "dynakin/measurement.hpp"
 #include "dynakin/panels.hpp"
 
@@ -23,15 +24,20 @@ class JointUpdate {
 
   // Each update is also written to the tape, if there is one.
   void record_to(FrameTape* tape) { tape_ = tape; }
+  // Panels are shared with it; nullptr: no longer.
+  void share_with(Helper* helper) { helper_ = helper; }
   // H and v of all blocks belong to the same predicted state; dx is the correction. P stays symmetric to the bit. Where
   // S is not positive definite nothing has changed but dx, which is zero.
   UpdateSums apply(const std::vector<RowBlock>& blocks, Eigen::MatrixXd& P, Eigen::VectorXd& dx);
 
  private:
-  void gather(const std::vector<RowBlock>& blocks, const Eigen::MatrixXd& P);
+  void gather(const std::vector<RowBlock>& blocks, int rows, const Eigen::MatrixXd& P);
   void add_up(const std::vector<RowBlock>& blocks, int rows);
+  template <class Part>
+  void each_panel(const Part& part);
 
   FrameTape* tape_ = nullptr;
+  Helper* helper_ = nullptr;
   Panels Z_;            // (n, rows) P H', then P H' L^-T with S = L L'
   Eigen::MatrixXd HP_;  // (rows, n)
   Eigen::MatrixXd S_;

@@ -31,6 +31,7 @@ void add_arrays_of(StateRecord&& record, std::size_t frames, const std::string& 
   const auto key = [&](const char* name, const char* end = "") { return nb::str((prefix + name + end).c_str()); };
   out[key("state")] = owned(std::move(record.state), {frames, n});
   out[key("state_sd")] = owned(std::move(record.state_sd), {frames, n});
+  if (record.said == Said::state) return;
   out[key("markers", suffix)] = owned(std::move(record.markers), {frames, n_markers, 3});
   out[key("wrench", suffix)] = owned(std::move(record.wrench), {frames, 6});
   out[key("moments")] = owned(std::move(record.moments), {frames, nc});
@@ -42,13 +43,16 @@ void add_arrays_of(StateRecord&& record, std::size_t frames, const std::string& 
 
 nb::dict arrays_of(RunRecord&& record, std::size_t frames) {
   const std::size_t n_markers = record.model.markers().size(), channels = 3 * n_markers + 6;
+  const bool sensors = record.sensors;
   nb::dict out;
   add_arrays_of(std::move(record), frames, "", "_estimated", out);
-  out["markers_predicted"] = owned(std::move(record.markers_predicted), {frames, n_markers, 3});
-  out["wrench_predicted"] = owned(std::move(record.wrench_predicted), {frames, 6});
-  out["innovation"] = owned(std::move(record.innovation), {frames, channels});
-  out["innovation_sd"] = owned(std::move(record.innovation_sd), {frames, channels});
-  out["test_ratio"] = owned(std::move(record.test_ratio), {frames, n_markers + 1});
+  if (sensors) {
+    out["markers_predicted"] = owned(std::move(record.markers_predicted), {frames, n_markers, 3});
+    out["wrench_predicted"] = owned(std::move(record.wrench_predicted), {frames, 6});
+    out["innovation"] = owned(std::move(record.innovation), {frames, channels});
+    out["innovation_sd"] = owned(std::move(record.innovation_sd), {frames, channels});
+    out["test_ratio"] = owned(std::move(record.test_ratio), {frames, n_markers + 1});
+  }
   out["nis"] = owned(std::move(record.nis), {frames});
   out["log_likelihood"] = owned(std::move(record.log_likelihood), {frames});
   out["step_us"] = owned(std::move(record.step_us), {frames});
@@ -89,11 +93,12 @@ struct Feet {
 };
 
 nb::dict run(Filter& filter, const Array1& time, const Array3& markers, const Array2& wrench, nb::object progress,
-             bool output_sd, const PyContactLoads* loads, const std::optional<Array3>& wrench_covariance,
-             const std::optional<Array3>& wrench_effects) {
+             bool output_sd, bool state_only, const PyContactLoads* loads,
+             const std::optional<Array3>& wrench_covariance, const std::optional<Array3>& wrench_effects) {
   const Trial trial = trial_of(filter, time, markers, wrench, wrench_covariance, wrench_effects);
-  Feet feet(filter.model(), loads, trial.frames);
-  RunRecord record(filter.model(), trial.frames, output_sd);
+  const Said said = state_only ? Said::state : output_sd ? Said::deviations : Said::outputs;
+  Feet feet(filter.model(), state_only ? nullptr : loads, trial.frames);
+  RunRecord record(filter.model(), trial.frames, said, !state_only);
   const AtWork working;
   for (std::size_t first = 0; first < trial.frames; first += k_stretch) {
     const std::size_t end = std::min(trial.frames, first + k_stretch);
@@ -109,13 +114,14 @@ nb::dict run(Filter& filter, const Array1& time, const Array3& markers, const Ar
 }
 
 nb::dict run_smoothed(Filter& filter, const Array1& time, const Array3& markers, const Array2& wrench,
-                      nb::object progress, bool output_sd, std::size_t stretch, const PyContactLoads* loads,
+                      nb::object progress, bool outputs, std::size_t stretch, const PyContactLoads* loads,
                       const std::optional<Array3>& wrench_covariance, const std::optional<Array3>& wrench_effects) {
   const Trial trial = trial_of(filter, time, markers, wrench, wrench_covariance, wrench_effects);
-  Feet feet(filter.model(), loads, trial.frames), smoothed_feet(filter.model(), loads, trial.frames);
+  Feet feet(filter.model(), outputs ? loads : nullptr, trial.frames);
+  Feet smoothed_feet(filter.model(), loads, trial.frames);
   const std::size_t frames = trial.frames;
   Smoother smoother(filter, trial, stretch);
-  RunRecord record(filter.model(), frames, output_sd);
+  RunRecord record(filter.model(), frames, outputs ? Said::deviations : Said::state);
   for (std::size_t first = 0; first < frames; first += k_stretch) {
     const std::size_t end = std::min(frames, first + k_stretch);
     {
@@ -135,7 +141,7 @@ nb::dict run_smoothed(Filter& filter, const Array1& time, const Array3& markers,
   nb::dict out = arrays_of(std::move(record), frames);
   add_arrays_of(std::move(smoothed), frames, "smoothed_", "", out);
   out["backward_us"] = owned(std::move(smoothed.backward_us), {frames});
-  feet.add_arrays(filter.model(), "", output_sd, out);
+  feet.add_arrays(filter.model(), "", true, out);
   smoothed_feet.add_arrays(filter.model(), "smoothed_", true, out);
   return out;
 }
@@ -144,23 +150,22 @@ nb::dict run_lagged(Filter& filter, const Array1& time, const Array3& markers, c
                     nb::object progress, const PyContactLoads* loads, const std::optional<Array3>& wrench_covariance,
                     const std::optional<Array3>& wrench_effects) {
   const Trial trial = trial_of(filter, time, markers, wrench, wrench_covariance, wrench_effects);
-  Feet feet(filter.model(), loads, trial.frames), lagged_feet(filter.model(), loads, trial.frames);
+  Feet lagged_feet(filter.model(), loads, trial.frames);
   const std::size_t frames = trial.frames;
   LaggedRun lagged_run(filter, trial, lag);
-  RunRecord record(filter.model(), frames);
-  StateRecord lagged(filter.model(), frames, true);
+  RunRecord record(filter.model(), frames, Said::state);
+  StateRecord lagged(filter.model(), frames, Said::deviations);
   constexpr std::size_t together = 16;  // a frame takes longer than in a run
   for (std::size_t first = 0; first < frames; first += together) {
     const std::size_t end = std::min(frames, first + together);
     {
       nb::gil_scoped_release release;
-      lagged_run.run(first, end, record, lagged, feet.pointer(), lagged_feet.pointer());
+      lagged_run.run(first, end, record, lagged, lagged_feet.pointer());
     }
     look_up(progress, end, frames);
   }
   nb::dict out = arrays_of(std::move(record), frames);
   add_arrays_of(std::move(lagged), frames, "smoothed_", "", out);
-  feet.add_arrays(filter.model(), "", false, out);
   lagged_feet.add_arrays(filter.model(), "smoothed_", true, out);
   return out;
 }
@@ -170,27 +175,30 @@ nb::dict run_lagged(Filter& filter, const Array1& time, const Array3& markers, c
 void bind_run(nb::class_<Filter>& filter) {
   filter
       .def("run", &run, nb::arg("time"), nb::arg("markers"), nb::arg("wrench"), nb::arg("progress") = nb::none(),
-           nb::arg("output_sd") = false, nb::arg("feet") = nb::none(), nb::arg("wrench_covariance") = nb::none(),
-           nb::arg("wrench_effects") = nb::none(),
+           nb::arg("output_sd") = false, nb::arg("state_only") = false, nb::arg("feet") = nb::none(),
+           nb::arg("wrench_covariance") = nb::none(), nb::arg("wrench_effects") = nb::none(),
            "Runs over time (T,), markers (T, M, 3) and wrench (T, 6); the first frame is an update only. Returns "
            "arrays by name; wrench_covariance (T, 6, 6), about the ground origin, takes the place of the settings', "
            "and wrench_effects (T, 6, 6 C) is what the states of the contacts take from it; with output_sd also "
-           "markers_sd, wrench_sd (of the body's own wrench) and moments_sd. "
+           "markers_sd, wrench_sd (of the body's own wrench) and moments_sd; with state_only nothing of markers, "
+           "wrenches and moments, nor of what was expected of sensors. "
            "With feet the moments are those of contact_moments, and foot_wrench, foot_adjustment, remainder, "
            "moment_source "
            "(and foot_wrench_sd) come with them. "
            "Raises DivergenceError naming the frame. progress(done, total) is called now and then.")
-      .def("run_smoothed", &run_smoothed, nb::arg("time"), nb::arg("markers"), nb::arg("wrench"),
-           nb::arg("progress") = nb::none(), nb::arg("output_sd") = false, nb::arg("stretch") = 0,
-           nb::arg("feet") = nb::none(), nb::arg("wrench_covariance") = nb::none(),
-           nb::arg("wrench_effects") = nb::none(),
-           "run, then backwards over the same frames: the arrays of run, and smoothed_state, _markers, _wrench and "
-           "_moments, each also with _sd, and backward_us. The filter then stands where run would have left it; after "
-           "an interruption it stands anywhere. progress counts both ways: total is twice the frames. Memory beside "
-           "the arrays: T / stretch checkpoints and stretch frames, twice as many where a second thread helps; 0: "
-           "sqrt(T). It helps where fewer threads smooth in this process than OMP_NUM_THREADS says (else: than the "
-           "machine has), and changes no bit. Raises ValueError where bounds are kept by constraint 'gain' or "
-           "'sigmoid'.")
+      .def(
+          "run_smoothed", &run_smoothed, nb::arg("time"), nb::arg("markers"), nb::arg("wrench"),
+          nb::arg("progress") = nb::none(), nb::arg("outputs") = false, nb::arg("stretch") = 0,
+          nb::arg("feet") = nb::none(), nb::arg("wrench_covariance") = nb::none(),
+          nb::arg("wrench_effects") = nb::none(),
+          "run, then backwards over the same frames: the arrays of run (of markers_estimated, wrench_estimated, "
+          "moments and the feet with `outputs` alone, then with deviations), and smoothed_state, _markers, _wrench and "
+          "_moments, each also with _sd, and backward_us. The filter then stands where run would have left it; after "
+          "an interruption it stands anywhere. progress counts both ways: total is twice the frames. Memory beside "
+          "the arrays: T / stretch checkpoints and stretch frames, twice as many where a second thread helps; 0: "
+          "sqrt(T). It helps where fewer threads smooth in this process than OMP_NUM_THREADS says (else: than the "
+          "machine has), and changes no bit. Raises ValueError where bounds are kept by constraint 'gain' or "
+          "'sigmoid'.")
       .def("run_lagged", &run_lagged, nb::arg("time"), nb::arg("markers"), nb::arg("wrench"), nb::arg("lag"),
            nb::arg("progress") = nb::none(), nb::arg("feet") = nb::none(), nb::arg("wrench_covariance") = nb::none(),
            nb::arg("wrench_effects") = nb::none(),

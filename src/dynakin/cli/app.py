@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import gc
 import os
 import sys
@@ -76,12 +77,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if "OMP_NUM_THREADS" not in os.environ:
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     gc.set_threshold(_MORE_BEFORE_GARBAGE)
+    atexit.register(gc.freeze)  # else Python looks for circles among all objects once more as it ends, for 0.3 s
     words = list(sys.argv[1:] if arguments is None else arguments)
-    if wrong := _without_value(words):
+    command: Any = typer.main.get_command(app)  # which takes 30 ms
+    if wrong := _without_value(words, command):
         print_error(wrong)
         return 2
     try:
-        code = app(args=words, standalone_mode=False)
+        code = command(args=words, standalone_mode=False)
     except DynakinError as error:
         if os.environ.get("DYNAKIN_DEBUG") == "1":
             raise
@@ -102,9 +105,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return code if isinstance(code, int) else 0
 
 
-def _without_value(words: Sequence[str]) -> str | None:
+def _without_value(words: Sequence[str], command: Any) -> str | None:
     """What is wrong where an option that needs a value is followed by another option, which click takes for it."""
-    command: Any = typer.main.get_command(app)
     for word in words:
         inner = getattr(command, "commands", {}).get(word)
         if inner is None:

@@ -86,7 +86,7 @@ def calibrated_noise(
     scaled = _scaled(noise, ratio, jerk_ratios(tracker, arrays, trial.time, chosen, groups))
     time, markers, wrench, contacts = trial.first(end)
     try:
-        again = tracker.changed(scaled).run_arrays(time, markers, wrench, progress, contacts, deviations=False)
+        again = tracker.changed(scaled).run_arrays(time, markers, wrench, progress, contacts, state_only=True)
     except DivergenceError:  # with other jerk: the factor alone leaves the movement as it is
         return _believed(_scaled(noise, ratio), noise, late)
     after = nis_per_row(again, chosen[:end])

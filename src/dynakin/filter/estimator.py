@@ -270,7 +270,7 @@ class Estimator:
             passes = 0 if ready.doubt else PASSES
 
             def first(own: Tracker, *trial: Any) -> dict[str, Array]:
-                return own.run_late_arrays(late, *trial) if once else own.run_arrays(*trial, deviations=False)
+                return own.run_late_arrays(late, *trial) if once else own.run_arrays(*trial, state_only=True)
 
             tracker, arrays, shift, clock = run_in_step(
                 ready.tracker.fresh(), recording.time, markers, ready.wrench, there, on_feet, passes, first

@@ -43,7 +43,7 @@ class Case:
         return self.data.run(self.filter().run_lagged, lag=lag)
 
     def smoothed(self, frames: int | None = None, stretch: int = 0, **changes: Any) -> dict[str, NDArray]:
-        return self.data.first(frames).run(self.filter(**changes).run_smoothed, output_sd=True, stretch=stretch)
+        return self.data.first(frames).run(self.filter(**changes).run_smoothed, outputs=True, stretch=stretch)
 
 
 def case(

@@ -70,7 +70,7 @@ class Trial:
         """Median place (3,) m of each marker over some frames, NaN where it is never seen there."""
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", RuntimeWarning)  # all-NaN: the answer is NaN, as wanted
-            return {key: np.asarray(np.nanmedian(path[frames], axis=0)) for key, path in self.paths.items()}
+            return {key: _median(path[frames]) for key, path in self.paths.items()}
 
     def calibration_frames(self, keys: set[MarkerKey], wished: set[MarkerKey]) -> tuple[npt.NDArray[np.intp], str]:
         """Frames on which lengths and marker places are measured, and a sentence that says which.
@@ -113,6 +113,12 @@ class Trial:
             first,
             f"the first {len(first)} usable frames of {self.recording.name} ({t0:.2f} to {t1:.2f} s; {why})",
         )
+
+
+def _median(places: Array) -> Array:
+    """Median over the first axis of what is known there."""
+    median = np.median if np.isfinite(places).all() else np.nanmedian  # the latter takes ten times as long
+    return np.asarray(median(places, axis=0))
 
 
 def choose_side(match: MarkerMatch, recording: Recording, side: str) -> tuple[str, str]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial.transform import Rotation
+import scipy
 
 from dynakin.recordings.rigidity import RigidMotion
 
@@ -40,8 +40,8 @@ class JointMotion:
         turned = np.swapaxes(proximal.rotations, 1, 2)
         turns = turned @ distal.rotations
         shifts = (turned @ (distal.translations - proximal.translations)[:, :, None])[:, :, 0]
-        mean = Rotation.from_matrix(turns).mean()
-        vectors = np.rad2deg((mean.inv() * Rotation.from_matrix(turns)).as_rotvec())
+        mean = scipy.spatial.transform.Rotation.from_matrix(turns).mean()
+        vectors = np.rad2deg((mean.inv() * scipy.spatial.transform.Rotation.from_matrix(turns)).as_rotvec())
         vectors = vectors - vectors.mean(axis=0)
         along = vectors @ np.linalg.eigh(vectors.T @ vectors)[1]
         low, high = np.percentile(along, [5.0, 95.0], axis=0)
@@ -103,7 +103,7 @@ def joint_axis(motion: JointMotion) -> JointAxis:
     others = np.array([_axes(motion.part(frames))[0] for frames in motion.blocks_left_out()])
     others *= np.sign(others @ a)[:, None]
     variance = (BLOCKS - 1) / BLOCKS * float(((others - others.mean(axis=0)) ** 2).sum())
-    order = np.argsort(Rotation.from_matrix(motion.turns).magnitude())
+    order = np.argsort(scipy.spatial.transform.Rotation.from_matrix(motion.turns).magnitude())
     less, more = (_axes(motion.part(half))[0] for half in np.array_split(order, 2))
     sd_deg = np.sqrt(np.rad2deg(np.sqrt(variance)) ** 2 + angle_deg(a, b) ** 2 + angle_deg(less, more, True) ** 2)
     apart = np.linalg.norm(a - motion.turns @ b, axis=1)

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial.transform import Rotation
 
 from dynakin.arrays import wrapped
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.model.calibration.joint_fit import joint_coordinates
+from dynakin.model.calibration.posture import turned
 from dynakin.model.schema import Interval, kinds_of
 
 Array = npt.NDArray[np.float64]
@@ -206,7 +206,7 @@ class _Body:
         up = -np.array(self.model.spec.gravity)
         up = up / np.linalg.norm(up) if np.any(up) else np.array([0.0, 1.0, 0.0])
         for angle in np.deg2rad([0.0, 90.0, 180.0, 270.0]):
-            turn = Rotation.from_rotvec(angle * up).as_matrix()
+            turn = turned(angle * up)
             poses.append((turn, here - turn @ centre))
         for pose in poses:
             yield self.moved(*pose)

@@ -5,10 +5,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from math import cos, sin, sqrt
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial.transform import Rotation
 
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
@@ -74,6 +74,22 @@ def frame_landmarks(segment: Segment) -> list[str]:
     return list(dict.fromkeys(names))
 
 
+def turned(vector: Array) -> Array:
+    """Rotation matrix (3, 3) by an angle, rad, about a direction: (3,), their product, by the quaternion. SciPy's, to
+    the last bit, would load a tenth of all libraries that a run starts with."""
+    x, y, z = map(float, vector)
+    angle = sqrt(x * x + y * y + z * z)
+    scale = 0.5 - angle**2 / 48.0 + angle**4 / 3840.0 if angle <= 1e-3 else sin(0.5 * angle) / angle
+    x, y, z, w = scale * x, scale * y, scale * z, cos(0.5 * angle)
+    return np.array(
+        [
+            [x * x - y * y - z * z + w * w, 2.0 * (x * y - z * w), 2.0 * (x * z + y * w)],
+            [2.0 * (x * y + z * w), -x * x + y * y - z * z + w * w, 2.0 * (y * z - x * w)],
+            [2.0 * (x * z - y * w), 2.0 * (y * z + x * w), -x * x - y * y + z * z + w * w],
+        ]
+    )
+
+
 def joint_motion(
     axes: tuple[Axis, ...], values: Mapping[str, float], lengths: Mapping[str, float]
 ) -> tuple[Array, Array]:
@@ -84,7 +100,7 @@ def joint_motion(
         s = sum(c * q**k for k, c in enumerate(axis.coefficients)) * (lengths[axis.scale] if axis.scale else 1.0)
         direction = np.array(axis.direction)
         if axis.kind == "rotation":
-            rotation = rotation @ Rotation.from_rotvec(s * direction).as_matrix()
+            rotation = rotation @ turned(s * direction)
         else:
             translation = translation + rotation @ (s * direction)
     return rotation, translation
@@ -164,7 +180,7 @@ def _target_rotation(
             axis = np.cross(before, now)
             sine, cosine = float(np.linalg.norm(axis)), float(before @ now)
             turn = np.arctan2(sine, cosine) * (axis / sine if sine > 0.0 else np.array([0.0, 0.0, 1.0]))
-            return np.asarray(Rotation.from_rotvec(turn).as_matrix() @ R_standing)
+            return turned(turn) @ R_standing
     return R_standing
 
 

@@ -150,7 +150,7 @@ def _patterns(given: str | Iterable[str] | Mapping[str, Any]) -> tuple[str, ...]
 def _possible(landmarks: Mapping[str, Any], markers: set[str], own: Mapping[str, Any]) -> dict[str, Any]:
     """Recipes without those of the shared ones that need a place or landmark which the set does not have."""
     kept = {
-        name: [(recipe, set() if name in own else _needs(recipe)) for recipe in recipes]
+        name: [(recipe, set() if name in own else _needs_of_shared()[id(recipe)]) for recipe in recipes]
         for name, recipes in landmarks.items()
     }
     while True:
@@ -160,6 +160,14 @@ def _possible(landmarks: Mapping[str, Any], markers: set[str], own: Mapping[str,
         if sum(map(len, next_kept.values())) == sum(map(len, kept.values())):
             return {name: [recipe for recipe, _ in recipes] for name, recipes in next_kept.items()}
         kept = next_kept
+
+
+@cache
+def _needs_of_shared() -> dict[int, set[str]]:
+    """By the recipe's identity: thirty sets and more are looked at for each recording, with the same recipes."""
+    shared = anatomy()
+    both = (*shared["landmarks"].values(), *shared["in_space"].values())
+    return {id(recipe): _needs(recipe) for recipes in both for recipe in recipes}
 
 
 def _needs(recipe: Any) -> set[str]:

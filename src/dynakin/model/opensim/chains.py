@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial.transform import Rotation
 
+from dynakin.model.calibration.posture import turned
 from dynakin.model.opensim.description import Coupler, Joint, JointAxis
 from dynakin.model.opensim.functions import Chain, Function, constant, is_constant, is_linear, joined
 
@@ -66,7 +66,7 @@ def place(joint: Joint, couplers: Mapping[str, Coupler], scales: Mapping[str, st
             if axis.kind == "translation":
                 terms.add(scale, R_PJ @ np.array(axis.direction) * value)
             elif host is None:
-                R_before = R_before @ Rotation.from_rotvec(value * np.array(axis.direction)).as_matrix()
+                R_before = R_before @ turned(value * np.array(axis.direction))
             elif value != 0.0:
                 axes.append(ChainAxis(host, axis.kind, R_CK @ np.array(axis.direction), (value,), "", ()))
             continue

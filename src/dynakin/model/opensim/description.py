@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial.transform import Rotation
+import scipy
 
 from dynakin.model.inertia import RigidBody
 from dynakin.model.opensim.functions import Function
@@ -31,7 +31,7 @@ class Offset:
     @property
     def rotation(self) -> Array:
         """R (3, 3) of the frame in its body."""
-        return np.asarray(Rotation.from_euler("XYZ", self.orientation).as_matrix())
+        return np.asarray(scipy.spatial.transform.Rotation.from_euler("XYZ", self.orientation).as_matrix())
 
     def then(self, other: Offset) -> Offset:
         """A frame that lies at ``other`` in this one."""
@@ -40,7 +40,7 @@ class Offset:
         if other.orientation == ZERO:
             turned = self.orientation
         else:
-            x, y, z = Rotation.from_matrix(self.rotation @ other.rotation).as_euler("XYZ")
+            x, y, z = scipy.spatial.transform.Rotation.from_matrix(self.rotation @ other.rotation).as_euler("XYZ")
             turned = (float(x), float(y), float(z))
         x, y, z = np.array(self.translation) + self.rotation @ np.array(other.translation)
         return Offset((float(x), float(y), float(z)), turned)

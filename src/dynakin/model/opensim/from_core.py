@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from scipy.spatial.transform import Rotation
+import scipy
 
 from dynakin.bindings import _core
 from dynakin.model.inertia import INERTIA_NAMES, RigidBody
@@ -83,7 +83,7 @@ class _Tree:
         place = np.array(segment.translation)
         for term in segment.lengths:
             place = place + self.length(term.parameter) * np.array(term.direction)
-        x, y, z = Rotation.from_matrix(segment.rotation).as_euler("XYZ")
+        x, y, z = scipy.spatial.transform.Rotation.from_matrix(segment.rotation).as_euler("XYZ")
         offset, parent = Offset(_vector(place), (float(x), float(y), float(z))), segment.parent
         groups = _groups(segment.axes)
         for k, group in enumerate(groups):

@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
-from scipy.spatial.transform import Rotation
+import scipy
 
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.power import root_coordinates
@@ -80,10 +80,11 @@ def _pelvis(estimate: Estimate, turn: Array) -> Array | None:
     R_GB = estimate.data["joint_orientations"].transpose("time", "joint", "axis", "axis_").values[:, at]
     own = estimate.data["coordinates"].sel(coordinate=list(PELVIS)).transpose("time", "coordinate").values
     known = np.isfinite(R_GB).all(axis=(1, 2))
-    if not known.any() or np.abs(Rotation.from_euler("ZXY", own[known]).as_matrix() - R_GB[known]).max() > _SAME:
+    rotation = scipy.spatial.transform.Rotation
+    if not known.any() or np.abs(rotation.from_euler("ZXY", own[known]).as_matrix() - R_GB[known]).max() > _SAME:
         return None
     angles = np.full(own.shape, np.nan)
-    angles[known] = np.unwrap(Rotation.from_matrix(turn @ R_GB[known]).as_euler("ZXY"), axis=0)
+    angles[known] = np.unwrap(rotation.from_matrix(turn @ R_GB[known]).as_euler("ZXY"), axis=0)
     return angles
 
 
