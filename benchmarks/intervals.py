@@ -64,7 +64,7 @@ Array = np.ndarray
 @dataclass(frozen=True)
 class Run:
     """One estimate against the truth: by block errors (T, C), the filter's own deviations, and variances by kind of
-    error at size 1; (T,) liveliness of the movement; (T, C) moments that are measured
+    error at size 1; (T,) intensity of the movement; (T, C) moments that are measured
     while some foot stands beside the plates. Frames that have no truth or no value are NaN. ``late``: whether
     later frames helped."""
 
@@ -75,7 +75,7 @@ class Run:
     error: dict[str, Array]
     own: dict[str, Array]
     parts: Parts
-    lively: Array
+    intensity: Array
     beside: Array | None
     variance_scale: float
     late: bool
@@ -183,7 +183,7 @@ def against(
         error,
         {block: values(f"{block}_sd") for block in blocks},
         {kind: {block: part[block][window][:, mine] for block in blocks} for kind, part in parts.items()},
-        systematic.lively(data)[window],
+        systematic.intensity(data)[window],
         None if beside is None else beside[window][:, mine],
         tracker.noise.variance_scale,
         bool(tracked.estimate.config["lag_s"]),
@@ -213,7 +213,7 @@ def figures(run: Run, sizes: Sizes | None) -> dict[str, tuple[float, ...]]:
     found = {}
     said = run.own
     if sizes is not None:
-        said = reported(sizes, run.variance_scale, run.own, run.parts, run.lively, run.beside, late=run.late)
+        said = reported(sizes, run.variance_scale, run.own, run.parts, run.intensity, run.beside, late=run.late)
     for title, block, places in groups_of(run):
         e, sd = run.error[block][:, places], said[block][:, places]
         if block == "coordinates":

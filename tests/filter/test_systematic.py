@@ -26,8 +26,8 @@ from dynakin.filter.systematic import (
     SPEEDS_STILL,
     Sizes,
     Systematic,
-    liveliness,
     measured_beside,
+    movement_intensity,
     reported,
 )
 from dynakin.settings.noise import Noise
@@ -244,10 +244,10 @@ def test_a_centre_of_mass_beside_its_place_is_that_of_bodies_that_are_changed() 
     assert not any(parts[block].any() for block in ("coordinates", "speeds", "accelerations"))
 
 
-def test_liveliness_is_the_mean_square_of_accelerations_over_their_deviations_of_what_moves() -> None:
+def test_intensity_is_the_mean_square_of_accelerations_over_their_deviations_of_what_moves() -> None:
     acceleration, sd = np.array([[2.0, 3.0, 5.0], [0.0, 0.0, 1.0]]), np.array([[1.0, 3.0, 0.0], [1.0, 1.0, 0.0]])
-    np.testing.assert_allclose(liveliness(acceleration, sd), [(4.0 + 1.0) / 2.0, 0.0])
-    assert liveliness(np.ones(3), np.zeros(3)) == 0.0
+    np.testing.assert_allclose(movement_intensity(acceleration, sd), [(4.0 + 1.0) / 2.0, 0.0])
+    assert movement_intensity(np.ones(3), np.zeros(3)) == 0.0
 
 
 def test_reported_deviations_hold_both_parts_and_a_scale_of_zero_leaves_the_filters_own() -> None:
@@ -260,27 +260,27 @@ def test_reported_deviations_hold_both_parts_and_a_scale_of_zero_leaves_the_filt
     external[2] = CONTACT
     parts = subject.parts(Q, QD, QDD, external)
     sizes = dict(zip(KINDS, SIZES, strict=True))
-    lively = np.mean(QDD**2) / 4.0
+    intense = np.mean(QDD**2) / 4.0
     nothing = Systematic(calibrated(), Noise(), subject.sizes.scaled(0.0))
     for late, laws in ((True, OWN_LATE | {"speeds": (SPEEDS_STILL, MOVING)}), (False, OWN_AT_ONCE)):
         both = subject.added(own, x, P, CONTACT[None], ["shank"], late=late)
         alone = nothing.added(own, x, P, CONTACT[None], ["shank"], late=late)
         for block, (still, moving) in laws.items():
-            factor = still + moving * lively
+            factor = still + moving * intense
             added = sum(sizes[kind] ** 2 * parts[kind][block] for kind in KINDS)
             np.testing.assert_allclose(alone[block], np.sqrt(factor) * own[block])
             np.testing.assert_allclose(both[block], np.sqrt(factor * own[block] ** 2 + added))
 
 
-def test_a_calm_movement_is_known_better_than_a_lively_one() -> None:
+def test_a_calm_movement_is_known_better_than_an_intense_one() -> None:
     own = {block: np.ones(10) for block in BLOCKS}
     subject = Systematic(calibrated(), Noise(), NONE)
     for late in (True, False):
-        calm, lively = (
+        calm, intense = (
             subject.added(own, np.r_[Q, QD, scale * QDD], np.zeros((30, 30)), CONTACT[None], ["shank"], late=late)
             for scale in (0.0, 10.0)
         )
-        assert (calm["speeds"] < 1.0).all() and (lively["speeds"] > 1.0).all()
+        assert (calm["speeds"] < 1.0).all() and (intense["speeds"] > 1.0).all()
         np.testing.assert_allclose(calm["coordinates"], 1.0)
 
 

@@ -1,5 +1,5 @@
 """What the filter's covariance cannot know: joints beside where they are, skin that follows them, bodies' centres of
-mass, inertia that a recording leaves open, and how lively the movement is.
+mass, inertia that a recording leaves open, and how intense the movement is.
 
 A consider covariance (Schmidt 1966): nothing is learned of these errors; their effect on what is reported is worked out
 afterwards and added to the filter's own variances ([derivations](derivations.md), section 17).
@@ -37,8 +37,8 @@ KINDS = (*OF_JOINTS, "skin", "mass_centre")
 Own = dict[str, tuple[float, float]]
 OWN_LATE: Own = {"coordinates": (1.0, 0.0), "accelerations": (0.12, 0.04), "moments": (0.25, 0.0)}
 """Factor on the filter's own variance of a block where later frames helped: the first number, and the second times the
-movement's `liveliness`. One density of jerk serves all movements: in theory half of a speed's variance is what such
-jerk leaves unseen, and five sixths of an acceleration's; a calm movement has none of it, a lively one more. Speeds have
+`movement_intensity`. One density of jerk serves all movements: in theory half of a speed's variance is what such jerk
+leaves unseen, and five sixths of an acceleration's; a calm movement has none of it, an intense one more. Speeds have
 `SPEEDS_STILL` and `Sizes.own_speeds`."""
 SPEEDS_STILL = 0.25
 OWN_AT_ONCE: Own = {
@@ -62,7 +62,7 @@ class Sizes:
         skin: of the displacement of a marker that follows a joint's angle, as a fraction of the declared size.
         mass_centre: m, of the centre of mass of each body beside where the model has it.
         own_speeds: what the factor on the filter's own variance of smoothed speeds grows by with the movement's
-            liveliness (`OWN_LATE`).
+            intensity (`OWN_LATE`).
         own_beside: factor on the filter's own variance of smoothed moments that are measured in a recording in which
             some foot stands beside the plates: what plates do not see they do not correct.
         inertia: whether what a recording leaves open of inertia counts in moments at least by the declared noise, as in
@@ -124,7 +124,7 @@ def usual_sizes(calibrated: CalibratedModel) -> Sizes:
     return SCALED if calibrated.plan is None else LANDMARKS
 
 
-def liveliness(acceleration: Array, sd: Array) -> Array:
+def movement_intensity(acceleration: Array, sd: Array) -> Array:
     """(...,) mean square of accelerations (..., K) over the filter's own deviations of them, of what moves."""
     moves = sd > 0.0
     ratio = np.divide(acceleration, sd, out=np.zeros_like(sd), where=moves)
@@ -139,7 +139,7 @@ def reported(
     variance_scale: float,
     own: Mapping[str, Array],
     parts: Parts,
-    lively: Array,
+    intensity: Array,
     beside: npt.NDArray[np.bool_] | None = None,
     *,
     late: bool,
@@ -148,14 +148,14 @@ def reported(
 
     Args:
         variance_scale: of the noise of the filter. own: the filter's own deviations, by block. parts: variances as of
-            `Systematic.over_time`. lively: (...,) as of `liveliness`. beside: (..., C) moments of `Sizes.own_beside`.
-            late: whether later frames helped.
+            `Systematic.over_time`. intensity: (...,) as of `movement_intensity`. beside: (..., C) moments of
+            `Sizes.own_beside`. late: whether later frames helped.
     """
     factors = sizes.late() if late else OWN_AT_ONCE
     found = {}
     for block, sd in own.items():
         still, moving = factors[block]
-        factor = still + moving * lively[..., None]
+        factor = still + moving * intensity[..., None]
         if late and beside is not None and block == "moments":
             factor = np.where(beside, sizes.own_beside, factor)
         variance = factor * np.square(sd)
@@ -360,24 +360,24 @@ class Systematic:
         inertia = covariance[np.ix_(self._inertia, self._inertia)] / self._variance_scale
         own = {block: found[block] for block in BLOCKS}
         K = len(self._free)
-        lively = liveliness(x[2 * K : 3 * K], own["accelerations"][self._free])
+        intense = movement_intensity(x[2 * K : 3 * K], own["accelerations"][self._free])
         parts = self._at(x, inertia, wrench, segments)
-        return reported(self.sizes, self._variance_scale, own, parts, lively, late=late)
+        return reported(self.sizes, self._variance_scale, own, parts, intense, late=late)
 
     def added_over_time(self, data: xr.Dataset, *, late: bool) -> xr.Dataset:
         """The same of a recording: ``data`` with other ``coordinates_sd`` ... ``moments_sd``."""
         order = ("time", "coordinate")
         own = {block: data[f"{block}_sd"].transpose(*order).values for block in BLOCKS}
-        found = self.over_time(data), self.lively(data), measured_beside(data)
+        found = self.over_time(data), self.intensity(data), measured_beside(data)
         sd = reported(self.sizes, self._variance_scale, own, *found, late=late)
         return data.assign({f"{block}_sd": (order, sd[block]) for block in BLOCKS})
 
-    def lively(self, data: xr.Dataset) -> Array:
-        """(T,) `liveliness` of a recording, by its states and the filter's own ``accelerations_sd``."""
+    def intensity(self, data: xr.Dataset) -> Array:
+        """(T,) `movement_intensity` of a recording, by its states and the filter's own ``accelerations_sd``."""
         K = len(self._free)
         states = data["state"].transpose("time", "element").values
         sd = data["accelerations_sd"].transpose("time", "coordinate").values[:, self._free]
-        return liveliness(states[:, 2 * K : 3 * K], sd)
+        return movement_intensity(states[:, 2 * K : 3 * K], sd)
 
 
 def measured_beside(data: xr.Dataset) -> npt.NDArray[np.bool_] | None:
