@@ -160,7 +160,7 @@ def against(
     data, tracker = tracked.estimate.data, tracked.tracker
     sizes = replace(usual_sizes(tracker.calibrated), inertia=True)  # worked out where it is not in use, too
     systematic = Systematic(tracker.calibrated, tracker.noise, sizes)
-    parts, beside = systematic.over_time(data), measured_beside(data)
+    parts, beside = systematic.over_time(data), measured_beside(data, len(tracker.calibrated.feet))
     all_names = [str(n) for n in data["coordinate"].values]
     chosen = [n for n in all_names if n in names and n not in tracked.estimate.held]
     mine, theirs = [all_names.index(n) for n in chosen], [names.index(n) for n in chosen]

@@ -47,6 +47,18 @@ def by_engine(ready: dict[str, Prepared], threads: int) -> dict[str, dict[str, n
     return {outcome.key: outcome.row for outcome in outcomes}
 
 
+def test_the_second_thread_of_a_step_changes_no_bit(ready, monkeypatch):
+    """Of a whole body, whose updates are shared (from 200 states on), smoothed and live."""
+    one, found = ready["fullbody 1"], []
+    assert one.tracker.calibrated.x0.size > 200
+    for threads in ("1", "2"):
+        monkeypatch.setenv("OMP_NUM_THREADS", threads)
+        live = one.tracker.fresh().run_arrays(one.recording.time, one.markers, one.wrench, None, one.contacts)
+        found.append(smoothed(ready, "fullbody 1") | {f"live_{key}": value for key, value in live.items()})
+    for array in found[0].keys() - TIMES - {f"live_{key}" for key in TIMES}:
+        assert found[0][array].tobytes() == found[1][array].tobytes(), array
+
+
 @pytest.mark.parametrize("side_by_side", [by_executor, by_engine])
 def test_two_threads_give_the_bits_of_one(ready, side_by_side):
     one, two = by_executor(ready, 1), side_by_side(ready, 2)

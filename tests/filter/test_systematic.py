@@ -100,6 +100,7 @@ def calibrated() -> Any:
         spec=model,
         names=tuple(_core.Model(model).layout.names),
         plan=None,
+        feet={},
         soft_tissue_m=DECLARED,
         marker_variance=np.zeros(12),
         unmodelled_m=0.0,
@@ -289,9 +290,10 @@ def test_measured_moments_count_more_where_some_foot_stands_beside_the_plates() 
     contact, source = np.array([[1, 1], [1, 2]]), np.array([[0, 0], [0, 1]])
     axes = ("time", "foot"), ("time", "coordinate")
     data = xr.Dataset({"foot_contact": (axes[0], contact), "moment_source": (axes[1], source)})
-    beside = measured_beside(data)
+    beside = measured_beside(data, 2)
     np.testing.assert_array_equal(beside, source == 0)
-    assert measured_beside(data.isel(time=[0])) is None
+    assert measured_beside(data.isel(time=[0]), 2) is None
+    assert measured_beside(data, 1) is None  # the second is a rail, say
     own = {"speeds": np.ones((2, 2)), "moments": np.ones((2, 2))}
     parts = {kind: {block: np.zeros((2, 2)) for block in own} for kind in (*KINDS, "inertia")}
     late, at_once = (reported(NONE, 1.0, own, parts, np.zeros(2), beside, late=late) for late in (True, False))

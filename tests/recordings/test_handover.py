@@ -82,6 +82,20 @@ def test_one_foot_takes_what_the_other_gives() -> None:
     assert longer[48 + round(PASSING_S * RATE_HZ), 1] == 1.0 and longer[70, 0] == 1.0
 
 
+@pytest.mark.parametrize(("seconds", "rate"), [(0.2, 100.0), (0.28, 100.0), (0.28, 1000.0)])
+def test_feet_that_land_and_leave_together_share_the_load(seconds: float, rate: float) -> None:
+    """A hop: the one a frame before the other; none takes what the other gives."""
+    frames, long = round(rate), seconds * rate
+    on, end = 0.2 * rate, 0.2 * rate + long
+    hop = [[Span(round(on), round(end), on, end)], [Span(round(on), round(end), on + 1.0, end + 1.0)]]
+    weights = stance_weights(hop, rate, frames)
+    inside = slice(round(on + 0.2 * long), round(end - 0.2 * long))
+    share = weights[inside, 0] / weights[inside].sum(axis=1)
+    np.testing.assert_allclose(share, 0.5, atol=0.2 * 100.0 / rate)
+    within = [[Span(0, frames, 0.1 * rate, 0.9 * rate)], hop[0]]  # one stands throughout
+    np.testing.assert_allclose(stance_weights(within, rate, frames)[inside, 0], 1.0)
+
+
 def replaced(span: Span, **changed: float) -> Span:
     return span._replace(**changed)
 

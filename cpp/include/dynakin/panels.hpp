@@ -42,7 +42,7 @@ class Panels {
   void set(const Eigen::Ref<const Eigen::MatrixXd>& Z);
   void set_column(Eigen::Index k, double factor, const Eigen::Ref<const Eigen::VectorXd>& column);
   void copy(const Panels& other, Eigen::Index columns);
-  // Z's columns from there on
+  // Z's columns from that one on.
   void get(Eigen::Index from, Eigen::Ref<Eigen::MatrixXd> Z) const;
   // Z', as many rows of it: the columns of one panel, or all.
   void get_transposed(Eigen::Index p, Eigen::Ref<Eigen::MatrixXd> Zt) const;

@@ -63,7 +63,7 @@ def _root(
 
 
 _MORE_BEFORE_GARBAGE = 100_000
-"""New objects before Python looks for circles among them. By its own 700 it looks 500 times while libraries are loaded
+"""New objects before Python collects reference cycles. By its own 700 it looks 500 times while libraries are loaded
 and results written, for a sixteenth of a short run."""
 
 
@@ -77,7 +77,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     if "OMP_NUM_THREADS" not in os.environ:
         os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     gc.set_threshold(_MORE_BEFORE_GARBAGE)
-    atexit.register(gc.freeze)  # else Python looks for circles among all objects once more as it ends, for 0.3 s
+    atexit.register(gc.freeze)  # else Python looks for reference cycles once more as it ends, for 0.3 s
     words = list(sys.argv[1:] if arguments is None else arguments)
     command: Any = typer.main.get_command(app)  # which takes 30 ms
     if wrong := _without_value(words, command):

@@ -137,7 +137,7 @@ def _with_errors(spec: _core.ModelSpec) -> tuple[_core.ModelSpec, list[str]]:
             axes[:0] = errors(name, "turned", "rotation") if inner else []
         axes[:0] = errors(name, "moved", "translation") if inner else []
         segment.axes = axes
-        segment.inertia_estimated = [segment.inertia[0] > 0.0 and each in _FIRST for each in INERTIA_NAMES]
+        segment.inertia_estimated = [bool(segment.inertia[0] > 0.0) and each in _FIRST for each in INERTIA_NAMES]
     larger.segments, larger.coordinates = segments, coordinates
     return larger, added
 

@@ -82,7 +82,7 @@ class Sizes:
     inertia: bool = True
 
     def scaled(self, factor: float) -> Sizes:
-        """The errors of joints and skin times a factor."""
+        """The errors of joints, skin and centres of mass times a factor."""
         return replace(self, **{kind: factor * getattr(self, kind) for kind in KINDS})
 
     def late(self) -> Own:
@@ -192,6 +192,7 @@ class Systematic:
         self.sizes = sizes or usual_sizes(calibrated).scaled(noise.systematic_scale)
         self._free = np.array([k for k, c in enumerate(spec.coordinates) if not c.locked])
         self._count = len(spec.coordinates)
+        self._feet = len(calibrated.feet)
         reference = neutral(calibrated)
         self._errors = JointErrors.of(spec, reference, calibrated.held)
         self._reference = reference[self._free]
@@ -368,7 +369,7 @@ class Systematic:
         """The same of a recording: ``data`` with other ``coordinates_sd`` ... ``moments_sd``."""
         order = ("time", "coordinate")
         own = {block: data[f"{block}_sd"].transpose(*order).values for block in BLOCKS}
-        found = self.over_time(data), self.intensity(data), measured_beside(data)
+        found = self.over_time(data), self.intensity(data), measured_beside(data, self._feet)
         sd = reported(self.sizes, self._variance_scale, own, *found, late=late)
         return data.assign({f"{block}_sd": (order, sd[block]) for block in BLOCKS})
 
@@ -380,9 +381,14 @@ class Systematic:
         return movement_intensity(states[:, 2 * K : 3 * K], sd)
 
 
-def measured_beside(data: xr.Dataset) -> npt.NDArray[np.bool_] | None:
-    """(T, C) moments that are measured in a recording in which some foot stands beside the plates; None: none does."""
-    if "foot_contact" not in data or not (data["foot_contact"].values == UNMEASURED).any():
+def measured_beside(data: xr.Dataset, feet: int) -> npt.NDArray[np.bool_] | None:
+    """(T, C) moments that are measured in a recording in which some foot stands beside the plates; None: none does.
+
+    Args:
+        feet: how many of the contacts are feet: the first ones, declared ones follow.
+    """
+    contact = data["foot_contact"].transpose("time", "foot").values[:, :feet] if "foot_contact" in data else None
+    if contact is None or not (contact == UNMEASURED).any():
         return None
     return np.asarray(data["moment_source"].transpose("time", "coordinate").values == MEASURED)
 

@@ -90,11 +90,15 @@ def stance_weights(spans: Sequence[Sequence[Span]], rate: float, frames: int) ->
             if frames < 2:
                 found[span.first, k] = 1.0
                 continue
-            rise = _handed_over([other.off - span.on for other in others if other.on < span.on < other.off], rate)
-            fall = _handed_over([span.off - other.on for other in others if span.on < other.on < span.off], rate)
+            rise = _handed_over([_together(other, span) for other in others], rate)
+            fall = _handed_over([_together(span, other) for other in others], rate)
             part = np.minimum((at - span.on) / rise, (span.off - at) / fall)
             found[:, k] = np.maximum(found[:, k], smooth_step(part))
     return found
+
+
+STEEPEST_STEP = 1.5
+"""Of `smooth_step`, in its middle."""
 
 
 def smooth_step(part: Array) -> Array:
@@ -103,10 +107,19 @@ def smooth_step(part: Array) -> Array:
     return np.asarray(x * x * (3.0 - 2.0 * x))
 
 
+def _together(before: Span, after: Span) -> float:
+    """Frames for which both stand while the load passes from the one to the other; inf where it does not, because one
+    stance lies within the other or both feet land and leave together, as in a hop."""
+    both = before.off - after.on
+    in_turn = before.on < after.on < before.off < after.off
+    return both if in_turn and 2.0 * both < min(before.off - before.on, after.off - after.on) else np.inf
+
+
 def _handed_over(both: Sequence[float], rate: float) -> float:
-    """Frames in which the load passes, of those for which both feet stand."""
+    """Frames in which the load passes, of those for which both feet stand (`_together`)."""
     fewest, most = (seconds * rate for seconds in BOTH_S)
-    return max(min(both), fewest) if both and min(both) <= most else PASSING_S * rate
+    shortest = min(both, default=np.inf)
+    return max(shortest, fewest) if shortest <= most else PASSING_S * rate
 
 
 def _highest(of: Array | None, frame: int, around_s: tuple[float, float], rate: float, otherwise: float) -> float:

@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from dynakin.arrays import runs
 from dynakin.recordings.feet.contact import FootContact
-from dynakin.recordings.feet.handover import Span, spans_of, stance_weights, supported
+from dynakin.recordings.feet.handover import BOTH_S, STEEPEST_STEP, Span, spans_of, stance_weights, supported
 from dynakin.recordings.recording import Array
 
 Flags = npt.NDArray[np.bool_]
@@ -29,8 +29,9 @@ BRIDGED_S = 0.25
 PRESSURE_REACH, ROLLED_M, FLAT_TILT_M = 0.55, 0.012, -0.006
 """The centre of pressure lies 0.55 of half the sole's length behind or before its middle once heel or toe are some
 12 mm above the other, measured from their lowest places: plates of `walking1`, `squats1` and `DJ1`; the walks of three
-other laboratories have 0.5 to 0.6 (0.7 of the simulated one in `truth3d`). `FLAT_TILT_M` is how much higher the toe's
-marker lies while the foot is flat, over their lowest places, where no stance shows it (`FootShape.flat_m`)."""
+other laboratories have 0.5 to 0.6 (0.7 of the simulated one in `truth3d`). `FLAT_TILT_M` is how much higher the
+heel's marker lies than the toe's while the foot is flat, both over their lowest places, where no stance shows it
+(`FootShape.flat_m`)."""
 STILL_M_S, STILL_S = 0.05, 0.1
 """A foot is flat while heel and toe touch and neither rises against the other by more; a recording that has less of it
 says nothing. By its own tilt the expected place is off by 0.09, not 0.20 of half the sole's length (`walking1`), 0.21,
@@ -110,9 +111,12 @@ class Soles:
 
     @property
     def passing(self) -> Array:
-        """(T, F) 1/s: how fast that changes; 0 of a single frame."""
+        """(T, F) 1/s: how fast that changes, no faster than in the shortest double support: where a foot is lost from
+        view its share jumps. 0 of a single frame."""
         share = self.share
-        return np.abs(np.gradient(share, axis=0)) * self.rate if len(share) > 1 else np.zeros_like(share)
+        if len(share) < 2:
+            return np.zeros_like(share)
+        return np.asarray(np.minimum(np.abs(np.gradient(share, axis=0)) * self.rate, STEEPEST_STEP / BOTH_S[0]))
 
 
 @dataclass(frozen=True, eq=False)
