@@ -64,9 +64,8 @@ Array = np.ndarray
 @dataclass(frozen=True)
 class Run:
     """One estimate against the truth: by block errors (T, C), the filter's own deviations, and variances by kind of
-    error at size 1; (T,) intensity of the movement; (T, C) moments that are measured
-    while some foot stands beside the plates. Frames that have no truth or no value are NaN. ``late``: whether
-    later frames helped."""
+    error at size 1; (T,) intensity of the movement; (T, C) moments that are measured in a recording in which some foot
+    stands beside the plates. Frames that have no truth or no value are NaN. ``late``: whether later frames helped."""
 
     case: str
     seed: int

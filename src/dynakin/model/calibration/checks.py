@@ -79,8 +79,8 @@ def check_masses(
 
 def report(model: ModelFile, plan: ModelPlan, mass_kg: float, messages: list[str]) -> None:
     """Say the lengths and masses that were found."""
-    sizes = {name: value for name, value in plan.geometry.lengths.items() if value}  # corrections start at 0
-    lengths = ", ".join(f"{name} {1000 * value:.0f}" for name, value in sizes.items())
+    known = plan.geometry.lengths.items()
+    lengths = ", ".join(f"{name} {1000 * value:.0f}" for name, value in known if value)  # corrections start at 0
     masses = ", ".join(f"{name} {body.mass:.2f}" for name, body in plan.bodies.items())
     messages.append(f"Lengths (mm): {lengths}.")
     messages.append(f"Masses (kg, {'both sides; ' if model.planar else ''}{mass_kg:.2f} in all): {masses}.")
