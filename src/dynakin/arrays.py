@@ -16,6 +16,14 @@ def runs(flags: npt.NDArray[np.bool_]) -> list[tuple[int, int]]:
     return [(int(first), int(end)) for first, end in edges.reshape(-1, 2)]
 
 
+def widened(flags: npt.NDArray[np.bool_], frames: int) -> npt.NDArray[np.bool_]:
+    """``flags`` (T,) with so many frames more on either side of each stretch of true."""
+    wide = flags.copy()
+    for first, end in runs(flags):
+        wide[max(0, first - frames) : end + frames] = True
+    return wide
+
+
 def peaks(path: npt.NDArray[np.float64], prominence: float) -> list[int]:
     """Where ``path`` (T,) is higher than on both sides, the middle of a flat top, and at least by ``prominence`` higher
     than the higher of the two lowest points on the way to something higher, or to an end, on either side.

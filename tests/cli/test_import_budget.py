@@ -13,7 +13,7 @@ from dynakin.simulation.support import PLATES
 DRAWING = ("matplotlib", "jinja2")
 STATISTICS = ("scipy.signal", "scipy.stats")  # the slowest parts of SciPy
 TABLES = ("xarray", "pandas")
-FILES = ("ezc3d", "h5py", "h5netcdf", "joblib")
+FILES = ("ezc3d", "netCDF4", "joblib")
 CORE = ("dynakin.bindings._core",)
 SEARCHES = ("scipy.optimize", "scipy.spatial")
 NUMBERS = ("numpy", "scipy")

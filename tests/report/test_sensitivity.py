@@ -39,7 +39,7 @@ def test_csv_and_netcdf_give_the_same_grid(table: Path, tmp_path: Path) -> None:
     values = grid.criterion.transpose(2, 0, 1)  # another order of dimensions
     coords = dict(zip(GAINS, grid.gains, strict=True))
     array = xr.DataArray(values, dims=(GAINS[2], GAINS[0], GAINS[1]), coords=coords, attrs={"units": "mm"})
-    array.to_dataset(name="criterion").to_netcdf(tmp_path / "gains.nc", engine="h5netcdf")
+    array.to_dataset(name="criterion").to_netcdf(tmp_path / "gains.nc", engine="netcdf4")
     again = read_sensitivity(tmp_path / "gains.nc")
     np.testing.assert_array_equal(again.criterion, grid.criterion)
     assert again.unit == "mm"
@@ -82,6 +82,6 @@ def test_what_is_no_grid_is_refused(tmp_path: Path) -> None:
     (tmp_path / "text.nc").write_text("not netCDF")
     with pytest.raises(ConfigError, match=r"text\.nc: cannot be read"):
         read_sensitivity(tmp_path / "text.nc")
-    xr.Dataset({"criterion": ("a", [1.0])}).to_netcdf(tmp_path / "other.nc", engine="h5netcdf")
+    xr.Dataset({"criterion": ("a", [1.0])}).to_netcdf(tmp_path / "other.nc", engine="netcdf4")
     with pytest.raises(ConfigError, match="no variable criterion over log10_coordinate_variance"):
         read_sensitivity(tmp_path / "other.nc")

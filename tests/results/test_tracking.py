@@ -95,7 +95,7 @@ def test_a_lost_trial_is_saved_only_where_asked(tmp_path: Path) -> None:
     assert "The filter is consistent" not in (folder / "report.html").read_text()
     table = np.genfromtxt((folder / "coordinates.mot").read_text().split("endheader\n")[1].splitlines()[1:])
     assert np.isnan(table[300:500, 1:]).all() and np.isfinite(table[:300, 1:]).all()
-    with xr.open_dataset(folder / "estimate.nc", engine="h5netcdf") as data:
+    with xr.open_dataset(folder / "estimate.nc", engine="netcdf4") as data:
         assert int(data["lost"].sum()) == 200
 
 

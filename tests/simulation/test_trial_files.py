@@ -72,7 +72,7 @@ def test_the_truth_is_in_the_files(saved: tuple[SimulatedTrial, Path]) -> None:
         np.testing.assert_allclose(table.values, data[variable].values, atol=1e-12)
     moments = read_table(folder / "truth_moments.sto")
     np.testing.assert_allclose(moments.column("knee_moment"), data["moments"].sel(coordinate="knee"), atol=1e-9)
-    with xr.open_dataset(folder / "truth.nc", engine="h5netcdf") as stored:
+    with xr.open_dataset(folder / "truth.nc", engine="netcdf4") as stored:
         for variable in data.data_vars:
             np.testing.assert_array_equal(stored[variable].values, data[variable].values, err_msg=str(variable))
         assert stored["moments"].attrs["units"] == "N m"

@@ -11,9 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import ndimage
 
-from dynakin.arrays import runs
+from dynakin.arrays import runs, widened
 from dynakin.filter.mass_centre import mass_centre
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.recording import rate_of
@@ -157,7 +156,10 @@ def _load_ratio(need: Array, have: Array, judged: Flags, weight: float, window: 
 
 def _window_means(values: Array, window: int) -> Array:
     """Means over the window around each frame, 0 beyond the ends: (T, ...) as given."""
-    return np.asarray(ndimage.uniform_filter1d(values, max(window, 1), axis=0, mode="constant"))
+    window = max(window, 1)
+    before, unchanged = window // 2, [(0, 0)] * (values.ndim - 1)
+    sums = np.cumsum(np.pad(values, [(before + 1, window - 1 - before), *unchanged]), axis=0)
+    return np.asarray((sums[window:] - sums[:-window]) / window)
 
 
 def _small_but_lasting(excess: Array, judged: Flags, window: int, least: float) -> Flags:
@@ -170,16 +172,17 @@ def _small_but_lasting(excess: Array, judged: Flags, window: int, least: float) 
     for axis in range(3):
         for sign in (1.0, -1.0):
             large = whole & (sign * means[:, axis] > least)
-            near = ndimage.binary_dilation(large, structure=np.ones(2 * (window // 2) + 1, dtype=bool))
-            found |= near & (sign * filled[:, axis] > 0.5 * least)
+            found |= widened(large, window // 2) & (sign * filled[:, axis] > 0.5 * least)
     return found
 
 
 def _with_edges(core: Flags, some: Flags, judged: Flags, claimed: Flags, rate: float) -> Flags:
     """Frames in which the excess is large, with those before and after in which it comes and goes."""
-    reach = 2 * round(SPREAD_S * rate) + 1
-    near = ndimage.binary_dilation(core, structure=np.ones(reach, dtype=bool))
-    found: Flags = claimed & np.asarray(ndimage.binary_propagation(core, mask=near & (~judged | some)))
+    near = widened(core, round(SPREAD_S * rate)) & (~judged | some)
+    found = core.copy()
+    for first, end in runs(near):
+        found[first:end] |= core[first:end].any()
+    found &= claimed
     for first, end in runs(~judged & claimed):  # not judged: as its neighbours are
         sides = [bool(found[k]) for k in (first - 1, end) if 0 <= k < len(found)]
         found[first:end] |= bool(sides) and all(sides)
@@ -188,8 +191,9 @@ def _with_edges(core: Flags, some: Flags, judged: Flags, claimed: Flags, rate: f
 
 def _smooth(values: Array, judged: Flags, rate: float) -> Array:
     """Gaussian mean over the judged frames alone; NaN elsewhere."""
-    weights = judged.astype(float)
-    sums = ndimage.gaussian_filter1d(np.where(judged[:, None], values, 0.0), SMOOTH_S * rate, axis=0, mode="constant")
-    total = ndimage.gaussian_filter1d(weights, SMOOTH_S * rate, mode="constant")
+    reach = round(4.0 * SMOOTH_S * rate)
+    kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / (SMOOTH_S * rate)) ** 2)
+    weighed = np.column_stack([np.where(judged[:, None], values, 0.0), judged])
+    sums = np.column_stack([np.convolve(column, kernel)[reach : reach + len(judged)] for column in weighed.T])
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(judged[:, None], sums / total[:, None], np.nan)
+        return np.where(judged[:, None], sums[:, :-1] / sums[:, -1:], np.nan)

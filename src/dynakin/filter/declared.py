@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
-from scipy import ndimage
+import scipy
 
-from dynakin.arrays import runs
+from dynakin.arrays import runs, widened
 from dynakin.filter.closure import Closure
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.settings.contacts import SEAT
@@ -51,8 +51,7 @@ def bearing(found: Closure, may: Flags, names: list[str], measured: list[bool], 
     """
     bears = np.zeros_like(may)
     judged = np.isfinite(found.excess[:, 1])
-    reach = np.ones(2 * round(MARGIN_S * rate) + 1, dtype=bool)
-    nearest = ndimage.distance_transform_edt(~judged, return_distances=False, return_indices=True)[0]
+    nearest = scipy.ndimage.distance_transform_edt(~judged, return_distances=False, return_indices=True)[0]
     for c, name in enumerate(names):
         if measured[c]:
             continue
@@ -61,6 +60,6 @@ def bearing(found: Closure, may: Flags, names: list[str], measured: list[bool], 
             upwards = not np.isfinite(excess).any() or float(np.nanmean(excess)) > 0.0
             if name != SEAT or (upwards and may[first:end, c].mean() > 0.5):
                 bears[first:end, c] = True
-        bears[:, c] = ndimage.binary_dilation(bears[:, c], structure=reach) & (may[:, c] | bears[:, c])
+        bears[:, c] = widened(bears[:, c], round(MARGIN_S * rate)) & (may[:, c] | bears[:, c])
         bears[:, c] = np.where(judged, bears[:, c], np.where(claimed, bears[nearest, c], may[:, c]))
     return bears

@@ -183,7 +183,7 @@ class _Beside(Thread):
             import xarray as xr  # first: the estimate itself is one
 
             xr.Dataset(coords={"axis": ["x"]})  # its first one has xarray load Dask, where that is installed
-            import h5netcdf  # noqa: F401
+            import netCDF4  # noqa: F401
 
             import dynakin.pipeline.result
             from dynakin.identification.observability.structure import structure_of

@@ -194,7 +194,7 @@ def _write_arrays(trial: SimulatedTrial, path: Path) -> None:
         for name, variable in data.data_vars.items()
         if variable.dtype.kind == "f" and variable.size > 1000
     }
-    data.to_netcdf(path, engine="h5netcdf", encoding=encoding)
+    data.to_netcdf(path, engine="netcdf4", encoding=encoding)
 
 
 def _rotations(trial: SimulatedTrial) -> NDArray[np.bool_]:

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 import numpy.typing as npt
-from scipy import ndimage
+import scipy
 
 from dynakin.arrays import runs
 from dynakin.errors import ModelError
@@ -124,7 +124,7 @@ def impulse_load(
     if np.count_nonzero(seen) < 2:
         return None
     path = np.interp(recording.time, recording.time[seen], height[seen])
-    speed = np.gradient(ndimage.gaussian_filter1d(path, _SPEED_S * recording.rate), recording.time)
+    speed = np.gradient(scipy.ndimage.gaussian_filter1d(path, _SPEED_S * recording.rate), recording.time)
     known = loads.total_known & np.isfinite(push) & seen & (loads.on.any(axis=(1, 2)))
     impulse, need, seconds = 0.0, 0.0, 0.0
     pushes, accelerations = list[Array](), list[Array]()

@@ -11,9 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
-from scipy import ndimage
 
-from dynakin.arrays import runs
+from dynakin.arrays import runs, widened
 from dynakin.recordings.feet.belt import belt_velocity
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
@@ -87,8 +86,7 @@ class FootContact:
 
     def bears(self, rate: float) -> Flags:
         """(T,) frames in which one of its stances may bear load, or nobody sees it, or just before or after that."""
-        around = 2 * round(2.0 * BEFORE_S * rate) + 1 if len(self.seen) > 1 else 1
-        found: Flags = ndimage.binary_dilation(~self.seen, np.ones(around, dtype=bool))
+        found: Flags = widened(~self.seen, round(2.0 * BEFORE_S * rate))
         for stance in self.stances:
             found[self.padded(stance, rate)] = True
         return found

@@ -205,7 +205,7 @@ def _on_grid(path: Path, gains: Array, values: Array, label: str = LABEL, unit: 
 
 def _read_netcdf(path: Path) -> Sensitivity:
     try:
-        with xr.open_dataset(path, engine="h5netcdf") as data:
+        with xr.open_dataset(path, engine="netcdf4") as data:
             data.load()
     except FileNotFoundError as error:
         raise OSError(2, "No such file or directory") from error

@@ -113,7 +113,7 @@ def write_netcdf(estimate: Estimate, path: Path) -> None:
 
     Times and constants stay as they are.
     """
-    import h5netcdf  # here, because it takes a tenth of a second
+    import netCDF4  # here, because only who writes waits for it
 
     data = full_dataset(estimate)
     encoding: dict[Hashable, dict[str, object]] = {}
@@ -131,8 +131,8 @@ def write_netcdf(estimate: Estimate, path: Path) -> None:
                 encoding[key]["dtype"] = "float32"
             rounded[key] = variable.copy(data=values)
     # By its path xarray would ask Dask who else writes it, which takes 0.3 s where it is there.
-    with h5netcdf.File(path, "w") as file:
-        store = xr.backends.H5NetCDFStore(file)
+    with netCDF4.Dataset(path, "w") as file:
+        store = xr.backends.NetCDF4DataStore(file)
         data.assign(rounded).dump_to_store(store, encoding=encoding)
 
 
