@@ -28,7 +28,7 @@ Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
 CALIBRATED_S = 4.0
-"""Part of a recording that is filtered again with other jerk densities, from its start: 3 s and 10 s give factors within
+"""Part of a recording that is filtered again with other jerk densities, from its start: 3 and 10 s give factors within
 2 % of each other."""
 SETTLING_S = 0.3
 """Left out of it: the first frames' covariances are the priors'."""
