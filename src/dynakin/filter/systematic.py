@@ -296,7 +296,7 @@ class Systematic:
         if not self._inertia:
             return np.zeros(self._count)
         T = _core.moment_jacobian(self._model, x, external)[: self._count, self._inertia]
-        return np.asarray(np.einsum("ci,ij,cj->c", T, covariance, T))
+        return np.asarray(((T @ covariance) * T).sum(axis=1))
 
     def _labelled(self, q: Array, qd: Array, qdd: Array, moments: Array) -> dict[str, Array]:
         found = {}
