@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "dynakin/reports.hpp"
-#include "dynakin/threads.hpp"
 
 namespace dynakin {
 
@@ -12,9 +11,8 @@ LaggedRun::LaggedRun(Filter& filter, const Trial& trial, int lag) : filter_(filt
 void LaggedRun::run(std::size_t first, std::size_t end, RunRecord& record, StateRecord& lagged,
                     ContactRecord* contacts) {
   const auto lag = static_cast<std::size_t>(lag_.lag());
-  const AtWork other(most_threads());
-  const Helped helped(filter_, static_cast<bool>(other));
-  Reports reports(lagged, contacts, static_cast<bool>(other));
+  const Helped helped(filter_);
+  Reports reports(lagged, contacts, static_cast<bool>(helped));
   for (std::size_t k = first; k < end; ++k) {
     lag_.open(trial_.dt(k));
     run_frames(filter_, trial_, k, k + 1, record);

@@ -5,7 +5,6 @@
 #include <string>
 
 #include "dynakin/reports.hpp"
-#include "dynakin/threads.hpp"
 
 namespace dynakin {
 
@@ -79,8 +78,8 @@ RunRecord::RunRecord(const Model& of, std::size_t frames, Said what, bool of_sen
       tracking(frames),
       constraints_met(frames) {}
 
-Helped::Helped(Filter& filter, bool beside)
-    : filter_(filter), helper_(beside && filter.model().state_size() >= k_worth_sharing) {
+Helped::Helped(Filter& filter)
+    : filter_(filter), other_(most_threads()), helper_(other_ && filter.model().state_size() >= k_worth_sharing) {
   filter_.share_with(&helper_);
 }
 
@@ -90,13 +89,9 @@ void run_frames(Filter& filter, const Trial& trial, std::size_t first, std::size
   const std::size_t m = 3 * filter.model().markers().size();
   filter.report_sensors(record.sensors);
   WrenchModel how;
-  std::optional<AtWork> other;
   std::optional<Helped> helped;
-  if (end - first > 1) {  // else whoever goes frame by frame sees to that
-    other.emplace(most_threads());
-    helped.emplace(filter, static_cast<bool>(*other));
-  }
-  Reports reports(record, contacts, helped && *other);
+  if (end - first > 1) helped.emplace(filter);  // else whoever goes frame by frame sees to that
+  Reports reports(record, contacts, helped && *helped);
   for (std::size_t k = first; k < end; ++k) {
     const auto start = clock::now();
     const StepReport report = step(filter, trial, k, how);

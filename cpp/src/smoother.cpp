@@ -40,8 +40,7 @@ Smoother::Smoother(Filter& filter, const Trial& trial, std::size_t stretch)
       x_(filter.state()) {}
 
 void Smoother::forward(std::size_t first, std::size_t end, RunRecord& record, ContactRecord* contacts) {
-  const AtWork other(most_threads());
-  const Helped helped(filter_, static_cast<bool>(other));
+  const Helped helped(filter_);
   filter_.record_to(&tape_);
   for (std::size_t k = first; k < end; ++k) {
     if (k % stretch_ == 0) filter_.save(checkpoints_[k / stretch_]);

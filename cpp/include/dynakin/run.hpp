@@ -8,6 +8,7 @@
 
 #include "dynakin/contact_record.hpp"
 #include "dynakin/output_sd.hpp"
+#include "dynakin/threads.hpp"
 #include "dynakin/trial.hpp"
 
 namespace dynakin {
@@ -57,16 +58,19 @@ struct RunRecord : StateRecord {
   std::vector<std::uint8_t> tracking, constraints_met;
 };
 
-// A filter's helper as long as this lives, where there may be one (threads.hpp) and the model is large enough.
+// A place for a second thread (threads.hpp) as long as this lives, false where there is none; it helps the filter where
+// the model is large enough.
 class Helped {
  public:
-  Helped(Filter& filter, bool beside);
+  explicit Helped(Filter& filter);
   ~Helped() { filter_.share_with(nullptr); }
   Helped(const Helped&) = delete;
   Helped& operator=(const Helped&) = delete;
+  explicit operator bool() const { return static_cast<bool>(other_); }
 
  private:
   Filter& filter_;
+  const AtWork other_;
   Helper helper_;
 };
 

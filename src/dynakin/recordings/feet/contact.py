@@ -86,7 +86,8 @@ class FootContact:
 
     def bears(self, rate: float) -> Flags:
         """(T,) frames in which one of its stances may bear load, or nobody sees it, or just before or after that."""
-        found: Flags = widened(~self.seen, round(2.0 * BEFORE_S * rate))
+        around = round(2.0 * BEFORE_S * rate) if len(self.seen) > 1 else 0  # one frame has no rate
+        found: Flags = widened(~self.seen, around)
         for stance in self.stances:
             found[self.padded(stance, rate)] = True
         return found
