@@ -87,6 +87,8 @@ def test_model_says_what_a_trial_tells(data_dir: Path, capsys: Said) -> None:
     [
         (["squat7", "--mass", "60"], "--mass is of use only with --identifiability"),
         (["squat7", "--identifiability", "--forces", "x.mot"], "--forces is of use only with --trial"),
+        (["squat7", "--identifiability", "--static", "x.trc"], "--static is of use only with --trial"),
+        (["squat7", "--static", "x.trc"], "--static is of use only with --identifiability"),
         (["--identifiability"], "expected a model's name"),
         (["squat7", "--identifiability", "--trial", "no.c3d"], "no.c3d"),
     ],

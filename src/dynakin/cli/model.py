@@ -12,7 +12,7 @@ from dynakin.cli.options import Given, with_settings
 from dynakin.settings.settings import Settings, option_names
 
 
-@with_settings("markers", "forces", "mass_kg", "height_m", "sex")
+@with_settings("markers", "forces", "static", "mass_kg", "height_m", "sex")
 def model(
     name: Annotated[
         str | None, typer.Argument(help="squat7, sagittal7, fullbody, a .toml or .osim file; none: list them.")
@@ -43,13 +43,14 @@ def model(
 
     console = out()
     needless = ["--trial"] if trial is not None else []
-    needless += [option_names(key)[0] for key in ("forces", "mass_kg", "height_m", "sex") if key in given]
+    needless += [option_names(key)[0] for key in ("forces", "static", "mass_kg", "height_m", "sex") if key in given]
     if needless and not identifiable and export is None:
         raise typer.BadParameter(f"{needless[0]} is of use only with --identifiability or --export")
     if parameters is not None and export is None:
         raise typer.BadParameter("--parameters is of use only with --export FILE")
-    if "forces" in given and trial is None:
-        raise typer.BadParameter("--forces is of use only with --trial FILE")
+    for key in ("forces", "static"):
+        if key in given and trial is None:
+            raise typer.BadParameter(f"{option_names(key)[0]} is of use only with --trial FILE")
     if name is None:
         if identifiable:
             raise typer.BadParameter("--identifiability: expected a model's name before it")
@@ -60,11 +61,11 @@ def model(
     settings = Settings.of({"model": name}, "model", ("model",), given)
     definition = definition_of(settings)
     if export is not None:
-        export_model(definition, export, parameters, settings.mass_kg, trial, settings.forces)
+        export_model(definition, export, parameters, settings.mass_kg, trial, settings.forces, settings.static)
         console.print(f"Written {export}", soft_wrap=True)
         return
     if identifiable:
-        print_identifiability(definition, trial, settings.forces)
+        print_identifiability(definition, trial, settings.forces, settings.static)
     elif isinstance(definition, OpenSimDefinition):
         print_opensim(console, definition)
     else:

@@ -138,7 +138,7 @@ def _states(model: ModelFile) -> Table:
     return rows
 
 
-def print_identifiability(definition: Definition, trial: Path | None, forces: Path | None) -> None:
+def print_identifiability(definition: Definition, trial: Path | None, forces: Path | None, static: Path | None) -> None:
     """Structure of the model, by a simulated person where no trial is given; the trial's posterior where one is.
 
     Raises:
@@ -150,7 +150,9 @@ def print_identifiability(definition: Definition, trial: Path | None, forces: Pa
         _print_structure(structure)
         return
     with stage("estimating") as progress:
-        estimate, tracker = Estimator(definition).track(read(trial, forces), progress=progress)
+        estimate, tracker = Estimator(definition).track(
+            read(trial, forces), static=None if static is None else read(static), progress=progress
+        )
     with stage("trying motions") as progress:
         found = identifiability(tracker, estimate, progress)
     _print_structure(found.structure, found)
@@ -212,6 +214,7 @@ def export_model(
     mass_kg: float | None,
     trial: Path | None,
     forces: Path | None,
+    static: Path | None,
 ) -> None:
     """Write a model with a run's values, where given.
 
@@ -227,7 +230,10 @@ def export_model(
         return
     if trial is None:
         raise typer.BadParameter("--export of a model that is no .osim file: expected --trial to measure it on")
-    write_osim(of_initial(definition.calibrate(read(trial, forces)), values), path)
+    write_osim(
+        of_initial(definition.calibrate(read(trial, forces), static=None if static is None else read(static)), values),
+        path,
+    )
 
 
 def _opensim_tree(definition: OpenSimDefinition) -> Tree:

@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 from dynakin.bindings import _core
 from dynakin.cli.app import app
 from dynakin.errors import ModelError, OutputError
+from dynakin.filter.build import definition_of
 from dynakin.model.opensim.description import OpenSimModel
 from dynakin.model.opensim.from_core import from_core
 from dynakin.model.opensim.identified import identified
@@ -19,6 +20,8 @@ from dynakin.model.opensim.read import read_osim
 from dynakin.model.opensim.scales import scale_names
 from dynakin.model.opensim.spec import to_spec
 from dynakin.model.opensim.write import write_osim
+from dynakin.recordings import read
+from dynakin.settings.settings import Settings
 from support.core.bridge import to_core
 from support.core.random_models import planar_model, spatial_model, with_functions
 from support.oracle.spec import Spec
@@ -172,6 +175,21 @@ def test_opensim_loads_a_built_in_model_measured_on_a_person(tmp_path: Path) -> 
     close(R[there], peer.poses()[0])
     close(origins[there], peer.poses()[1])
     close(_core.marker_positions(core, x), peer.marker_places())
+
+
+def test_an_export_is_measured_on_the_standing_trial(data_dir: Path, tmp_path: Path) -> None:
+    trial, static = (str(data_dir / "opencap_subject4" / name) for name in ("walking1.trc", "static1.trc"))
+    command = ["model", "fullbody", "--markers", "opencap", "--mass", "60.05", "--trial", trial]
+    places = []
+    for name, options in (("without", []), ("with", ["--static", static])):
+        out = tmp_path / f"{name}.osim"
+        result = CliRunner().invoke(app, [*command, *options, "--export", str(out)])
+        assert result.exit_code == 0, result.output
+        places.append({marker.name: marker.location for marker in read_osim(out).markers})
+    definition = definition_of(Settings(model="fullbody", markers="opencap", mass_kg=60.05))
+    standing = definition.calibrate(read(trial), static=read(static)).spec.markers
+    close([places[1][marker.name] for marker in standing], [marker.position for marker in standing])
+    assert max(np.abs(np.subtract(places[0][m.name], m.position)).max() for m in standing) > 1e-3
 
 
 TREES = [planar_model(2), planar_model(50, n_segments=7), *(spatial_model(s, nonlinear=False) for s in range(100, 106))]

@@ -132,7 +132,7 @@ def write_netcdf(estimate: Estimate, path: Path) -> None:
             rounded[key] = variable.copy(data=values)
     # By its path xarray would ask Dask who else writes it, which takes 0.3 s where it is there.
     with netCDF4.Dataset(path, "w") as file:
-        store = xr.backends.NetCDF4DataStore(file)
+        store = xr.backends.NetCDF4DataStore(file)  # type: ignore[no-untyped-call]
         data.assign(rounded).dump_to_store(store, encoding=encoding)
 
 
