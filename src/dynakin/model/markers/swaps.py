@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -255,7 +255,7 @@ def _swaps_for_a_while(
                 continue
             other = places.copy()
             other[either, i], other[either, j] = places[either, j], places[either, i]
-            after = _all_off(other, partners, found)
+            after = _all_off(other, partners, found, off, {i, j, *partners[i], *partners[j]})
             mended = either & (after[:, [i, j]].max(axis=1) < _MENDED * off[:, [i, j]].max(axis=1))
             gain = float(off.sum() - after.sum())
             if 2 * mended.sum() >= either.sum() and gain > 0.0:
@@ -308,12 +308,18 @@ def _way(places: Array) -> float:
     return float(np.nansum(np.linalg.norm(np.diff(places, axis=0), axis=2)))
 
 
-def _all_off(places: Array, partners: Sequence[Sequence[int]], found: Found) -> Array:
+def _all_off(
+    places: Array,
+    partners: Sequence[Sequence[int]],
+    found: Found,
+    before: Array | None = None,
+    changed: Collection[int] | None = None,
+) -> Array:
     """How far (T, n) m each marker is from where it usually is on its segment, by the mean over its distances to the
-    others there; 0 where none is seen."""
-    off = np.zeros(places.shape[:2])
+    others there; 0 where none is seen. ``before`` was so; only of the markers ``changed`` something is another now."""
+    off = np.zeros(places.shape[:2]) if before is None else before.copy()
     for k, others in enumerate(partners):
-        if others:
+        if others and (changed is None or k in changed):
             lengths = np.linalg.norm(places[:, list(others)] - places[:, k, None], axis=2)
             wrong = np.abs(lengths - found.distance[k, list(others)])
             n = np.isfinite(wrong).sum(axis=1)
