@@ -258,10 +258,12 @@ def _swaps_for_a_while(
             # An exchange makes no new lengths, only of others; it changes nothing for who is on neither's segment.
             order = np.arange(len(keys))
             order[[i, j]] = j, i
-            beside = sorted({i, j} | partners[i] | partners[j])
+            beside = np.array(sorted({i, j} | partners[i] | partners[j]))
             changed = lengths[either][:, order[beside]][:, :, order]
             after = off.copy()
-            after[np.ix_(either, beside)] = _off(changed, found.distance[beside], expected.rigid[beside])
+            after[np.flatnonzero(either)[:, None], beside] = _off(
+                changed, found.distance[beside], expected.rigid[beside]
+            )
             mended = either & (after[:, [i, j]].max(axis=1) < _MENDED * off[:, [i, j]].max(axis=1))
             gain = float(whole - after.sum())
             if 2 * mended.sum() >= either.sum() and gain > 0.0:
