@@ -11,6 +11,8 @@ CPP_TESTS := $(shell find cpp/tests -type f)
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 unexport PYTHONDONTWRITEBYTECODE  # tests start many processes; each would compile all modules again
+# pip compiles there, and the C++ tests link the same core.
+export SKBUILD_BUILD_DIR := build/package
 # A file's tests stay in one process, so that what they share is made once.
 PYTEST := $(BIN)/python -m pytest -n logical --maxprocesses 8 --dist loadfile
 
@@ -70,18 +72,18 @@ nightly: test-cpp-sanitize
 	$(PYTEST) -m nightly --dist load
 	+@$(MAKE) --no-print-directory peers
 
-# The core's own tests: as shipped (nothing may be allocated in a step), and under the sanitizers.
-test-cpp test-cpp-sanitize: BUILD = build/cpp-$(if $(findstring sanitize,$@),sanitize,release)
+# The core's own tests: as the package has it (nothing may be allocated in a step), and under the sanitizers.
+test-cpp: BUILD = $(SKBUILD_BUILD_DIR)
+test-cpp-sanitize: BUILD = build/cpp-sanitize
 test-cpp test-cpp-sanitize: $(VENV)/.dev
-	@$(BIN)/cmake -S . -B $(BUILD) -G Ninja -DDYNAKIN_PYTHON=OFF -DDYNAKIN_TESTS=ON \
-	  -DDYNAKIN_SANITIZE=$(if $(findstring sanitize,$@),ON,OFF) \
-	  -DCMAKE_PREFIX_PATH="$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" >/dev/null
-	@MAKEFLAGS= $(BIN)/cmake --build $(BUILD) >$(BUILD)/build.log || { cat $(BUILD)/build.log; exit 1; }
+	@$(if $(findstring sanitize,$@),$(BIN)/cmake -S . -B $(BUILD) -G Ninja -DDYNAKIN_PYTHON=OFF -DDYNAKIN_SANITIZE=ON \
+	  -DCMAKE_PREFIX_PATH="$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" >/dev/null)
+	@MAKEFLAGS= $(BIN)/cmake --build $(BUILD) --target core_tests >$(BUILD)/tests.log || { cat $(BUILD)/tests.log; exit 1; }
 	@$(BIN)/ctest --test-dir $(BUILD) --output-on-failure
 
 # The core as others take it: installed, and examples/cpp built against that.
 test-cpp-install: test-cpp
-	@rm -rf build/cpp-example && $(BIN)/cmake --install build/cpp-release --prefix build/cpp-example/prefix >/dev/null
+	@rm -rf build/cpp-example && $(BIN)/cmake --install $(SKBUILD_BUILD_DIR) --component cpp --prefix build/cpp-example/prefix >/dev/null
 	@$(BIN)/cmake -S examples/cpp -B build/cpp-example -G Ninja -DCMAKE_BUILD_TYPE=Release \
 	  -DCMAKE_PREFIX_PATH="$(CURDIR)/build/cpp-example/prefix;$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))')" >/dev/null
 	@MAKEFLAGS= $(BIN)/cmake --build build/cpp-example >/dev/null

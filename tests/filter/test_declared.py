@@ -35,12 +35,12 @@ def person() -> dynakin.ModelDefinition:
 
 
 @cache
-def sit(seed: int, plates: str = "feet") -> SimulatedTrial:
+def sit(seed: int, plates: str) -> SimulatedTrial:
     return simulate("fullbody", "sit", seed, 11.0, 50.0, 70.0, 1.75, "male", plates=plates)
 
 
 @cache
-def seated(seed: int, plates: str = "feet") -> dynakin.Estimate:
+def seated(seed: int, plates: str) -> dynakin.Estimate:
     given = {"plate 3": "seat"} if plates == "all" else None
     return dynakin.Estimator(person(), contacts=["seat"], plates=given).run(sit(seed, plates).recording)
 
@@ -60,7 +60,7 @@ def seat_force(seed: int, plates: str = "feet") -> tuple[np.ndarray, np.ndarray,
 )
 def test_the_force_of_a_declared_seat_comes_out_with_a_deviation(seed: int) -> None:
     found, sd, truth = seat_force(seed)
-    bears = seated(seed).data["foot_contact"].sel(foot="seat").values == UNMEASURED
+    bears = seated(seed, "feet").data["foot_contact"].sel(foot="seat").values == UNMEASURED
     loaded = truth[:, 1] > LEAST_N
     assert bears[loaded].all() and 0.2 < bears.mean() < 0.5
     error = (found - truth)[:, 1]
@@ -71,7 +71,7 @@ def test_the_force_of_a_declared_seat_comes_out_with_a_deviation(seed: int) -> N
 
 
 def test_feet_on_plates_stay_measured_under_a_declared_seat_and_so_do_legs_and_trunk() -> None:
-    data = seated(1).data
+    data = seated(1, "feet").data
     bears = data["foot_contact"].sel(foot="seat").values == UNMEASURED
     for name in (*LEGS, "lumbar_extension"):
         assert (data["moment_source"].sel(coordinate=name).values == MEASURED).all(), name
@@ -80,14 +80,14 @@ def test_feet_on_plates_stay_measured_under_a_declared_seat_and_so_do_legs_and_t
     assert (
         (codes[:, :2] == MEASURED).all() and (codes[bears, 2] == DERIVED).all() and (codes[~bears, 2] == MEASURED).all()
     )
-    truth = sit(1).truth.data["moments"]
+    truth = sit(1, "feet").truth.data["moments"]
     for name, limit in (("hip_flexion_r", 6.0), ("knee_angle_r", 4.0), ("ankle_angle_r", 4.0)):
         off = data["moments"].sel(coordinate=name).values - truth.sel(coordinate=name).values
         assert np.sqrt(np.mean(off**2)) < limit, name
 
 
 def test_a_declared_seat_is_in_the_files(tmp_path: Path) -> None:
-    estimate = seated(1)
+    estimate = seated(1, "feet")
     assert estimate.foot_names == ["right", "left"] and estimate.contact_names == ["right", "left", "seat"]
     figures = contact_figures(estimate, np.ones(len(estimate.time), dtype=bool))["seat"]
     assert figures["derived"] == figures["frames"] > 50 and figures["measured"] == figures["absent"] == 0
@@ -176,13 +176,13 @@ def test_a_declared_rail_takes_what_the_plates_lack_on_the_hand() -> None:
 )
 def test_wrong_names_are_refused_in_one_line(contacts: list[object], words: str) -> None:
     with pytest.raises(ConfigError, match=words) as caught:
-        dynakin.Estimator(person(), contacts=contacts).calibrate(sit(1).recording)  # type: ignore[arg-type]
+        dynakin.Estimator(person(), contacts=contacts).calibrate(sit(1, "feet").recording)  # type: ignore[arg-type]
     assert "\n" not in str(caught.value)
 
 
 def test_hands_and_segments_are_known_by_their_names() -> None:
     estimator = dynakin.Estimator(person(), contacts=["hand_right", "left_hand", "torso", "seat"])
-    initial = estimator.calibrate(sit(1).recording)
+    initial = estimator.calibrate(sit(1, "feet").recording)
     assert initial.contacts == {"hand_right": "hand_r", "left_hand": "hand_l", "torso": "torso", "seat": "pelvis"}
 
 

@@ -129,7 +129,7 @@ def test_a_name_at_the_wrong_place_is_said_to_be_unsure() -> None:
 
 def test_what_is_written_loads_and_runs(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """From names that no set knows to results, in two commands; a file that exists is left alone."""
-    trial = simulate("fullbody", "squat", seed=35, duration_s=5.0, markers="plug-in-gait")
+    trial = simulate("fullbody", "squat", 35, 5.0, 50.0, markers="plug-in-gait")
     sides = {"R": "rechts", "L": "links"}
     german = {"ASI": "SIAS", "PSI": "SIPS", "KNE": "Knie lateral", "ANK": "Knoechel", "HEE": "Ferse", "TOE": "Zehe",
               "MT5": "Meta5", "SHO": "Schulter", "ELB": "Ellbogen", "WRA": "radialwrist", "WRB": "ulnarwrist",

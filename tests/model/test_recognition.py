@@ -15,7 +15,7 @@ import pytest
 from dynakin.errors import ModelError, RecordingError
 from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
 from dynakin.model.markers.match import MarkerMatch, match_markers
-from dynakin.model.markers.recognise import choose_marker_set, recognise
+from dynakin.model.markers.recognise import Recognised, choose_marker_set, recognise
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.landmarks import FacingPairs
 from dynakin.recordings.orientation import find_forward
@@ -86,6 +86,11 @@ def walking(marker_set: str) -> Recording:
     return Recording(marker_set, None, time, tuple(site.name for site in sites), markers)
 
 
+@cache
+def recognised(marker_set: str) -> Recognised:
+    return recognise(walking(marker_set))
+
+
 def exchanged(recording: Recording, one: str, other: str, frames: slice = slice(None)) -> Recording:
     i, j = (recording.marker_names.index(name) for name in (one, other))
     markers = recording.markers.copy()
@@ -103,8 +108,7 @@ def warnings_of(messages: tuple[str, ...]) -> list[str]:
 
 @pytest.mark.parametrize("name", WITH_LEGS)
 def test_every_set_is_recognised_on_a_walking_person_and_nothing_is_found_wrong(name: str) -> None:
-    recording = walking(name)
-    found = recognise(recording)
+    recording, found = walking(name), recognised(name)
     assert found.match.marker_set.name == name
     assert not warnings_of(found.messages)
     assert found.messages[0].startswith(f"Marker set {name}: {len(found.match.names)} of its ")
@@ -117,17 +121,15 @@ def test_every_set_is_recognised_on_a_walking_person_and_nothing_is_found_wrong(
 ], ids=["colon", "prefix", "lower", "upper", "dots", "blanks"])  # fmt: skip
 @pytest.mark.parametrize("name", WITH_LEGS)
 def test_every_set_is_recognised_however_it_is_spelt(name: str, spelt: Callable[[str], str]) -> None:
-    recording = walking(name)
-    plain = recognise(recording).match
-    other = recognise(renamed(recording, spelt)).match
+    plain = recognised(name).match
+    other = recognise(renamed(walking(name), spelt)).match
     assert other.marker_set.name == name
     assert other.names == {key: spelt(own) for key, own in plain.names.items()}
 
 
 @pytest.mark.parametrize("name", WITH_LEGS)
 def test_right_for_left_is_named_in_every_set_and_mended(name: str) -> None:
-    recording = walking(name)
-    match = recognise(recording).match
+    recording, match = walking(name), recognised(name).match
     places = [place for place in ("KNE", "KJ", "ANK", "AJ") if {(place, "right"), (place, "left")} <= set(match.names)]
     assert places
     for place in places:
@@ -143,8 +145,7 @@ def test_right_for_left_is_named_in_every_set_and_mended(name: str) -> None:
 
 @pytest.mark.parametrize("name", WITH_LEGS)
 def test_a_mirrored_person_is_refused_in_every_set_that_shows_the_front(name: str) -> None:
-    recording = walking(name)
-    pairs = recognise(recording).match.facing_pairs
+    recording, pairs = walking(name), recognised(name).match.facing_pairs
     if not pairs.heel_toe and not pairs.pelvis:
         pytest.skip("no place of this set shows where the front is")
     find_ground_frame(recording, pairs=pairs)

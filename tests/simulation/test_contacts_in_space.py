@@ -53,8 +53,8 @@ def motion_of(trial: SimulatedTrial) -> Motion:
 
 
 @cache
-def moving_of(case: str, seed: int, rate_hz: float = 100.0):
-    trial = perfect(case, seed, rate_hz)
+def moving_of(case: str, seed: int, *rate_hz: float):
+    trial = perfect(case, seed, *rate_hz)  # as it was called: a default that is written out is another key
     return kinematics(trial.truth.tree, motion_of(trial)).segments
 
 

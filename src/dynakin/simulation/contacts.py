@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from dynakin.arrays import cross
 from dynakin.errors import ConfigError
 from dynakin.simulation.bodies.body import Contact, SimulatedBody
 from dynakin.simulation.mechanics import Dynamics, Motion, TreeMotion, dynamics, kinematics
@@ -119,7 +120,7 @@ def seat_wrench(wrench: Array, seat: Seat) -> Array:
     about_floor = wrench[:, 5] + seat.floor_m * wrench[:, 0]
     push = np.maximum((limit * wrench[:, 1] - about_floor) / (limit - x), 0.0)
     force = np.outer(push, [0.0, 1.0, 0.0])
-    return np.hstack([force, np.cross(np.broadcast_to(seat.point, force.shape), force)])
+    return np.hstack([force, cross(np.broadcast_to(seat.point, force.shape), force)])
 
 
 def split_wrench(wrench: Array, right_z: float, left_z: float) -> tuple[Array, Array]:
@@ -143,5 +144,5 @@ def split_wrench(wrench: Array, right_z: float, left_z: float) -> tuple[Array, A
         # The push apart fades with the lesser loaded foot.
         own[:, 2] -= side * 2.0 * SIDEWAYS_SHARE * share * (1.0 - share) * force[:, 1]
         point = np.stack([x, zero, at + beside], axis=1)
-        feet.append(np.hstack([own, np.cross(point, own) + np.outer(part * free, [0.0, 1.0, 0.0])]))
+        feet.append(np.hstack([own, cross(point, own) + np.outer(part * free, [0.0, 1.0, 0.0])]))
     return feet[0], feet[1]

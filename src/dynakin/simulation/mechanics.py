@@ -13,6 +13,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from dynakin.arrays import cross
+
 Array = NDArray[np.float64]
 
 GRAVITY = np.array([0.0, -9.80665, 0.0])  # m/s^2, ground frame: X forward, Y up, Z right
@@ -73,12 +75,12 @@ class SegmentMotion:
 
     def point_velocity(self, p_B: Array) -> Array:
         """Velocity (T, 3) of a point fixed in the segment."""
-        return self.velocity + np.cross(self.omega, self.rotation @ p_B)
+        return self.velocity + cross(self.omega, self.rotation @ p_B)
 
     def point_acceleration(self, p_B: Array) -> Array:
         """Acceleration (T, 3) of a point fixed in the segment."""
         r = self.rotation @ p_B
-        return self.acceleration + np.cross(self.alpha, r) + np.cross(self.omega, np.cross(self.omega, r))
+        return self.acceleration + cross(self.alpha, r) + cross(self.omega, cross(self.omega, r))
 
 
 @dataclass
@@ -114,6 +116,29 @@ def kinematics(tree: Sequence[Segment], motion: Motion) -> TreeMotion:
     return result
 
 
+def at_rest(tree: Sequence[Segment], names: tuple[str, ...], q: Array) -> TreeMotion:
+    """As `kinematics` of postures ``q`` (T, n) in which nothing moves, in a third of the time."""
+    frames = q.shape[0]
+    zero = np.zeros((frames, 3))
+    result = TreeMotion()
+    for segment in tree:
+        if segment.parent is None:
+            rotation, origin = np.tile(np.eye(3), (frames, 1, 1)), np.tile(segment.placement, (frames, 1))
+        else:
+            parent = result.segments[segment.parent]
+            rotation, origin = parent.rotation, parent.point(segment.placement)
+        for k, axis in enumerate(segment.axes):
+            direction, angle = np.asarray(axis.direction, dtype=float), q[:, names.index(axis.coordinate)]
+            u = rotation @ direction
+            result.axes[segment.name, k] = (u, origin)
+            if axis.translation:
+                origin = origin + u * angle[:, None]
+            else:
+                rotation = rotation @ rotation_about(direction, angle)
+        result.segments[segment.name] = SegmentMotion(rotation, origin, zero, zero, zero, zero)
+    return result
+
+
 def _advance(body: SegmentMotion, axis: Axis, q: Array, qd: Array, qdd: Array) -> SegmentMotion:
     direction = np.asarray(axis.direction, dtype=float)
     u = body.rotation @ direction
@@ -121,12 +146,12 @@ def _advance(body: SegmentMotion, axis: Axis, q: Array, qd: Array, qdd: Array) -
         moved = SegmentMotion(body.rotation, body.origin, body.velocity, body.acceleration, body.omega, body.alpha)
         d = u * q[:, None]
         moved.origin = body.origin + d
-        moved.velocity = body.velocity + np.cross(body.omega, d) + u * qd
+        moved.velocity = body.velocity + cross(body.omega, d) + u * qd
         moved.acceleration = (
             body.acceleration
-            + np.cross(body.alpha, d)
-            + np.cross(body.omega, np.cross(body.omega, d))
-            + 2.0 * np.cross(body.omega, u * qd)
+            + cross(body.alpha, d)
+            + cross(body.omega, cross(body.omega, d))
+            + 2.0 * cross(body.omega, u * qd)
             + u * qdd
         )
         return moved
@@ -136,7 +161,7 @@ def _advance(body: SegmentMotion, axis: Axis, q: Array, qd: Array, qdd: Array) -
         body.velocity,
         body.acceleration,
         body.omega + u * qd,
-        body.alpha + u * qdd + np.cross(body.omega, u * qd),
+        body.alpha + u * qdd + cross(body.omega, u * qd),
     )
 
 
@@ -188,7 +213,7 @@ def dynamics(
         inertia_G = body.rotation @ segment.inertia @ np.swapaxes(body.rotation, 1, 2)
         spin = (inertia_G @ body.omega[:, :, None])[:, :, 0]
         force = segment.mass * (body.point_acceleration(segment.com) - GRAVITY)
-        moment = np.cross(c, force) + (inertia_G @ body.alpha[:, :, None])[:, :, 0] + np.cross(body.omega, spin)
+        moment = cross(c, force) + (inertia_G @ body.alpha[:, :, None])[:, :, 0] + cross(body.omega, spin)
         load[segment.name] = (force, moment)
         if external and segment.name in external:
             given = external[segment.name]
@@ -201,7 +226,7 @@ def dynamics(
         force, moment = load[segment.name]
         for k, axis in enumerate(segment.axes):
             u, point = moving.axes[segment.name, k]
-            effort = force if axis.translation else moment - np.cross(point, force)
+            effort = force if axis.translation else moment - cross(point, force)
             # += because one coordinate may drive several axes
             moments[:, motion.names.index(axis.coordinate)] += np.sum(u * effort, axis=1)
         if segment.parent is None:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dynakin.arrays import with_nulls
+from dynakin.arrays import cross, with_nulls
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.results.files.config import versions
 from dynakin.results.files.folder import FolderKind, check_output_writable, replacing
@@ -98,7 +98,7 @@ def _applied(plate: Plate) -> tuple[Array, Array, Array]:
     middle = plate.corners.mean(axis=0)
     unloaded = np.isnan(plate.cop).any(axis=1, keepdims=True)
     point = np.where(unloaded, middle, plate.cop)
-    return plate.force, point, np.where(unloaded, plate.moment - np.cross(point, plate.force), plate.free_moment)
+    return plate.force, point, np.where(unloaded, plate.moment - cross(point, plate.force), plate.free_moment)
 
 
 def _coordinate_writer(variable: str, title: str, unit: str) -> Callable[[SimulatedTrial, Path], None]:

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dynakin.arrays import cross
 from dynakin.errors import ConfigError
 
 Array = NDArray[np.float64]
@@ -153,7 +154,7 @@ def split_between(wrench: Array, support: Support) -> tuple[Array, Array]:
     feet = []
     for part, point, push in ((share, points[0], -inward), (1.0 - share, points[1], inward)):
         own = part[:, None] * force + push
-        feet.append(np.hstack([own, np.cross(point, own) + np.outer(part * free, [0.0, 1.0, 0.0])]))
+        feet.append(np.hstack([own, cross(point, own) + np.outer(part * free, [0.0, 1.0, 0.0])]))
     return feet[0], feet[1]
 
 

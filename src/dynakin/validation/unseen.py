@@ -79,6 +79,8 @@ def unseen_figures(
     Raises:
         ConfigError: the horizon is not within the trial. DynakinError: as `Estimator.run`.
     """
+    if not 0.0 < horizon_s < 0.5 * float(recording.time[-1] - recording.time[0]):
+        raise ConfigError(f"the horizon is {horizon_s:g} s, expected more than 0 and less than half of the trial")
     if setup.definition.floating:
         return figures_in_space(recording, setup, static=static, horizon_s=horizon_s, progress=progress)
     figures = plates_withheld(recording, setup, static=static)
@@ -162,8 +164,6 @@ def _left_out(estimator: Estimator, preset: str, trial: _Trial, progress: Progre
 
 def _ahead(estimator: Estimator, preset: str, trial: _Trial, horizon_s: float) -> Figures:
     time, initial = trial.recording.time, trial.initial
-    if not 0.0 < horizon_s < 0.5 * float(time[-1] - time[0]):
-        raise ConfigError(f"the horizon is {horizon_s:g} s, expected more than 0 and less than half of the trial")
     yardstick = ahead(horizon_s)
     frames = span_frames(time, horizon_s)
     states = estimator.start(initial).run_arrays(time, trial.markers, trial.wrench)["state"]

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import cross
 from dynakin.errors import ModelError
 from dynakin.model.markers.match import MarkerKey, MarkerMatch
 from dynakin.model.markers.schema import Offset, PelvisRegression, PolarRegression, Recipe, by_sex
@@ -143,7 +144,7 @@ class LandmarkFinder:
             values = [self._value(name, side, positions) for side in self._sides_of(name)]
             values = [value for value in values if np.isfinite(value).all()]
             if values:
-                point = np.mean(values, axis=0)
+                point = _middle(values)
                 found[name] = np.array([point[0], point[1], 0.0]) if self.planar else point
         return found
 
@@ -158,7 +159,7 @@ class LandmarkFinder:
             values = {s: value for s, value in values.items() if np.isfinite(value).all()}
             found |= {f"{name}{SUFFIXES[s]}": value for s, value in values.items()}
             if len(values) == len(SIDES):
-                found[name] = np.mean(list(values.values()), axis=0)
+                found[name] = _middle(list(values.values()))
         for side, suffix in SUFFIXES.items():
             ends = [found.get(f"{name}{suffix}") for name in ("heel", "toe")]
             up = np.array([0.0, 1.0, 0.0])
@@ -181,12 +182,12 @@ class LandmarkFinder:
         def point(source: str) -> Array:
             sides = _sides(recipe, side)
             if source in self._recipes:
-                return np.asarray(np.mean([self._value(source, s, positions) for s in sides], axis=0))
+                return _middle([self._value(source, s, positions) for s in sides])
             keys = {key for s in sides if (key := self._key(source, s)) is not None}
-            return np.asarray(np.mean([positions.get(key, _NOWHERE) for key in sorted(keys)], axis=0))
+            return _middle([positions.get(key, _NOWHERE) for key in sorted(keys)])
 
         if recipe.mean is not None:
-            return np.asarray(np.mean([point(source) for source in recipe.mean], axis=0))
+            return _middle([point(source) for source in recipe.mean])
         if recipe.pelvis is not None:
             return self._pelvis(recipe.pelvis, _sides(recipe, side)[0], positions)
         if recipe.polar is not None:
@@ -203,16 +204,15 @@ class LandmarkFinder:
 
     def _pelvis(self, regression: PelvisRegression, side: str, positions: Positions) -> Array:
         right, left = (positions.get((regression.asis, s), _NOWHERE) for s in SIDES)
-        back = np.mean(
-            [positions.get(k, _NOWHERE) for s in SIDES if (k := self._key(regression.psis, s)) is not None],
-            axis=0,
-        )
+        back = _middle([
+            positions.get(k, _NOWHERE) for s in SIDES if (k := self._key(regression.psis, s)) is not None
+        ])  # fmt: skip
         front = 0.5 * (right + left)
         width, depth = float(np.linalg.norm(right - left)), float(np.linalg.norm(front - back))
         z = (right - left) / width
-        y = np.cross(z, front - back)
+        y = cross(z, front - back)
         y /= np.linalg.norm(y)
-        axes = np.column_stack([np.cross(y, z), y, z])  # ISB pelvis frame in the ground
+        axes = np.column_stack([cross(y, z), y, z])  # ISB pelvis frame in the ground
         male, female = (
             np.array(c.width) * width + np.array(c.depth) * depth + np.array(c.constant_m)
             for c in (regression.male, regression.female)
@@ -256,6 +256,14 @@ class LandmarkFinder:
         return offset_point(offset, point, across, side, fraction * size)
 
 
+def _middle(points: Sequence[Array]) -> Array:
+    """Of a few points (3,): as `np.mean`, which takes ten times as long, and each frame of a trial has some hundred."""
+    found = points[0]
+    for point in points[1:]:
+        found = found + point
+    return found / len(points)
+
+
 def slope(heel_to_toe: Array) -> Array:
     """Elevation (rad) of lines (..., 3) over the horizontal."""
     return np.asarray(np.arctan2(heel_to_toe[..., 1], np.hypot(heel_to_toe[..., 0], heel_to_toe[..., 2])))
@@ -269,7 +277,7 @@ def corner(ends: Sequence[Array], outward: Array) -> Array:
     """
     a, b, c = ends
     edge = np.mean([np.linalg.norm(b - a), np.linalg.norm(c - b), np.linalg.norm(a - c)])
-    normal = np.cross(b - a, c - a)
+    normal = cross(b - a, c - a)
     normal *= np.sign(normal @ outward) / np.linalg.norm(normal)
     return np.asarray(np.mean(ends, axis=0) - edge / np.sqrt(6.0) * normal)
 
@@ -326,7 +334,7 @@ def offset_point(
         if offset.bend is not None:
             upper, middle, lower = (point(name) for name in offset.bend)
             a, b = lower - middle, upper - middle
-            plane = np.cross(a, b) / (np.linalg.norm(a) * np.linalg.norm(b))  # to the right of a flexed arm
+            plane = cross(a, b) / (np.linalg.norm(a) * np.linalg.norm(b))  # to the right of a flexed arm
             outward = across + BENT * (plane if side == "right" else -plane)
         start, end = (point(name) for name in offset.square_to)
         line = (end - start) / np.linalg.norm(end - start)

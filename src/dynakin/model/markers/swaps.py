@@ -244,21 +244,31 @@ def _swaps_for_a_while(
     what the exception, the greater part of the trial says."""
     frames = frames_of(recording)
     places = places_of(recording, match, keys, frames)
-    partners = [[int(j) for j in np.flatnonzero(row)] for row in expected.rigid]
+    partners = [{int(j) for j in np.flatnonzero(row)} for row in expected.rigid]
     swaps: list[Swap] = []
     while len(swaps) < _MOST:
-        off = _all_off(places, partners, found)
+        lengths = np.linalg.norm(places[:, None] - places[:, :, None], axis=3)
+        off = _off(lengths, found.distance, expected.rigid)
+        away, whole = off > _OFF_M, off.sum()
         accounts = []
         for i, j in combinations(range(len(keys)), 2):
-            either = (off[:, [i, j]] > _OFF_M).any(axis=1)
-            if either.sum() < _FEWEST_FRAMES or len({*partners[i], *partners[j]} - {i, j}) < _FEWEST_OTHERS:
+            either = away[:, i] | away[:, j]
+            if either.sum() < _FEWEST_FRAMES or len((partners[i] | partners[j]) - {i, j}) < _FEWEST_OTHERS:
                 continue
-            other = places.copy()
-            other[either, i], other[either, j] = places[either, j], places[either, i]
-            after = _all_off(other, partners, found)
+            # An exchange makes no new lengths, only of others; it changes nothing for who is on neither's segment.
+            order = np.arange(len(keys))
+            order[[i, j]] = j, i
+            beside = np.array(sorted({i, j} | partners[i] | partners[j]))
+            changed = lengths[either][:, order[beside]][:, :, order]
+            after = off.copy()
+            after[np.flatnonzero(either)[:, None], beside] = _off(
+                changed, found.distance[beside], expected.rigid[beside]
+            )
             mended = either & (after[:, [i, j]].max(axis=1) < _MENDED * off[:, [i, j]].max(axis=1))
-            gain = float(off.sum() - after.sum())
+            gain = float(whole - after.sum())
             if 2 * mended.sum() >= either.sum() and gain > 0.0:
+                other = places.copy()
+                other[either, i], other[either, j] = places[either, j], places[either, i]
                 shorter = _way(places[:, [i, j]]) - _way(other[:, [i, j]])
                 accounts.append((gain, shorter, i, j, mended, other))
         if not accounts:
@@ -308,14 +318,9 @@ def _way(places: Array) -> float:
     return float(np.nansum(np.linalg.norm(np.diff(places, axis=0), axis=2)))
 
 
-def _all_off(places: Array, partners: Sequence[Sequence[int]], found: Found) -> Array:
-    """How far (T, n) m each marker is from where it usually is on its segment, by the mean over its distances to the
-    others there; 0 where none is seen."""
-    off = np.zeros(places.shape[:2])
-    for k, others in enumerate(partners):
-        if others:
-            lengths = np.linalg.norm(places[:, list(others)] - places[:, k, None], axis=2)
-            wrong = np.abs(lengths - found.distance[k, list(others)])
-            n = np.isfinite(wrong).sum(axis=1)
-            off[:, k] = np.where(n > 0, np.nansum(wrong, axis=1) / np.maximum(n, 1), 0.0)
-    return off
+def _off(lengths: Array, usual: Array, rigid: npt.NDArray[np.bool_]) -> Array:
+    """How far (T, k) m markers are from where they usually are on their segments, by the mean over their distances
+    (T, k, n) to the others there, ``rigid`` (k, n); 0 where none is seen."""
+    wrong = np.abs(lengths - usual)
+    seen = rigid & np.isfinite(wrong)
+    return np.asarray(np.where(seen, wrong, 0.0).sum(axis=2) / np.maximum(seen.sum(axis=2), 1))

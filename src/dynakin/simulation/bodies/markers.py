@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from dynakin.arrays import cross
 from dynakin.simulation.bodies.subject import SimulatedSubject
 from dynakin.simulation.mechanics import TreeMotion
 
@@ -160,4 +161,4 @@ def _pelvis_frame(r_asis: Array, l_asis: Array, r_psis: Array, l_psis: Array) ->
     z = r_asis - l_asis
     z = z - np.sum(z * x, axis=1, keepdims=True) * x
     z = z / np.linalg.norm(z, axis=1, keepdims=True)
-    return np.stack([x, np.cross(z, x), z], axis=2), front
+    return np.stack([x, cross(z, x), z], axis=2), front

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from dynakin.arrays import wrapped
 from dynakin.errors import ConfigError
 from dynakin.simulation.jets import Jet, polynomial
-from dynakin.simulation.mechanics import Motion, Segment, kinematics
+from dynakin.simulation.mechanics import Segment, at_rest
 
 Array = NDArray[np.float64]
 
@@ -97,7 +97,6 @@ def _com_x(tree: Sequence[Segment], path: PosturePath, levels: Array, balanced: 
     angles = {name: np.deg2rad(path.standing_deg[name] + path.added_deg[name] * levels) for name in path.standing_deg}
     angles[path.balanced] = np.full_like(levels, balanced)
     q = np.stack([angles[name] for name in names], axis=1)
-    rest = np.zeros_like(q)
-    moving = kinematics(tree, Motion(names, q, rest, rest))
+    moving = at_rest(tree, names, q)
     weighted = sum(s.mass * moving.segments[s.name].point(s.com)[:, 0] for s in tree)
     return np.asarray(weighted / sum(s.mass for s in tree))

@@ -19,6 +19,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from dynakin.arrays import cross
 from dynakin.errors import ConfigError
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.bodies.whole_body import SIDES, Sole, ankle_height, hip_in_pelvis
@@ -280,7 +281,7 @@ def _fit(posed: _Posed) -> Corrections:
         wrench = dynamics(body.tree, motion, moving).wrench
         force = wrench[:, :3]
         about = np.where(flying[:, None], moving.segments["torso"].origin, presses)
-        moment = wrench[:, 3:] - np.cross(about, force)
+        moment = wrench[:, 3:] - cross(about, force)
         wanted = np.stack([np.zeros_like(load), load, np.zeros_like(load)], axis=1)
         knees = motion.q[:, [motion.names.index(f"knee_angle_{side}") for side, _ in SIDES]]
         straight = np.maximum(_STRAIGHTEST - knees, 0.0) / _TOO_STRAIGHT

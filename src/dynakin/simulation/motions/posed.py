@@ -7,9 +7,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from dynakin.arrays import cross
 from dynakin.errors import ConfigError
 from dynakin.simulation.jets import Jet, constant
-from dynakin.simulation.mechanics import Axis, Motion, Segment, SegmentMotion, TreeMotion, kinematics
+from dynakin.simulation.mechanics import Axis, Motion, Segment, SegmentMotion, TreeMotion, at_rest, kinematics
 from dynakin.simulation.motions.movement import in_order
 
 Array = NDArray[np.float64]
@@ -120,14 +121,9 @@ def _close(tree: Sequence[Segment], given: Mapping[str, Jet], foot: SegmentMotio
     for j, name in enumerate(names):
         if j not in free:
             q[:, j], qd[:, j], qdd[:, j] = given[name].value, given[name].rate, given[name].second
-    rest = np.zeros_like(q)
-
-    def moving(q: Array, qd: Array = rest, qdd: Array = rest) -> TreeMotion:
-        return kinematics(branch, Motion(names, q, qd, qdd))
-
-    q[:, free] = _first_guess(tree, moving(q), foot, side, [names[j] for j in free])
+    q[:, free] = _first_guess(tree, at_rest(branch, names, q), foot, side, [names[j] for j in free])
     for _ in range(_MOST_STEPS):
-        found = moving(q)
+        found = at_rest(branch, names, q)
         error = _apart(found.segments[f"foot_{side}"], foot)
         if np.abs(error).max() < _CLOSED:
             break
@@ -141,7 +137,7 @@ def _close(tree: Sequence[Segment], given: Mapping[str, Jet], foot: SegmentMotio
             "subject nearer to the table (a smaller spread, or another seed)"
         )
     for order in (1, 2):  # first the speeds, then with them the accelerations
-        found = moving(q, qd, qdd)
+        found = kinematics(branch, Motion(names, q, qd, qdd))
         own = found.segments[f"foot_{side}"]
         wanted = (foot.velocity, foot.omega) if order == 1 else (foot.acceleration, foot.alpha)
         already = (own.velocity, own.omega) if order == 1 else (own.acceleration, own.alpha)
@@ -175,5 +171,5 @@ def _apart(own: SegmentMotion, wanted: SegmentMotion) -> Array:
 
 def _solve(moving: TreeMotion, keys: Sequence[tuple[str, int]], point: Array, gap: Array) -> Array:
     """Rates (T, 6) of the leg's axes that give its foot the velocity and angular velocity ``gap`` (T, 6)."""
-    columns = [np.hstack([np.cross(u, point - on_axis), u]) for u, on_axis in (moving.axes[key] for key in keys)]
+    columns = [np.hstack([cross(u, point - on_axis), u]) for u, on_axis in (moving.axes[key] for key in keys)]
     return np.asarray(np.linalg.solve(np.stack(columns, axis=2), gap[:, :, None])[:, :, 0])

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from dynakin.arrays import cross
 from dynakin.errors import ConfigError
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.bodies.whole_body import SIDES
@@ -83,7 +84,7 @@ def hold_rail(
         taken = {}
         for grip in grips:
             point = moving.segments[grip.segment].point(grip.place)
-            taken[_NAMES[grip.side]] = Hand(np.hstack([force, np.cross(point, force)]), point)
+            taken[_NAMES[grip.side]] = Hand(np.hstack([force, cross(point, force)]), point)
         return taken
 
     return replace(
@@ -171,7 +172,7 @@ def _reaching(tree: Sequence[Segment], motion: Motion, grip: Grip, time: Array) 
         moving = kinematics(branch, Motion(motion.names, q, qd, qdd))
         hand = moving.segments[grip.segment]
         point = hand.point(grip.place)
-        columns = np.stack([np.cross(u, point - on_axis) for u, on_axis in (moving.axes[key] for key in keys)], axis=2)
+        columns = np.stack([cross(u, point - on_axis) for u, on_axis in (moving.axes[key] for key in keys)], axis=2)
         reached = point, hand.point_velocity(grip.place), hand.point_acceleration(grip.place)
         return lambda gap: np.linalg.solve(columns, gap[:, :, None])[:, :, 0], reached
 

@@ -13,7 +13,7 @@ from dynakin.errors import ConfigError
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.bodies.posture import PosturePath, balance, balanced_angle, posture_jets
 from dynakin.simulation.jets import Jet, constant, step
-from dynakin.simulation.mechanics import Motion, kinematics
+from dynakin.simulation.mechanics import Motion, at_rest
 from dynakin.simulation.motions.movement import STANDING_S, Movement, Repetition, Seat, in_order
 from dynakin.simulation.motions.squat import add_wander, draw_wander
 
@@ -114,6 +114,6 @@ def _seat(body: SimulatedBody, path: PosturePath) -> Seat:
     """Below the hip of the lowest posture."""
     angles = {n: np.deg2rad(path.standing_deg[n] + path.added_deg[n]) for n in path.standing_deg}
     q = np.array([[(angles | {path.balanced: 0.0})[name] for name in body.coordinates]])
-    hip = kinematics(body.tree, Motion(body.coordinates, q, 0.0 * q, 0.0 * q)).segments["pelvis"].origin[0]
+    hip = at_rest(body.tree, body.coordinates, q).segments["pelvis"].origin[0]
     point = hip + body.subject.height_m * np.array([*SEAT_FROM_HIP, 0.0])
     return Seat("pelvis", point, -FEET_REAR * body.subject.height_m, body.floor_m)

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from dynakin.arrays import cross
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.bodies.whole_body import SIDES, Sole, hip_in_pelvis
 from dynakin.simulation.jets import Jet
@@ -86,7 +87,7 @@ def _movement(level: Walk, body: SimulatedBody, climbs: Mapping[int, float]) -> 
         share = on.share[:, None] if on.share is not None else 0.5
         presses = share * on.right + (1.0 - share) * on.left
         force = wrench[:, :3]
-        left = wrench[:, 3:] - np.cross(presses, force)
+        left = wrench[:, 3:] - cross(presses, force)
         dx, dz = left[:, 2] / force[:, 1], -left[:, 0] / force[:, 1]
         free = left[:, 1] - (dz * force[:, 0] - dx * force[:, 2])
         knees = motion.q[:, [motion.names.index(f"knee_angle_{side}") for side, _ in SIDES]]

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from dynakin.arrays import cross
 from dynakin.recordings.plates.pressure import UNLOADED_N, Surface, plate_from_wrench
 from dynakin.recordings.recording import Plate
 from dynakin.simulation.bodies.body import Contact
@@ -70,12 +71,12 @@ def measure(
     wrench: (T, 6) true, about the ground origin; centre, origin: (3,) m, the middle of the plate's top and the
     ground origin, laboratory; half_m: half the plate's length and width.
     """
-    about_centre = wrench[:, 3:] + np.cross(origin - centre, wrench[:, :3])
+    about_centre = wrench[:, 3:] + cross(origin - centre, wrench[:, :3])
     channels = np.hstack([wrench[:, :3], about_centre]) * errors.gain + np.outer(time - time[0], errors.drift)
     force = channels[:, :3] + noise.plate_force_sd_n * rng.standard_normal((len(wrench), 3))
     about_centre = channels[:, 3:] + noise.plate_moment_sd_nm * rng.standard_normal((len(wrench), 3))
     force, about_centre = _rounded(force, noise.plate_step_n), _rounded(about_centre, noise.plate_step_nm)
-    moment = about_centre + np.cross(centre, force)
+    moment = about_centre + cross(centre, force)
     corners = centre + np.array([[x * half_m[0], 0.0, z * half_m[1]] for x, z in ((1, 1), (1, -1), (-1, -1), (-1, 1))])
     return plate_from_wrench(
         name,
