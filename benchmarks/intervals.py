@@ -258,7 +258,7 @@ def tell(runs: Sequence[Run], sizes: dict[str, Sizes]) -> None:
 
 def choose(runs: Sequence[Run], kind: str, start: dict[str, Sizes]) -> Sizes:
     """Sizes of one kind of model for which groups lie nearest to 94 % and 1.3, and none is far off."""
-    names = [name for name, value in asdict(start[kind]).items() if not isinstance(value, bool)]
+    names = [name for name, value in asdict(start[kind]).items() if value and not isinstance(value, bool)]
     first = np.log([getattr(start[kind], name) for name in names])
     mine = [run for run in runs if run.sizes == kind]
 

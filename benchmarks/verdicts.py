@@ -1,6 +1,7 @@
 """Thresholds of the verdicts, chosen on trials with known truth and judged on others.
 
-    OMP_NUM_THREADS=1 .venv/bin/python benchmarks/verdicts.py [--write] [--again] [--truth3d FOLDER --since TIME]
+    OMP_NUM_THREADS=1 .venv/bin/python benchmarks/verdicts.py [--write] [--again] [--present]
+        [--truth3d FOLDER --since TIME]
 
 Simulated planar squats, and squats and walks of the whole body, good ones and with one trouble each
 (`known_truth_cases.TROUBLES`), and what dynakin made after TIME, with no option but --lag and --live-like, of truth3d's
@@ -12,7 +13,8 @@ with the best balanced accuracy on one half of the seeds are taken; the tables a
 reaches `LEAST_ACCURACY`, the limit lies beyond all runs of that half.
 
 ``--write`` puts thresholds into ``results/measures/verdicts.toml`` and the tables into ``docs/validation.md``;
-``--again`` runs everything anew (else what was kept); ``--kept`` takes only what was kept.
+``--present`` judges the thresholds as they are and chooses none, ``--write`` then puts down tables alone; ``--again``
+runs everything anew (else what was kept); ``--kept`` takes only what was kept.
 """
 
 from __future__ import annotations
@@ -41,6 +43,7 @@ from dynakin.results.measures.consistency import (
     Limits,
     NoiseFrom,
     judge_group,
+    limits,
     noise_from,
     statistics_of,
 )
@@ -298,30 +301,34 @@ def main() -> None:
     parser.add_argument("--write", action="store_true")
     parser.add_argument("--again", action="store_true")
     parser.add_argument("--kept", action="store_true")
+    parser.add_argument("--present", action="store_true")
     parser.add_argument("--truth3d", type=Path, default=TRUTH3D)
     parser.add_argument("--since", type=datetime.fromisoformat, default=datetime.min.replace(year=1970))
     asked = parser.parse_args()
     trials = [*simulated(asked.again, asked.kept), *of_truth3d(asked.truth3d, asked.since)]
     choosing, judging = ([t for t in trials if t.chooses == half] for half in (True, False))
-    limits: AllLimits = {n: {group: chosen(choosing, n, group) for group in BLOCKS} for n in get_args(NoiseFrom)}
+    anew = {n: {group: chosen(choosing, n, group) for group in BLOCKS} for n in get_args(NoiseFrom)}
+    taken: AllLimits = limits() if asked.present else anew
     said = "; ".join(
         f"{noise} noise, {group} {word} {'below' if word == 'conservative' else 'above'} {limit.value:.2g} of "
         f"`{limit.statistic}`"
-        for noise, groups in limits.items()
+        for noise, groups in taken.items()
         for group, own in groups.items()
         for word, limit in zip(Limits._fields, own, strict=True)
     )
+    how = "As they are; of the half that may choose" if asked.present else "Chosen on"
     text = [
-        f"Chosen on {len(choosing)} trials (own simulator: odd seeds; truth3d: 1, 2): {said}. On these:",
+        f"{how} {len(choosing)} trials (own simulator: odd seeds; truth3d: 1, 2): {said}. On these:",
         "",
-        *confusion(choosing, limits),
+        *confusion(choosing, taken),
         "",
     ]
-    text += [f"On {len(judging)} others:", "", *confusion(judging, limits), ""]
-    text += ["The others by what was wrong:", "", *by_trouble(judging, limits)]
+    text += [f"On {len(judging)} others:", "", *confusion(judging, taken), ""]
+    text += ["The others by what was wrong:", "", *by_trouble(judging, taken)]
     print("\n".join(text))
     if asked.write:
-        TARGET.write_text(toml(limits, len(choosing), len(judging)), encoding="utf-8")
+        if not asked.present:
+            TARGET.write_text(toml(taken, len(choosing), len(judging)), encoding="utf-8")
         page = PAGE.read_text(encoding="utf-8")
         before, _, rest = page.partition(MARKS[0])
         _, mark, after = rest.partition(MARKS[1])

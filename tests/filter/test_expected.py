@@ -148,6 +148,8 @@ def test_a_foot_that_hands_over_may_do_so_earlier_or_later() -> None:
     )
     later = soles.share[10 - round(HANDED_OVER_S * rate), 0] - soles.share[10, 0]
     assert passes == pytest.approx(np.hypot(still, WEIGHT * later), rel=1e-6)
+    frame = replace(soles, stance=soles.stance[10:11], support=soles.support[10:11], share_before=soles.share[9:10])
+    np.testing.assert_allclose(frame.passing, soles.passing[10:11])  # live, one at a time
 
 
 def test_codes_names_and_what_does_not_touch() -> None:

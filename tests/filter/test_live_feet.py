@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -9,9 +10,12 @@ import pytest
 
 from dynakin import Estimator, Subject, load_model
 from dynakin.errors import ModelError
+from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.expected import ContactPaths, expected_loads
 from dynakin.filter.samples import Sample, recording_arrays
+from dynakin.filter.tracker import Tracker
 from dynakin.recordings.feet.assignment import foot_loads
+from dynakin.recordings.feet.contact import UNMEASURED
 from dynakin.recordings.recording import Recording
 from dynakin.settings import presets
 from dynakin.simulation.trial import simulate
@@ -23,12 +27,8 @@ def test_step_by_step_moments_bands_and_the_delayed_are_those_of_the_run() -> No
     live = Estimator(model, presets.default().changed(systematic_scale=0.0)).start(recording, lag_s=0.04)
     initial = live.calibrated
     markers, wrench = recording_arrays(recording, initial)
-    loads = foot_loads(recording, initial.ground, initial.foot_markers)
-    paths, nothing = ContactPaths.of(initial).at(markers), np.zeros((len(markers), 0), bool)
-    feet = expected_loads(loads, initial, live.noise, paths, np.zeros(len(markers), bool), nothing)
-    arrays_of = [name for name, values in vars(feet).items() if isinstance(values, np.ndarray)]
-    for k, sample in enumerate(_samples(recording)):
-        part = replace(feet, **{name: getattr(feet, name)[k : k + 1] for name in arrays_of})
+    feet = _feet(recording, live)
+    for sample, part in zip(_samples(recording), _frames(feet), strict=True):
         now = live.step(sample, part)
     arrays = Estimator(model).start(initial).run_arrays(recording.time, markers, wrench, feet=feet)
     np.testing.assert_allclose(now.moments, arrays["moments"][-1], atol=1e-6)
@@ -39,6 +39,42 @@ def test_step_by_step_moments_bands_and_the_delayed_are_those_of_the_run() -> No
     np.testing.assert_allclose(delayed.moments, smoothed["moments"][-5], atol=1e-5)
     with pytest.raises(ModelError, match="segment 'paw' is not in the model"):
         live.step(sample, replace(part, segments=("paw", "foot_l")))
+
+
+def test_a_session_counts_measured_moments_more_once_a_foot_has_stood_beside_the_plates() -> None:
+    """As a recording does (`measured_beside`): late ones, in all frames from then on."""
+    recording = simulate("fullbody", "squat", 1, 5.0).recording.window(2.0, 2.2)
+    model = load_model("fullbody", Subject(mass_kg=70.0, height_m=1.75, sex="male"))
+    for beside in (False, True):
+        live = Estimator(model, presets.default()).start(recording, lag_s=0.04)
+        samples, frames = _samples(recording), list(_frames(_feet(recording, live)))
+        if beside:
+            contact = frames[2].contact.copy()
+            contact[0, 0] = UNMEASURED
+            frames[2] = replace(frames[2], contact=contact)
+        for sample, part in zip(samples, frames, strict=True):
+            live.step(sample, part)
+        before = {late: live.deviations(delayed=late)["moments"].values for late in (True, False)}
+        assert live.systematic is not None
+        live.systematic.sizes = replace(live.systematic.sizes, own_beside=25.0)
+        after = {late: live.deviations(delayed=late)["moments"].values for late in (True, False)}
+        np.testing.assert_array_equal(after[False], before[False])
+        knee = [coordinate.name for coordinate in live.calibrated.spec.coordinates].index("knee_angle_l")
+        assert (after[True][knee] > before[True][knee]) == beside
+
+
+def _feet(recording: Recording, live: Tracker) -> ContactLoads:
+    """All of the recording seen."""
+    initial, (markers, _) = live.calibrated, recording_arrays(recording, live.calibrated)
+    loads = foot_loads(recording, initial.ground, initial.foot_markers)
+    paths, nothing = ContactPaths.of(initial).at(markers), np.zeros((len(markers), 0), bool)
+    return expected_loads(loads, initial, live.noise, paths, np.zeros(len(markers), bool), nothing)
+
+
+def _frames(feet: ContactLoads) -> Iterator[ContactLoads]:
+    names = [name for name, values in vars(feet).items() if isinstance(values, np.ndarray)]
+    for k in range(len(feet.wrench)):
+        yield replace(feet, **{name: getattr(feet, name)[k : k + 1] for name in names})
 
 
 def _samples(recording: Recording) -> list[Sample]:

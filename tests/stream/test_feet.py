@@ -245,6 +245,23 @@ def test_a_foot_beside_the_plate_is_not_measured(trial: SimulatedTrial) -> None:
     assert not known and found.contact.tolist() == [[UNMEASURED, ON_PLATE, ON_PLATE]]
 
 
+def test_a_foot_that_takes_over_load_may_have_done_so_earlier_or_later(
+    trial: SimulatedTrial, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """As in recordings: how unsure the push of a foot beside the plate is, from its touch-down on."""
+
+    def unsure() -> np.ndarray:
+        person = Standing(trial)
+        looks = [person.look(350.0, person.middles[0])[0] for _ in range(20)]
+        return np.array([np.linalg.norm(found.effects[0, 1, 6:12]) for found in looks])
+
+    as_it_is = unsure()
+    monkeypatch.setattr("dynakin.filter.expected.HANDED_OVER_S", 0.0)
+    without = unsure()
+    assert (as_it_is[1:4] > 1.01 * without[1:4]).all()
+    np.testing.assert_allclose(as_it_is[[0, *range(12, 20)]], without[[0, *range(12, 20)]])
+
+
 def test_a_load_where_nobody_stands_is_not_the_person(trial: SimulatedTrial) -> None:
     person = Standing(trial)
     found, known = person.look(300.0, person.middles[0] + np.array([1.0, 0.0, 0.0]))

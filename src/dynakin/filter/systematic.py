@@ -63,8 +63,9 @@ class Sizes:
         mass_centre: m, of the centre of mass of each body beside where the model has it.
         own_speeds: what the factor on the filter's own variance of smoothed speeds grows by with the movement's
             intensity (`OWN_LATE`).
-        own_beside: factor on the filter's own variance of smoothed moments that are measured in a recording in which
-            some foot stands beside the plates: what plates do not see they do not correct.
+        own_beside: part of the variance by the declared noise that counts at least, of late moments that are measured
+            in a recording in which some foot stands beside the plates, or in a session in which one has: what plates do
+            not see they do not correct, and small innovations do not show it.
         inertia: whether what a recording leaves open of inertia counts in moments at least by the declared noise, as in
             `Estimate.parameters`, where the noise that was found in the recording takes it for better known.
     """
@@ -100,7 +101,7 @@ LANDMARKS = Sizes(
     skin=0.12,
     mass_centre=0.02,
     own_speeds=0.17,
-    own_beside=2.25,
+    own_beside=0.14,
 )
 """Joints that are found from markers on the skin."""
 SCALED = Sizes(
@@ -113,7 +114,7 @@ SCALED = Sizes(
     skin=0.08,
     mass_centre=0.003,
     own_speeds=0.06,
-    own_beside=0.25,
+    own_beside=0.0,
     inertia=False,
 )
 """Joints of a skeleton that was scaled to the person (.osim)."""
@@ -157,7 +158,7 @@ def reported(
         still, moving = factors[block]
         factor = still + moving * intensity[..., None]
         if late and beside is not None and block == "moments":
-            factor = np.where(beside, sizes.own_beside, factor)
+            factor = np.where(beside, np.maximum(factor, sizes.own_beside / variance_scale), factor)
         variance = factor * np.square(sd)
         for kind in KINDS:
             variance = variance + getattr(sizes, kind) ** 2 * parts[kind][block]
@@ -350,20 +351,21 @@ class Systematic:
         wrench: Array,
         segments: Sequence[str],
         *,
+        beside: npt.NDArray[np.bool_] | None = None,
         late: bool,
     ) -> dict[str, Array]:
         """The filter's standard deviations of one frame (block -> (C,)) with these errors.
 
         Args:
-            x: (n,) state, of covariance (n, n). wrench: (F, 6) of the contacts on these segments. late: whether later
-                frames helped.
+            x: (n,) state, of covariance (n, n). wrench: (F, 6) of the contacts on these segments. beside: (C,) moments
+                of `Sizes.own_beside`. late: whether later frames helped.
         """
         inertia = covariance[np.ix_(self._inertia, self._inertia)] / self._variance_scale
         own = {block: found[block] for block in BLOCKS}
         K = len(self._free)
         intense = movement_intensity(x[2 * K : 3 * K], own["accelerations"][self._free])
         parts = self._at(x, inertia, wrench, segments)
-        return reported(self.sizes, self._variance_scale, own, parts, intense, late=late)
+        return reported(self.sizes, self._variance_scale, own, parts, intense, beside, late=late)
 
     def added_over_time(self, data: xr.Dataset, *, late: bool) -> xr.Dataset:
         """The same of a recording: ``data`` with other ``coordinates_sd`` ... ``moments_sd``."""
@@ -387,10 +389,14 @@ def measured_beside(data: xr.Dataset, feet: int) -> npt.NDArray[np.bool_] | None
     Args:
         feet: how many of the contacts are feet: the first ones, declared ones follow.
     """
-    contact = data["foot_contact"].transpose("time", "foot").values[:, :feet] if "foot_contact" in data else None
-    if contact is None or not (contact == UNMEASURED).any():
+    if "foot_contact" not in data or not some_beside(data["foot_contact"].transpose("time", "foot").values, feet):
         return None
     return np.asarray(data["moment_source"].transpose("time", "coordinate").values == MEASURED)
+
+
+def some_beside(contact: npt.NDArray[np.uint8], feet: int) -> bool:
+    """Whether some foot stands beside the plates in one of the frames of these contacts (T, F), as above."""
+    return bool((contact[:, :feet] == UNMEASURED).any())
 
 
 def _differences(values: list[Array]) -> tuple[Array, Array, Array]:

@@ -26,8 +26,8 @@ FITTING_MM = 15.0
 # Expected one frame ahead against seen: further apart than this, the estimate follows the measurements.
 FOLLOWING = 4.0
 
-# Calibrated variances this many times the declared ones are said: good trials with known truth have below 0.3, cameras
-# of 3 mm 5 to 6, with angles' deviations that are too small in one of four (docs/validation.md).
+# Calibrated variances this many times the declared ones are said: good trials with known truth have below 0.2, and
+# cameras of 3 mm 1.3, whose deviations still hold (docs/validation.md).
 NOISY = 2.0
 # A marker is named where it fits worse than half of all by this factor.
 STANDS_OUT = 3.0

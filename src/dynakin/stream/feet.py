@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Mapping
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -84,6 +85,7 @@ class LiveFeet:
         self._time_before = -np.inf
         self._shapes: list[FootShape] = []
         self._since = np.full(F, np.nan)  # when the stance began
+        self._share: tuple[float, Array] | None = None  # when soles were looked at last, and each foot's share then
         self._forward = initial.ground.vectors_to_ground(initial.ground.forward)[[0, 2]]
         self._floor_m = float(initial.ground.points_to_ground(np.zeros(3))[1])  # streams put plates there, too
         self._touched = np.full(F, -np.inf)  # when the foot last stood
@@ -203,7 +205,13 @@ class LiveFeet:
         weight = smooth_step(np.fmin((since + EARLY_S) / PASSING_S, 1.0 - left / AFTER_S))
         weight = np.where(self._marked, np.where(bears, weight, 0.0), 1.0)
         support = np.minimum(weight.sum(keepdims=True), 1.0)
-        return Soles(middle, half, (bears | ~self._marked)[None], weight[None], support, pressure, covariance)
+        soles = Soles(middle, half, (bears | ~self._marked)[None], weight[None], support, pressure, covariance)
+        if self._share is not None:
+            before_s, share = self._share
+            rate = 1.0 / float(np.clip(time_s - before_s, *_DT_S))
+            soles = replace(soles, rate=rate, share_before=share)
+        self._share = time_s, soles.share
+        return soles
 
     def news(self) -> list[str]:
         """Sentences, each said once."""

@@ -59,6 +59,7 @@ class Soles:
         pressure: (T, F, 3) m, where its centre of pressure is expected, by how far the foot has rolled.
         pressure_covariance: (T, F, 2, 2) m^2 of that along X and Z of the ground.
         rate: Hz, of the frames; 0 of a single one.
+        share_before: (1, F) `share` in the frame before them, where it is known (live).
     """
 
     middle: Array
@@ -69,6 +70,7 @@ class Soles:
     pressure: Array
     pressure_covariance: Array
     rate: float = 0.0
+    share_before: Array | None = None
 
     @classmethod
     def of(cls, contacts: list[FootContact | None], forward: Array, rate: float, frames: int) -> Soles:
@@ -112,11 +114,12 @@ class Soles:
     @property
     def passing(self) -> Array:
         """(T, F) 1/s: how fast that changes, no faster than in the shortest double support: where a foot is lost from
-        view its share jumps. 0 of a single frame."""
-        share = self.share
+        view its share jumps. 0 of a single frame before which nothing is known."""
+        share = self.share if self.share_before is None else np.vstack([self.share_before, self.share])
         if len(share) < 2:
             return np.zeros_like(share)
-        return np.asarray(np.minimum(np.abs(np.gradient(share, axis=0)) * self.rate, STEEPEST_STEP / BOTH_S[0]))
+        passing = np.minimum(np.abs(np.gradient(share, axis=0)) * self.rate, STEEPEST_STEP / BOTH_S[0])
+        return np.asarray(passing[-len(self.stance) :])
 
 
 @dataclass(frozen=True, eq=False)
