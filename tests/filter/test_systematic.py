@@ -20,6 +20,7 @@ from dynakin.filter.systematic import (
     BLOCKS,
     COMMON,
     KINDS,
+    LANDMARKS,
     OWN_AT_ONCE,
     OWN_LATE,
     SKIN_ANGLE_RAD,
@@ -44,7 +45,7 @@ CONTACT = np.array([40.0, 500.0, -60.0, 30.0, -20.0, 90.0])
 """N, N m about the ground's origin, on the shank."""
 SIZES = (0.01, 0.02, 0.05, 0.04, 0.06, 0.07, 0.3, 0.015)
 MOVING, BESIDE = 0.1, 0.2
-NONE = Sizes(*np.zeros(len(SIZES)), own_speeds=MOVING, own_beside=BESIDE)
+NONE = Sizes(*np.zeros(len(SIZES)), placed=np.inf, own_speeds=MOVING, own_beside=BESIDE)
 DECLARED = np.repeat([0.014, 0.018, 0.010], 4)
 
 
@@ -99,6 +100,7 @@ def calibrated() -> Any:
     return SimpleNamespace(
         spec=model,
         names=tuple(_core.Model(model).layout.names),
+        x0=_core.Model(model).initial_state(),
         plan=None,
         feet={},
         soft_tissue_m=DECLARED,
@@ -113,6 +115,13 @@ def calibrated() -> Any:
 
 def systematic() -> Systematic:
     return Systematic(calibrated(), Noise())
+
+
+def with_motion(x: Array) -> Array:
+    """The state in the movement of Q, QD and QDD."""
+    moving = x.copy()
+    moving[: 3 * len(Q)] = np.concatenate([Q, QD, QDD])
+    return moving
 
 
 def found(wrong: _core.Model, q: Array) -> Array:
@@ -253,7 +262,7 @@ def test_intensity_is_the_mean_square_of_accelerations_over_their_deviations_of_
 
 def test_reported_deviations_hold_both_parts_and_a_scale_of_zero_leaves_the_filters_own() -> None:
     """Its own part times what the movement makes of it."""
-    subject = Systematic(calibrated(), Noise(), Sizes(*SIZES, own_speeds=MOVING, own_beside=BESIDE))
+    subject = Systematic(calibrated(), Noise(), Sizes(*SIZES, placed=np.inf, own_speeds=MOVING, own_beside=BESIDE))
     x = np.r_[Q, QD, QDD]
     P = np.zeros((30, 30))
     own = {block: np.full(10, 0.02) for block in BLOCKS} | {"accelerations": np.full(10, 2.0)}
@@ -403,6 +412,28 @@ def test_over_time_inertia_is_known_as_well_as_in_each_frame() -> None:
         scales = np.r_[np.ones(30), np.full(4, w)]
         live = found.added(own, x, np.outer(scales, scales) * last, CONTACT[None], ["shank"], late=False)
         np.testing.assert_allclose(recorded[k], live["moments"], rtol=1e-9)
+
+
+def test_a_skeleton_whose_markers_lie_elsewhere_has_centres_of_joints_that_are_as_much_less_sure() -> None:
+    person = calibrated()
+    person.names += tuple(f"marker/{marker.name}/{axis}" for marker in person.spec.markers for axis in "xyz")
+    person.x0 = x = np.concatenate([person.x0, *(marker.position for marker in person.spec.markers)])
+    subject, moved = Systematic(person, Noise()), x.copy()
+    moved[-3 * len(person.spec.markers) + 1 :: 3] += 0.012
+    assert subject.moved_m(x) == 0.0
+    assert subject.moved_m(moved) == pytest.approx(0.012)
+    assert systematic().moved_m(x) == 0.0  # no marker is looked for
+    usual, wider = subject.sizes, subject.sizes.fitting(0.012)
+    assert usual.fitting(0.9 * usual.placed) == usual
+    assert wider.ball_centre / usual.ball_centre == pytest.approx(0.012 / usual.placed)
+    assert wider == replace(usual, hinge_centre=wider.hinge_centre, ball_centre=wider.ball_centre)
+    own = dict.fromkeys(BLOCKS, np.full(len(Q), 0.01)) | {"speeds": np.full(len(Q), 0.1)}
+    said = [
+        subject.added(own | {"moments": np.ones(len(Q))}, state, np.eye(len(x)), CONTACT[None], ["shank"], late=True)
+        for state in (with_motion(x), with_motion(moved))
+    ]
+    assert (said[1]["moments"] >= said[0]["moments"]).all() and said[1]["moments"][-1] > 1.1 * said[0]["moments"][-1]
+    assert LANDMARKS.fitting(0.1) == LANDMARKS
 
 
 def test_a_joint_of_which_a_rotation_is_held_is_the_joint_that_it_was() -> None:

@@ -61,6 +61,8 @@ class Sizes:
         root: rad, of the turn of the pelvis' frame in the pelvis.
         skin: of the displacement of a marker that follows a joint's angle, as a fraction of the declared size.
         mass_centre: m, of the centre of mass of each body beside where the model has it.
+        placed: m, how far (mean) markers may be found from where the model has them, for centres of joints to be as
+            sure as said: of a model that was scaled worse to the person both are off (`fitting`).
         own_speeds: what the factor on the filter's own variance of smoothed speeds grows by with the movement's
             intensity (`OWN_LATE`).
         own_beside: part of the variance by the declared noise that counts at least, of late moments that are measured
@@ -78,6 +80,7 @@ class Sizes:
     root: float
     skin: float
     mass_centre: float
+    placed: float
     own_speeds: float
     own_beside: float
     inertia: bool = True
@@ -85,6 +88,11 @@ class Sizes:
     def scaled(self, factor: float) -> Sizes:
         """The errors of joints, skin and centres of mass times a factor."""
         return replace(self, **{kind: factor * getattr(self, kind) for kind in KINDS})
+
+    def fitting(self, moved_m: float) -> Sizes:
+        """Of a model whose markers are found so far (mean) from where it has them."""
+        farther = max(moved_m / self.placed, 1.0)
+        return replace(self, hinge_centre=farther * self.hinge_centre, ball_centre=farther * self.ball_centre)
 
     def late(self) -> Own:
         """`OWN_LATE` with that of speeds."""
@@ -100,6 +108,7 @@ LANDMARKS = Sizes(
     root=np.radians(0.5),
     skin=0.12,
     mass_centre=0.02,
+    placed=np.inf,
     own_speeds=0.17,
     own_beside=0.14,
 )
@@ -113,11 +122,12 @@ SCALED = Sizes(
     root=np.radians(0.9),
     skin=0.08,
     mass_centre=0.003,
+    placed=0.005,
     own_speeds=0.06,
     own_beside=0.0,
     inertia=False,
 )
-"""Joints of a skeleton that was scaled to the person (.osim)."""
+"""Joints of a skeleton that was scaled to the person (.osim): as well as can be where markers lie within ``placed``."""
 
 
 def usual_sizes(calibrated: CalibratedModel) -> Sizes:
@@ -197,6 +207,10 @@ class Systematic:
         reference = neutral(calibrated)
         self._errors = JointErrors.of(spec, reference, calibrated.held)
         self._reference = reference[self._free]
+        first = {name: k for k, name in enumerate(calibrated.names)}
+        axes = [[f"marker/{marker.name}/{axis}" for axis in "xyz"] for marker in spec.markers]
+        self._places = np.array([[first[n] for n in own] for own in axes if first.keys() >= set(own)], dtype=np.intp)
+        self._place0 = calibrated.x0[self._places]
         self._measured = np.array([marker.measured for marker in spec.markers]).ravel()
         sd = np.hypot(np.sqrt(marker_variance(calibrated, noise)), soft_tissue_sd(noise, calibrated.soft_tissue_m))
         self._root_weight = np.repeat(1.0 / sd, 3) * self._measured
@@ -365,15 +379,23 @@ class Systematic:
         K = len(self._free)
         intense = movement_intensity(x[2 * K : 3 * K], own["accelerations"][self._free])
         parts = self._at(x, inertia, wrench, segments)
-        return reported(self.sizes, self._variance_scale, own, parts, intense, beside, late=late)
+        sizes = self.sizes.fitting(self.moved_m(x))
+        return reported(sizes, self._variance_scale, own, parts, intense, beside, late=late)
 
     def added_over_time(self, data: xr.Dataset, *, late: bool) -> xr.Dataset:
         """The same of a recording: ``data`` with other ``coordinates_sd`` ... ``moments_sd``."""
         order = ("time", "coordinate")
         own = {block: data[f"{block}_sd"].transpose(*order).values for block in BLOCKS}
         found = self.over_time(data), self.intensity(data), measured_beside(data, self._feet)
-        sd = reported(self.sizes, self._variance_scale, own, *found, late=late)
+        sizes = self.sizes.fitting(self.moved_m(data["state"].transpose("time", "element").values[-1]))
+        sd = reported(sizes, self._variance_scale, own, *found, late=late)
         return data.assign({f"{block}_sd": (order, sd[block]) for block in BLOCKS})
+
+    def moved_m(self, x: Array) -> float:
+        """How far markers are found from where the model has them by a state (n,), mean; 0 where none is looked for."""
+        if not len(self._places):
+            return 0.0
+        return float(np.linalg.norm(x[self._places] - self._place0, axis=1).mean())
 
     def intensity(self, data: xr.Dataset) -> Array:
         """(T,) `movement_intensity` of a recording, by its states and the filter's own ``accelerations_sd``."""
