@@ -7,7 +7,6 @@ OUT ?= out/demo
 LEVEL ?= $(if $(filter x86_64 amd64,$(shell uname -m)),v3,baseline)
 CORE := $(shell find cpp/include cpp/src src/dynakin/bindings -name '*.?pp') CMakeLists.txt pyproject.toml \
   $(shell find src/dynakin -name __init__.py)  # a new package must be made known to the editable install
-CPP_TESTS := $(shell find cpp/tests -type f)
 export PATH := $(CURDIR)/$(BIN):$(PATH)
 export PIP_DISABLE_PIP_VERSION_CHECK := 1
 unexport PYTHONDONTWRITEBYTECODE  # tests start many processes; each would compile all modules again
@@ -35,6 +34,9 @@ $(VENV)/.env: | prerequisites
 	$(BIN)/python -m pip install --quiet "scikit-build-core>=0.11" "nanobind>=3" "cmeel-eigen>=3.4" cmake ninja
 	@touch $@
 
+ifeq ($(wildcard $(SKBUILD_BUILD_DIR)/CMakeCache.txt),)
+.PHONY: $(VENV)/.built  # the build folder was removed: made again
+endif
 $(VENV)/.built: $(VENV)/.env $(CORE)
 	$(BIN)/python -m pip install --quiet --no-build-isolation --editable .
 	@$(BIN)/python -m compileall -q src  # as an install does that is not editable: else each start may compile all

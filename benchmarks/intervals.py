@@ -64,9 +64,9 @@ Array = np.ndarray
 @dataclass(frozen=True)
 class Run:
     """One estimate against the truth: by block errors (T, C), the filter's own deviations, and variances by kind of
-    error at size 1; (T,) intensity of the movement; (T, C) moments that are measured in a recording in which some foot
-    stands beside the plates. Frames that have no truth or no value are NaN. ``moved_m``: as of `Sizes.fitting`;
-    ``late``: whether later frames helped."""
+    error at size 1; (T,) intensity of the movement and how far markers are moved; (T, C) moments that are measured in a
+    recording in which some foot stands beside the plates. Frames that have no truth or no value are NaN. ``late``:
+    whether later frames helped."""
 
     case: str
     seed: int
@@ -78,7 +78,7 @@ class Run:
     intensity: Array
     beside: Array | None
     variance_scale: float
-    moved_m: float
+    moved_m: Array
     late: bool
 
 
@@ -187,7 +187,7 @@ def against(
         systematic.intensity(data)[window],
         None if beside is None else beside[window][:, mine],
         tracker.noise.variance_scale,
-        systematic.moved_m(data["state"].transpose("time", "element").values[-1]),
+        systematic.moved_m(data["state"].transpose("time", "element").values)[window],
         bool(tracked.estimate.config["lag_s"]),
     )
 
@@ -215,8 +215,8 @@ def figures(run: Run, sizes: Sizes | None) -> dict[str, tuple[float, ...]]:
     found = {}
     said = run.own
     if sizes is not None:
-        sizes = sizes.fitting(run.moved_m)
-        said = reported(sizes, run.variance_scale, run.own, run.parts, run.intensity, run.beside, late=run.late)
+        over_time = run.intensity, run.moved_m, run.beside
+        said = reported(sizes, run.variance_scale, run.own, run.parts, *over_time, late=run.late)
     for title, block, places in groups_of(run):
         e, sd = run.error[block][:, places], said[block][:, places]
         if block == "coordinates":
@@ -262,7 +262,8 @@ def tell(runs: Sequence[Run], sizes: dict[str, Sizes]) -> None:
 
 def choose(runs: Sequence[Run], kind: str, start: dict[str, Sizes]) -> Sizes:
     """Sizes of one kind of model for which groups lie nearest to 94 % and 1.3, and none is far off."""
-    names = [name for name, value in asdict(start[kind]).items() if type(value) is float and 0.0 < value < np.inf]
+    fixed = ("placed", "inertia")  # beyond `placed` only its ratio to the centres' sizes counts
+    names = [name for name, value in asdict(start[kind]).items() if value and name not in fixed]
     first = np.log([getattr(start[kind], name) for name in names])
     mine = [run for run in runs if run.sizes == kind]
 

@@ -15,7 +15,7 @@ STATISTICS = ("scipy.signal", "scipy.stats")  # the slowest parts of SciPy
 TABLES = ("xarray", "pandas")
 FILES = ("ezc3d", "netCDF4", "joblib")
 CORE = ("dynakin.bindings._core",)
-SEARCHES = ("scipy.optimize", "scipy.spatial")
+SEARCHES = ("scipy.optimize", "scipy.spatial", "scipy.ndimage")
 NUMBERS = ("numpy", "scipy")
 
 LOADED = "import sys; print(*sys.modules)"

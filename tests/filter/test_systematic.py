@@ -23,6 +23,7 @@ from dynakin.filter.systematic import (
     LANDMARKS,
     OWN_AT_ONCE,
     OWN_LATE,
+    SCALED,
     SKIN_ANGLE_RAD,
     SPEEDS_STILL,
     Sizes,
@@ -306,10 +307,12 @@ def test_measured_moments_count_more_where_some_foot_stands_beside_the_plates() 
     own = {"speeds": np.ones((2, 2)), "moments": np.ones((2, 2))}
     parts = {kind: {block: np.zeros((2, 2)) for block in own} for kind in (*KINDS, "inertia")}
     scale = 0.1  # of the noise that was found
-    late, at_once = (reported(NONE, scale, own, parts, np.zeros(2), beside, late=late) for late in (True, False))
+    late, at_once = (
+        reported(NONE, scale, own, parts, np.zeros(2), np.zeros(2), beside, late=late) for late in (True, False)
+    )
     still, more = OWN_LATE["moments"][0], BESIDE / scale
     np.testing.assert_allclose(late["moments"] ** 2, [[more, more], [more, still]])
-    declared = reported(NONE, 1.0, own, parts, np.zeros(2), beside, late=True)
+    declared = reported(NONE, 1.0, own, parts, np.zeros(2), np.zeros(2), beside, late=True)
     np.testing.assert_allclose(declared["moments"] ** 2, still)  # holds as much already
     np.testing.assert_allclose(at_once["moments"] ** 2, OWN_AT_ONCE["moments"][0])
     np.testing.assert_allclose(late["speeds"] ** 2, SPEEDS_STILL)
@@ -423,17 +426,20 @@ def test_a_skeleton_whose_markers_lie_elsewhere_has_centres_of_joints_that_are_a
     assert subject.moved_m(x) == 0.0
     assert subject.moved_m(moved) == pytest.approx(0.012)
     assert systematic().moved_m(x) == 0.0  # no marker is looked for
-    usual, wider = subject.sizes, subject.sizes.fitting(0.012)
-    assert usual.fitting(0.9 * usual.placed) == usual
-    assert wider.ball_centre / usual.ball_centre == pytest.approx(0.012 / usual.placed)
-    assert wider == replace(usual, hinge_centre=wider.hinge_centre, ball_centre=wider.ball_centre)
     own = dict.fromkeys(BLOCKS, np.full(len(Q), 0.01)) | {"speeds": np.full(len(Q), 0.1)}
     said = [
         subject.added(own | {"moments": np.ones(len(Q))}, state, np.eye(len(x)), CONTACT[None], ["shank"], late=True)
         for state in (with_motion(x), with_motion(moved))
     ]
     assert (said[1]["moments"] >= said[0]["moments"]).all() and said[1]["moments"][-1] > 1.1 * said[0]["moments"][-1]
-    assert LANDMARKS.fitting(0.1) == LANDMARKS
+    assert subject.misfit(x) == [] and "12 mm" in subject.misfit(moved)[0] and "2.4 times" in subject.misfit(moved)[0]
+    none = {kind: dict.fromkeys(BLOCKS, np.zeros((3, 1))) for kind in (*KINDS, "inertia")}
+    centres = none | dict.fromkeys(("hinge_centre", "ball_centre"), dict.fromkeys(BLOCKS, np.ones((3, 1))))
+    still, moved_m = dict.fromkeys(BLOCKS, np.zeros((3, 1))), SCALED.placed * np.array([0.5, 1.0, 3.0])
+    by_frame = reported(SCALED, 1.0, still, centres, np.zeros(3), moved_m, late=True)["moments"][:, 0]
+    np.testing.assert_allclose(by_frame / np.hypot(SCALED.hinge_centre, SCALED.ball_centre), [1.0, 1.0, 3.0])
+    measured = reported(LANDMARKS, 1.0, still, centres, np.zeros(3), np.full(3, 0.1), late=True)["moments"]
+    np.testing.assert_allclose(measured, np.hypot(LANDMARKS.hinge_centre, LANDMARKS.ball_centre))
 
 
 def test_a_joint_of_which_a_rotation_is_held_is_the_joint_that_it_was() -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 import tomllib
 from pathlib import Path
 
@@ -124,6 +126,28 @@ def test_parameters_json_is_strict_json_with_every_parameter(folder: Path, estim
     thigh = found["length/thigh"]
     assert thigh["at_bound"] and thigh["table"] is None and thigh["unit"] == "m"
     assert thigh["value"] == pytest.approx(1.2 * 0.43)
+
+
+def test_threads_may_save_at_a_time(tmp_path: Path) -> None:
+    """In a process of its own, which the library would crash."""
+    program = f"""
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+import dynakin
+from dynakin.results.files.netcdf import write_netcdf
+from dynakin.simulation import simulate
+from dynakin.simulation.output import save_trial
+trial = simulate("squat7", "squat", 1, 5.0)
+estimate = dynakin.run(trial.recording, model="squat7").estimate
+def write(k):
+    write_netcdf(estimate, Path({str(tmp_path)!r}) / f"{{k}}.nc")
+    save_trial(trial, Path({str(tmp_path)!r}) / f"truth_{{k}}")
+with ThreadPoolExecutor(3) as threads:
+    list(threads.map(write, range(12)))
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert len(list(tmp_path.glob("*.nc"))) == len(list(tmp_path.glob("*/*.nc"))) == 12
 
 
 def test_netcdf_gives_everything_back_with_labels(folder: Path, estimate: Estimate) -> None:

@@ -225,6 +225,8 @@ def export_model(
         raise typer.BadParameter(f"--export is {path}, expected a file that ends in .osim")
     values = {} if parameters is None else read_values(parameters)
     if isinstance(definition, OpenSimDefinition):
+        if trial is not None:
+            raise typer.BadParameter("--trial is of no use with --export of an .osim file, which has places of its own")
         mass = mass_of_run(parameters) if mass_kg is None and parameters is not None else mass_kg
         write_osim(of_definition(definition, values, mass), path)
         return

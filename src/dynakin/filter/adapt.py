@@ -28,8 +28,8 @@ Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
 
 CALIBRATED_S = 4.0
-"""Part of a recording that is filtered again with other jerk densities, from its start: 3 and 10 s give factors within
-2 % of each other."""
+"""How long somebody is followed of what is filtered again with other jerk densities, from the recording's start: 3 and
+10 s give factors within 2 % of each other."""
 SETTLING_S = 0.3
 """Left out of it: the first frames' covariances are the priors'."""
 LEAST_FRAMES = 25
@@ -67,7 +67,8 @@ def calibrated_noise(
 ) -> Noise | None:
     """The noise with the scales that a recording asks for; None where it is too short.
 
-    One more pass, over `CALIBRATED_S`, for a floating model, none for one that is fixed in the ground.
+    One more pass, until somebody was followed for `CALIBRATED_S`, for a floating model, none for one that is fixed in
+    the ground.
 
     Args:
         tracker: of the run. arrays: of that run, as `Tracker.run_arrays` gives them. frames: (T,) to look at; all
@@ -80,7 +81,8 @@ def calibrated_noise(
     ratio = nis_per_row(arrays, chosen)
     if ratio is None:
         return None
-    end = int(np.searchsorted(trial.time, trial.time[0] + CALIBRATED_S, side="right"))
+    first = int(np.argmax(arrays["tracking"][: len(trial.time)] == FOLLOWING))
+    end = int(np.searchsorted(trial.time, trial.time[first] + CALIBRATED_S, side="right"))
     groups, before = joint_groups(tracker.calibrated), nis_per_row(arrays, chosen[:end])
     if not groups or before is None:
         return _believed(_scaled(noise, ratio), noise, late)

@@ -50,6 +50,8 @@ def bearing(found: Closure, may: Flags, names: list[str], measured: list[bool], 
         may: (T, C) of `may_bear`. claimed: (T,) frames in which the plates' sum was compared with the motion.
     """
     bears = np.zeros_like(may)
+    if all(measured):
+        return bears
     judged = np.isfinite(found.excess[:, 1])
     nearest = scipy.ndimage.distance_transform_edt(~judged, return_distances=False, return_indices=True)[0]
     for c, name in enumerate(names):

@@ -293,6 +293,8 @@ class Estimator:
         doubt = [ready.doubt] if ready.doubt else clock if ground.usable else []
         config["noise_used"] = tracker.noise.scales()
         notes += [*doubt, *ready.unsmoothed]
+        if tracker.systematic is not None:
+            notes += tracker.systematic.misfit(arrays["state"][-1])
         covariances = (initial_covariance(calibrated, tracker.noise), tracker.covariance)
         estimate = assemble(
             arrays, tracker.core_model, calibrated, recording, (markers, wrench), config, notes, covariances,

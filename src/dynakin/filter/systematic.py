@@ -32,6 +32,11 @@ BLOCKS = ("coordinates", "speeds", "accelerations", "moments")
 OF_JOINTS = get_args(Kind)
 KINDS = (*OF_JOINTS, "skin", "mass_centre")
 """What `Sizes` has a size of. What is not known of inertia has none: it is in the filter's covariance."""
+CENTRES = ("hinge_centre", "ball_centre")
+"""What goes by how far markers have moved, too."""
+MISFIT = 1.6
+"""Times `Sizes.placed` from which a run says that a model was not scaled well: by truth 0.6 to 1.1 with the person's
+own skeleton, 2.5 to 3.2 with one scaled by hand."""
 
 
 Own = dict[str, tuple[float, float]]
@@ -62,7 +67,7 @@ class Sizes:
         skin: of the displacement of a marker that follows a joint's angle, as a fraction of the declared size.
         mass_centre: m, of the centre of mass of each body beside where the model has it.
         placed: m, how far (mean) markers may be found from where the model has them, for centres of joints to be as
-            sure as said: of a model that was scaled worse to the person both are off (`fitting`).
+            sure as said: of a model that was scaled worse to the person both are off, in proportion.
         own_speeds: what the factor on the filter's own variance of smoothed speeds grows by with the movement's
             intensity (`OWN_LATE`).
         own_beside: part of the variance by the declared noise that counts at least, of late moments that are measured
@@ -88,11 +93,6 @@ class Sizes:
     def scaled(self, factor: float) -> Sizes:
         """The errors of joints, skin and centres of mass times a factor."""
         return replace(self, **{kind: factor * getattr(self, kind) for kind in KINDS})
-
-    def fitting(self, moved_m: float) -> Sizes:
-        """Of a model whose markers are found so far (mean) from where it has them."""
-        farther = max(moved_m / self.placed, 1.0)
-        return replace(self, hinge_centre=farther * self.hinge_centre, ball_centre=farther * self.ball_centre)
 
     def late(self) -> Own:
         """`OWN_LATE` with that of speeds."""
@@ -151,6 +151,7 @@ def reported(
     own: Mapping[str, Array],
     parts: Parts,
     intensity: Array,
+    moved_m: Array,
     beside: npt.NDArray[np.bool_] | None = None,
     *,
     late: bool,
@@ -159,10 +160,12 @@ def reported(
 
     Args:
         variance_scale: of the noise of the filter. own: the filter's own deviations, by block. parts: variances as of
-            `Systematic.over_time`. intensity: (...,) as of `movement_intensity`. beside: (..., C) moments of
+            `Systematic.over_time`. intensity: (...,) as of `movement_intensity`. moved_m: (...,) as of
+            `Systematic.moved_m`. beside: (..., C) moments of
             `Sizes.own_beside`. late: whether later frames helped.
     """
     factors = sizes.late() if late else OWN_AT_ONCE
+    farther = np.maximum(moved_m / sizes.placed, 1.0)[..., None]
     found = {}
     for block, sd in own.items():
         still, moving = factors[block]
@@ -171,7 +174,8 @@ def reported(
             factor = np.where(beside, np.maximum(factor, sizes.own_beside / variance_scale), factor)
         variance = factor * np.square(sd)
         for kind in KINDS:
-            variance = variance + getattr(sizes, kind) ** 2 * parts[kind][block]
+            size = getattr(sizes, kind) * (farther if kind in CENTRES else 1.0)
+            variance = variance + size**2 * parts[kind][block]
         if sizes.inertia:  # the filter's own part has so much of it already
             variance = variance + np.maximum(1.0 - factor * variance_scale, 0.0) * parts["inertia"][block]
         found[block] = np.sqrt(variance)
@@ -379,23 +383,34 @@ class Systematic:
         K = len(self._free)
         intense = movement_intensity(x[2 * K : 3 * K], own["accelerations"][self._free])
         parts = self._at(x, inertia, wrench, segments)
-        sizes = self.sizes.fitting(self.moved_m(x))
-        return reported(sizes, self._variance_scale, own, parts, intense, beside, late=late)
+        return reported(self.sizes, self._variance_scale, own, parts, intense, self.moved_m(x), beside, late=late)
 
     def added_over_time(self, data: xr.Dataset, *, late: bool) -> xr.Dataset:
         """The same of a recording: ``data`` with other ``coordinates_sd`` ... ``moments_sd``."""
         order = ("time", "coordinate")
         own = {block: data[f"{block}_sd"].transpose(*order).values for block in BLOCKS}
-        found = self.over_time(data), self.intensity(data), measured_beside(data, self._feet)
-        sizes = self.sizes.fitting(self.moved_m(data["state"].transpose("time", "element").values[-1]))
-        sd = reported(sizes, self._variance_scale, own, *found, late=late)
+        moved = self.moved_m(data["state"].transpose("time", "element").values)
+        found = self.over_time(data), self.intensity(data), moved, measured_beside(data, self._feet)
+        sd = reported(self.sizes, self._variance_scale, own, *found, late=late)
         return data.assign({f"{block}_sd": (order, sd[block]) for block in BLOCKS})
 
-    def moved_m(self, x: Array) -> float:
-        """How far markers are found from where the model has them by a state (n,), mean; 0 where none is looked for."""
+    def moved_m(self, x: Array) -> Array:
+        """(...,) how far markers are found from where the model has them by states (..., n), mean; 0 where none is
+        looked for."""
         if not len(self._places):
-            return 0.0
-        return float(np.linalg.norm(x[self._places] - self._place0, axis=1).mean())
+            return np.zeros(x.shape[:-1])
+        return np.asarray(np.linalg.norm(x[..., self._places] - self._place0, axis=-1).mean(axis=-1))
+
+    def misfit(self, x: Array) -> list[str]:
+        """What there is to say of how well the model was scaled to the person, by the last state (n,)."""
+        moved_m = float(self.moved_m(x))
+        if not moved_m > self.sizes.placed * MISFIT:
+            return []
+        return [
+            f"Markers lie {1000.0 * moved_m:.0f} mm (mean) from where the model has them, of a model that fits the "
+            f"person at most {1000.0 * self.sizes.placed:.0f} mm: the centres of its joints count as "
+            f"{moved_m / self.sizes.placed:.1f} times less sure. Scale the model to the person, or take fullbody."
+        ]
 
     def intensity(self, data: xr.Dataset) -> Array:
         """(T,) `movement_intensity` of a recording, by its states and the filter's own ``accelerations_sd``."""

@@ -16,6 +16,7 @@ from dynakin.recordings.recording import Plate, Recording
 from dynakin.results.files.config import versions
 from dynakin.results.files.folder import FolderKind, check_output_writable, replacing
 from dynakin.results.files.markers import write_trc
+from dynakin.results.files.netcdf import ONE_AT_A_TIME
 from dynakin.results.files.storage import write_storage
 from dynakin.simulation.truth import Truth
 
@@ -194,7 +195,8 @@ def _write_arrays(trial: SimulatedTrial, path: Path) -> None:
         for name, variable in data.data_vars.items()
         if variable.dtype.kind == "f" and variable.size > 1000
     }
-    data.to_netcdf(path, engine="netcdf4", encoding=encoding)
+    with ONE_AT_A_TIME:
+        data.to_netcdf(path, engine="netcdf4", encoding=encoding)
 
 
 def _rotations(trial: SimulatedTrial) -> NDArray[np.bool_]:

@@ -41,6 +41,7 @@ Flags = npt.NDArray[np.bool_]
 _RISE_M_S = 0.0025  # how fast a marker's lowest place is forgotten, so that one bad moment does not stay
 _BELT_STEP_S, _BELT_EVERY_S = 0.018, 0.5  # a belt is looked for twice a second, in 50 moments a second
 _DT_S = (0.001, 0.05)  # how far ahead the feet are predicted
+_LEAST_S = 0.001  # between frames of which a share's rate is taken
 
 
 class LiveFeet:
@@ -208,7 +209,7 @@ class LiveFeet:
         soles = Soles(middle, half, (bears | ~self._marked)[None], weight[None], support, pressure, covariance)
         if self._share is not None:
             before_s, share = self._share
-            rate = 1.0 / float(np.clip(time_s - before_s, *_DT_S))
+            rate = 1.0 / max(time_s - before_s, _LEAST_S)
             soles = replace(soles, rate=rate, share_before=share)
         self._share = time_s, soles.share
         return soles

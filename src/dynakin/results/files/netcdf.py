@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Hashable
 from pathlib import Path
+from threading import Lock
 from typing import Any
 
 import numpy as np
@@ -54,6 +55,8 @@ _COVARIANCE_BITS = 32
 """The smallest eigenvalues of a covariance are differences of large numbers."""
 _STEPS = {"markers": 2.0**-20, "joint_centres": 2.0**-20, "joint_orientations": 2.0**-20, "joint_loads": 2.0**-10}
 """About 1 µm, 1e-6 of a direction's cosine, 1 mN and 1 mN m. Powers of two leave zeros at the end, which compress."""
+ONE_AT_A_TIME = Lock()
+"""Who writes by the netCDF library: it lets go of the interpreter, and does not bear a second thread."""
 _PARAMETER_NUMBERS = ("value", "sd", "initial", "table", "lower", "upper")
 
 
@@ -131,7 +134,7 @@ def write_netcdf(estimate: Estimate, path: Path) -> None:
                 encoding[key]["dtype"] = "float32"
             rounded[key] = variable.copy(data=values)
     # By its path xarray would ask Dask who else writes it, which takes 0.3 s where it is there.
-    with netCDF4.Dataset(path, "w") as file:
+    with ONE_AT_A_TIME, netCDF4.Dataset(path, "w") as file:
         store = xr.backends.NetCDF4DataStore(file)  # type: ignore[no-untyped-call]
         data.assign(rounded).dump_to_store(store, encoding=encoding)
 
