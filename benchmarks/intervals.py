@@ -38,6 +38,7 @@ from dynakin.filter.systematic import (
     Systematic,
     measured_beside,
     reported,
+    states_of,
     usual_sizes,
 )
 from dynakin.model.definition import load_model
@@ -187,7 +188,7 @@ def against(
         systematic.intensity(data)[window],
         None if beside is None else beside[window][:, mine],
         tracker.noise.variance_scale,
-        systematic.moved_m(data["state"].transpose("time", "element").values)[window],
+        systematic.moved_m(states_of(data))[window],
         bool(tracked.estimate.config["lag_s"]),
     )
 

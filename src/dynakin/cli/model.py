@@ -61,11 +61,11 @@ def model(
     settings = Settings.of({"model": name}, "model", ("model",), given)
     definition = definition_of(settings)
     if export is not None:
-        export_model(definition, export, parameters, settings.mass_kg, trial, settings.forces, settings.static)
+        export_model(definition, export, parameters, trial, settings)
         console.print(f"Written {export}", soft_wrap=True)
         return
     if identifiable:
-        print_identifiability(definition, trial, settings.forces, settings.static)
+        print_identifiability(definition, trial, settings)
     elif isinstance(definition, OpenSimDefinition):
         print_opensim(console, definition)
     else:

@@ -26,9 +26,11 @@ from dynakin.model.schema import ModelFile, kinds_of
 from dynakin.model.schema import Segment as ModelSegment
 from dynakin.progress import stage
 from dynakin.recordings.read import read
+from dynakin.recordings.recording import Recording
 from dynakin.results.measures.posterior import JUDGEMENT_WORDS, judged
 from dynakin.results.naming import number, sentence
 from dynakin.settings.model import Bounds
+from dynakin.settings.settings import Settings
 
 
 def list_models() -> Table:
@@ -138,7 +140,7 @@ def _states(model: ModelFile) -> Table:
     return rows
 
 
-def print_identifiability(definition: Definition, trial: Path | None, forces: Path | None, static: Path | None) -> None:
+def print_identifiability(definition: Definition, trial: Path | None, settings: Settings) -> None:
     """Structure of the model, by a simulated person where no trial is given; the trial's posterior where one is.
 
     Raises:
@@ -150,9 +152,8 @@ def print_identifiability(definition: Definition, trial: Path | None, forces: Pa
         _print_structure(structure)
         return
     with stage("estimating") as progress:
-        estimate, tracker = Estimator(definition).track(
-            read(trial, forces), static=None if static is None else read(static), progress=progress
-        )
+        recording, static = _read(trial, settings)
+        estimate, tracker = Estimator(definition).track(recording, static=static, progress=progress)
     with stage("trying motions") as progress:
         found = identifiability(tracker, estimate, progress)
     _print_structure(found.structure, found)
@@ -211,10 +212,8 @@ def export_model(
     definition: Definition,
     path: Path,
     parameters: Path | None,
-    mass_kg: float | None,
     trial: Path | None,
-    forces: Path | None,
-    static: Path | None,
+    settings: Settings,
 ) -> None:
     """Write a model with a run's values, where given.
 
@@ -227,15 +226,20 @@ def export_model(
     if isinstance(definition, OpenSimDefinition):
         if trial is not None:
             raise typer.BadParameter("--trial is of no use with --export of an .osim file, which has places of its own")
-        mass = mass_of_run(parameters) if mass_kg is None and parameters is not None else mass_kg
+        mass = settings.mass_kg
+        if mass is None and parameters is not None:
+            mass = mass_of_run(parameters)
         write_osim(of_definition(definition, values, mass), path)
         return
     if trial is None:
         raise typer.BadParameter("--export of a model that is no .osim file: expected --trial to measure it on")
-    write_osim(
-        of_initial(definition.calibrate(read(trial, forces), static=None if static is None else read(static)), values),
-        path,
-    )
+    recording, static = _read(trial, settings)
+    write_osim(of_initial(definition.calibrate(recording, static=static), values), path)
+
+
+def _read(trial: Path, settings: Settings) -> tuple[Recording, Recording | None]:
+    """The trial with its forces, and the standing trial where there is one."""
+    return read(trial, settings.forces), None if settings.static is None else read(settings.static)
 
 
 def _opensim_tree(definition: OpenSimDefinition) -> Tree:

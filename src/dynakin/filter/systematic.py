@@ -333,7 +333,7 @@ class Systematic:
                 whose contacts have been used.
         """
         time = np.asarray(data["time"].values)
-        states = data["state"].transpose("time", "element").values
+        states = states_of(data)
         # how inertia hangs together is known at the end alone, how well it is known in each frame
         sd = data["state_sd"].transpose("time", "element").values[:, self._inertia]
         together = _correlation(data["final_covariance"].values[np.ix_(self._inertia, self._inertia)])
@@ -389,7 +389,7 @@ class Systematic:
         """The same of a recording: ``data`` with other ``coordinates_sd`` ... ``moments_sd``."""
         order = ("time", "coordinate")
         own = {block: data[f"{block}_sd"].transpose(*order).values for block in BLOCKS}
-        moved = self.moved_m(data["state"].transpose("time", "element").values)
+        moved = self.moved_m(states_of(data))
         found = self.over_time(data), self.intensity(data), moved, measured_beside(data, self._feet)
         sd = reported(self.sizes, self._variance_scale, own, *found, late=late)
         return data.assign({f"{block}_sd": (order, sd[block]) for block in BLOCKS})
@@ -415,9 +415,14 @@ class Systematic:
     def intensity(self, data: xr.Dataset) -> Array:
         """(T,) `movement_intensity` of a recording, by its states and the filter's own ``accelerations_sd``."""
         K = len(self._free)
-        states = data["state"].transpose("time", "element").values
+        states = states_of(data)
         sd = data["accelerations_sd"].transpose("time", "coordinate").values[:, self._free]
         return movement_intensity(states[:, 2 * K : 3 * K], sd)
+
+
+def states_of(data: xr.Dataset) -> Array:
+    """(T, n) of a recording."""
+    return np.asarray(data["state"].transpose("time", "element").values)
 
 
 def measured_beside(data: xr.Dataset, feet: int) -> npt.NDArray[np.bool_] | None:

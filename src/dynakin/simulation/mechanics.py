@@ -94,30 +94,36 @@ class TreeMotion:
 
 def kinematics(tree: Sequence[Segment], motion: Motion) -> TreeMotion:
     """Poses, velocities and accelerations of all segments; parents must stand before their children."""
-    frames = motion.q.shape[0]
-    zero = np.zeros((frames, 3))
-    ground = SegmentMotion(np.tile(np.eye(3), (frames, 1, 1)), zero, zero, zero, zero, zero)
-    result = TreeMotion()
+    result = at_rest(tree, motion.names, motion.q)
     for segment in tree:
-        parent = ground if segment.parent is None else result.segments[segment.parent]
-        state = SegmentMotion(
-            parent.rotation,
-            parent.point(segment.placement),
-            parent.point_velocity(segment.placement),
-            parent.point_acceleration(segment.placement),
-            parent.omega,
-            parent.alpha,
-        )
+        own = result.segments[segment.name]
+        velocity, acceleration, omega, alpha = own.velocity, own.acceleration, own.omega, own.alpha
+        if segment.parent is not None:
+            parent = result.segments[segment.parent]
+            velocity, omega = parent.point_velocity(segment.placement), parent.omega
+            acceleration, alpha = parent.point_acceleration(segment.placement), parent.alpha
         for k, axis in enumerate(segment.axes):
             j = motion.names.index(axis.coordinate)
-            result.axes[segment.name, k] = (state.rotation @ np.asarray(axis.direction), state.origin)
-            state = _advance(state, axis, motion.q[:, j], motion.qd[:, j, None], motion.qdd[:, j, None])
-        result.segments[segment.name] = state
+            u, _ = result.axes[segment.name, k]
+            qd, qdd = motion.qd[:, j, None], motion.qdd[:, j, None]
+            if axis.translation:
+                d = u * motion.q[:, j, None]
+                velocity = velocity + cross(omega, d) + u * qd
+                acceleration = (
+                    acceleration
+                    + cross(alpha, d)
+                    + cross(omega, cross(omega, d))
+                    + 2.0 * cross(omega, u * qd)
+                    + u * qdd
+                )
+            else:
+                omega, alpha = omega + u * qd, alpha + u * qdd + cross(omega, u * qd)
+        own.velocity, own.acceleration, own.omega, own.alpha = velocity, acceleration, omega, alpha
     return result
 
 
 def at_rest(tree: Sequence[Segment], names: tuple[str, ...], q: Array) -> TreeMotion:
-    """As `kinematics` of postures ``q`` (T, n) in which nothing moves, in a third of the time."""
+    """Poses of all segments in postures ``q`` (T, n) in which nothing moves."""
     frames = q.shape[0]
     zero = np.zeros((frames, 3))
     result = TreeMotion()
@@ -137,32 +143,6 @@ def at_rest(tree: Sequence[Segment], names: tuple[str, ...], q: Array) -> TreeMo
                 rotation = rotation @ rotation_about(direction, angle)
         result.segments[segment.name] = SegmentMotion(rotation, origin, zero, zero, zero, zero)
     return result
-
-
-def _advance(body: SegmentMotion, axis: Axis, q: Array, qd: Array, qdd: Array) -> SegmentMotion:
-    direction = np.asarray(axis.direction, dtype=float)
-    u = body.rotation @ direction
-    if axis.translation:
-        moved = SegmentMotion(body.rotation, body.origin, body.velocity, body.acceleration, body.omega, body.alpha)
-        d = u * q[:, None]
-        moved.origin = body.origin + d
-        moved.velocity = body.velocity + cross(body.omega, d) + u * qd
-        moved.acceleration = (
-            body.acceleration
-            + cross(body.alpha, d)
-            + cross(body.omega, cross(body.omega, d))
-            + 2.0 * cross(body.omega, u * qd)
-            + u * qdd
-        )
-        return moved
-    return SegmentMotion(
-        body.rotation @ rotation_about(direction, q),
-        body.origin,
-        body.velocity,
-        body.acceleration,
-        body.omega + u * qd,
-        body.alpha + u * qdd + cross(body.omega, u * qd),
-    )
 
 
 def rotation_about(direction: Array, angle: Array) -> Array:

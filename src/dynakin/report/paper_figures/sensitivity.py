@@ -20,6 +20,7 @@ from matplotlib.ticker import MaxNLocator
 
 from dynakin.errors import ConfigError
 from dynakin.report.plot import INK, QUIET
+from dynakin.results.files.netcdf import ONE_AT_A_TIME
 from dynakin.results.naming import number
 
 Array = npt.NDArray[np.float64]
@@ -205,7 +206,7 @@ def _on_grid(path: Path, gains: Array, values: Array, label: str = LABEL, unit: 
 
 def _read_netcdf(path: Path) -> Sensitivity:
     try:
-        with xr.open_dataset(path, engine="netcdf4") as data:
+        with ONE_AT_A_TIME, xr.open_dataset(path, engine="netcdf4") as data:
             data.load()
     except FileNotFoundError as error:
         raise OSError(2, "No such file or directory") from error

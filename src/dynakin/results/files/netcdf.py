@@ -56,7 +56,7 @@ _COVARIANCE_BITS = 32
 _STEPS = {"markers": 2.0**-20, "joint_centres": 2.0**-20, "joint_orientations": 2.0**-20, "joint_loads": 2.0**-10}
 """About 1 µm, 1e-6 of a direction's cosine, 1 mN and 1 mN m. Powers of two leave zeros at the end, which compress."""
 ONE_AT_A_TIME = Lock()
-"""Who writes by the netCDF library: it lets go of the interpreter, and does not bear a second thread."""
+"""Who reads or writes by the netCDF library: it lets go of the interpreter, and does not bear a second thread."""
 _PARAMETER_NUMBERS = ("value", "sd", "initial", "table", "lower", "upper")
 
 
