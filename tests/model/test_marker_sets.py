@@ -54,7 +54,8 @@ def wearing(person: SimulatedTrial, marker_set: str) -> Recording:
 
 
 def measured(recording: Recording, marker_set: str) -> CalibratedModel:
-    return load_model("fullbody", WHO, markers=marker_set).calibrate(recording)
+    up = "+Y" if marker_set == "rizzoli-trunk" else "auto"  # a trunk is hardly higher than broad
+    return load_model("fullbody", WHO, markers=marker_set).calibrate(recording, vertical=up)
 
 
 def difference_deg(person: SimulatedTrial, initial: CalibratedModel, coordinate: str) -> float:

@@ -11,6 +11,7 @@ import pytest
 import dynakin
 from dynakin.bindings import _core
 from dynakin.simulation.bodies.body import ten_numbers
+from dynakin.simulation.bodies.subject import Spread
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.trial import simulate
@@ -152,7 +153,7 @@ def test_squat7_initialises_on_its_own_simulation(side: str) -> None:
 def test_fullbody_measured_on_exact_markers_is_the_true_body() -> None:
     """Where the marker set tells the joint centres (hips, knees), the built-in model at the true angles carries every
     marker of pelvis, thighs and shanks where it was recorded, in a deep squat too."""
-    trial = simulate("fullbody", "squat", 3, 6.0, noise=PERFECT)
+    trial = simulate("fullbody", "squat", 3, 6.0, noise=PERFECT, spread=Spread(joint=0.0, axis=0.0))
     recording, data = trial.recording, trial.truth.data
     subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
     estimator = dynakin.Estimator(dynakin.load_model("fullbody", subject=subject, markers="opencap"))

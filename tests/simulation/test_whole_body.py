@@ -9,7 +9,9 @@ import pytest
 
 from dynakin.errors import ConfigError, DynakinError
 from dynakin.model.definition import load_model
-from dynakin.simulation.bodies.whole_body import Sole
+from dynakin.simulation.bodies.body import SimulatedBody
+from dynakin.simulation.bodies.subject import Spread, draw_subject
+from dynakin.simulation.bodies.whole_body import Sole, build_body
 from dynakin.simulation.jets import Jet
 from dynakin.simulation.mechanics import Motion, kinematics
 from dynakin.simulation.motions.posed import close_legs, knee_flexion
@@ -22,12 +24,52 @@ from support.trees import inverse_dynamics
 PERFECT = SensorNoise.none()
 MOTIONS = ("squat", "gait")
 SEEDS = (1, 2, 3)
+HEIGHT_M = 1.75
+BY_LANDMARKS = Spread(joint=0.0, axis=0.0)
+"""A person whose joints are where landmarks have them."""
 FEET = (("right foot", "foot_r"), ("left foot", "foot_l"))
 
 
 @cache
 def perfect(motion: str, seed: int, rate_hz: float = 100.0) -> SimulatedTrial:
     return simulate("fullbody", motion, seed, 6.0 if motion == "squat" else 3.0, rate_hz, noise=PERFECT)
+
+
+def body_of(seed: int, spread: Spread) -> SimulatedBody:
+    return build_body(
+        draw_subject(np.random.default_rng(seed), 70.0, HEIGHT_M, "male", spread), np.random.default_rng(seed)
+    )
+
+
+def beside_landmarks(body: SimulatedBody, side: str) -> dict[str, np.ndarray]:
+    """(3,) m from the middle of the epicondyles to the knee, and from the regressed hip to the hip."""
+    sites, tree = {site.name: site.place for site in body.sites}, {segment.name: segment for segment in body.tree}
+    middle = 0.5 * (sites["r_knee" if side == "r" else "L_knee"] + sites["r_mknee" if side == "r" else "L_mknee"])
+    assert body.hips is not None
+    half = body.hips.half_width_m * (1.0 if side == "r" else -1.0)
+    regressed = body.hips.middle + np.array([0.0, 0.0, half])
+    return {"knee": tree[f"shank_{side}"].placement - middle, "hip": tree[f"thigh_{side}"].placement - regressed}
+
+
+def test_joints_lie_beside_their_landmarks_as_people_differ() -> None:
+    """Over 60 persons by the spread's size, the left leg as the mirror image of the right."""
+    drawn = [body_of(seed, Spread(joint=0.004, axis=0.05)) for seed in range(60)]
+    for joint in ("hip", "knee"):
+        right, left = (np.stack([beside_landmarks(body, side)[joint] for body in drawn]) for side in "rl")
+        np.testing.assert_allclose(left, right * [1.0, 1.0, -1.0], atol=1e-12)
+        np.testing.assert_allclose(right.std(axis=0), 0.004 * HEIGHT_M, rtol=0.3)
+    knees = np.stack([{s.name: s for s in body.tree}["shank_r"].axes[0].direction for body in drawn])
+    np.testing.assert_allclose(np.linalg.norm(knees, axis=1), 1.0, rtol=1e-12)
+    np.testing.assert_allclose(knees[:, :2].std(axis=0), 0.05, rtol=0.3)
+    none = body_of(1, BY_LANDMARKS)
+    assert all(np.abs(off).max() < 1e-12 for side in "rl" for off in beside_landmarks(none, side).values())
+
+
+def test_stated_lengths_are_distances_of_joints() -> None:
+    body = body_of(2, Spread())
+    tree = {segment.name: segment for segment in body.tree}
+    for length, segment in (("pelvis", "thigh_r"), ("thigh", "shank_r"), ("shank", "foot_l"), ("lumbar", "torso")):
+        assert body.lengths[length] == pytest.approx(float(np.linalg.norm(tree[segment].placement)), rel=1e-12)
 
 
 def motion_of(trial: SimulatedTrial, every: int = 1) -> Motion:
@@ -199,7 +241,7 @@ def _turns(trial: SimulatedTrial) -> list[str]:
 
 @pytest.mark.parametrize("markers", ["opencap", "plug-in-gait"])
 def test_markers_lie_where_the_tree_carries_them(markers: str) -> None:
-    trial = simulate("fullbody", "squat", 4, 5.0, noise=PERFECT, markers=markers)
+    trial = simulate("fullbody", "squat", 4, 5.0, noise=PERFECT, markers=markers, spread=BY_LANDMARKS)
     moving = kinematics(trial.truth.tree, motion_of(trial))
     for site in trial.truth.sites:
         np.testing.assert_allclose(trial.recording.marker(site.name), moving.segments[site.segment].point(site.place))
@@ -237,7 +279,7 @@ def test_shares_add_up_to_the_whole() -> None:
 
 
 def test_a_leg_that_does_not_reach_is_named() -> None:
-    trial = perfect("squat", 1)
+    trial = simulate("fullbody", "squat", 1, 6.0, noise=PERFECT, spread=BY_LANDMARKS)
     motion = motion_of(trial, 300)
     moving = kinematics(trial.truth.tree, motion)
     feet = {segment: moving.segments[segment] for _, segment in FEET}

@@ -38,8 +38,9 @@ def functional_trial(
     motion = _motion(body, joint, size)
     made = simulate(body, motion, seed=seed, duration_s=_SECONDS, noise=noise)
     segments = kinematics(body.tree, motion(made.recording.time[STANDING])).segments
+    bends_about = -np.array({segment.name: segment for segment in body.tree}["shank_r"].axes[0].direction)
     centre = segments["thigh_r"].origin.mean(axis=0) + made.truth.origin_L
-    return made.recording, centre, segments["thigh_r"].rotation[0][:, 2]
+    return made.recording, centre, segments["thigh_r"].rotation[0] @ bends_about
 
 
 def _motion(body: SimulatedBody, joint: str, size: float) -> Callable[[Array], Motion]:

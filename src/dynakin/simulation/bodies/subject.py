@@ -10,7 +10,7 @@ what is drawn is always a possible body.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +38,8 @@ FRACTIONS: Mapping[str, float] = {
     "hip_width": 0.110,  # between the hip joint centres, and the feet below them
     "shoulder_width": 0.220,
 }
+JOINTS = ("hip", "lumbar", "knee", "ankle")
+HINGES = ("knee_angle", "ankle_angle", "subtalar_angle")
 T12_ON_TORSO = 0.30  # T12/L1 from L5/S1 up, over the torso
 ANKLE_DIRECTION = np.array([-0.988, 0.152, 0.0])  # from the toe landmark, foot flat
 LUMBAR_DIRECTION = np.array([-0.30, 0.954, 0.0])  # from the hip, pelvis frame (X from mid-PSIS to mid-ASIS)
@@ -49,7 +51,11 @@ class Spread:
 
     length: of each length; mass: of each part's mass; size: of the stretch of a part's mass distribution
     along each axis (second moments go with its square); centre: of the centre of mass, over the part's
-    length.
+    length. Of a body in space: joint, of the centres of hips, L5/S1, knees and ankles beside where landmarks have
+    them, an axis, over the body height (5 mm: regressions err by 5 to 8 mm, the middle of two landmarks by 4 to 8;
+    Harrington et al. 2007, J Biomech 40:595; Della Croce et al. 2005, Gait Posture 21:226); axis, of the turn of the
+    axes of knees, ankles and feet, rad (5 deg: between a knee's 3 and the 4 to 11 of ankle and foot, Isman and Inman
+    1969).
 
     Raises:
         ConfigError: a value below 0 or above 0.5; the message names it.
@@ -59,6 +65,8 @@ class Spread:
     mass: float = 0.08
     size: float = 0.05
     centre: float = 0.02
+    joint: float = 0.003
+    axis: float = 0.09
 
     def __post_init__(self) -> None:
         for key, value in vars(self).items():
@@ -68,7 +76,7 @@ class Spread:
     @classmethod
     def none(cls) -> Spread:
         """The table itself."""
-        return cls(0.0, 0.0, 0.0, 0.0)
+        return cls(*np.zeros(len(fields(cls))).tolist())
 
     def times(self, factor: float) -> Spread:
         """All of them ``factor`` times as large.
@@ -86,7 +94,8 @@ class SimulatedSubject:
     """A person before it is put into a model.
 
     lengths: m, by the names of `FRACTIONS`; parts: pseudo-inertia (4, 4) of one side of each part of the table,
-    about the part's own origin.
+    about the part's own origin; centres: (3,) m from where landmarks have a joint of `JOINTS` to where it is, turns:
+    (3,) rad of the axes of `HINGES` from an average person's, both of the right side, the left is its mirror image.
     """
 
     mass_kg: float
@@ -94,6 +103,8 @@ class SimulatedSubject:
     sex: str | None
     lengths: Mapping[str, float]
     parts: Mapping[str, Array]
+    centres: Mapping[str, Array] = field(default_factory=lambda: dict.fromkeys(JOINTS, np.zeros(3)))
+    turns: Mapping[str, Array] = field(default_factory=lambda: dict.fromkeys(HINGES, np.zeros(3)))
 
     def placed(self, part: str, shift: Array) -> Array:
         """A part moved to ``shift`` (3,) m."""
@@ -148,7 +159,9 @@ def draw_subject(
     parts = _draw_parts(rng, load_table(table, sex), lengths, spread)  # type: ignore[arg-type]
     total = sum(J[3, 3] * (2.0 if name in PAIRED else 1.0) for name, J in parts.items())
     parts = {name: J * (mass_kg / total) for name, J in parts.items()}
-    return SimulatedSubject(mass_kg, height_m, sex, lengths, parts)
+    centres = {name: spread.joint * height_m * rng.standard_normal(3) for name in JOINTS}
+    turns = {name: spread.axis * rng.standard_normal(3) for name in HINGES}
+    return SimulatedSubject(mass_kg, height_m, sex, lengths, parts, centres, turns)
 
 
 def _draw_parts(

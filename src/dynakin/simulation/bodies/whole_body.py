@@ -33,7 +33,9 @@ Direction = tuple[float, float, float]
 
 SIDES = (("r", 1.0), ("l", -1.0))
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-# The ankle's outer end lies 10 deg down (Inman 1976); subtalar axis: Rajagopal et al. 2016, IEEE TBME 63:2068-2079.
+# An average person's axes. The ankle's outer end lies 10 deg down (Inman 1976); subtalar: Rajagopal et al. 2016, IEEE
+# TBME 63:2068-2079.
+_KNEE = np.array([0.0, 0.0, -1.0])
 _ANKLE = np.array([0.0, -0.17364818, 0.98480775])
 _SUBTALAR = np.array([0.78717961, 0.60474746, -0.12094949])
 # Middle of the ASIS from the middle of the hip centres, over the height: Harrington et al. (2007, J Biomech 40:595-602)
@@ -76,12 +78,23 @@ def ankle_height(subject: SimulatedSubject) -> float:
 
 def hip_in_pelvis(subject: SimulatedSubject, sign: float) -> Array:
     """The hip centre (3,) m in the pelvis' frame; sign: 1 right, -1 left, 0 the middle of both."""
+    return _regressed_hip(subject, sign) + subject.centres["hip"] * [1.0, 1.0, sign]
+
+
+def _regressed_hip(subject: SimulatedSubject, sign: float) -> Array:
+    """Where the landmarks of the pelvis have it."""
     half = 0.5 * subject.lengths["hip_width"]
     return np.asarray(np.array([0.0, 0.0, sign * half]) - subject.height_m * _ASIS_FROM_HIPS)
 
 
 def _lumbar_in_pelvis(subject: SimulatedSubject) -> Array:
-    return hip_in_pelvis(subject, 0.0) + subject.lengths["pelvis"] * LUMBAR_DIRECTION
+    middle = _regressed_hip(subject, 0.0) + subject.lengths["pelvis"] * LUMBAR_DIRECTION
+    return np.asarray(middle + subject.centres["lumbar"] * [1.0, 1.0, 0.0])
+
+
+def _below(subject: SimulatedSubject, segment: str, joint: str, sign: float) -> Array:
+    """The joint (3,) m at the lower end of thigh or shank, in its frame."""
+    return np.asarray(subject.centres[joint] * [1.0, 1.0, sign] - [0.0, subject.lengths[segment], 0.0])
 
 
 def _shoulder_in_torso(subject: SimulatedSubject, sign: float) -> Array:
@@ -96,13 +109,17 @@ def _lengths(subject: SimulatedSubject) -> dict[str, float]:
         "pelvis": float(np.linalg.norm(hip_in_pelvis(subject, 1.0))),
         "lumbar": float(np.linalg.norm(_lumbar_in_pelvis(subject))),
         "shoulder": float(np.linalg.norm(_shoulder_in_torso(subject, 1.0))),
-        **{name: L[name] for name in ("thigh", "shank", "torso", "upper_arm", "forearm")},
+        "thigh": float(np.linalg.norm(_below(subject, "thigh", "knee", 1.0))),
+        "shank": float(np.linalg.norm(_below(subject, "shank", "ankle", 1.0))),
+        **{name: L[name] for name in ("torso", "upper_arm", "forearm")},
     }
 
 
-def _unit(vector: Array) -> Direction:
-    x, y, z = vector / np.linalg.norm(vector)
-    return float(x), float(y), float(z)
+def _hinge(subject: SimulatedSubject, coordinate: str, mean: Array) -> tuple[str, Direction]:
+    """A coordinate of the right leg about the subject's own axis."""
+    own = mean + np.cross(subject.turns[coordinate], mean)
+    x, y, z = own / np.linalg.norm(own)
+    return coordinate, (float(x), float(y), float(z))
 
 
 def _hinges(side: str, sign: float, *axes: tuple[str, Direction]) -> tuple[Axis, ...]:
@@ -126,13 +143,13 @@ def build_tree(subject: SimulatedSubject) -> tuple[Segment, ...]:
     for side, sign in SIDES:
         part = _sided(subject, sign)
         hip = _hinges(side, sign, ("hip_flexion", Z), ("hip_adduction", X), ("hip_rotation", Y))
-        knee = _hinges(side, sign, ("knee_angle", (0.0, 0.0, -1.0)), ("knee_adduction", X))
-        turns = ("ankle_angle", _unit(_ANKLE)), ("subtalar_angle", _unit(_SUBTALAR))
+        knee = _hinges(side, sign, _hinge(subject, "knee_angle", _KNEE), ("knee_adduction", X))
+        turns = (_hinge(subject, "ankle_angle", _ANKLE), _hinge(subject, "subtalar_angle", _SUBTALAR))
         ankle = _hinges(side, sign, ("tibial_torsion", Y), *turns)
         tree += [
             segment(f"thigh_{side}", "pelvis", hip_in_pelvis(subject, sign), hip, part["thigh"]),
-            segment(f"shank_{side}", f"thigh_{side}", -L["thigh"] * np.array(Y), knee, part["shank"]),
-            segment(f"foot_{side}", f"shank_{side}", -L["shank"] * np.array(Y), ankle, part["foot"]),
+            segment(f"shank_{side}", f"thigh_{side}", _below(subject, "thigh", "knee", sign), knee, part["shank"]),
+            segment(f"foot_{side}", f"shank_{side}", _below(subject, "shank", "ankle", sign), ankle, part["foot"]),
         ]
     for name, parent, place, stem, body in (
         ("torso", "pelvis", lumbar, "lumbar", symmetric(torso)),
@@ -171,7 +188,7 @@ def put_on(subject: SimulatedSubject, rng: np.random.Generator, markers: str) ->
     """
     if markers in SETS:
         return draw_sites(rng, subject, SETS[markers])
-    joints = {"hip": hip_in_pelvis(subject, 1.0), "shoulder": _shoulder_in_torso(subject, 1.0)}
+    joints = {"hip": _regressed_hip(subject, 1.0), "shoulder": _shoulder_in_torso(subject, 1.0)}
     return worn_sites(rng, subject, load_marker_set(markers), joints)
 
 
@@ -190,7 +207,7 @@ def build_body(subject: SimulatedSubject, rng: np.random.Generator, markers: str
         centres[joints[stem] + suffix] = (segment.name, np.zeros(3))
     hips = HipCentres(
         ("r.ASIS", "L.ASIS", "r.PSIS", "L.PSIS"), ("R_HJC_reg", "L_HJC_reg"), 0.5 * L["hip_width"],
-        hip_in_pelvis(subject, 0.0),
+        _regressed_hip(subject, 0.0),
     )  # fmt: skip
     full = {f"{stem}_{side}": value for stem, value in FULL_CHANGE_DEG.items() for side, _ in SIDES}
     full |= {stem: FULL_CHANGE_DEG[stem] for stem in ("lumbar_extension", "neck_extension")}

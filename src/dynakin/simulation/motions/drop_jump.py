@@ -123,9 +123,9 @@ class _Posed:
     @classmethod
     def standing(cls, body: SimulatedBody, jumper: Jumper, flight: Flight) -> _Posed:
         """With the centre of mass over the middle of the feet."""
-        L = body.subject.lengths
+        L = body.lengths
         leg = np.sqrt(L["shank"] ** 2 + L["thigh"] ** 2 + 2.0 * L["shank"] * L["thigh"] * np.cos(np.deg2rad(_KNEE_DEG)))
-        beside = jumper.half_width_m - 0.5 * L["hip_width"]
+        beside = jumper.half_width_m - hip_in_pelvis(body.subject, 1.0)[2]
         hips = np.array([0.0, ankle_height(body.subject) + np.sqrt(leg**2 - beside**2 - 0.02**2), 0.0])
         target = _PRESSES[0] * Sole.of(body.subject).ball[0] * np.cos(jumper.toe_out)
         start = np.zeros(1)

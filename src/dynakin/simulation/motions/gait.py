@@ -129,7 +129,7 @@ def fit(walk: Walk, body: SimulatedBody, reach: Reach | None = None) -> dict[str
     """
     H = body.subject.height_m
     start = dict.fromkeys(FITTED, 0.0)
-    legs = body.subject.lengths["shank"] + body.subject.lengths["thigh"]
+    legs = body.lengths["shank"] + body.lengths["thigh"]
     start |= {"x0": -0.46 * walk.step_m, "y0": 0.035 * H + 0.965 * legs, "pitch": 1.10, "lift": 0.050}
     start |= {"yc2": -0.010, "zc1": -0.006, "zs1": 0.018, "lumbar_rotationc1": float(np.deg2rad(-8.0))}
     x = np.array([start[name] for name in FITTED])
@@ -170,7 +170,7 @@ def _residuals(
     spline = CubicSpline(_KNEE[:, 0], np.deg2rad(_KNEE[:, 1]), bc_type="periodic")
     free = body.tree[0].axes
     at_hips = dict(zip(("pelvis_tx", "pelvis_ty", "pelvis_tz"), hips, strict=True))
-    thigh, shank = body.subject.lengths["thigh"], body.subject.lengths["shank"]
+    thigh, shank = body.lengths["thigh"], body.lengths["shank"]
     for side, sign in SIDES:
         own = np.tile(part if side == "r" else part + 0.5, sets)
         across = hip_in_pelvis(body.subject, sign) - hip_in_pelvis(body.subject, 0.0)

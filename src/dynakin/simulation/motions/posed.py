@@ -98,7 +98,8 @@ def close_legs(tree: Sequence[Segment], given: Mapping[str, Jet], feet: Mapping[
 
 
 def knee_flexion(tree: Sequence[Segment], hip: Array, ankle: Array, side: str) -> Array:
-    """The knee's angle (T,) rad between a hip and an ankle (T, 3) m; 0 where they lie too far apart."""
+    """The knee's angle (T,) rad between a hip and an ankle (T, 3) m, of legs whose joints lie along their segments; 0
+    where they are too far apart."""
     thigh, shank = _lengths(tree, side)
     apart = np.sum((hip - ankle) ** 2, axis=1)
     cosine = (apart - thigh**2 - shank**2) / (2.0 * thigh * shank)

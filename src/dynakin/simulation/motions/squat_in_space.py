@@ -170,7 +170,7 @@ def posed_on_feet(body: SimulatedBody, stance: Stance, jets: Mapping[str, Jet], 
 def mid_hip(body: SimulatedBody, stance: Stance, level: Jet) -> Point:
     """Middle of the hip centres over shanks and thighs that lean as in the plane; what the wide stance costs of the
     height while standing is taken off everywhere."""
-    L = body.subject.lengths
+    L = body.lengths
     nothing, up = np.zeros(3), np.array([0.0, 1.0, 0.0])
     plane = [
         Segment("shank", None, nothing, (Axis("ankle", (0.0, 0.0, -1.0)),), 1.0, nothing, np.eye(3)),
@@ -183,7 +183,7 @@ def mid_hip(body: SimulatedBody, stance: Stance, level: Jet) -> Point:
     }
     thigh, upright = (kinematics(plane, in_order(("ankle", "knee"), j)).segments["thigh"] for j in (jets, standing))
     top = L["thigh"] * up
-    beside = stance.half_width_m - 0.5 * L["hip_width"]
+    beside = stance.half_width_m - hip_in_pelvis(body.subject, 1.0)[2]
     high = float(upright.point(top)[0, 1])
     lower = high - np.sqrt(high**2 - beside**2)
     place = STANDS_AT + np.array([0.0, ankle_height(body.subject) - lower, 0.0])
