@@ -36,8 +36,9 @@ from dynakin.filter.systematic import (
     Parts,
     Sizes,
     Systematic,
-    measured_beside,
     reported,
+    some_beside,
+    sources_of,
     states_of,
     usual_sizes,
 )
@@ -65,9 +66,9 @@ Array = np.ndarray
 @dataclass(frozen=True)
 class Run:
     """One estimate against the truth: by block errors (T, C), the filter's own deviations, and variances by kind of
-    error at size 1; (T,) intensity of the movement and how far markers are moved; (T, C) moments that are measured in a
-    recording in which some foot stands beside the plates. Frames that have no truth or no value are NaN. ``late``:
-    whether later frames helped."""
+    error at size 1; (T,) intensity of the movement and how far markers are moved; (T, C) where moments come from,
+    and whether some foot stands beside the plates. Frames that have no truth or no value are NaN. ``late``: whether
+    later frames helped."""
 
     case: str
     seed: int
@@ -77,7 +78,8 @@ class Run:
     own: dict[str, Array]
     parts: Parts
     intensity: Array
-    beside: Array | None
+    sources: Array | None
+    beside: bool
     variance_scale: float
     moved_m: Array
     late: bool
@@ -162,7 +164,7 @@ def against(
     data, tracker = tracked.estimate.data, tracked.tracker
     sizes = replace(usual_sizes(tracker.calibrated), inertia=True)  # worked out where it is not in use, too
     systematic = Systematic(tracker.calibrated, tracker.noise, sizes)
-    parts, beside = systematic.over_time(data), measured_beside(data, len(tracker.calibrated.feet))
+    parts, sources = systematic.over_time(data), sources_of(data)
     all_names = [str(n) for n in data["coordinate"].values]
     chosen = [n for n in all_names if n in names and n not in tracked.estimate.held]
     mine, theirs = [all_names.index(n) for n in chosen], [names.index(n) for n in chosen]
@@ -186,7 +188,8 @@ def against(
         {block: values(f"{block}_sd") for block in blocks},
         {kind: {block: part[block][window][:, mine] for block in blocks} for kind, part in parts.items()},
         systematic.intensity(data)[window],
-        None if beside is None else beside[window][:, mine],
+        None if sources is None else sources[window][:, mine],
+        some_beside(data, len(tracker.calibrated.feet)),
         tracker.noise.variance_scale,
         systematic.moved_m(states_of(data))[window],
         bool(tracked.estimate.config["lag_s"]),
@@ -216,8 +219,8 @@ def figures(run: Run, sizes: Sizes | None) -> dict[str, tuple[float, ...]]:
     found = {}
     said = run.own
     if sizes is not None:
-        over_time = run.intensity, run.moved_m, run.beside
-        said = reported(sizes, run.variance_scale, run.own, run.parts, *over_time, late=run.late)
+        over_time = run.intensity, run.moved_m, run.sources
+        said = reported(sizes, run.variance_scale, run.own, run.parts, *over_time, beside=run.beside, late=run.late)
     for title, block, places in groups_of(run):
         e, sd = run.error[block][:, places], said[block][:, places]
         if block == "coordinates":

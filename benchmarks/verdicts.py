@@ -55,7 +55,7 @@ TRUTH3D = Path("/work/t3d/cache")
 TARGET = ROOT / "src" / "dynakin" / "results" / "measures" / "verdicts.toml"
 PAGE = ROOT / "docs" / "validation.md"
 MARKS = ("<!-- verdicts: begin -->", "<!-- verdicts: end -->")
-SEEDS = {"sagittal": (1, 2, 3, 4), "gait": (1, 2), "squat": (1, 2)}
+SEEDS = {"sagittal": (1, 2, 3, 4), "gait": (1, 2, 3, 4, 5, 6), "squat": (1, 2, 3, 4, 5, 6)}
 WINDOWS_S = {"squat": (2.0, np.inf), "walk": (0.3, 3.1)}
 """As truth3d judges."""
 BLOCKS = {"motion": ("coordinates", "speeds"), "moments": ("moments",)}

@@ -116,7 +116,7 @@ def movement_of(body: SimulatedBody, chosen: Sequence[Gesture]) -> Movement:
         rest = constant(time, 0.0)
         jets |= {f"tibial_torsion_{side}": rest for side, _ in SIDES}
         jets |= {f"knee_adduction_{side}": rest for side, _ in SIDES if f"knee_adduction_{side}" in names}
-        L = body.subject.lengths
+        L = body.lengths
         high = ankle_height(body.subject) + STANDING * (L["shank"] + L["thigh"])
         hips = [constant(time, float(v)) for v in MIDDLE + np.array([_HIPS_AHEAD_M, high, 0.0])]
         hips = [jet + summed(time, f"hips_{axis}") for jet, axis in zip(hips, "xyz", strict=True)]

@@ -42,7 +42,7 @@ def test_step_by_step_moments_bands_and_the_delayed_are_those_of_the_run() -> No
 
 
 def test_a_session_counts_measured_moments_more_once_a_foot_has_stood_beside_the_plates() -> None:
-    """As a recording does (`measured_beside`): late ones, in all frames from then on."""
+    """As a recording does: late ones, in all frames from then on."""
     recording = simulate("fullbody", "squat", 1, 5.0).recording.window(2.0, 2.2)
     model = load_model("fullbody", Subject(mass_kg=70.0, height_m=1.75, sex="male"))
     for beside in (False, True):

@@ -28,10 +28,11 @@ from dynakin.filter.systematic import (
     SPEEDS_STILL,
     Sizes,
     Systematic,
-    measured_beside,
     movement_intensity,
     reported,
+    some_beside,
 )
+from dynakin.results.measures.sources import DERIVED, MEASURED, PRIOR
 from dynakin.settings.noise import Noise
 
 Array = npt.NDArray[np.float64]
@@ -295,27 +296,34 @@ def test_a_calm_movement_is_known_better_than_an_intense_one() -> None:
         np.testing.assert_allclose(calm["coordinates"], 1.0)
 
 
-def test_measured_moments_count_more_where_some_foot_stands_beside_the_plates() -> None:
-    """Late ones alone; a recording on plates has none of them."""
-    contact, source = np.array([[1, 1], [1, 2]]), np.array([[0, 0], [0, 1]])
-    axes = ("time", "foot"), ("time", "coordinate")
-    data = xr.Dataset({"foot_contact": (axes[0], contact), "moment_source": (axes[1], source)})
-    beside = measured_beside(data, 2)
-    np.testing.assert_array_equal(beside, source == 0)
-    assert measured_beside(data.isel(time=[0]), 2) is None
-    assert measured_beside(data, 1) is None  # the second is a rail, say
+def test_a_foot_stands_beside_the_plates_in_some_frame() -> None:
+    data = xr.Dataset({"foot_contact": (("time", "foot"), np.array([[1, 1], [1, 2]]))})
+    assert some_beside(data, 2)
+    assert not some_beside(data.isel(time=[0]), 2)
+    assert not some_beside(data, 1)  # the second is a rail, say
+    assert not some_beside(xr.Dataset(), 2)
+
+
+def test_measured_moments_count_more_where_some_foot_stands_beside_the_plates_and_priors_in_full() -> None:
+    """Measured ones late alone; derived ones as the movement has it."""
+    source = np.array([[MEASURED, MEASURED], [DERIVED, PRIOR]])
     own = {"speeds": np.ones((2, 2)), "moments": np.ones((2, 2))}
     parts = {kind: {block: np.zeros((2, 2)) for block in own} for kind in (*KINDS, "inertia")}
     scale = 0.1  # of the noise that was found
-    late, at_once = (
-        reported(NONE, scale, own, parts, np.zeros(2), np.zeros(2), beside, late=late) for late in (True, False)
-    )
-    still, more = OWN_LATE["moments"][0], BESIDE / scale
-    np.testing.assert_allclose(late["moments"] ** 2, [[more, more], [more, still]])
-    declared = reported(NONE, 1.0, own, parts, np.zeros(2), np.zeros(2), beside, late=True)
-    np.testing.assert_allclose(declared["moments"] ** 2, still)  # holds as much already
-    np.testing.assert_allclose(at_once["moments"] ** 2, OWN_AT_ONCE["moments"][0])
-    np.testing.assert_allclose(late["speeds"] ** 2, SPEEDS_STILL)
+
+    def variances(scale: float, *, beside: bool, late: bool) -> dict[str, Array]:
+        found = reported(NONE, scale, own, parts, np.zeros(2), np.zeros(2), source, beside=beside, late=late)
+        return {block: sd**2 for block, sd in found.items()}
+
+    still, more, now = OWN_LATE["moments"][0], BESIDE / scale, OWN_AT_ONCE["moments"][0]
+    late = variances(scale, beside=True, late=True)
+    np.testing.assert_allclose(late["moments"], [[more, more], [still, 1.0]])
+    np.testing.assert_allclose(late["speeds"], SPEEDS_STILL)
+    for noise_scale, beside in ((1.0, True), (scale, False)):  # holds as much already; none stands beside
+        found = variances(noise_scale, beside=beside, late=True)["moments"]
+        np.testing.assert_allclose(found, [[still, still], [still, 1.0]])
+    at_once = variances(scale, beside=True, late=False)["moments"]
+    np.testing.assert_allclose(at_once, [[now, now], [now, 1.0]])
 
 
 def with_inertia() -> tuple[Any, Array]:

@@ -42,27 +42,39 @@ def body_of(seed: int, spread: Spread) -> SimulatedBody:
 
 
 def beside_landmarks(body: SimulatedBody, side: str) -> dict[str, np.ndarray]:
-    """(3,) m from the middle of the epicondyles to the knee, and from the regressed hip to the hip."""
+    """(3,) m to the knee from the middle of the epicondyles, to the ankle from below the malleoli, to the hip from the
+    regressed one."""
     sites, tree = {site.name: site.place for site in body.sites}, {segment.name: segment for segment in body.tree}
     middle = 0.5 * (sites["r_knee" if side == "r" else "L_knee"] + sites["r_mknee" if side == "r" else "L_mknee"])
     assert body.hips is not None
     half = body.hips.half_width_m * (1.0 if side == "r" else -1.0)
     regressed = body.hips.middle + np.array([0.0, 0.0, half])
-    return {"knee": tree[f"shank_{side}"].placement - middle, "hip": tree[f"thigh_{side}"].placement - regressed}
+    own = "r" if side == "r" else "L"
+    malleoli = 1.027 * 0.5 * (sites[f"{own}_ankle"] + sites[f"{own}_mankle"])  # the ankle lies 2.7 % further down
+    ankle = tree[f"foot_{side}"].placement - malleoli
+    return {
+        "knee": tree[f"shank_{side}"].placement - middle,
+        "ankle": ankle,
+        "hip": tree[f"thigh_{side}"].placement - regressed,
+    }
 
 
 def test_joints_lie_beside_their_landmarks_as_people_differ() -> None:
     """Over 60 persons by the spread's size, the left leg as the mirror image of the right."""
     drawn = [body_of(seed, Spread(joint=0.004, axis=0.05)) for seed in range(60)]
-    for joint in ("hip", "knee"):
+    for joint in ("hip", "knee", "ankle"):
         right, left = (np.stack([beside_landmarks(body, side)[joint] for body in drawn]) for side in "rl")
         np.testing.assert_allclose(left, right * [1.0, 1.0, -1.0], atol=1e-12)
         np.testing.assert_allclose(right.std(axis=0), 0.004 * HEIGHT_M, rtol=0.3)
-    knees = np.stack([{s.name: s for s in body.tree}["shank_r"].axes[0].direction for body in drawn])
-    np.testing.assert_allclose(np.linalg.norm(knees, axis=1), 1.0, rtol=1e-12)
-    np.testing.assert_allclose(knees[:, :2].std(axis=0), 0.05, rtol=0.3)
+    for coordinate in ("knee_angle_r", "ankle_angle_r", "subtalar_angle_r"):
+        axes = np.array(
+            [a.direction for body in drawn for s in body.tree for a in s.axes if a.coordinate == coordinate]
+        )
+        np.testing.assert_allclose(np.linalg.norm(axes, axis=1), 1.0, rtol=1e-12)
+        turns = np.linalg.norm(np.cross(axes, axes.mean(axis=0)), axis=1)
+        assert np.sqrt(np.mean(turns**2)) == pytest.approx(0.05 * np.sqrt(2.0), rel=0.3)
     none = body_of(1, BY_LANDMARKS)
-    assert all(np.abs(off).max() < 1e-12 for side in "rl" for off in beside_landmarks(none, side).values())
+    assert all(np.abs(off).max() < 1e-9 for side in "rl" for off in beside_landmarks(none, side).values())
 
 
 def test_stated_lengths_are_distances_of_joints() -> None:
@@ -241,10 +253,12 @@ def _turns(trial: SimulatedTrial) -> list[str]:
 
 @pytest.mark.parametrize("markers", ["opencap", "plug-in-gait"])
 def test_markers_lie_where_the_tree_carries_them(markers: str) -> None:
-    trial = simulate("fullbody", "squat", 4, 5.0, noise=PERFECT, markers=markers, spread=BY_LANDMARKS)
-    moving = kinematics(trial.truth.tree, motion_of(trial))
-    for site in trial.truth.sites:
-        np.testing.assert_allclose(trial.recording.marker(site.name), moving.segments[site.segment].point(site.place))
+    for spread in (Spread(), BY_LANDMARKS):
+        trial = simulate("fullbody", "squat", 4, 5.0, noise=PERFECT, markers=markers, spread=spread)
+        moving = kinematics(trial.truth.tree, motion_of(trial))
+        for site in trial.truth.sites:
+            carried = moving.segments[site.segment].point(site.place)
+            np.testing.assert_allclose(trial.recording.marker(site.name), carried)
     joints = trial.truth.data["joint_centres"]
     if markers == "opencap":
         for name, joint in (("R_HJC_reg", "hip_r"), ("L_HJC_reg", "hip_l")):

@@ -35,7 +35,12 @@ def simulate(
     mass: Annotated[float, typer.Option("--mass", help="Body mass, kg.")] = 70.0,
     height: Annotated[float, typer.Option("--height", help="Body height, m.")] = 1.75,
     sex: Annotated[str, typer.Option("--sex", help="male, female or mean of both, for the table.")] = "male",
-    spread: Annotated[float, typer.Option(help="Of the subject about the table; 0: none, 1: as people are.")] = 1.0,
+    spread: Annotated[
+        float,
+        typer.Option(
+            help="Of the subject about the table, and of joints about their landmarks; 0: none, 1: as people are."
+        ),
+    ] = 1.0,
     sensors: Annotated[str, typer.Option(help="none (perfect), default, laboratory, or a .toml file.")] = "default",
     sensor: Annotated[list[str] | None, typer.Option(help="KEY=VALUE of one sensor error; may be repeated.")] = None,
     motion_cutoff: Annotated[

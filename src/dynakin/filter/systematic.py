@@ -20,7 +20,7 @@ from dynakin.filter.joint_errors import JointErrors, Kind, floats
 from dynakin.filter.noise import marker_variance, soft_tissue_sd
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.contact import UNMEASURED
-from dynakin.results.measures.sources import MEASURED
+from dynakin.results.measures.sources import MEASURED, PRIOR
 from dynakin.settings.noise import Noise
 
 if TYPE_CHECKING:
@@ -152,8 +152,9 @@ def reported(
     parts: Parts,
     intensity: Array,
     moved_m: Array,
-    beside: npt.NDArray[np.bool_] | None = None,
+    sources: npt.NDArray[np.uint8] | None = None,
     *,
+    beside: bool = False,
     late: bool,
 ) -> dict[str, Array]:
     """Standard deviations that are reported: block -> (..., C).
@@ -161,8 +162,9 @@ def reported(
     Args:
         variance_scale: of the noise of the filter. own: the filter's own deviations, by block. parts: variances as of
             `Systematic.over_time`. intensity: (...,) as of `movement_intensity`. moved_m: (...,) as of
-            `Systematic.moved_m`. beside: (..., C) moments of
-            `Sizes.own_beside`. late: whether later frames helped.
+            `Systematic.moved_m`. sources: (..., C) of the moments (`results.measures.sources`): the filter's own part
+            of what rests on a prior counts in full, because how a jerk is seen has no part in that. beside: whether
+            `Sizes.own_beside` counts. late: whether later frames helped.
     """
     factors = sizes.late() if late else OWN_AT_ONCE
     farther = np.maximum(moved_m / sizes.placed, 1.0)[..., None]
@@ -170,8 +172,10 @@ def reported(
     for block, sd in own.items():
         still, moving = factors[block]
         factor = still + moving * intensity[..., None]
-        if late and beside is not None and block == "moments":
-            factor = np.where(beside, np.maximum(factor, sizes.own_beside / variance_scale), factor)
+        if sources is not None and block == "moments":
+            measured = sizes.own_beside / variance_scale if late and beside else 0.0
+            least = np.select([sources == PRIOR, sources == MEASURED], [1.0, measured], 0.0)
+            factor = np.maximum(factor, least)
         variance = factor * np.square(sd)
         for kind in KINDS:
             size = getattr(sizes, kind) * (farther if kind in CENTRES else 1.0)
@@ -369,29 +373,32 @@ class Systematic:
         wrench: Array,
         segments: Sequence[str],
         *,
-        beside: npt.NDArray[np.bool_] | None = None,
+        sources: npt.NDArray[np.uint8] | None = None,
+        beside: bool = False,
         late: bool,
     ) -> dict[str, Array]:
         """The filter's standard deviations of one frame (block -> (C,)) with these errors.
 
         Args:
-            x: (n,) state, of covariance (n, n). wrench: (F, 6) of the contacts on these segments. beside: (C,) moments
-                of `Sizes.own_beside`. late: whether later frames helped.
+            x: (n,) state, of covariance (n, n). wrench: (F, 6) of the contacts on these segments. sources, beside,
+                late: as of `reported`.
         """
         inertia = covariance[np.ix_(self._inertia, self._inertia)] / self._variance_scale
         own = {block: found[block] for block in BLOCKS}
         K = len(self._free)
         intense = movement_intensity(x[2 * K : 3 * K], own["accelerations"][self._free])
         parts = self._at(x, inertia, wrench, segments)
-        return reported(self.sizes, self._variance_scale, own, parts, intense, self.moved_m(x), beside, late=late)
+        moved = self.moved_m(x)
+        return reported(self.sizes, self._variance_scale, own, parts, intense, moved, sources, beside=beside, late=late)
 
     def added_over_time(self, data: xr.Dataset, *, late: bool) -> xr.Dataset:
         """The same of a recording: ``data`` with other ``coordinates_sd`` ... ``moments_sd``."""
         order = ("time", "coordinate")
         own = {block: data[f"{block}_sd"].transpose(*order).values for block in BLOCKS}
         moved = self.moved_m(states_of(data))
-        found = self.over_time(data), self.intensity(data), moved, measured_beside(data, self._feet)
-        sd = reported(self.sizes, self._variance_scale, own, *found, late=late)
+        found = self.over_time(data), self.intensity(data), moved, sources_of(data)
+        beside = some_beside(data, self._feet)
+        sd = reported(self.sizes, self._variance_scale, own, *found, beside=beside, late=late)
         return data.assign({f"{block}_sd": (order, sd[block]) for block in BLOCKS})
 
     def moved_m(self, x: Array) -> Array:
@@ -425,19 +432,22 @@ def states_of(data: xr.Dataset) -> Array:
     return np.asarray(data["state"].transpose("time", "element").values)
 
 
-def measured_beside(data: xr.Dataset, feet: int) -> npt.NDArray[np.bool_] | None:
-    """(T, C) moments that are measured in a recording in which some foot stands beside the plates; None: none does.
+def sources_of(data: xr.Dataset) -> npt.NDArray[np.uint8] | None:
+    """(T, C) where the moments of a recording come from; None where that is not known."""
+    return data["moment_source"].transpose("time", "coordinate").values if "moment_source" in data else None
+
+
+def some_beside(data: xr.Dataset, feet: int) -> bool:
+    """Whether some foot stands beside the plates in a frame of a recording.
 
     Args:
         feet: how many of the contacts are feet: the first ones, declared ones follow.
     """
-    if "foot_contact" not in data or not some_beside(data["foot_contact"].transpose("time", "foot").values, feet):
-        return None
-    return np.asarray(data["moment_source"].transpose("time", "coordinate").values == MEASURED)
+    return "foot_contact" in data and beside_plates(data["foot_contact"].transpose("time", "foot").values, feet)
 
 
-def some_beside(contact: npt.NDArray[np.uint8], feet: int) -> bool:
-    """Whether some foot stands beside the plates in one of the frames of these contacts (T, F), as above."""
+def beside_plates(contact: npt.NDArray[np.uint8], feet: int) -> bool:
+    """The same of contacts (T, F)."""
     return bool((contact[:, :feet] == UNMEASURED).any())
 
 

@@ -18,7 +18,7 @@ from dynakin.filter.noise import prior_factor
 from dynakin.filter.samples import Sample, sample_arrays
 from dynakin.filter.sources import ContactSources
 from dynakin.filter.step import Codes, Labelled, Labels, StepEstimate, deviations_of, step_estimate
-from dynakin.filter.systematic import Systematic, some_beside
+from dynakin.filter.systematic import Systematic, beside_plates
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.progress import Progress
 from dynakin.recordings.feet.contact import UNMEASURED
@@ -158,7 +158,7 @@ class Tracker:
         sources = self._sources.moments(feet)[0]
         unmeasured = feet is not None and bool((feet.contact == UNMEASURED).any())
         blind = feet is not None and bool(feet.blind.any())
-        self._beside |= feet is not None and some_beside(feet.contact, len(self.calibrated.feet))
+        self._beside |= feet is not None and beside_plates(feet.contact, len(self.calibrated.feet))
         segments = () if feet is None else feet.segments
         self._stepped.append(_Stepped(sample.time_s, loads, sources, segments, unmeasured, blind))
         self._latest = step_estimate(self.core_model, self._labels, sample.time_s, self.state, report, sources, loads)
@@ -210,8 +210,10 @@ class Tracker:
             if loads is not None:
                 wrench = _core.contact_moments(self.core_model, state, loads)["foot_wrench"]
             segments = () if step is None else step.segments
-            beside = step.sources == MEASURED if step is not None and self._beside else None
-            found |= self.systematic.added(found, state, covariance, wrench, segments, beside=beside, late=late)
+            sources = None if step is None else step.sources
+            found |= self.systematic.added(
+                found, state, covariance, wrench, segments, sources=sources, beside=self._beside, late=late
+            )
         if step is not None:
             found["moments"] = np.where(step.sources == ABSENT, np.nan, found["moments"])
         return {name: Labelled(values, self._labels.on(name)) for name, values in found.items()}

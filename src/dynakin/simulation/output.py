@@ -45,7 +45,8 @@ def save_trial(trial: SimulatedTrial, folder: str | Path) -> Path:
     frame), which `dynakin.read` takes; truth_coordinates.mot, truth_speeds.sto, truth_accelerations.sto (degrees,
     m), truth_moments.sto, truth_wrench.sto and of each contact truth_contacts.sto (N m, N; ground frame, about its
     origin); truth.json (settings,
-    parameters, marker places, faults); truth.nc (every array, labelled). The same trial gives the same bytes.
+    parameters, joints' places and axes, marker places, faults); truth.nc (every array, labelled). The same trial gives
+    the same bytes.
 
     Raises:
         OutputError: the folder cannot be written, or holds something that the simulator did not write.
@@ -167,6 +168,15 @@ def _write_truth(trial: SimulatedTrial, path: Path) -> None:
         "notes": list(trial.recording.notes),
         "ground_origin_in_laboratory_m": truth.origin_L.tolist(),
         "parameters": truth.parameters,
+        "segments": [
+            {
+                "name": s.name,
+                "parent": s.parent,
+                "placement_m": s.placement.tolist(),
+                "axes": {a.coordinate: list(a.direction) for a in s.axes},
+            }
+            for s in truth.tree
+        ],
         "markers": [
             {"name": s.name, "segment": s.segment, "place_m": s.place.tolist(), "landmark": s.landmark}
             for s in truth.sites

@@ -124,8 +124,8 @@ def marker_positions(sites: Sequence[Site], moving: TreeMotion, displacement: Ar
 @dataclass(frozen=True)
 class HipCentres:
     """Virtual hip centres: the pelvis markers that they rest on (right and left ASIS, right and left PSIS), their
-    names (right, left), their true distance from the midline, m, and the middle between them (3,) m in the pelvis'
-    frame."""
+    names (right, left), the regression's distance from the midline, m, and the middle between them (3,) m in the
+    pelvis' frame. The joint may lie beside it."""
 
     pelvis: tuple[str, str, str, str]
     names: tuple[str, str]

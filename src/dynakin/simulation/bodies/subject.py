@@ -38,6 +38,7 @@ FRACTIONS: Mapping[str, float] = {
     "hip_width": 0.110,  # between the hip joint centres, and the feet below them
     "shoulder_width": 0.220,
 }
+# Joints of a body in space that lie beside their landmarks, and coordinates about axes of the person's own.
 JOINTS = ("hip", "lumbar", "knee", "ankle")
 HINGES = ("knee_angle", "ankle_angle", "subtalar_angle")
 T12_ON_TORSO = 0.30  # T12/L1 from L5/S1 up, over the torso
