@@ -38,11 +38,11 @@ from dynakin.filter.systematic import (
     Systematic,
     reported,
     some_beside,
-    sources_of,
     states_of,
     usual_sizes,
 )
 from dynakin.model.definition import load_model
+from dynakin.results.measures.sources import MEASURED, moment_sources
 from dynakin.settings import presets
 from dynakin.settings.noise import Noise
 from dynakin.simulation.trial import simulate
@@ -78,7 +78,7 @@ class Run:
     own: dict[str, Array]
     parts: Parts
     intensity: Array
-    sources: Array | None
+    sources: Array
     beside: bool
     variance_scale: float
     moved_m: Array
@@ -164,7 +164,7 @@ def against(
     data, tracker = tracked.estimate.data, tracked.tracker
     sizes = replace(usual_sizes(tracker.calibrated), inertia=True)  # worked out where it is not in use, too
     systematic = Systematic(tracker.calibrated, tracker.noise, sizes)
-    parts, sources = systematic.over_time(data), sources_of(data)
+    parts = systematic.over_time(data)
     all_names = [str(n) for n in data["coordinate"].values]
     chosen = [n for n in all_names if n in names and n not in tracked.estimate.held]
     mine, theirs = [all_names.index(n) for n in chosen], [names.index(n) for n in chosen]
@@ -174,11 +174,9 @@ def against(
         found: Array = data[name].transpose("time", "coordinate").values[window][:, mine]
         return found
 
-    measured = np.ones((int(window.sum()), len(mine)), dtype=bool)
-    if "moment_source" in data:
-        measured = values("moment_source") == 0
+    sources = moment_sources(data)[window][:, mine]
     error = {block: values(block) - truth[block][window][:, theirs] for block in blocks}
-    error["moments"] = np.where(measured, error["moments"], np.nan)
+    error["moments"] = np.where(sources == MEASURED, error["moments"], np.nan)
     return Run(
         case,
         seed,
@@ -188,7 +186,7 @@ def against(
         {block: values(f"{block}_sd") for block in blocks},
         {kind: {block: part[block][window][:, mine] for block in blocks} for kind, part in parts.items()},
         systematic.intensity(data)[window],
-        None if sources is None else sources[window][:, mine],
+        sources,
         some_beside(data, len(tracker.calibrated.feet)),
         tracker.noise.variance_scale,
         systematic.moved_m(states_of(data))[window],

@@ -416,7 +416,9 @@ def test_over_time_inertia_is_known_as_well_as_in_each_frame() -> None:
     expected = wider[:, None] ** 2 * variance / s
     np.testing.assert_allclose(found.over_time(data)["inertia"]["moments"], expected, rtol=1e-6)
     blocks = ("coordinates", "speeds", "accelerations", "moments")
-    data = data.assign({f"{block}_sd": (("time", "coordinate"), np.zeros((4, 10))) for block in blocks})
+    data = data.assign(
+        {f"{b}{end}": (("time", "coordinate"), np.zeros((4, 10))) for b in blocks for end in ("", "_sd")}
+    )
     recorded = found.added_over_time(data, late=False)["moments_sd"].values
     own = {block: np.zeros(10) for block in blocks}
     for k, w in enumerate(wider):

@@ -45,17 +45,13 @@ def beside_landmarks(body: SimulatedBody, side: str) -> dict[str, np.ndarray]:
     """(3,) m to the knee from the middle of the epicondyles, to the ankle from below the malleoli, to the hip from the
     regressed one."""
     sites, tree = {site.name: site.place for site in body.sites}, {segment.name: segment for segment in body.tree}
-    middle = 0.5 * (sites["r_knee" if side == "r" else "L_knee"] + sites["r_mknee" if side == "r" else "L_mknee"])
+    own, sign = ("r", 1.0) if side == "r" else ("L", -1.0)
     assert body.hips is not None
-    half = body.hips.half_width_m * (1.0 if side == "r" else -1.0)
-    regressed = body.hips.middle + np.array([0.0, 0.0, half])
-    own = "r" if side == "r" else "L"
-    malleoli = 1.027 * 0.5 * (sites[f"{own}_ankle"] + sites[f"{own}_mankle"])  # the ankle lies 2.7 % further down
-    ankle = tree[f"foot_{side}"].placement - malleoli
+    knee, malleoli = (0.5 * (sites[f"{own}_{name}"] + sites[f"{own}_m{name}"]) for name in ("knee", "ankle"))
     return {
-        "knee": tree[f"shank_{side}"].placement - middle,
-        "ankle": ankle,
-        "hip": tree[f"thigh_{side}"].placement - regressed,
+        "knee": tree[f"shank_{side}"].placement - knee,
+        "ankle": tree[f"foot_{side}"].placement - 1.027 * malleoli,  # the ankle lies 2.7 % further down
+        "hip": tree[f"thigh_{side}"].placement - body.hips.middle - [0.0, 0.0, sign * body.hips.half_width_m],
     }
 
 
@@ -293,14 +289,14 @@ def test_shares_add_up_to_the_whole() -> None:
 
 
 def test_a_leg_that_does_not_reach_is_named() -> None:
-    trial = simulate("fullbody", "squat", 1, 6.0, noise=PERFECT, spread=BY_LANDMARKS)
-    motion = motion_of(trial, 300)
-    moving = kinematics(trial.truth.tree, motion)
-    feet = {segment: moving.segments[segment] for _, segment in FEET}
-    jets = {n: Jet(motion.q[:, k], motion.qd[:, k], motion.qdd[:, k]) for k, n in enumerate(motion.names)}
-    found = close_legs(trial.truth.tree, jets, feet)
-    for name, jet in found.items():  # from the truth's own pelvis and feet, the truth's own angles
-        np.testing.assert_allclose(jet.second, jets[name].second, atol=1e-7)
+    for trial in (perfect("squat", 1), simulate("fullbody", "squat", 1, 6.0, noise=PERFECT, spread=BY_LANDMARKS)):
+        motion = motion_of(trial, 300)
+        moving = kinematics(trial.truth.tree, motion)
+        feet = {segment: moving.segments[segment] for _, segment in FEET}
+        jets = {n: Jet(motion.q[:, k], motion.qd[:, k], motion.qdd[:, k]) for k, n in enumerate(motion.names)}
+        found = close_legs(trial.truth.tree, jets, feet)
+        for name, jet in found.items():  # from the truth's own pelvis and feet, the truth's own angles
+            np.testing.assert_allclose(jet.second, jets[name].second, atol=1e-7)
     hip, ankle = (trial.truth.data["joint_centres"].sel(joint=j).values[::300] for j in ("hip_r", "ankle_r"))
     np.testing.assert_allclose(knee_flexion(trial.truth.tree, hip, ankle, "r"), found["knee_angle_r"].value, atol=1e-9)
     high = jets | {"pelvis_ty": jets["pelvis_ty"] + 0.2}

@@ -20,7 +20,7 @@ from dynakin.filter.joint_errors import JointErrors, Kind, floats
 from dynakin.filter.noise import marker_variance, soft_tissue_sd
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.contact import UNMEASURED
-from dynakin.results.measures.sources import MEASURED, PRIOR
+from dynakin.results.measures.sources import MEASURED, PRIOR, moment_sources
 from dynakin.settings.noise import Noise
 
 if TYPE_CHECKING:
@@ -396,7 +396,7 @@ class Systematic:
         order = ("time", "coordinate")
         own = {block: data[f"{block}_sd"].transpose(*order).values for block in BLOCKS}
         moved = self.moved_m(states_of(data))
-        found = self.over_time(data), self.intensity(data), moved, sources_of(data)
+        found = self.over_time(data), self.intensity(data), moved, moment_sources(data)
         beside = some_beside(data, self._feet)
         sd = reported(self.sizes, self._variance_scale, own, *found, beside=beside, late=late)
         return data.assign({f"{block}_sd": (order, sd[block]) for block in BLOCKS})
@@ -430,11 +430,6 @@ class Systematic:
 def states_of(data: xr.Dataset) -> Array:
     """(T, n) of a recording."""
     return np.asarray(data["state"].transpose("time", "element").values)
-
-
-def sources_of(data: xr.Dataset) -> npt.NDArray[np.uint8] | None:
-    """(T, C) where the moments of a recording come from; None where that is not known."""
-    return data["moment_source"].transpose("time", "coordinate").values if "moment_source" in data else None
 
 
 def some_beside(data: xr.Dataset, feet: int) -> bool:

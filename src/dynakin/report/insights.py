@@ -331,7 +331,7 @@ def _bounds(estimate: Estimate, metrics: Metrics) -> Insight | None:
         "warning",
         "Bounds",
         f"{len(stuck)} of {len(free)} estimated parameters end on a bound ({counts}): {listed(stuck)}. The data ask "
-        f"for a value that the person cannot have, or joints lie elsewhere than the model has them: it does not fit "
+        "for a value that the person cannot have, or joints lie elsewhere than the model has them: it does not fit "
         f"there.{for_a_time}",
         "Check the mass and the height, then the film for a marker of those segments off its place."
         if any(p.kind == "inertia" for p in ending)

@@ -118,7 +118,7 @@ def tracker_of(definition: Definition) -> Tracker:
             height_m=who.height_m or HEIGHT_M,
             sex=who.sex,
             noise=SensorNoise.none(),
-            spread=Spread().times(0.0),
+            spread=Spread.none(),
         )
         try:
             started.append(Estimator(definition).start(trial.recording))

@@ -10,7 +10,7 @@ what is drawn is always a possible body.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,7 +77,7 @@ class Spread:
     @classmethod
     def none(cls) -> Spread:
         """The table itself."""
-        return cls(*np.zeros(len(fields(cls))).tolist())
+        return cls().times(0.0)
 
     def times(self, factor: float) -> Spread:
         """All of them ``factor`` times as large.
@@ -104,8 +104,8 @@ class SimulatedSubject:
     sex: str | None
     lengths: Mapping[str, float]
     parts: Mapping[str, Array]
-    centres: Mapping[str, Array] = field(default_factory=lambda: dict.fromkeys(JOINTS, np.zeros(3)))
-    turns: Mapping[str, Array] = field(default_factory=lambda: dict.fromkeys(HINGES, np.zeros(3)))
+    centres: Mapping[str, Array]
+    turns: Mapping[str, Array]
 
     def placed(self, part: str, shift: Array) -> Array:
         """A part moved to ``shift`` (3,) m."""

@@ -78,7 +78,12 @@ def ankle_height(subject: SimulatedSubject) -> float:
 
 def hip_in_pelvis(subject: SimulatedSubject, sign: float) -> Array:
     """The hip centre (3,) m in the pelvis' frame; sign: 1 right, -1 left, 0 the middle of both."""
-    return _regressed_hip(subject, sign) + subject.centres["hip"] * [1.0, 1.0, sign]
+    return _regressed_hip(subject, sign) + _beside(subject, "hip", sign)
+
+
+def _beside(subject: SimulatedSubject, joint: str, sign: float) -> Array:
+    """(3,) m from where landmarks have a joint to where it is; ``sign`` as of `hip_in_pelvis`."""
+    return np.asarray(subject.centres[joint] * [1.0, 1.0, sign])
 
 
 def _regressed_hip(subject: SimulatedSubject, sign: float) -> Array:
@@ -89,12 +94,12 @@ def _regressed_hip(subject: SimulatedSubject, sign: float) -> Array:
 
 def _lumbar_in_pelvis(subject: SimulatedSubject) -> Array:
     middle = _regressed_hip(subject, 0.0) + subject.lengths["pelvis"] * LUMBAR_DIRECTION
-    return np.asarray(middle + subject.centres["lumbar"] * [1.0, 1.0, 0.0])
+    return middle + _beside(subject, "lumbar", 0.0)
 
 
 def _below(subject: SimulatedSubject, segment: str, joint: str, sign: float) -> Array:
     """The joint (3,) m at the lower end of thigh or shank, in its frame."""
-    return np.asarray(subject.centres[joint] * [1.0, 1.0, sign] - [0.0, subject.lengths[segment], 0.0])
+    return _beside(subject, joint, sign) - subject.lengths[segment] * np.array(Y)
 
 
 def _shoulder_in_torso(subject: SimulatedSubject, sign: float) -> Array:
