@@ -113,6 +113,9 @@ LANDMARKS = Sizes(
     own_beside=0.14,
 )
 """Joints that are found from markers on the skin."""
+IN_MOTION = replace(LANDMARKS, hinge_centre=0.015)
+"""Knees and ankles that the movement alone places: on simulated squats their moments err two to five times as much
+(`docs/validation.md`)."""
 SCALED = Sizes(
     hinge_centre=0.0014,
     ball_centre=0.0016,
@@ -132,7 +135,9 @@ SCALED = Sizes(
 
 def usual_sizes(calibrated: CalibratedModel) -> Sizes:
     """By where the joints of a model come from."""
-    return SCALED if calibrated.plan is None else LANDMARKS
+    if calibrated.plan is None:
+        return SCALED
+    return IN_MOTION if calibrated.joints_in_motion else LANDMARKS
 
 
 def movement_intensity(acceleration: Array, sd: Array) -> Array:

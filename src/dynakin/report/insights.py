@@ -135,6 +135,20 @@ def _guessed(estimate: Estimate, metrics: Metrics) -> Insight | None:
     return Insight("warning", "Guessed marker places", text, "Look at them: dynakin markers new TRIAL -o my.toml.")
 
 
+def _in_motion(estimate: Estimate, metrics: Metrics) -> Insight | None:
+    """Joints that are known to centimetres."""
+    if not estimate.joints_in_motion:
+        return None
+    text = (
+        f"No marker shows {listed([words(name) for name in estimate.joints_in_motion])} and nobody stands still: these "
+        "joints are where the segments turn against each other in the movement, to some 15 mm. Angles of the legs have "
+        "their zero a few degrees off, and their moments are up to five times less sure; the deviations say so."
+    )
+    return Insight(
+        "warning", "Joint centres", text, "Give a standing trial with markers on knees and ankles (--static)."
+    )
+
+
 def _failed(estimate: Estimate, metrics: Metrics) -> Insight | None:
     failed = [message.removeprefix(FAILED).strip() for message in estimate.messages if message.startswith(FAILED)]
     if not failed:
@@ -448,6 +462,7 @@ def _step_time(estimate: Estimate, metrics: Metrics) -> Insight:
 
 FINDINGS: tuple[tuple[Callable[[Estimate, Metrics], Insight | list[Insight] | None], tuple[str, ...]], ...] = (
     (_guessed, ()),
+    (_in_motion, ()),
     (_mass, ()),
     (_failed, ()),
     (_tracking, ()),

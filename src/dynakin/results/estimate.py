@@ -115,6 +115,11 @@ class Estimate:
         return str(self.config.get("marker_places", "named"))
 
     @property
+    def joints_in_motion(self) -> list[str]:
+        """Knees and ankles that no marker shows, where the movement has them."""
+        return list(self.config.get("joints_in_motion", ()))
+
+    @property
     def marker_names(self) -> list[str]:
         """Names of the markers used, as in the recording."""
         return [str(name) for name in self.data["marker"].values]

@@ -30,7 +30,7 @@ _MARKER_WEIGHT = 0.01
 """Of a marker on the skin next to a landmark: people differ there, but it shows where the segment faces."""
 _HOLD_WEIGHT = 1e-4
 """Of each of six points a tenth of the height away that hold the segment's direction to its parent's."""
-_HOLD = 0.1
+HOLD = 0.1
 _FLIP, _IN_THE_MIDDLE = np.array([1.0, 1.0, -1.0]), np.array([1.0, 1.0, 0.0])
 _ONE_PLACE_M = 1e-3
 _LEAST = 2
@@ -169,14 +169,14 @@ def completed(
                 source.append(height_m * place)
                 target.append(seen)
                 weights.append(_MARKER_WEIGHT)
-        turn, shift = _laid(np.array(source), np.array(target), np.array(weights), hold, _HOLD * height_m)
+        turn, shift = laid(np.array(source), np.array(target), np.array(weights), hold, HOLD * height_m)
         turns[segment.name] = turn
         for name in missing:
             found.landmarks[name] = turn @ shape[name] + shift
             found.added[name] = segment.name
             _beside_hinge(name, segment.side, known, found.landmarks)
-        laid = set(missing) & set(frame_landmarks(segment))
-        for floor in (name for name in frame_landmarks(segment) if laid and name.startswith("floor")):
+        new = set(missing) & set(frame_landmarks(segment))
+        for floor in (name for name in frame_landmarks(segment) if new and name.startswith("floor")):
             up = next(name for name in frame_landmarks(segment) if name.startswith("over_floor"))
             found.landmarks[up] = found.landmarks[floor] + turn @ np.array([0.0, 1.0, 0.0])  # flat in the proportions
         if segment.side is not None:
@@ -255,7 +255,7 @@ def _held(segment: Segment, turns: Mapping[str, Array]) -> Array:
     return np.column_stack([ahead, up, np.cross(ahead, up)])
 
 
-def _laid(source: Array, target: Array, weights: Array, hold: Array, reach: float) -> tuple[Array, Array]:
+def laid(source: Array, target: Array, weights: Array, hold: Array, reach: float) -> tuple[Array, Array]:
     """Rotation (3, 3) and shift (3,) that lay points (K, 3) best on targets, directions held to a rotation weakly."""
     weights = weights / weights.sum()
     a, b = weights @ source, weights @ target

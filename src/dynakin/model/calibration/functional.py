@@ -27,8 +27,8 @@ from dynakin.recordings.rigidity import RigidMotion, distance_sd_m, rigid_motion
 
 Array = npt.NDArray[np.float64]
 
-_SIDES = {"r": "right", "l": "left"}
-_SEGMENTS = {"hip": ("pelvis", "thigh"), "knee": ("thigh", "shank")}
+SIDE_OF = {"r": "right", "l": "left"}
+_SEGMENTS = {"hip": ("pelvis", "thigh"), "knee": ("thigh", "shank"), "ankle": ("shank", "foot")}
 _BONES = {"thigh": ("hip", "knee"), "shank": ("knee", "ankle")}
 _COMPARED = {"hip": ("hip",), "knee": ("knee", "knee_lateral", "hip")}  # landmarks of the markers' own joint
 _IN_WORDS = {"hip": "hip centre", "knee": "knee centre", "knee_lateral": "lateral epicondyle"}
@@ -76,7 +76,7 @@ def functional_landmarks(
         if other := another_person(trials[joint], source.recording):
             raise ModelError(f"{where}: {other}; expected the person and the markers that are measured")
         _refuse_unmarked(joint, found, finder, where)
-        motion, without = _motion(joint, trials[joint], found, source, frames, where)
+        motion, without = joint_motion(joint, trials[joint], found, source, frames, where)
         if without:
             messages.append(
                 f"{trials[joint].name}: {', '.join(without)} left out for {joint}: moved against the others of the "
@@ -106,7 +106,7 @@ def _refuse_unmarked(joint: str, found: Mapping[str, Array], finder: LandmarkFin
     lacking = [point for point in _COMPARED[name] if f"{point}_{letter}" not in found]
     if lacking:
         raise ModelError(
-            f"{where}: no markers of the standing person give the {_SIDES[letter]} "
+            f"{where}: no markers of the standing person give the {SIDE_OF[letter]} "
             f"{' and '.join(_IN_WORDS[point] for point in lacking)} (marker set {finder.match.marker_set.name}) that "
             "the trial's is compared with; expected markers there, in the trial or in a static one (--static)"
         )
@@ -133,7 +133,7 @@ def _put_centre(centre: Centre, found: dict[str, Array], joint: str, turned: Arr
     found[joint] = centre.point
     forward, up, outward = 1e3 * off * [1.0, 1.0, 1.0 if joint.endswith("_r") else -1.0]
     return (
-        f"Hip centre {_SIDES[joint[-1]]}: from {file} (thigh turned through {turned[0]:.0f} by {turned[1]:.0f} deg, "
+        f"Hip centre {SIDE_OF[joint[-1]]}: from {file} (thigh turned through {turned[0]:.0f} by {turned[1]:.0f} deg, "
         f"residual {1e3 * centre.residual_m:.1f} mm), standard deviation {1e3 * centre.sd_m:.1f} mm; "
         f"{1e3 * float(np.linalg.norm(off)):.1f} mm from the marker set's: {forward:+.1f} forward, {up:+.1f} up, "
         f"{outward:+.1f} outward."
@@ -172,7 +172,7 @@ def _put_axis(
     inward = np.rad2deg(np.arctan2(now @ ahead, now @ out)) * (1.0 if letter == "r" else -1.0)
     raised = np.rad2deg(np.arcsin(np.clip(now @ up, -1.0, 1.0)) - np.arcsin(np.clip(before @ up, -1.0, 1.0)))
     return (
-        f"Knee axis {_SIDES[letter]}: from {file} (knee turned through {turned[0]:.0f} deg, residual "
+        f"Knee axis {SIDE_OF[letter]}: from {file} (knee turned through {turned[0]:.0f} deg, residual "
         f"{axis.residual_deg:.1f} deg), standard deviation {axis.sd_deg:.1f} deg; {off:.1f} deg from the marker set's: "
         f"its outer end {abs(inward):.1f} deg to the {'front' if inward > 0.0 else 'back'}, {abs(raised):.1f} deg "
         f"{'up' if raised > 0.0 else 'down'}."
@@ -183,10 +183,10 @@ def _middle(found: dict[str, Array], *names: str) -> None:
     """The middle of both sides, as ``LandmarkFinder.find_in_space`` has it."""
     for name in names:
         if name in found:
-            found[name] = np.mean([found[f"{name}_{letter}"] for letter in _SIDES], axis=0)
+            found[name] = np.mean([found[f"{name}_{letter}"] for letter in SIDE_OF], axis=0)
 
 
-def _motion(
+def joint_motion(
     joint: str,
     trial: Recording,
     landmarks: Mapping[str, Array],
@@ -263,7 +263,7 @@ def _markers_of(
     Raises:
         ModelError: fewer than three.
     """
-    side, marker_set = _SIDES[letter], source.match.marker_set
+    side, marker_set = SIDE_OF[letter], source.match.marker_set
     came = match_markers(marker_set, trial.marker_names, trial.seen, str(trial.path or trial.name)).names
     sides = ("right", "left", "centre") if part == "pelvis" else (side, "centre")
     keys = [(m.name, s) for m in marker_set.markers if m.segment == part and not m.landmark_only for s in sides]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -16,13 +16,13 @@ from dynakin.model.calibration.completion import Completed, completed, free
 from dynakin.model.calibration.frames import Trial, choose_side
 from dynakin.model.calibration.functional import functional_landmarks
 from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder, slope
+from dynakin.model.calibration.legs_in_motion import LEG_JOINTS, legs_in_motion
 from dynakin.model.calibration.lumping import PlacedPart, segment_bodies
 from dynakin.model.calibration.posture import Posture, find_geometry, find_posture, frame_landmarks
 from dynakin.model.calibration.sites import Candidate, as_marked, candidates, find_locks, place_sites
 from dynakin.model.markers.match import MarkerKey, MarkerMatch
 from dynakin.model.markers.recognise import lacking, recognise
 from dynakin.model.markers.schema import MarkerSetFile
-from dynakin.model.mirroring import SUFFIXES
 from dynakin.model.plan import Geometry, ModelPlan
 from dynakin.model.schema import ModelFile
 from dynakin.model.table import BodyTable
@@ -49,6 +49,7 @@ class Measured:
     trial: Trial
     unplaced: tuple[Candidate, ...]  # markers of a model in space that the calibration frames do not show
     held: dict[str, str]  # coordinate -> why nothing shows it
+    joints_in_motion: tuple[str, ...]  # knees and ankles that the movement alone places
     still: bool  # the person stands still in the calibration frames
 
 
@@ -118,18 +119,27 @@ def measure(
         frames, which = source.calibration_frames(needed, wished)
     source = trial if static is None else _at_origin(model, source, finder, frames)
     messages.append(f"Lengths and marker places: {which}.")
+    window = standing_window(source.recording)
+    still = window is not None and window.start <= frames[0] < window.stop
     standing = source.median(frames)
-    found = Completed(finder.find(standing))
+    found, in_motion = Completed(finder.find(standing)), tuple[str, ...]()
     if model.sided:
         landmarks = finder.find_in_space(standing)
         if functional:
             landmarks, how_found = functional_landmarks(functional, landmarks, finder, source, frames)
+            messages += how_found
+        seen, why = landmarks, list[str]()
+        if not still and finder.height_m is not None:
+            landmarks, how_found, why = legs_in_motion(landmarks, source, frames, finder.height_m)
             messages += how_found
         try:
             found = completed(model, table, locks, landmarks, standing, finder.height_m or np.nan, trial.match.where)
         except ModelError as error:
             reasons = dict.fromkeys(source.match.left_out.values())
             raise ModelError("; ".join([error.message, *reasons])) from None
+        in_motion = tuple(name for name in LEG_JOINTS if name in landmarks and name not in seen)
+        if not still:
+            _refuse_supposed_legs(found.added.keys() - seen.keys(), found.added, chosen, source, why)
     landmarks = found.landmarks
 
     set_, names = source.match.marker_set, source.match.names
@@ -166,21 +176,24 @@ def measure(
     )  # fmt: skip
     report(model, plan, mass_kg, messages)
     placed_names = {site.recorded for site in sites}
-    window = standing_window(source.recording)
-    still = window is not None and window.start <= frames[0] < window.stop
     left = tuple(c for c in chosen if c.recorded not in placed_names)
-    marked = {candidate.segment for candidate in chosen}
-    joints = {f"{joint}{suffix}" for joint in ("knee", "ankle") for suffix in SUFFIXES.values()}
-    supposed = sorted(name for name, own in found.added.items() if name in joints and own in marked)
-    if supposed and not still:
-        messages.append(
-            f"Warning: no marker shows {', '.join(supposed)}, and nobody stands still in the calibration frames: the "
-            "legs are laid out as those of an adult who stands, and their angles may be tens of degrees off. Give a "
-            "standing trial with markers on knees and ankles (--static)."
-        )
     held = {name: f"segment {segment} has no markers" for segment, names in bare.items() for name in names}
     trial = as_asked if model.floating else trial
-    return plan, Measured(trial.ground, side, mass_kg, height_m, parts, tuple(messages), trial, left, held, still)
+    return plan, Measured(
+        trial.ground, side, mass_kg, height_m, parts, tuple(messages), trial, left, held, in_motion, still
+    )
+
+
+def _refuse_supposed_legs(
+    lacking: Set[str], segments: Mapping[str, str], chosen: Sequence[Candidate], source: Trial, why: Sequence[str]
+) -> None:
+    """Knees and ankles laid out as those of an adult who stands are tens of degrees off where nobody does."""
+    marked = {candidate.segment for candidate in chosen}
+    if supposed := [name for name in LEG_JOINTS if name in lacking and segments[name] in marked]:
+        raise ModelError(
+            f"{source.match.where}: no marker shows {', '.join(supposed)}, and nobody stands still in it; expected a "
+            f"standing trial (--static), with markers on knees and ankles if it can be. {' '.join(why)}".rstrip()
+        )
 
 
 def _common(match: MarkerMatch, other: MarkerMatch) -> MarkerMatch:
