@@ -183,7 +183,7 @@ def test_metrics_hold_the_keys_of_the_design(estimate: Estimate) -> None:
         "window",
         "lag_s",
         "marker_places",
-        "joints_in_motion",
+        "unmarked_joints",
         "markers",
         "wrench",
         "prediction",

@@ -92,7 +92,7 @@ def assemble(
         "side": initial.side,
         "held": dict(initial.held),
         "marker_places": "guessed" if initial.guessed_places else "named",
-        "joints_in_motion": list(initial.joints_in_motion),
+        "unmarked_joints": list(initial.unmarked_joints),
         "ground": {
             "vertical": initial.ground.vertical,
             "forward": initial.ground.forward.tolist(),

@@ -113,8 +113,8 @@ LANDMARKS = Sizes(
     own_beside=0.14,
 )
 """Joints that are found from markers on the skin."""
-IN_MOTION = replace(LANDMARKS, hinge_centre=0.015)
-"""Knees and ankles that the movement alone places: on simulated squats their moments err two to five times as much
+UNMARKED = replace(LANDMARKS, hinge_centre=0.015, hinge_axes=np.radians(6.0), pair_axes=np.radians(6.0))
+"""Knees and ankles that no marker shows: on simulated squats their moments err two to five times as much
 (`docs/validation.md`)."""
 SCALED = Sizes(
     hinge_centre=0.0014,
@@ -137,7 +137,7 @@ def usual_sizes(calibrated: CalibratedModel) -> Sizes:
     """By where the joints of a model come from."""
     if calibrated.plan is None:
         return SCALED
-    return IN_MOTION if calibrated.joints_in_motion else LANDMARKS
+    return UNMARKED if calibrated.unmarked_joints else LANDMARKS
 
 
 def movement_intensity(acceleration: Array, sd: Array) -> Array:

@@ -248,7 +248,7 @@ class ModelDefinition:
             held=held,
             joint_prior=None if together is None else JointPrior(*together),
             guessed_places=self.marker_set is None and rest.trial.match.marker_set.name == GUESSED,
-            joints_in_motion=rest.joints_in_motion,
+            unmarked_joints=rest.unmarked_joints,
         )
 
 

@@ -135,14 +135,15 @@ def _guessed(estimate: Estimate, metrics: Metrics) -> Insight | None:
     return Insight("warning", "Guessed marker places", text, "Look at them: dynakin markers new TRIAL -o my.toml.")
 
 
-def _in_motion(estimate: Estimate, metrics: Metrics) -> Insight | None:
+def _unmarked(estimate: Estimate, metrics: Metrics) -> Insight | None:
     """Joints that are known to centimetres."""
-    if not estimate.joints_in_motion:
+    if not estimate.unmarked_joints:
         return None
+    names = listed([words(name) for name in estimate.unmarked_joints])
     text = (
-        f"No marker shows {listed([words(name) for name in estimate.joints_in_motion])} and nobody stands still: these "
-        "joints are where the segments turn against each other in the movement, to some 15 mm. Angles of the legs have "
-        "their zero a few degrees off, and their moments are up to five times less sure; the deviations say so."
+        f"No marker shows {names}: they are where the movement, or else the proportions of an adult who stands, has "
+        "them, to one or two centimetres. The zeros of the legs' angles may be 10 deg off, and moments at knee and "
+        "ankle are two to five times less sure; the deviations say so."
     )
     return Insight(
         "warning", "Joint centres", text, "Give a standing trial with markers on knees and ankles (--static)."
@@ -462,7 +463,7 @@ def _step_time(estimate: Estimate, metrics: Metrics) -> Insight:
 
 FINDINGS: tuple[tuple[Callable[[Estimate, Metrics], Insight | list[Insight] | None], tuple[str, ...]], ...] = (
     (_guessed, ()),
-    (_in_motion, ()),
+    (_unmarked, ()),
     (_mass, ()),
     (_failed, ()),
     (_tracking, ()),

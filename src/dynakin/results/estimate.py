@@ -115,9 +115,9 @@ class Estimate:
         return str(self.config.get("marker_places", "named"))
 
     @property
-    def joints_in_motion(self) -> list[str]:
+    def unmarked_joints(self) -> list[str]:
         """Knees and ankles that no marker shows, where the movement has them."""
-        return list(self.config.get("joints_in_motion", ()))
+        return list(self.config.get("unmarked_joints", ()))
 
     @property
     def marker_names(self) -> list[str]:

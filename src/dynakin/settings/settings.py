@@ -33,7 +33,7 @@ _PATHS = ("trial", "forces", "static", "parameters", "output")
 FunctionalJoint = Literal["hip_r", "hip_l", "knee_r", "knee_l"]
 """Joints whose centre or axis a trial of their own can show."""
 NEEDED = {"trial": "TRIAL", "output": "-o OUT"}
-RECORDED = ("ground", "held", "marker_places", "joints_in_motion", "identified", "noise_used", "versions")
+RECORDED = ("ground", "held", "marker_places", "unmarked_joints", "identified", "noise_used", "versions")
 """Keys that an output's config.toml has for the record: not for people to set, and not read."""
 
 
@@ -130,7 +130,7 @@ class Settings(Strict, use_attribute_docstrings=True):
     """Written into an output's config.toml for the record: coordinates that no marker shows, and why. Not read."""
     marker_places: str | None = None
     """Written into an output's config.toml for the record: named by a marker set, or guessed. Not read."""
-    joints_in_motion: list[str] = Field(default_factory=list)
+    unmarked_joints: list[str] = Field(default_factory=list)
     """Written into an output's config.toml for the record: knees and ankles that the movement places. Not read."""
     identified: str | None = None
     """Written into an output's config.toml for the record: what was taken of `parameters`. Not read."""

@@ -71,7 +71,7 @@ class CalibratedModel:
         unmarked_kg: mass of the segments that no marker shows, and that hang still on their neighbours.
         held: coordinate -> why nothing shows it, where it is held at an angle for lack of markers: results have none.
         guessed_places: whether the places of the markers were guessed, because no marker set has their names.
-        joints_in_motion: knees and ankles that no marker shows, placed by the movement (`legs_in_motion`).
+        unmarked_joints: knees and ankles that no marker shows, placed by the movement (`legs_in_motion`).
         joint_prior: how elements hang together at first; the others are independent.
     """
 
@@ -102,7 +102,7 @@ class CalibratedModel:
     unmarked_kg: float = 0.0
     held: dict[str, str] = field(default_factory=dict)
     guessed_places: bool = False
-    joints_in_motion: tuple[str, ...] = ()
+    unmarked_joints: tuple[str, ...] = ()
     joint_prior: JointPrior | None = None
     contacts: dict[str, str] = field(default_factory=dict)
 

@@ -96,7 +96,7 @@ def functional_landmarks(
                     f"{where}: the knee turns through {turned[0]:.0f} deg, expected {_KNEE_DEG:g} deg or more"
                 )
             messages.append(_put_axis(joint_axis(motion), found, finder, joint, turned, where, trials[joint].name))
-        _middle(found, *(("hip",) if name == "hip" else ("knee", "knee_lateral")))
+        put_middles(found, *(("hip",) if name == "hip" else ("knee", "knee_lateral")))
     return found, messages
 
 
@@ -179,10 +179,10 @@ def _put_axis(
     )
 
 
-def _middle(found: dict[str, Array], *names: str) -> None:
+def put_middles(found: dict[str, Array], *names: str) -> None:
     """The middle of both sides, as ``LandmarkFinder.find_in_space`` has it."""
     for name in names:
-        if name in found:
+        if all(f"{name}_{letter}" in found for letter in SIDE_OF):
             found[name] = np.mean([found[f"{name}_{letter}"] for letter in SIDE_OF], axis=0)
 
 

@@ -52,6 +52,10 @@ class JointMotion:
         block = np.arange(len(self.turns)) * BLOCKS // len(self.turns)
         return [block != k for k in range(BLOCKS)]
 
+    def angles_rad(self) -> Array:
+        """(T,) how far the distal segment is turned from how it stands."""
+        return np.asarray(scipy.spatial.transform.Rotation.from_matrix(self.turns).magnitude())
+
     def part(self, frames: npt.NDArray[np.bool_] | npt.NDArray[np.intp]) -> JointMotion:
         """Only these frames."""
         return JointMotion(self.turns[frames], self.shifts[frames], self.range_deg)
@@ -107,7 +111,7 @@ def joint_axis(motion: JointMotion) -> JointAxis:
     others = np.array([_axes(motion.part(frames))[0] for frames in motion.blocks_left_out()])
     others *= np.sign(others @ a)[:, None]
     variance = (BLOCKS - 1) / BLOCKS * float(((others - others.mean(axis=0)) ** 2).sum())
-    order = np.argsort(scipy.spatial.transform.Rotation.from_matrix(motion.turns).magnitude())
+    order = np.argsort(motion.angles_rad())
     less, more = (_axes(motion.part(half))[0] for half in np.array_split(order, 2))
     sd_deg = np.sqrt(np.rad2deg(np.sqrt(variance)) ** 2 + angle_deg(a, b) ** 2 + angle_deg(less, more, True) ** 2)
     apart = np.linalg.norm(a - motion.turns @ b, axis=1)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -16,7 +16,7 @@ from dynakin.model.calibration.completion import Completed, completed, free
 from dynakin.model.calibration.frames import Trial, choose_side
 from dynakin.model.calibration.functional import functional_landmarks
 from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder, slope
-from dynakin.model.calibration.legs_in_motion import LEG_JOINTS, legs_in_motion
+from dynakin.model.calibration.legs_in_motion import LEG_JOINTS, Legs, legs_in_motion
 from dynakin.model.calibration.lumping import PlacedPart, segment_bodies
 from dynakin.model.calibration.posture import Posture, find_geometry, find_posture, frame_landmarks
 from dynakin.model.calibration.sites import Candidate, as_marked, candidates, find_locks, place_sites
@@ -31,6 +31,7 @@ from dynakin.recordings.feet.contact import foot_contacts
 from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_laboratory_frame
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.standing import standing_window
+from dynakin.results.naming import listed, words
 from dynakin.settings.subject import Subject
 
 Array = npt.NDArray[np.float64]
@@ -49,7 +50,7 @@ class Measured:
     trial: Trial
     unplaced: tuple[Candidate, ...]  # markers of a model in space that the calibration frames do not show
     held: dict[str, str]  # coordinate -> why nothing shows it
-    joints_in_motion: tuple[str, ...]  # knees and ankles that the movement alone places
+    unmarked_joints: tuple[str, ...]  # knees and ankles that no marker shows
     still: bool  # the person stands still in the calibration frames
 
 
@@ -122,24 +123,27 @@ def measure(
     window = standing_window(source.recording)
     still = window is not None and window.start <= frames[0] < window.stop
     standing = source.median(frames)
-    found, in_motion = Completed(finder.find(standing)), tuple[str, ...]()
+    found, unmarked = Completed(finder.find(standing)), tuple[str, ...]()
     if model.sided:
         landmarks = finder.find_in_space(standing)
         if functional:
             landmarks, how_found = functional_landmarks(functional, landmarks, finder, source, frames)
             messages += how_found
-        seen, why = landmarks, list[str]()
-        if not still and finder.height_m is not None:
-            landmarks, how_found, why = legs_in_motion(landmarks, source, frames, finder.height_m)
-            messages += how_found
+        legs = Legs(landmarks)
+        if finder.height_m is not None:
+            legs = legs_in_motion(landmarks, trial.recording, source, frames, finder.height_m)
+            messages += legs.messages
         try:
-            found = completed(model, table, locks, landmarks, standing, finder.height_m or np.nan, trial.match.where)
+            found = completed(
+                model, table, locks, legs.landmarks, standing, finder.height_m or np.nan, trial.match.where
+            )
         except ModelError as error:
             reasons = dict.fromkeys(source.match.left_out.values())
             raise ModelError("; ".join([error.message, *reasons])) from None
-        in_motion = tuple(name for name in LEG_JOINTS if name in landmarks and name not in seen)
-        if not still:
-            _refuse_supposed_legs(found.added.keys() - seen.keys(), found.added, chosen, source, why)
+        supposed = _supposed_legs(found, legs, chosen)
+        if supposed and not still:
+            raise ModelError(_no_legs(supposed, source, static, legs))
+        unmarked = tuple(name for name in LEG_JOINTS if name in (*legs.joints, *supposed))
     landmarks = found.landmarks
 
     set_, names = source.match.marker_set, source.match.names
@@ -180,20 +184,23 @@ def measure(
     held = {name: f"segment {segment} has no markers" for segment, names in bare.items() for name in names}
     trial = as_asked if model.floating else trial
     return plan, Measured(
-        trial.ground, side, mass_kg, height_m, parts, tuple(messages), trial, left, held, in_motion, still
+        trial.ground, side, mass_kg, height_m, parts, tuple(messages), trial, left, held, unmarked, still
     )
 
 
-def _refuse_supposed_legs(
-    lacking: Set[str], segments: Mapping[str, str], chosen: Sequence[Candidate], source: Trial, why: Sequence[str]
-) -> None:
-    """Knees and ankles laid out as those of an adult who stands are tens of degrees off where nobody does."""
+def _supposed_legs(found: Completed, legs: Legs, chosen: Sequence[Candidate]) -> list[str]:
+    """Knees and ankles of marked segments that are where an adult who stands has them."""
     marked = {candidate.segment for candidate in chosen}
-    if supposed := [name for name in LEG_JOINTS if name in lacking and segments[name] in marked]:
-        raise ModelError(
-            f"{source.match.where}: no marker shows {', '.join(supposed)}, and nobody stands still in it; expected a "
-            f"standing trial (--static), with markers on knees and ankles if it can be. {' '.join(why)}".rstrip()
-        )
+    return [n for n in LEG_JOINTS if n not in legs.landmarks and n in found.added and found.added[n] in marked]
+
+
+def _no_legs(supposed: Sequence[str], source: Trial, static: Recording | None, legs: Legs) -> str:
+    """Laid out as those of an adult who stands, they are tens of degrees off where nobody does."""
+    expected = "a standing trial with markers on knees and ankles (--static)"
+    if static is not None:
+        expected = "another one, of the person standing still with markers on knees and ankles (--static)"
+    said = f"no marker shows {listed([words(name) for name in supposed])}, and nobody stands still in it"
+    return " ".join([f"{source.match.where}: {said}; expected {expected}.", *legs.failed])
 
 
 def _common(match: MarkerMatch, other: MarkerMatch) -> MarkerMatch:

@@ -88,7 +88,7 @@ def compute_metrics(estimate: Estimate, failures: Failures | None = None) -> dic
         "window": {"start_s": float(kept[0]), "end_s": float(kept[-1])},
         "lag_s": None if estimate.smoothed else estimate.lag_s,
         "marker_places": estimate.marker_places,
-        "joints_in_motion": estimate.joints_in_motion,
+        "unmarked_joints": estimate.unmarked_joints,
     }
     for name, block in blocks.items():
         metrics[name] = None
