@@ -82,6 +82,7 @@ def estimate_of(data: Trial, feet: ContactLoads | None, smooth: bool = False) ->
         feet={},
         contacts={},
         held={},
+        unmarked_joints=(),
         unmarked_feet={},
         guessed_places=False,
         soft_tissue_m=np.zeros(len(SPEC.markers)),
