@@ -116,7 +116,7 @@ class Estimate:
 
     @property
     def unmarked_joints(self) -> list[str]:
-        """Knees and ankles that no marker shows, where the movement has them."""
+        """Knees and ankles that no marker shows: where the movement or proportions have them."""
         return list(self.config.get("unmarked_joints", ()))
 
     @property

@@ -131,7 +131,7 @@ class Settings(Strict, use_attribute_docstrings=True):
     marker_places: str | None = None
     """Written into an output's config.toml for the record: named by a marker set, or guessed. Not read."""
     unmarked_joints: list[str] = Field(default_factory=list)
-    """Written into an output's config.toml for the record: knees and ankles that the movement places. Not read."""
+    """Written into an output's config.toml for the record: knees and ankles that no marker shows. Not read."""
     identified: str | None = None
     """Written into an output's config.toml for the record: what was taken of `parameters`. Not read."""
     noise_used: dict[str, Any] = Field(default_factory=dict)

@@ -71,7 +71,8 @@ class CalibratedModel:
         unmarked_kg: mass of the segments that no marker shows, and that hang still on their neighbours.
         held: coordinate -> why nothing shows it, where it is held at an angle for lack of markers: results have none.
         guessed_places: whether the places of the markers were guessed, because no marker set has their names.
-        unmarked_joints: knees and ankles that no marker shows, placed by the movement (`legs_in_motion`).
+        unmarked_joints: knees and ankles that no marker shows, where the movement (`legs_in_motion`) or proportions
+            have them.
         joint_prior: how elements hang together at first; the others are independent.
     """
 
