@@ -30,7 +30,7 @@ _MARKER_WEIGHT = 0.01
 """Of a marker on the skin next to a landmark: people differ there, but it shows where the segment faces."""
 _HOLD_WEIGHT = 1e-4
 """Of each of six points a tenth of the height away that hold the segment's direction to its parent's."""
-HOLD = 0.1
+_HOLD = 0.1
 _FLIP, _IN_THE_MIDDLE = np.array([1.0, 1.0, -1.0]), np.array([1.0, 1.0, 0.0])
 _ONE_PLACE_M = 1e-3
 _LEAST = 2
@@ -169,7 +169,7 @@ def completed(
                 source.append(height_m * place)
                 target.append(seen)
                 weights.append(_MARKER_WEIGHT)
-        turn, shift = laid(np.array(source), np.array(target), np.array(weights), hold, HOLD * height_m)
+        turn, shift = laid(np.array(source), np.array(target), np.array(weights), hold, height_m)
         turns[segment.name] = turn
         for name in missing:
             found.landmarks[name] = turn @ shape[name] + shift
@@ -255,12 +255,16 @@ def _held(segment: Segment, turns: Mapping[str, Array]) -> Array:
     return np.column_stack([ahead, up, np.cross(ahead, up)])
 
 
-def laid(source: Array, target: Array, weights: Array, hold: Array, reach: float) -> tuple[Array, Array]:
-    """Rotation (3, 3) and shift (3,) that lay points (K, 3) best on targets, directions held to a rotation weakly."""
+def laid(source: Array, target: Array, weights: Array, hold: Array, height_m: float) -> tuple[Array, Array]:
+    """Rotation (3, 3) and shift (3,) that lay points (K, 3) best on targets, directions held to a rotation weakly.
+
+    Args:
+        height_m: of the body.
+    """
     weights = weights / weights.sum()
     a, b = weights @ source, weights @ target
     covariance = (target - b).T @ (weights[:, None] * (source - a))
-    covariance += _HOLD_WEIGHT * 2.0 * reach**2 * hold
+    covariance += _HOLD_WEIGHT * 2.0 * (_HOLD * height_m) ** 2 * hold
     u, _, vt = np.linalg.svd(covariance)
     turn = u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))]) @ vt
     return turn, b - turn @ a

@@ -40,10 +40,10 @@ _FLAT_M = 0.012  # a cluster less wide than this turns about its own line unseen
 _DEFORMED_M = 0.015
 """Misfit of a segment's markers to their shape while standing, 90 frames of 100: 5 to 10 mm by skin. A marker whose
 label is swapped with its neighbour's in a part of a trial makes 30 (lateral and medial epicondyle)."""
-_HIP_DEG, _KNEE_DEG = 20.0, 40.0
+_HIP_DEG, KNEE_DEG = 20.0, 40.0
 """Least range of motion: of the thigh about its second axis, and of the knee. On simulated persons errors reach 10 mm
 there (14 mm at 13 deg, 25 mm at 11, where it is skin that turns) and 4 deg (9 deg at half of it)."""
-_HIP_RESIDUAL_M, _KNEE_RESIDUAL_DEG = 0.015, 5.0
+CENTRE_RESIDUAL_M, KNEE_RESIDUAL_DEG = 0.015, 5.0
 """Largest root mean square by which the joint moves against itself: 6 to 9 mm and 1.5 deg on simulated persons."""
 _HIP_SD_M = 0.018
 """Largest standard deviation of a hip centre: 7 to 13 mm on simulated persons (seeds 401 to 414), 8 mm on a real one;
@@ -91,9 +91,9 @@ def functional_landmarks(
                 )
             messages.append(_put_centre(joint_centre(motion), found, joint, turned, where, trials[joint].name))
         else:
-            if turned[0] < _KNEE_DEG:
+            if turned[0] < KNEE_DEG:
                 raise ModelError(
-                    f"{where}: the knee turns through {turned[0]:.0f} deg, expected {_KNEE_DEG:g} deg or more"
+                    f"{where}: the knee turns through {turned[0]:.0f} deg, expected {KNEE_DEG:g} deg or more"
                 )
             messages.append(_put_axis(joint_axis(motion), found, finder, joint, turned, where, trials[joint].name))
         put_middles(found, *(("hip",) if name == "hip" else ("knee", "knee_lateral")))
@@ -113,10 +113,10 @@ def _refuse_unmarked(joint: str, found: Mapping[str, Array], finder: LandmarkFin
 
 
 def _put_centre(centre: Centre, found: dict[str, Array], joint: str, turned: Array, where: str, file: str) -> str:
-    if centre.residual_m > _HIP_RESIDUAL_M:
+    if centre.residual_m > CENTRE_RESIDUAL_M:
         raise ModelError(
             f"{where}: pelvis and thigh do not turn about one point (it moves by {1e3 * centre.residual_m:.0f} mm, "
-            f"expected at most {1e3 * _HIP_RESIDUAL_M:g} mm)"
+            f"expected at most {1e3 * CENTRE_RESIDUAL_M:g} mm)"
         )
     if centre.sd_m > _HIP_SD_M:
         raise ModelError(
@@ -143,10 +143,10 @@ def _put_centre(centre: Centre, found: dict[str, Array], joint: str, turned: Arr
 def _put_axis(
     axis: JointAxis, found: dict[str, Array], finder: LandmarkFinder, joint: str, turned: Array, where: str, file: str
 ) -> str:
-    if axis.residual_deg > _KNEE_RESIDUAL_DEG:
+    if axis.residual_deg > KNEE_RESIDUAL_DEG:
         raise ModelError(
             f"{where}: thigh and shank do not turn about one axis (it turns by {axis.residual_deg:.1f} deg, expected "
-            f"at most {_KNEE_RESIDUAL_DEG:g} deg)"
+            f"at most {KNEE_RESIDUAL_DEG:g} deg)"
         )
     letter = joint[-1]
     centre, lateral = found[joint], found[f"knee_lateral_{letter}"]

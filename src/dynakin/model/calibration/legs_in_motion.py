@@ -17,20 +17,26 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.errors import ModelError
-from dynakin.model.calibration.completion import HOLD, Proportions, laid
+from dynakin.model.calibration.completion import Proportions, laid
 from dynakin.model.calibration.frames import Trial
-from dynakin.model.calibration.functional import SIDE_OF, joint_motion, put_middles
-from dynakin.model.calibration.joint_motion import Centre, joint_axis, joint_centre
+from dynakin.model.calibration.functional import (
+    CENTRE_RESIDUAL_M,
+    KNEE_DEG,
+    KNEE_RESIDUAL_DEG,
+    SIDE_OF,
+    joint_motion,
+    put_middles,
+)
+from dynakin.model.calibration.joint_motion import Centre, JointMotion, joint_axis, joint_centre
 from dynakin.recordings.recording import Recording
 
 Array = npt.NDArray[np.float64]
 
 LEG_JOINTS = ("knee_r", "knee_l", "ankle_r", "ankle_l")
-_RANGE_DEG = {"knee": 40.0, "ankle": 15.0}
-"""Least range of motion; of a knee as in functional trials."""
-_AXIS_RESIDUAL_DEG, _AXIS_SD_DEG = 5.0, 20.0
-_CENTRE_RESIDUAL_M = 0.015
-"""As in functional trials; but how well an axis is known is asked there of the people who read it."""
+_RANGE_DEG = {"knee": KNEE_DEG, "ankle": 15.0}
+"""Least range of motion."""
+_AXIS_SD_DEG = 20.0
+"""How well a knee's axis must be known; that of functional trials is read by people."""
 _TURNED_RAD = np.radians(10.0)
 """Frames in which a knee is turned less from the calibration frames say nothing of its axis; a person who stands for
 most of a trial has many."""
@@ -67,129 +73,135 @@ def legs_in_motion(
         if not lacking or not {"hip_r", "hip_l"} <= landmarks.keys():
             continue
         names = f"{side} {' and '.join(name.split('_')[0] for name in lacking)}"
-        unmarked = [name for name in lacking if name.startswith("knee") or f"malleoli_{letter}" not in landmarks]
+        leg = _Leg(landmarks, letter, moving, source, frames, height_m)
         try:
-            places, said = _leg(landmarks, letter, moving, source, frames, height_m)
+            places, said = leg.places()
         except ModelError as error:
             found.failed.append(f"The movement does not show the {names}: {error.message}.")
-            places = {} if f"ankle_{letter}" in landmarks else _motionless_ankle(landmarks, letter, height_m)
-            unmarked = [name for name in unmarked if name in places]
+            ankle = leg.ankle_at_rest()
+            places = {} if ankle is None else {f"ankle_{letter}": ankle}
         else:
             found.messages.append(
                 f"{names.capitalize()}: no marker shows the joint, so it is where the segments turn against each other "
                 f"in the movement, with a leg that is straight seen from the front.{said}"
             )
         found.landmarks |= places
-        found.joints += unmarked
+        found.joints += [n for n in lacking if n in places and (n.startswith("knee") or leg.marked_ankle() is None)]
     put_middles(found.landmarks, "knee", "knee_lateral", "ankle")
     return found
 
 
-def _leg(
-    landmarks: Mapping[str, Array],
-    letter: str,
-    moving: Recording,
-    source: Trial,
-    frames: npt.NDArray[np.intp],
-    height_m: float,
-) -> tuple[dict[str, Array], str]:
-    """Knee, its outer end and ankle of one leg, those that are known as they are, and what did not help."""
-    hip, knee, lateral, ankle = (landmarks.get(f"{n}_{letter}") for n in ("hip", "knee", "knee_lateral", "ankle"))
-    ankle = landmarks.get(f"malleoli_{letter}") if ankle is None else ankle
-    assert hip is not None
-    below = ankle if ankle is not None else _by_foot(landmarks, letter, height_m)
-    across = None if knee is None or lateral is None else (lateral - knee) / np.linalg.norm(lateral - knee)
-    if across is None or knee is None:
-        motion, _ = joint_motion(f"knee_{letter}", moving, landmarks, source, frames, f"{SIDE_OF[letter]} knee")
-        _require(motion.range_deg[0], _RANGE_DEG["knee"], "knee")
+@dataclass(frozen=True, eq=False)
+class _Leg:
+    """One leg of `legs_in_motion`, with its arguments."""
+
+    landmarks: Mapping[str, Array]
+    letter: str
+    moving: Recording
+    source: Trial
+    frames: npt.NDArray[np.intp]
+    height_m: float
+
+    def places(self) -> tuple[dict[str, Array], str]:
+        """Knee, its outer end and ankle, those that are known as they are, and what did not help."""
+        knee, lateral, ankle = self._known("knee"), self._known("knee_lateral"), self.marked_ankle()
+        below = self.ankle_at_rest()
+        if below is None:
+            raise ModelError("no markers show heel and toes")
+        if knee is not None and lateral is not None:
+            across = (lateral - knee) / np.linalg.norm(lateral - knee)
+        else:
+            motion, across = self._knee_axis()
+            knee = self._knee(motion, across, below) if knee is None else knee
+        said = ""
+        if ankle is None:
+            try:
+                ankle = self._ankle(across, below)
+            except ModelError as error:
+                ankle, said = below, f" The ankle is that of a foot of usual shape: {error.message}."
+            self._check_bone(ankle, knee, ("knee_r", "ankle_r"), "shank")
+        lateral = knee + self._usual("knee_lateral_r", "knee_r") * across if lateral is None else lateral
+        found = {"knee": knee, "knee_lateral": lateral, "ankle": ankle}
+        return {f"{name}_{self.letter}": place for name, place in found.items()}, said
+
+    def marked_ankle(self) -> Array | None:
+        """As the markers have it; between the malleoli, whose recipe asks for the knee, where that is lacking."""
+        ankle = self._known("ankle")
+        return self._known("malleoli") if ankle is None else ankle
+
+    def ankle_at_rest(self) -> Array | None:
+        """As marked, else that of a foot of usual shape laid on the markers' heel and toes; None where these are not
+        marked either."""
+        if (ankle := self.marked_ankle()) is not None:
+            return ankle
+        shape = {name: self.height_m * place for name, place in Proportions.load().landmarks.items()}
+        names = [f"{name}_{self.letter}" for name in ("heel", "toe", "metatarsals")]
+        shown = [name for name in names if name in self.landmarks]
+        if names[0] not in shown or len(shown) < 2:
+            return None
+        source, target = (np.array([places[name] for name in shown]) for places in (shape, self.landmarks))
+        turn, shift = laid(source, target, np.ones(len(shown)), np.eye(3), self.height_m)
+        return np.asarray(turn @ shape[f"ankle_{self.letter}"] + shift)
+
+    def _known(self, name: str) -> Array | None:
+        return self.landmarks.get(f"{name}_{self.letter}")
+
+    def _motion(self, joint: str) -> JointMotion:
+        """Of a joint that turns far enough."""
+        own, where = f"{joint}_{self.letter}", f"{SIDE_OF[self.letter]} {joint}"
+        motion, _ = joint_motion(own, self.moving, self.landmarks, self.source, self.frames, where)
+        turned, least = motion.range_deg[0], _RANGE_DEG[joint]
+        if turned < least:
+            raise ModelError(f"the {joint} turns through {turned:.2f} deg, expected {least:g} deg or more")
+        return motion
+
+    def _knee_axis(self) -> tuple[JointMotion, Array]:
+        """The knee's motion where it is turned, and its axis outwards."""
+        motion = self._motion("knee")
         motion = motion.part(motion.angles_rad() > _TURNED_RAD)
         axis = joint_axis(motion)
-        if axis.residual_deg > _AXIS_RESIDUAL_DEG or axis.sd_deg > _AXIS_SD_DEG:
+        if axis.residual_deg > KNEE_RESIDUAL_DEG or axis.sd_deg > _AXIS_SD_DEG:
             raise ModelError(
                 f"thigh and shank do not turn about one axis (it turns by {axis.residual_deg:.1f} deg, expected at "
-                f"most {_AXIS_RESIDUAL_DEG:g}, and is known to {axis.sd_deg:.1f} deg, expected {_AXIS_SD_DEG:g})"
+                f"most {KNEE_RESIDUAL_DEG:g}, and is known to {axis.sd_deg:.1f} deg, expected {_AXIS_SD_DEG:g})"
             )
-        outward = (landmarks["hip_r"] - landmarks["hip_l"]) * (1.0 if letter == "r" else -1.0)
-        across = axis.direction * np.sign(axis.direction @ outward)
-        if knee is None:
-            line = (below - hip) / np.linalg.norm(below - hip)
-            upright = across - line * float(across @ line)
-            centre = joint_centre(motion, (upright / np.linalg.norm(upright), hip))
-            _check_residual(centre, "thigh")
-            knee = centre.point
-            _check_bone(knee, hip, height_m, ("hip_r", "knee_r"), "thigh")
-    said = ""
-    if ankle is None:
-        try:
-            ankle = _ankle(landmarks, letter, moving, source, frames, (across, below))
-        except ModelError as error:
-            ankle, said = below, f" The ankle is that of a foot of usual shape: {error.message}."
-        _check_bone(ankle, knee, height_m, ("knee_r", "ankle_r"), "shank")
-    if lateral is None:
+        outward = (self.landmarks["hip_r"] - self.landmarks["hip_l"]) * (1.0 if self.letter == "r" else -1.0)
+        return motion, axis.direction * np.sign(axis.direction @ outward)
+
+    def _knee(self, motion: JointMotion, across: Array, ankle: Array) -> Array:
+        """On the axis, in the plane through hip and ankle."""
+        hip = self.landmarks[f"hip_{self.letter}"]
+        line = (ankle - hip) / np.linalg.norm(ankle - hip)
+        upright = across - line * float(across @ line)
+        centre = joint_centre(motion, (upright / np.linalg.norm(upright), hip))
+        _check_residual(centre, "thigh")
+        self._check_bone(centre.point, hip, ("hip_r", "knee_r"), "thigh")
+        return centre.point
+
+    def _ankle(self, across: Array, by_foot: Array) -> Array:
+        """By the foot's shape, and along the plane across the leg's axis by the movement as well."""
+        centre = joint_centre(self._motion("ankle"), (across, by_foot))
+        _check_residual(centre, "shank")
+        part = _FOOT_SD_M**2 / (_FOOT_SD_M**2 + centre.sd_m**2)
+        apart = centre.point - by_foot
+        return np.asarray(by_foot + part * (apart - across * float(across @ apart)))
+
+    def _usual(self, start: str, end: str) -> float:
+        """The distance (m) of two landmarks of an adult of this height."""
         places = Proportions.load().landmarks
-        lateral = knee + height_m * float(np.linalg.norm(places["knee_lateral_r"] - places["knee_r"])) * across
-    return {f"knee_{letter}": knee, f"knee_lateral_{letter}": lateral, f"ankle_{letter}": ankle}, said
+        return self.height_m * float(np.linalg.norm(places[start] - places[end]))
 
-
-def _shown(landmarks: Mapping[str, Array], letter: str) -> list[str]:
-    """Heel and toes, as far as they are marked; none where the heel, or all else, is not."""
-    shown = [name for name in (f"{each}_{letter}" for each in ("heel", "toe", "metatarsals")) if name in landmarks]
-    return shown if f"heel_{letter}" in shown and len(shown) > 1 else []
-
-
-def _motionless_ankle(landmarks: Mapping[str, Array], letter: str, height_m: float) -> dict[str, Array]:
-    """The ankle between the malleoli, else by the foot's shape; nothing where neither is marked."""
-    if f"malleoli_{letter}" in landmarks:  # whose recipe asks for the knee, too
-        return {f"ankle_{letter}": landmarks[f"malleoli_{letter}"]}
-    return {f"ankle_{letter}": _by_foot(landmarks, letter, height_m)} if _shown(landmarks, letter) else {}
-
-
-def _by_foot(landmarks: Mapping[str, Array], letter: str, height_m: float) -> Array:
-    """The ankle of a foot of usual shape laid on the markers' heel and toes."""
-    shape = {name: height_m * place for name, place in Proportions.load().landmarks.items()}
-    shown = _shown(landmarks, letter)
-    if not shown:
-        raise ModelError("no markers show heel and toes")
-    source, target = (np.array([places[name] for name in shown]) for places in (shape, landmarks))
-    turn, shift = laid(source, target, np.ones(len(shown)), np.eye(3), HOLD * height_m)
-    return np.asarray(turn @ shape[f"ankle_{letter}"] + shift)
-
-
-def _ankle(
-    landmarks: Mapping[str, Array],
-    letter: str,
-    moving: Recording,
-    source: Trial,
-    frames: npt.NDArray[np.intp],
-    foot: tuple[Array, Array],
-) -> Array:
-    """The ankle by the foot's shape, and along the plane across the leg's axis by the movement as well."""
-    across, by_foot = foot
-    motion, _ = joint_motion(f"ankle_{letter}", moving, landmarks, source, frames, f"{SIDE_OF[letter]} ankle")
-    _require(motion.range_deg[0], _RANGE_DEG["ankle"], "ankle")
-    centre = joint_centre(motion, (across, by_foot))
-    _check_residual(centre, "shank")
-    part = _FOOT_SD_M**2 / (_FOOT_SD_M**2 + centre.sd_m**2)
-    apart = centre.point - by_foot
-    return np.asarray(by_foot + part * (apart - across * float(across @ apart)))
-
-
-def _require(turned_deg: float, least_deg: float, joint: str) -> None:
-    if turned_deg < least_deg:
-        raise ModelError(f"the {joint} turns through {turned_deg:.2f} deg, expected {least_deg:g} deg or more")
+    def _check_bone(self, below: Array, above: Array, ends: tuple[str, str], bone: str) -> None:
+        usual, length = self._usual(*ends), float(np.linalg.norm(below - above))
+        if abs(length / usual - 1.0) > _BONE:
+            raise ModelError(
+                f"the {bone} would be {length:.2f} m long, expected {usual:.2f} m give or take {_BONE:.0%}"
+            )
 
 
 def _check_residual(centre: Centre, bone: str) -> None:
-    if centre.residual_m > _CENTRE_RESIDUAL_M:
+    if centre.residual_m > CENTRE_RESIDUAL_M:
         raise ModelError(
             f"the segments below and above the {bone}'s lower end do not turn about one point (it moves by "
-            f"{1e3 * centre.residual_m:.0f} mm, expected at most {1e3 * _CENTRE_RESIDUAL_M:g} mm)"
+            f"{1e3 * centre.residual_m:.0f} mm, expected at most {1e3 * CENTRE_RESIDUAL_M:g} mm)"
         )
-
-
-def _check_bone(below: Array, above: Array, height_m: float, ends: tuple[str, str], bone: str) -> None:
-    places = Proportions.load().landmarks
-    usual = height_m * float(np.linalg.norm(places[ends[0]] - places[ends[1]]))
-    length = float(np.linalg.norm(below - above))
-    if abs(length / usual - 1.0) > _BONE:
-        raise ModelError(f"the {bone} would be {length:.2f} m long, expected {usual:.2f} m give or take {_BONE:.0%}")
