@@ -45,7 +45,7 @@ def print_summary(result: Result, folder: Path) -> None:
         console.print(f"Report   {folder / 'report.html'}", soft_wrap=True)
 
 
-SAID_BEFORE = ("Joint moments", "Mass")
+SAID_BEFORE = ("Joint moments", "Mass", "Joint centres")
 """Titles of findings that stand above the figures."""
 ALWAYS = ("Uncertainty", "Adaptation")
 """Those that are said where they are no warning too."""

@@ -82,8 +82,8 @@ def legs_in_motion(
             places = {} if ankle is None else {f"ankle_{letter}": ankle}
         else:
             found.messages.append(
-                f"{names.capitalize()}: no marker shows the joint, so it is where the segments turn against each other "
-                f"in the movement, with a leg that is straight seen from the front.{said}"
+                f"{names.capitalize()}: where the segments turn against each other in the movement, with a leg that is "
+                f"straight seen from the front.{said}"
             )
         found.landmarks |= places
         found.joints += [n for n in lacking if n in places and (n.startswith("knee") or leg.marked_ankle() is None)]

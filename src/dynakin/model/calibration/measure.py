@@ -144,6 +144,12 @@ def measure(
         if supposed and not still:
             raise ModelError(_no_legs(supposed, source, static, legs))
         unmarked = tuple(name for name in LEG_JOINTS if name in (*legs.joints, *supposed))
+        if unmarked:
+            messages.append(
+                f"Warning: no marker shows {', '.join(sorted(unmarked))}: they are where the movement, or else the "
+                "proportions of an adult who stands, has them, to one or two centimetres. Give a standing trial with "
+                "markers on knees and ankles (--static)."
+            )
     landmarks = found.landmarks
 
     set_, names = source.match.marker_set, source.match.names
