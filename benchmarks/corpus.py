@@ -4,7 +4,8 @@
 
 A second row has what lies beside a recording (`recordings.beside`: ground forces, the same person standing). Then the
 differences from what the files themselves hold: Vicon's angles, moments and powers, OpenSim's IK and ID. Runs are kept
-in ``build/recordings`` by their inputs and the source. ``--write`` puts the tables into ``docs/validation.md``.
+in ``build/recordings`` by their inputs and the source. ``--write`` puts the tables into
+``docs/validation/recordings.md``.
 """
 
 from __future__ import annotations
@@ -20,6 +21,7 @@ from typing import Any
 
 import xarray as xr
 from corpus_references import Difference, Key, Theirs, differences, of_opensim, of_vicon
+from pages import put
 from source_digest import source_digest
 
 from dynakin.errors import DynakinError
@@ -27,9 +29,8 @@ from dynakin.recordings.beside import STANDING_WORDS, forces_beside, static_besi
 from dynakin.recordings.frame import find_laboratory_frame
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
-from recordings import DATA, kept, put_between
+from recordings import DATA, kept
 
-MARKS = ("<!-- corpus: begin -->", "<!-- corpus: end -->")
 ANGLE_GOAL_DEG, MOMENT_GOAL = 5.0, 0.15
 """RMS after offset; N m/kg. One recording that Vicon processed twice differs by 0.10 to 0.17 N m/kg."""
 _FROM = {
@@ -204,7 +205,7 @@ def main() -> None:
     parser.add_argument("--only", action="append", default=[], help="part of the names of recordings; all else is left")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--out", type=Path, help="also write the tables here (.md)")
-    parser.add_argument("--write", action="store_true", help="put the tables into docs/validation.md")
+    parser.add_argument("--write", action="store_true", help="put the tables into docs/validation/recordings.md")
     asked = parser.parse_args()
     paths = [
         path.absolute()
@@ -220,7 +221,7 @@ def main() -> None:
     if asked.out is not None:
         asked.out.write_text("\n".join(lines) + "\n", encoding="utf-8")
     if asked.write:
-        put_between(MARKS, lines)
+        put("validation/recordings.md", "corpus", lines)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""The presets by their error against simulated truth, live and smoothed: the second table of docs/validation.md.
+"""The presets by their error against simulated truth, live and smoothed: the second table of docs/validation/planar.md.
 
     python benchmarks/estimator_by_error.py [--model sagittal7] [--seeds 1 20] [--duration 30] [--set KEY=VALUE]
 

@@ -14,14 +14,14 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from known_truth import KEPT, ROOT, Array, Run, run
+from known_truth import KEPT, Array, Run, run
 from known_truth_cases import GIVEN, given
+from pages import DOCS, put
 
 from dynakin.results.measures.sources import ABSENT, MEASURED
 from dynakin.validation.coverage import Z_95
 
-PAGE, FIGURE = ROOT / "docs" / "accuracy.md", ROOT / "docs" / "figures" / "accuracy.png"
-MARKS = ("<!-- given: begin -->", "<!-- given: end -->")
+FIGURE = DOCS / "figures" / "accuracy.png"
 MOTIONS = {"gait": "Walking", "squat": "Squatting"}
 JOINTS = {"hip": "hip_flexion", "knee": "knee_angle", "ankle": "ankle_angle"}
 BLOCKS = {"angles": "coordinates", "speeds": "speeds", "moments": "moments"}
@@ -181,12 +181,7 @@ def main() -> None:
     print("\n".join(lines))
     if asked.write:
         draw(found)
-        page = PAGE.read_text(encoding="utf-8")
-        before, _, rest = page.partition(MARKS[0])
-        _, mark, after = rest.partition(MARKS[1])
-        if not mark:
-            raise SystemExit(f"{PAGE} lacks {MARKS[0]} and {MARKS[1]}")
-        PAGE.write_text(before + "\n".join([MARKS[0], "", *lines, MARKS[1]]) + after, encoding="utf-8")
+        put("accuracy.md", "given", lines)
 
 
 if __name__ == "__main__":

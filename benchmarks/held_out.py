@@ -4,7 +4,7 @@
 
 `dynakin.validation.unseen_in_space` on parts of recordings of ``../shared/data``: the filter, smoothed, beside inverse
 kinematics and dynamics on the same calibrated model. Figures are kept in ``build/held_out``, one file a recording;
-``--write`` puts the table of all that are kept into ``docs/validation.md``.
+``--write`` puts the table of all that are kept into ``docs/validation/held_out.md``.
 """
 
 from __future__ import annotations
@@ -14,6 +14,8 @@ import json
 from dataclasses import dataclass
 from pathlib import Path
 
+from pages import put
+
 from dynakin.model.definition import load_model
 from dynakin.recordings.read import read
 from dynakin.settings.defaults import HORIZON_S
@@ -22,10 +24,9 @@ from dynakin.validation.setup import Setup
 from dynakin.validation.table2 import MARKERS
 from dynakin.validation.unseen import unseen_figures
 from dynakin.validation.yardsticks import LEFT_OUT, LINEAR, PERSISTENCE, WITHHELD, Figures, ahead
-from recordings import DATA, ROOT, TRIALS, put_between
+from recordings import DATA, ROOT, TRIALS
 
 KEPT = ROOT / "build" / "held_out"
-MARKS = ("<!-- held out: begin -->", "<!-- held out: end -->")
 AHEAD = ahead(HORIZON_S)
 FORCE, MOMENT = ("fx", "fy", "fz"), ("mx", "my", "mz")
 ROWS = (
@@ -110,7 +111,7 @@ def main() -> None:
     parser.add_argument("names", nargs="*", help="parts of recordings' names; none: all")
     parser.add_argument("--model", default="fullbody", choices=["fullbody", "osim"])
     parser.add_argument("--again", action="store_true", help="also where figures are kept")
-    parser.add_argument("--write", action="store_true", help="put the table into docs/validation.md")
+    parser.add_argument("--write", action="store_true", help="put the table into docs/validation/held_out.md")
     asked = parser.parse_args()
     KEPT.mkdir(parents=True, exist_ok=True)
     for part in PARTS:
@@ -124,7 +125,7 @@ def main() -> None:
     lines = table()
     print("\n".join(lines))
     if asked.write:
-        put_between(MARKS, lines)
+        put("validation/held_out.md", "held out", lines)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Methods by their error against the truth of simulated squats: the table of docs/validation.md.
+"""Methods by their error against the truth of simulated squats: the table of docs/validation/planar.md.
 
     python benchmarks/methods_by_error.py [FIRST_SEED LAST_SEED]
 

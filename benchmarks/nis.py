@@ -5,7 +5,7 @@
 Each recording of ``../shared/data`` is prepared as `benchmarks/recordings.py` runs it (its own .osim, else
 ``fullbody``). Its noise is calibrated on every other stretch (`filter.adapt`) and judged on the others, of the first
 20 s. A stretch is a second, or a tenth of a recording shorter than 10 s. Figures are kept in ``build/nis``, one file a
-recording; ``--write`` puts the table of all that are kept into ``docs/validation.md``.
+recording; ``--write`` puts the table of all that are kept into ``docs/validation/noise.md``.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from pages import put
 
 from dynakin.errors import DynakinError
 from dynakin.filter.adapt import Flags, Trial, calibrated_noise, nis_per_row
@@ -24,11 +25,10 @@ from dynakin.filter.tracker import Tracker
 from dynakin.settings.noise import JointGroup
 from dynakin.settings.settings import Settings
 from dynakin.validation.case import case_of
-from recordings import DATA, ROOT, TRIALS, Array, put_between
+from recordings import DATA, ROOT, TRIALS, Array
 from recordings import Trial as Known
 
 KEPT = ROOT / "build" / "nis"
-MARKS = ("<!-- nis: begin -->", "<!-- nis: end -->")
 LONGEST_S = 20.0
 GROUPS: tuple[JointGroup, ...] = ("pelvis", "upper_body", "hips", "knees", "feet")
 HEAD = (
@@ -42,7 +42,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", help="parts of recordings' names; none: all")
     parser.add_argument("--model", default="own", choices=["own", "fullbody"], help="own: a recording's .osim")
-    parser.add_argument("--write", action="store_true", help="put the table into docs/validation.md")
+    parser.add_argument("--write", action="store_true", help="put the table into docs/validation/noise.md")
     asked = parser.parse_args()
     KEPT.mkdir(parents=True, exist_ok=True)
     for trial in TRIALS:
@@ -51,7 +51,7 @@ def main() -> None:
             kept(trial, asked.model).write_text(json.dumps(found, indent=1), encoding="utf-8")
             print(row(trial, found), flush=True)
     if asked.write:
-        put_between(MARKS, table(asked.model))
+        put("validation/noise.md", "nis", table(asked.model))
 
 
 def kept(trial: Known, wanted: str) -> Path:

@@ -5,7 +5,7 @@
 Each runs with its own .osim, else ``fullbody``, and no option but the mass, the forces and the standing trial that
 belong to it. What is measured, derived, prior and absent is what ``estimate.nc`` says (``moment_source``). Runs are
 kept in ``build/recordings`` by their inputs and the source, so that the table can be made again. ``--write`` puts the
-tables into ``docs/validation.md``.
+tables into ``docs/validation/recordings.md``.
 """
 
 from __future__ import annotations
@@ -25,6 +25,7 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
+from pages import put
 from recordings_references import JOINTS, SIDES, Array, Inverse, Reference, bodies_under, of_c3d, of_storage
 from source_digest import source_digest
 
@@ -33,8 +34,6 @@ from dynakin.results.measures.sources import MEANINGS, MEASURED
 ROOT = Path(__file__).resolve().parents[1]
 DATA = Path(os.environ.get("DYNAKIN_TEST_DATA", ROOT.parent / "shared" / "data"))
 KEPT = ROOT / "build" / "recordings"
-PAGE = ROOT / "docs" / "validation.md"
-MARKS = ("<!-- recordings: begin -->", "<!-- recordings: end -->")
 LIMIT_S = 1800.0
 SHOWN = 240  # characters of a refusal
 Make = Callable[[], Reference]
@@ -355,20 +354,12 @@ def tables(runs: list[Run]) -> Iterator[str]:
             yield f"| `{each.trial.name}` | {reference.what} | {joint} | {cells[0]} | {cells[1]} |"
 
 
-def put_between(marks: tuple[str, str], lines: list[str]) -> None:
-    """Into the page, in the place of what stands between these marks."""
-    text = PAGE.read_text(encoding="utf-8")
-    before, rest = text.split(marks[0], 1)
-    after = rest.split(marks[1], 1)[1]
-    PAGE.write_text("\n".join([before + marks[0], "", *lines, "", marks[1] + after]), encoding="utf-8")
-
-
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("names", nargs="*", help="parts of recordings' names; all where none is given")
     parser.add_argument("--jobs", type=int, default=2)
     parser.add_argument("--model", choices=("own", "fullbody"), default="own", help="own: a recording's .osim")
-    parser.add_argument("--write", action="store_true", help=f"put the tables into {PAGE.relative_to(ROOT)}")
+    parser.add_argument("--write", action="store_true", help="put the tables into docs/validation/recordings.md")
     asked = parser.parse_args()
     chosen = [t for t in TRIALS if not asked.names or any(part in t.name for part in asked.names)]
     source = source_digest()
@@ -377,7 +368,7 @@ def main() -> None:
     lines = list(tables(runs))
     print("\n".join(lines))
     if asked.write:
-        put_between(MARKS, lines)
+        put("validation/recordings.md", "recordings", lines)
 
 
 if __name__ == "__main__":

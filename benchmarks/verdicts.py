@@ -12,7 +12,7 @@ times. For each group and word, of runs with declared noise and with calibrated 
 with the best balanced accuracy on one half of the seeds are taken; the tables are of the other. Where no threshold
 reaches `LEAST_ACCURACY`, the limit lies beyond all runs of that half.
 
-``--write`` puts thresholds into ``results/measures/verdicts.toml`` and the tables into ``docs/validation.md``;
+``--write`` puts thresholds into ``results/measures/verdicts.toml`` and the tables into ``docs/validation/verdicts.md``;
 ``--present`` judges the thresholds as they are and chooses none, ``--write`` then puts down tables alone; ``--again``
 runs everything anew (else what was kept); ``--kept`` takes only what was kept.
 """
@@ -34,6 +34,7 @@ import numpy as np
 import xarray as xr
 from known_truth import KEPT, ROOT, Array, run
 from known_truth_cases import TROUBLES, troubled
+from pages import put
 
 from dynakin.results.measures.consistency import (
     INSIDE,
@@ -53,8 +54,6 @@ from dynakin.validation.coverage import Z_95
 
 TRUTH3D = Path("/work/t3d/cache")
 TARGET = ROOT / "src" / "dynakin" / "results" / "measures" / "verdicts.toml"
-PAGE = ROOT / "docs" / "validation.md"
-MARKS = ("<!-- verdicts: begin -->", "<!-- verdicts: end -->")
 SEEDS = {"sagittal": (1, 2, 3, 4), "gait": (1, 2, 3, 4, 5, 6), "squat": (1, 2, 3, 4, 5, 6)}
 WINDOWS_S = {"squat": (2.0, np.inf), "walk": (0.3, 3.1)}
 """As truth3d judges."""
@@ -284,7 +283,7 @@ def by_trouble(trials: Sequence[Trial], limits: AllLimits) -> list[str]:
 def toml(limits: AllLimits, trials: int, judged: int) -> str:
     lines = [
         "# When a run is called conservative or overconfident. Written by `benchmarks/verdicts.py --write`: chosen on",
-        f"# {trials} trials with known truth, judged on {judged} others (docs/validation.md).",
+        f"# {trials} trials with known truth, judged on {judged} others (docs/validation/verdicts.md).",
         "# A statistic is one of `statistics_of`; conservative below its value, overconfident above. Where no",
         f"# threshold told a word's runs from others, its value lies beyond all of the first by a factor of {ROOM:g}.",
     ]
@@ -329,12 +328,7 @@ def main() -> None:
     if asked.write:
         if not asked.present:
             TARGET.write_text(toml(taken, len(choosing), len(judging)), encoding="utf-8")
-        page = PAGE.read_text(encoding="utf-8")
-        before, _, rest = page.partition(MARKS[0])
-        _, mark, after = rest.partition(MARKS[1])
-        if not mark:
-            raise SystemExit(f"{PAGE} lacks {MARKS[0]} and {MARKS[1]}")
-        PAGE.write_text(before + "\n".join([MARKS[0], "", *text, "", MARKS[1]]) + after, encoding="utf-8")
+        put("validation/verdicts.md", "verdicts", text)
 
 
 if __name__ == "__main__":

@@ -6,7 +6,7 @@ Recordings of ``../shared/data`` and simulated trials run with all their plates,
 without those of the right and of the left foot, and with all of them summed into one ("shared"). Forces and centres of
 pressure are judged against the withheld plates (simulated: the truth), moments against those that the run with all
 plates calls measured (simulated: the truth). What is kept in ``build/withheld`` is found by inputs and source.
-``--write`` puts the tables into ``docs/validation.md``, a JSON with every figure goes to ``build/withheld``.
+``--write`` puts the tables into ``docs/validation/plates.md``, a JSON with every figure goes to ``build/withheld``.
 """
 
 from __future__ import annotations
@@ -20,6 +20,7 @@ from typing import Any
 
 import numpy as np
 from kept_runs import Run, kept_run
+from pages import put
 from withheld_judge import (
     FORCES,
     HEAD,
@@ -44,10 +45,9 @@ from dynakin.recordings.recording import Plate, Recording
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.trial import simulate
 from dynakin.units import GRAVITY_M_S2
-from recordings import DATA, PAGE, ROOT, TRIALS, put_between
+from recordings import DATA, ROOT, TRIALS
 
 KEPT = ROOT / "build" / "withheld"
-MARKS = ("<!-- withheld: begin -->", "<!-- withheld: end -->")
 NOTHING, ALL, RIGHT, LEFT, SHARED = ARMS = ("nothing", "all", "right", "left", "shared")
 POOLED = {NOTHING: (NOTHING,), ALL: (ALL,), "one of two": (RIGHT, LEFT), SHARED: (SHARED,)}
 Spans = tuple[tuple[float, float], ...]
@@ -309,7 +309,7 @@ def main() -> None:
     parser.add_argument("--live", action="store_true", help="each frame as it would be live, instead of smoothed")
     parser.add_argument("--model", choices=("own", "fullbody"), default="own", help="own: a recording's .osim")
     parser.add_argument("-o", "--output", type=Path, help="JSON file (build/withheld/withheld*.json)")
-    parser.add_argument("--write", action="store_true", help=f"put the table into {PAGE.relative_to(ROOT)}")
+    parser.add_argument("--write", action="store_true", help="put the table into docs/validation/plates.md")
     asked = parser.parse_args()
     chosen = [c for c in CASES if not asked.names or any(part in title(c) for part in asked.names)]
     found = [judged(c, asked.live, asked.model == "fullbody", lambda t: print(t, flush=True)) for c in chosen]
@@ -327,7 +327,7 @@ def main() -> None:
     output.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
     print(f"{output}, {content['seconds']:.0f} s of estimates")
     if asked.write:
-        put_between(MARKS, lines)
+        put("validation/plates.md", "withheld", lines)
 
 
 if __name__ == "__main__":

@@ -115,7 +115,7 @@ LANDMARKS = Sizes(
 """Joints that are found from markers on the skin."""
 UNMARKED = replace(LANDMARKS, hinge_centre=0.015, hinge_axes=np.radians(6.0), pair_axes=np.radians(6.0))
 """Knees and ankles that no marker shows: on simulated squats their moments err two to five times as much
-(`docs/validation.md`)."""
+(`docs/validation/geometry.md`)."""
 SCALED = Sizes(
     hinge_centre=0.0014,
     ball_centre=0.0016,

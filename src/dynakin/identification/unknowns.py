@@ -29,7 +29,7 @@ class GeometryPriors:
     considered_length_m: float = 0.008
     """What a length that is held may be wrong by: it widens the deviations of what is estimated."""
     considered_zero_deg: float = 2.0
-    """The same of a zero: landmarks and skin turn a segment's frame by 1 to 4 deg (docs/validation.md)."""
+    """The same of a zero: landmarks and skin turn a segment's frame by 1 to 4 deg (docs/validation/geometry.md)."""
     plate_force_n: float = 3.0
     """A trial's own constant error of each force."""
     plate_moment_nm: float = 1.0

@@ -27,7 +27,7 @@ FITTING_MM = 15.0
 FOLLOWING = 4.0
 
 # Calibrated variances this many times the declared ones are said: good trials with known truth have below 0.2, and
-# cameras of 3 mm 1.3, whose deviations still hold (docs/validation.md).
+# cameras of 3 mm 1.3, whose deviations still hold (docs/validation/verdicts.md).
 NOISY = 2.0
 # A marker is named where it fits worse than half of all by this factor.
 STANDS_OUT = 3.0

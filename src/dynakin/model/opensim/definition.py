@@ -44,7 +44,7 @@ _MODEL_M = 0.003
 normalised innovations are consistent with it (1.1), and far too large with the cameras' noise alone (1.9 to 18)."""
 _SKIN_LASTS = 10.0 / 3.0
 """The skeleton's joints do not hang on the markers, so that what these show beside it is skin, which moves slowly:
-0.5 s with the default noise (`docs/validation.md`, What was tried)."""
+0.5 s with the default noise (`docs/validation/held_out.md`)."""
 
 
 @dataclass(frozen=True, eq=False)
