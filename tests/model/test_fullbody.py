@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -164,6 +166,14 @@ def test_a_person_without_arms_or_head_markers_has_them_locked() -> None:
     locked = {c.name for c in initial.spec.coordinates if c.locked}
     assert {"arm_flex_r", "elbow_flex_l", "neck_extension"} <= locked
     assert sum(body.mass for body in initial.plan.bodies.values()) == pytest.approx(70.0)
+
+
+def test_a_movement_that_never_shows_most_markers_at_once_is_refused() -> None:
+    whole = standing()
+    markers = whole.markers.copy()
+    markers[::2, ::2], markers[1::2, 1::2] = np.nan, np.nan  # each frame shows the other half
+    with pytest.raises(ModelError, match=r"no frame shows \d+ % of the \d+ markers"):
+        definition().calibrate(replace(whole, markers=markers), static=whole, vertical="+Y", forward=(1.0, 0.0, 0.0))
 
 
 def test_a_limb_written_once_has_two_sides() -> None:

@@ -50,6 +50,17 @@ def test_chain_joins_each_joint_to_the_next_and_the_last_to_its_farthest_marker(
     )
 
 
+def test_lost_frames_neither_choose_the_curve_nor_bend_it(jointed: Estimate) -> None:
+    data = jointed.data.copy(deep=True)
+    for name in ("coordinates", "markers_estimated", "joint_centres"):
+        data[name].loc[{"time": data["time"][40:60]}] = np.nan
+    data["lost"] = ("time", np.isin(np.arange(len(jointed.time)), np.arange(40, 60)))
+    lost, whole = playback(replace(jointed, data=data)), playback(jointed)
+    assert lost.curve_label.split(",")[0] == whole.curve_label.split(",")[0]
+    assert "nan" not in lost.curve and lost.curve.startswith("M")
+    assert chain_of(replace(jointed, data=data)).bones == chain_of(jointed).bones
+
+
 def test_force_acts_where_its_moment_vanishes(jointed: Estimate) -> None:
     wrench = np.full((len(jointed.time), 6), np.nan)
     wrench[:, [0, 1, 5]] = [30.0, 600.0, -72.0]

@@ -35,6 +35,13 @@ def folder(estimate: Estimate, tmp_path_factory: pytest.TempPathFactory) -> Path
     return Result(estimate).save(tmp_path_factory.mktemp("results") / "out")
 
 
+def test_every_variable_is_documented(folder: Path) -> None:
+    manual = (Path(__file__).parents[2] / "docs" / "formats.md").read_text(encoding="utf-8")
+    with xr.open_dataset(folder / "estimate.nc") as data:
+        names = [str(name) for name in data.data_vars if not str(name).startswith(("parameter_", "event_"))]
+    assert [name for name in names if f"`{name}`" not in manual] == []
+
+
 def test_all_files_are_there_and_none_is_left_beside(folder: Path) -> None:
     assert {entry.name for entry in folder.iterdir()} == set(OUTPUT_FILES)  # none of the optional ones
     assert [entry.name for entry in folder.parent.iterdir()] == ["out"]

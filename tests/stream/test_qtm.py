@@ -23,6 +23,7 @@ from support.stream.qtm_server import QtmServer
 
 pytest.importorskip("qtm_rt")
 from dynakin.stream.sources.qtm import QtmSource
+from dynakin.stream.sources.qtm_parameters import parse_parameters
 
 
 @pytest.fixture(scope="module")
@@ -131,6 +132,12 @@ def test_nobody_answers() -> None:
 def test_qtm_without_a_measurement_is_told_so(squat: Recording) -> None:
     with serving(squat, measuring=False) as server, pytest.raises(StreamError, match="no frames come within 1 s"):
         QtmSource("127.0.0.1", port=server.port).open(1.0)
+
+
+def test_plates_in_an_unknown_unit_are_refused() -> None:
+    text = "<P><The_3D><Label><Name>C7</Name></Label></The_3D><Force><Unit_Length>ell</Unit_Length><Plate/></Force></P>"
+    with pytest.raises(StreamError, match="unknown unit 'ell', expected mm, cm or m"):
+        parse_parameters(text, "qtm:here")
 
 
 @pytest.mark.parametrize("text", ["qtm:", "qtm:host,forces=floor", "qtm:host,port=x", "qtm:host,rate=3"])

@@ -94,7 +94,7 @@ def test_angles_and_moments_are_compared_coordinate_by_coordinate(compared: Tria
 def test_files_hold_the_rows_and_replace_only_an_earlier_comparison(compared: Trial, tmp_path: Path) -> None:
     rows = table2([compared])
     folder = tmp_path / "out"
-    save_comparison(folder, {"table2": rows, "angles": angle_differences([compared])})
+    save_comparison(folder, {"table2": rows, "angles": angle_differences([compared]), "truth": rows})
     save_comparison(folder, {"table2": rows})
     assert sorted(entry.name for entry in folder.iterdir()) == ["comparison.json", "table2.csv"]
     with (folder / "table2.csv").open() as file:

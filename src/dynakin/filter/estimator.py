@@ -313,17 +313,18 @@ class Estimator:
     def _measured(self, recording: Recording, calibrated: CalibratedModel) -> tuple[Array, Array, Ground]:
         markers, wrench = recording_arrays(recording, calibrated, gaps=self.noise.recover)
         tolerance = self.noise.plate_load_tolerance
-        return markers, wrench, known_ground(recording, calibrated, markers, wrench, self.plates, tolerance)
+        ground, wrench = known_ground(recording, calibrated, markers, wrench, self.plates, tolerance)
+        return markers, wrench, ground
 
-    def measured(self, recording: Recording, calibrated: CalibratedModel) -> tuple[Array, Array, list[str]]:
-        """What the filter takes of a recording: markers (T, M, 3) m, wrench (T, 6), NaN where it is not known (all of
-        it where the plates carry something that the model does not have), and what there is to say of the plates.
+    def measured(self, recording: Recording, calibrated: CalibratedModel) -> tuple[Array, Array]:
+        """What the filter takes of a recording: markers (T, M, 3) m, and wrench (T, 6), NaN where it is not known (all
+        of it where the plates carry something that the model does not have).
 
         Raises:
             RecordingError: markers or plates do not fit the model.
         """
-        markers, wrench, ground = self._measured(recording, calibrated)
-        return markers, wrench, list(ground.notes)
+        markers, wrench, _ = self._measured(recording, calibrated)
+        return markers, wrench
 
     def settings(self) -> dict[str, object]:
         """What was asked for, as plain data: written into the outputs."""

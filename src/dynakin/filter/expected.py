@@ -13,6 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
+import scipy.linalg
 
 from dynakin.filter.contacts import RESIDUAL, ContactLoads, carry
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -97,7 +98,7 @@ def expected_loads(
     K = F + C
     contact = np.concatenate([feet, np.where(bears, UNMEASURED, NO_CONTACT).astype(np.uint8)], axis=1)
     wrench = np.zeros((frames, K + 1, 6))
-    wrench[:, :F] = np.nan_to_num(loads.wrench)
+    wrench[:, :F] = np.where((feet == ON_PLATE)[..., None], loads.wrench, np.nan_to_num(loads.wrench))
     for k, name in enumerate(initial.contacts, start=F):
         if (measured := loads.others.get(name)) is not None:
             contact[:, k] = np.where(measured.any(axis=1), ON_PLATE, NO_CONTACT)
@@ -206,11 +207,13 @@ def _divide(t: int, feet: npt.NDArray[np.intp], priors: dict[int, Prior], wrench
     plate = plate_errors(wrench[t, feet].sum(axis=0)[None])[0]
     S = np.sum(list(each.values()), axis=0) + plate
     lacks = np.sum([wrench[t, k] - priors[k].mean[t] for k in feet], axis=0)
-    gains = {k: np.linalg.solve(S, each[k]).T for k in feet}
+    root = np.linalg.cholesky(S)
+    parts = {k: scipy.linalg.solve_triangular(root, each[k], lower=True) for k in feet}  # S^-1 = R^-T R^-1
+    lacking = scipy.linalg.solve_triangular(root, lacks, lower=True)
     for k in feet:
-        wrench[t, k] = priors[k].mean[t] + gains[k] @ lacks
+        wrench[t, k] = priors[k].mean[t] + parts[k].T @ lacking
         for j in feet:
-            errors[t, k, :, j] = (each[k] if j == k else 0.0) - gains[k] @ each[j]
+            errors[t, k, :, j] = (each[k] if j == k else 0.0) - parts[k].T @ parts[j]
 
 
 @dataclass(frozen=True)

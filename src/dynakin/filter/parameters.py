@@ -32,10 +32,10 @@ def parameters_of(
     """
     segments = {marker.name: marker.segment for marker in initial.spec.markers}
     skin = length_skin_sd(initial, length_skin_fraction)
-    units = _units_of_amounts(initial) | dict.fromkeys(initial.dimensionless, "1")
+    units = element_units(initial)
     found = []
     for k, name in enumerate(initial.names):
-        word, owner, last = element(name)
+        word, owner, _ = element(name)
         if word not in _KINDS:
             continue  # a coordinate, speed or acceleration
         kind = _KINDS[word]
@@ -48,7 +48,7 @@ def parameters_of(
                 name=name,
                 kind=kind,
                 segment=segments[owner] if kind == "marker" else "plates" if kind == "plates" else owner,
-                unit=units.get(owner) or _unit(kind, last or owner),
+                unit=units[name],
                 value=float(state[k]),
                 sd=float(np.hypot(sd[k], unseen)),
                 initial=float(initial.x0[k]),
@@ -65,19 +65,32 @@ def parameters_of(
         if not length.estimated:
             value = float(length.value)
             name = f"length/{length.name}"
-            unit = units.get(length.name, "m")
+            unit = _length_units(initial).get(length.name, "m")
             found.append(
                 Parameter(name, "length", length.name, unit, value, 0.0, value, None, None, None, False, False)
             )
     return found
 
 
-def _units_of_amounts(initial: CalibratedModel) -> dict[str, str]:
-    """Of lengths that scale an axis of a joint that turns: how far it moves along in a radian, or is turned itself."""
+def element_units(initial: CalibratedModel) -> dict[str, str]:
+    """The unit of each constant of the state, by its name: lengths, marker places, inertia, the plates' errors."""
+    lengths = _length_units(initial)
+    found = {}
+    for name in initial.names:
+        word, owner, last = element(name)
+        if word in _KINDS:
+            found[name] = lengths.get(owner) or _unit(_KINDS[word], last or owner)
+    return found
+
+
+def _length_units(initial: CalibratedModel) -> dict[str, str]:
+    """Of lengths that are none: factors, and what scales an axis of a joint that turns, which says how far it moves
+    along in a radian, or is turned itself."""
     kinds = kinds_of(initial.spec.segments)
     axes = [axis for segment in initial.spec.segments for axis in segment.axes if axis.scale]
     turning = [axis for axis in axes if kinds[axis.coordinate] == "rotation"]
-    return {a.scale: "m/rad" if a.kind == "translation" else "rad" for a in turning}
+    amounts = {a.scale: "m/rad" if a.kind == "translation" else "rad" for a in turning}
+    return amounts | dict.fromkeys(initial.dimensionless, "1")
 
 
 def length_skin_sd(initial: CalibratedModel, share: float) -> dict[str, float]:

@@ -85,9 +85,9 @@ def known_ground(
     wrench: Array,
     assigned: Mapping[str, str] | None = None,
     tolerance: float | None = None,
-) -> Ground:
-    """Find what is known of the ground, and leave out (NaN, in place) the frames in which the plates do not carry all
-    of the person from the total wrench (T, 6).
+) -> tuple[Ground, Array]:
+    """What is known of the ground, and the total wrench (T, 6) without (NaN) the frames in which the plates do not
+    carry all of the person.
 
     Args:
         markers: (T, M, 3) m, of the model, ground frame. assigned: plate -> foot, as for `foot_loads`.
@@ -122,7 +122,7 @@ def known_ground(
             "No force plates: the ground reaction follows from the motion where one foot may stand, and where both may "
             "how they divide it is assumed; inertial parameters stay as the table has them."
         )
-        return Ground(loads, np.zeros(n, dtype=bool), may, False, None, (text,), (text,))
+        return Ground(loads, np.zeros(n, dtype=bool), may, False, None, (text,), (text,)), wrench
     # steps off the plates: their mean load is no mass
     mass = None if initial.feet else initial.weighed_kg
     check = check_plates(recording, initial.ground, mass, foot_markers(initial), loads)
@@ -179,12 +179,13 @@ def known_ground(
                     f"In {np.count_nonzero(light & ~beside[:, k])} of these frames the {foot} foot's plate reads less "
                     f"than {LOADED_N:g} N: what the foot carries there is not known."
                 )
-    wrench[undeclared if loads is None else ~loads.total_known] = np.nan
+    partly = undeclared if loads is None else ~loads.total_known
+    wrench = np.where(partly[:, None], np.nan, wrench)
     used = int(np.count_nonzero(np.isfinite(wrench).all(axis=1)))
     if loads is not None or used < n:
         notes.append(f"The total wrench is measured in {used} of {n} frames.")
     ratio = None if found is None else found.load_ratio
-    return Ground(loads, undeclared, bears, used > 0, ratio, (*notes, *reasons), tuple(reasons))
+    return Ground(loads, undeclared, bears, used > 0, ratio, (*notes, *reasons), tuple(reasons)), wrench
 
 
 def _nearly_all(found: Closure) -> bool:

@@ -25,7 +25,7 @@ Array = npt.NDArray[np.float64]
 SHORTEST_S = 1.0  # of frames with the wrench, in one trial at least
 PASSES = 4  # linearised anew, and weights measured anew, at each
 FIRST_SIGMA = np.array([10.0, 20.0, 10.0, 10.0, 10.0, 10.0])
-"""N, N m (fx ... mz): size of a model's error before anything is known of it (DESIGN section 3)."""
+"""N, N m (fx ... mz): size of a model's error before anything is known of it."""
 LEAST_SIGMA = 1.0  # N or N m: a residual that was fitted is smaller than the error
 LEAST_TAU_S = 0.25
 """An error is taken to last as long at least, and at first: so long does it on real squats (0.16 to 0.27 s). Errors of

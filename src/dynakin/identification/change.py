@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from dynakin.errors import ModelError
+from dynakin.identification.observability.base import base_spread
 from dynakin.model.identified import IdentifiedSubject
 from dynakin.results.naming import number
 
@@ -43,7 +44,7 @@ def change_between(before: IdentifiedSubject, after: IdentifiedSubject) -> list[
     K = np.array(before.batch.K)
     first, second = (K @ np.array(subject.batch.values) for subject in (before, after))
     spread = np.array(before.batch.covariance) + np.array(after.batch.covariance)
-    sd = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", K, spread, K), 0.0))
+    sd = base_spread(K, spread)
     found = [
         Change(words, float(a), float(b), float(s))
         for words, a, b, s in zip(before.batch.base_words, first, second, sd, strict=True)

@@ -40,7 +40,7 @@ class InertialPriors:
     """Standard deviations about the table, a segment."""
 
     log_mass: float = 0.10
-    """Of the logarithm of each mass, before the total is held: tables differ by that much (model.priors)."""
+    """Of the logarithm of each mass, before the total is held: tables differ by that much."""
     centre_fraction: float = 0.03
     """Of the centre of mass along each axis, over the segment's length. Tables differ by 2 to 5 %."""
     log_gyration: float = 0.07

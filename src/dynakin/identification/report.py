@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from dynakin.identification.batch import Posterior
 from dynakin.identification.decision import Decision
+from dynakin.identification.observability.base import base_spread
 from dynakin.model.identified import Batch
 from dynakin.results.measures.posterior import judged
 from dynakin.results.naming import listed, number, words
@@ -26,10 +27,7 @@ def in_words(decision: Decision, posterior: Posterior, batch: Batch) -> list[str
 def base_of_batch(batch: Batch) -> tuple[Array, Array, Array]:
     """Base parameters of a batch (r,), their standard deviations and those of the prior."""
     K = np.array(batch.K)
-    sd, prior = (
-        np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", K, np.array(matrix), K), 0.0))
-        for matrix in (batch.covariance, batch.prior_covariance)
-    )
+    sd, prior = (base_spread(K, np.array(matrix)) for matrix in (batch.covariance, batch.prior_covariance))
     return K @ np.array(batch.values), sd, prior
 
 

@@ -189,7 +189,7 @@ class Common:
         Raises:
             RecordingError: it has none, or they are refused.
         """
-        measured = measured_wrench(recording, movement.start, self.estimator.plates)
+        measured = self._measured_wrench(recording, movement.start)
         wrench = measured
         if not as_measured:
             first_of_second = movement.time[middle_of(len(movement.time))]
@@ -197,6 +197,9 @@ class Common:
         every = np.searchsorted(recording.time, movement.time - 1e-9)
         kept, unfiltered = (np.where(movement.lost[:, None], np.nan, w[every]) for w in (wrench, measured))
         return MeasuredTrial(movement, kept, unfiltered, self.floating)
+
+    def _measured_wrench(self, recording: Recording, start: CalibratedModel) -> Array:
+        return measured_wrench(recording, start, self.estimator.plates, self.estimator.noise.plate_load_tolerance)
 
     def check(self, recording: Recording) -> None:
         """Whether a trial can be identified on: before anything that takes long.
@@ -209,7 +212,7 @@ class Common:
         if not recording.plates:
             raise RecordingError(f"{where}: no force plates, expected at least one; give its ground forces (--forces)")
         start = self._start(replace(recording, plates=()), None)
-        push = measured_wrench(recording, start, self.estimator.plates)[:, 1]
+        push = self._measured_wrench(recording, start)[:, 1]
         load, weighed = float(np.nanmean(push)) / GRAVITY_M_S2, self.initial.weighed_kg
         if abs(load - weighed) > LOAD_APART * weighed:
             raise RecordingError(

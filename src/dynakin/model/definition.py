@@ -101,7 +101,7 @@ class Definition(Protocol):
             side: limb markers of a lumped model: "right", "left", "both" (separate sites), "auto" (fewest gaps, right
                 on a tie).
             vertical, forward: directions of the laboratory, found in the recording where "auto".
-            priors, bounds: other numbers than the defaults of ``dynakin.model.priors``.
+            priors, bounds: other numbers than the defaults of ``dynakin.settings.model``.
             ground: directions of the ground frame, where they are known already. Its origin is replaced by the model's
                 ground landmark.
 

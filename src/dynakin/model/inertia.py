@@ -1,8 +1,8 @@
 """Rigid-body inertia about the origin of a frame, and the maps that carry a table's entry into a model's
 segment.
 
-The ten numbers are mass, first moment (m c) and tensor entries about the ORIGIN of the frame (DESIGN section
-3). The three maps of the table into the planar chain are ``rotated``, ``moved`` and lumping (``mirrored``
+The ten numbers are mass, first moment (m c) and tensor entries about the ORIGIN of the frame.
+The three maps of the table into the planar chain are ``rotated``, ``moved`` and lumping (``mirrored``
 and ``+``).
 """
 
@@ -96,7 +96,7 @@ class RigidBody:
         return pseudo
 
     def possible_in_plane(self) -> bool:
-        """m > 0 and m izz > mx^2 + my^2: all that a motion in the x-y plane asks (DESIGN section 3)."""
+        """m > 0 and m izz > mx^2 + my^2: all that a motion in the x-y plane asks."""
         mx, my, _ = self.first_moment
         return self.mass > 0.0 and self.mass * self.inertia[2, 2] > mx**2 + my**2
 

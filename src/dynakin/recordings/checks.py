@@ -92,7 +92,7 @@ def check_plates(
     centre of pressure lies under a foot, the force is near vertical, the free moment acts about the vertical
     and is small.
 
-    Over all frames, no plate may be beyond the limits of friction or of its own edges (`plate_limits`).
+    Over all frames, no plate may be beyond the limits of friction or of its own edges.
 
     Where nobody stands still, the mean over all loaded frames takes its place for all but the mass, which is
     only told.

@@ -119,7 +119,7 @@ def find_ground_frame(
         pairs: markers that show the facing direction; ``find_marker``'s rules for their spelling.
 
     Raises:
-        RecordingError: not given and not to be found, or the person is seen in a mirror (`handedness`).
+        RecordingError: not given and not to be found, or the person is seen in a mirror.
         ConfigError: an unknown axis, or a forward direction that is vertical.
     """
     if vertical.casefold() == "auto":

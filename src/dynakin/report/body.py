@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from dynakin.elements import element
 from dynakin.report.labels import is_planar
 from dynakin.report.sides import values_of
 from dynakin.report.styles import SIDE_COLOURS, segment_colours, side_of
@@ -31,11 +30,6 @@ class Chain:
     bones: tuple[Bone, ...]
 
 
-def marker_segments(estimate: Estimate) -> dict[str, str]:
-    """Marker -> the segment that carries it, where the marker's place is estimated."""
-    return {element(p.name).owner: p.segment for p in estimate.parameters if p.kind == "marker"}
-
-
 def segment_names(estimate: Estimate) -> list[str]:
     """Segments in the model's order: those of the joints, or, without joint centres, those of the parameters."""
     if "joint_segment" in estimate.data.coords:
@@ -52,7 +46,7 @@ def colours_of(estimate: Estimate) -> dict[str, str]:
 def painted(estimate: Estimate, chain: Chain) -> tuple[dict[str, str], dict[str, str]]:
     """Colour of each segment that is drawn or carries a marker, and the words of a key with theirs: in a plane each its
     own; in space its side's, because thirty segments in six colours say nothing."""
-    segments = dict.fromkeys([*(bone.segment for bone in chain.bones), *marker_segments(estimate).values()])
+    segments = dict.fromkeys([*(bone.segment for bone in chain.bones), *estimate.marker_segments.values()])
     if is_planar(estimate):
         colours = colours_of(estimate)
         return colours, {words(bone.segment): colours[bone.segment] for bone in chain.bones}
@@ -74,13 +68,14 @@ def chain_of(estimate: Estimate) -> Chain:
     parents = [int(parent) for parent in data["joint_parent"].values]
     segments = [str(name) for name in data["joint_segment"].values]
     bones = [Bone(p, j, segments[p]) for j, p in enumerate(parents) if p >= 0]
-    markers = np.nan_to_num(values_of(estimate, "markers_estimated"))
-    carriers = marker_segments(estimate)
+    markers = np.where(estimate.modelled_axes(), values_of(estimate, "markers_estimated"), 0.0)
+    known = ~estimate.lost  # the others are empty
+    carriers = estimate.marker_segments
     for joint, segment in enumerate(segments):
         own = [k for k, name in enumerate(estimate.marker_names) if carriers.get(name) == segment]
         if joint in parents or not own:
             continue
-        far = np.linalg.norm(markers[:, own] - points[joint][:, None], axis=2).mean(axis=0)
+        far = np.linalg.norm(markers[known][:, own] - points[joint][known, None], axis=2).sum(axis=0)
         bones.append(Bone(joint, len(points), segment))
         points.append(markers[:, own[int(np.argmax(far))]])
     return Chain(np.stack(points, axis=1), tuple(bones))

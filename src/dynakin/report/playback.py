@@ -14,7 +14,7 @@ import numpy as np
 import numpy.typing as npt
 from markupsafe import Markup
 
-from dynakin.report.body import chain_of, marker_segments, painted
+from dynakin.report.body import chain_of, painted
 from dynakin.report.labels import is_planar, short_marker_names
 from dynakin.report.plot import INK, MEASURED
 from dynakin.report.sides import Joint, joints_of, normalising_mass, values_of
@@ -98,7 +98,7 @@ def playback(estimate: Estimate) -> Playback:
     if "mass_centre" in estimate.data and not planar:
         arrays["mass_centre"] = 1000.0 * values_of(estimate, "mass_centre")
     frames = _frames_shown(estimate, sum(array.shape[1] for array in arrays.values()))
-    carriers, names = marker_segments(estimate), short_marker_names(estimate.marker_names)
+    carriers, names = estimate.marker_segments, short_marker_names(estimate.marker_names)
     content = {
         "time": [round(float(t), 3) for t in estimate.time[frames]],
         "bones": [[b.start, b.end, colours[b.segment]] for b in chain.bones],
@@ -281,9 +281,11 @@ def _curve(estimate: Estimate) -> tuple[str, str]:
     rotations, angles = np.flatnonzero(estimate.is_rotation()), _degrees(estimate)
     if not len(rotations):
         return "", ""
-    ranges = np.nan_to_num(np.ptp(angles[:, rotations], axis=0))
-    index = int(rotations[int(np.argmax(ranges))])
-    kept = np.unique(np.linspace(0, len(angles) - 1, 500).astype(int))
+    known = np.flatnonzero(np.isfinite(angles[:, rotations]).all(axis=1))  # lost frames are empty
+    if not len(known):
+        return "", ""
+    index = int(rotations[int(np.argmax(np.ptp(angles[known][:, rotations], axis=0)))])
+    kept = known[np.unique(np.linspace(0, len(known) - 1, 500).astype(int))]
     t, values = estimate.time[kept], angles[kept, index]
     low, high = float(values.min()), float(values.max())
     x = 1000.0 * (t - t[0]) / max(float(t[-1] - t[0]), 1e-9)

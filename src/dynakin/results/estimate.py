@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
+from dynakin.elements import element
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Recording
 from dynakin.results.records import Event, Parameter, Timing, Tracking
@@ -123,6 +124,11 @@ class Estimate:
     def marker_names(self) -> list[str]:
         """Names of the markers used, as in the recording."""
         return [str(name) for name in self.data["marker"].values]
+
+    @property
+    def marker_segments(self) -> dict[str, str]:
+        """Marker (its name in the model) -> the segment that carries it, where the marker's place is estimated."""
+        return {element(p.name).owner: p.segment for p in self.parameters if p.kind == "marker"}
 
     def is_rotation(self) -> np.ndarray:
         """(C,) bool: which coordinates are rotations (the others are translations)."""

@@ -91,7 +91,7 @@ class Bounds(Strict, use_attribute_docstrings=True):
     mass_fraction: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.20
     """Of the table's mass, as in (9)."""
     first_moment_fraction: Positive = 0.20
-    """Of mass times length: +-20 % of a first moment near zero is no interval (DESIGN section 3)."""
+    """Of mass times length: +-20 % of a first moment near zero is no interval."""
     inertia_fraction: Annotated[float, Field(gt=0.0, lt=1.0)] = 0.20
     """Of the absolute value, as in (9)."""
 

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.elements import element
 from dynakin.filter.step import StepEstimate
 from dynakin.filter.tracker import Tracker
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -35,7 +36,7 @@ class Monitor:
         self.last = Status(phase="running")
         self._plates, self._used, self._holds = plates, used, holds
         self._recent: deque[tuple[float, float]] = deque()
-        kinds = [name.split("/")[0] for name in initial.names]
+        kinds = [element(name).kind for name in initial.names]
         self._constants = np.flatnonzero([kind in ("length", "inertia") for kind in kinds])
         self._bounded = np.flatnonzero(np.isfinite(initial.lower) & [k in ("length", "inertia") for k in kinds])
         self._since: tuple[float, Array] | None = None

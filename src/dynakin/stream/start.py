@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
+from dynakin.elements import element
 from dynakin.errors import ModelError, RecordingError
 from dynakin.files import LARGEST_TEXT, read_bytes
 from dynakin.filter.estimator import Estimator
@@ -25,6 +26,7 @@ from dynakin.recordings.orientation import axis_vector, find_vertical
 from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N, Surface, plate_from_wrench
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.recordings.standing import standing_window
+from dynakin.results.naming import listed
 from dynakin.stream.fusion import Fused
 
 _NOW_S = 0.1  # the present posture, from a few frames
@@ -184,14 +186,21 @@ def begin(
 def _continued(initial: CalibratedModel, known: Mapping[str, tuple[float, float]]) -> CalibratedModel:
     """The same model with constants as they were found before, as sure as they were."""
     x0, sd0 = initial.x0.copy(), initial.sd0.copy()
-    found = 0
-    for k, name in enumerate(initial.names):
-        if name in known and name.split("/")[0] in _KINDS:
-            x0[k], sd0[k] = known[name]
-            found += 1
-    if not found:
+    names = [name for name in known if name in initial.names and element(name).kind in _KINDS]
+    if not names:
         raise ModelError("the saved parameters are another model's: none of their names is in this model")
-    return replace(initial, x0=np.clip(x0, initial.lower, initial.upper), sd0=sd0)
+    beyond = []
+    for name in names:
+        k = initial.names.index(name)
+        value, sd = known[name]
+        if initial.lower[k] <= value <= initial.upper[k]:
+            x0[k], sd0[k] = value, sd
+        else:
+            beyond.append(name)
+    if not beyond:
+        return replace(initial, x0=x0, sd0=sd0)
+    text = f"Of the saved parameters {listed(beyond)} lie beyond their bounds as measured here: measured anew."
+    return replace(initial, x0=x0, sd0=sd0, messages=(*initial.messages, text))
 
 
 def read_known(path: Path) -> dict[str, tuple[float, float]]:

@@ -21,6 +21,7 @@ FILES = (
     "held_out.csv",
     "unseen.csv",
     "repetitions.csv",
+    "truth.csv",
     "comparison.json",
     "report.html",
 )

@@ -73,8 +73,8 @@ class IdentifyingTrial:
 class Blind:
     """Predictions of a trial's wrench from its markers; nothing in here has seen its plates.
 
-    start: the judging trial's own coordinates and ground frame. wrenches: (T, 6) N and N m by method. plates: as
-    `Setup.plates`, for judging.
+    start: the judging trial's own coordinates and ground frame. wrenches: (T, 6) N and N m by method. plates,
+    tolerance: as `Setup` has them, for judging.
     """
 
     recording: Recording
@@ -82,6 +82,7 @@ class Blind:
     wrenches: dict[str, Array]
     notes: tuple[str, ...]
     plates: Mapping[str, str] | None = None
+    tolerance: float | None = None
 
 
 def halves(recording: Recording) -> tuple[Recording, Recording]:
@@ -118,7 +119,7 @@ def identify_on(
         estimates[preset], tracker = estimator.track(recording, static=static, lag_s=0.0)
         _refuse_lost(estimates[preset], f"EKF ({preset})")
     initial = tracker.calibrated
-    wrench = measured_wrench(recording, initial, setup.plates)
+    wrench = measured_wrench(recording, initial, setup.plates, setup.plate_load_tolerance)
     ground = initial.ground if same_recording else None
     return IdentifyingTrial(recording, static, setup, initial, estimates, wrench, ground)
 
@@ -166,7 +167,7 @@ def predict_blind(identified: IdentifyingTrial, recording: Recording) -> Blind:
     known = identified.wrench[np.isfinite(identified.wrench).all(axis=1)]
     for label, guess in (("last", known[-1]), ("mean", known.mean(axis=0))):
         found[f"persistence: {label}"] = np.repeat(guess[None], recording.n_frames, axis=0)
-    return Blind(recording, start, found, tuple(notes), setup.plates)
+    return Blind(recording, start, found, tuple(notes), setup.plates, setup.plate_load_tolerance)
 
 
 def judge(blind: Blind, recording: Recording) -> list[Row]:
@@ -176,7 +177,7 @@ def judge(blind: Blind, recording: Recording) -> list[Row]:
     Raises:
         RecordingError: as `measured_wrench`.
     """
-    measured = measured_wrench(recording, blind.start, blind.plates)
+    measured = measured_wrench(recording, blind.start, blind.plates, blind.tolerance)
     window = evaluation_window(recording.time)
     rows = []
     for k in np.flatnonzero(blind.start.spec.wrench_measured):
@@ -186,11 +187,16 @@ def judge(blind: Blind, recording: Recording) -> list[Row]:
     return rows
 
 
-def measured_wrench(recording: Recording, initial: CalibratedModel, plates: Mapping[str, str] | None = None) -> Array:
+def measured_wrench(
+    recording: Recording,
+    initial: CalibratedModel,
+    plates: Mapping[str, str] | None = None,
+    tolerance: float | None = None,
+) -> Array:
     """The plates' total wrench (T, 6) N and N m about the ground origin; NaN where they do not measure all of it.
 
     Args:
-        plates: plate -> foot, as `Estimator` takes it.
+        plates, tolerance: plate -> foot, and how far the plates' mean may be from the weight, as for `known_ground`.
 
     Raises:
         RecordingError: there are no plates to identify on or to be judged by, they are refused, or in no frame do they
@@ -198,11 +204,12 @@ def measured_wrench(recording: Recording, initial: CalibratedModel, plates: Mapp
     """
     if not recording.plates:
         raise RecordingError(
-            f"{recording.path or recording.name}: no force plates, expected at least one: the comparison needs them "
-            "(--forces)"
+            f"{recording.path or recording.name}: no force plates, expected at least one: what is predicted is "
+            "judged by them (--forces)"
         )
     wrench = initial.ground.wrench_to_ground(recording.total_wrench())
-    known_ground(recording, initial, marker_paths(recording, initial, initial.ground), wrench, plates)
+    markers = marker_paths(recording, initial, initial.ground)
+    _, wrench = known_ground(recording, initial, markers, wrench, plates, tolerance)
     if not np.isfinite(wrench).all(axis=1).any():
         where = recording.path or recording.name
         raise RecordingError(f"{where}: in no frame do the plates measure the whole wrench, expected a second of them")

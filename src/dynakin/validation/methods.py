@@ -207,7 +207,7 @@ def trial_of(
 
     Args:
         estimates: by the name of their preset, at least one. initial, definition: what they started from
-            (`Estimator.initial`, `Estimator.model`).
+            (`Tracker.calibrated`, `Estimator.model`).
         tolerant: a reference method that fails stops nothing: the notes say why it is left out. Else only a model
             that is no hinge chain in the plane is a note.
         inverse: a model in space has inverse kinematics and dynamics beside it, which take 4 ms a frame; else no

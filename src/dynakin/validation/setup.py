@@ -55,6 +55,11 @@ class Setup:
         if not self.cutoff_hz > 0.0:
             raise ConfigError(f"comparison: the cut-off is {self.cutoff_hz:g} Hz, expected a positive number")
 
+    @property
+    def plate_load_tolerance(self) -> float | None:
+        """The widest of the presets', by which plates are judged."""
+        return max((t for noise in self.noise.values() if (t := noise.plate_load_tolerance)), default=None)
+
     def estimator(self, preset: str) -> Estimator:
         """A filter with the noise of one of the presets, not started yet."""
         return Estimator(

@@ -56,6 +56,7 @@ def identified_alone(base: BaseParameters, measured: MeasuredModel) -> set[str]:
     return {name for name, value in zip(base.over, left, strict=True) if value < _NONE}
 
 
-def base_spread(base: BaseParameters, covariance: Array) -> Array:
-    """Standard deviations (r,) of the base parameters from a covariance (e, e) of the inertial numbers."""
-    return np.sqrt(np.maximum(np.diag(base.K @ covariance @ base.K.T), 0.0))
+def base_spread(K: Array, covariance: Array) -> Array:
+    """Standard deviations (r,) of the base parameters K phi from a covariance (e, e) of the inertial numbers phi; a
+    variance that rounding left below 0 is 0."""
+    return np.asarray(np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", K, covariance, K), 0.0)))

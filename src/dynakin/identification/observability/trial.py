@@ -148,7 +148,7 @@ def _base_posterior(structure: Structure, noise: Noise, estimate: Estimate) -> t
     root = np.sqrt(variance_scales(over, noise))  # by the declared variances, as the constants' own deviations
     prior, after = (
         base_spread(
-            base, estimate.data[f"{when}_covariance"].sel(element=over, element_=over).values / np.outer(root, root)
+            base.K, estimate.data[f"{when}_covariance"].sel(element=over, element_=over).values / np.outer(root, root)
         )
         for when in ("initial", "final")
     )

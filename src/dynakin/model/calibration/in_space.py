@@ -73,6 +73,9 @@ def started(plan: ModelPlan, trial: Trial, unplaced: tuple[Candidate, ...], stil
     if extra:
         plan = replace(plan, sites=(*plan.sites, *extra))
         model, paths = _core.Model(to_core(plan)), _paths(trial, plan.sites)
+    usable = np.flatnonzero(_enough(paths))
+    if not len(usable):
+        raise ModelError(f"{trial.match.where}: no frame shows {100 * _SEEN:.0f} % of the {len(plan.sites)} markers")
     plan, held = hold_unseen(plan, _postures(model, paths, limits))
     if held:
         names = ", ".join(held)
@@ -82,9 +85,6 @@ def started(plan: ModelPlan, trial: Trial, unplaced: tuple[Candidate, ...], stil
         plan, how = _averaged(plan, paths, limits)
         model = _core.Model(to_core(plan))
         messages += how
-    usable = np.flatnonzero(_enough(paths))
-    if not len(usable):
-        raise ModelError(f"{trial.match.where}: no frame shows {100 * _SEEN:.0f} % of the {len(plan.sites)} markers")
     first = int(usable[0])
     if first > 0:
         messages.append(f"Start from frame {first} ({trial.recording.time[first]:.2f} s): markers are missing before.")

@@ -145,8 +145,9 @@ def measure(
             raise ModelError(_no_legs(supposed, source, static, legs))
         unmarked = tuple(name for name in LEG_JOINTS if name in (*legs.joints, *supposed))
         if unmarked:
+            joints = listed([words(name) for name in sorted(unmarked)])
             messages.append(
-                f"Warning: no marker shows {', '.join(sorted(unmarked))}: they are where the movement, or else the "
+                f"Warning: no marker shows {joints}: they are where the movement, or else the "
                 "proportions of an adult who stands, has them, to one or two centimetres. Give a standing trial with "
                 "markers on knees and ankles (--static)."
             )

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
+import scipy.linalg
 
 from dynakin.bindings import _core
 from dynakin.model.plan import Geometry, ModelPlan
@@ -68,8 +69,9 @@ def hold_unseen(plan: ModelPlan, postures: list[tuple[Array, Array]]) -> tuple[M
 
 def _deviations(J: Array, prior: Array) -> Array:
     """Standard deviations (n,) of each coordinate with the others free, from rows that are in units of theirs."""
-    information = J.T @ J + np.diag(prior**-2.0)
-    return np.asarray(np.sqrt(np.diag(np.linalg.inv(information))))
+    root = np.linalg.cholesky(J.T @ J + np.diag(prior**-2.0))
+    spread = scipy.linalg.solve_triangular(root, np.eye(len(root)), lower=True)  # its square is the inverse
+    return np.asarray(np.linalg.norm(spread, axis=0))
 
 
 def _depths(plan: ModelPlan) -> dict[str, int]:

@@ -13,7 +13,7 @@ from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Patch
 
-from dynakin.report.body import chain_of, marker_segments, painted
+from dynakin.report.body import chain_of, painted
 from dynakin.report.chart import band_is_too_wide
 from dynakin.report.figure import draw_sourced
 from dynakin.report.labels import COMPONENT_LABELS, is_planar, moment_note
@@ -49,7 +49,7 @@ def markers_figure(estimate: Estimate, comparison: Trial | None = None) -> Figur
     """Figure 4: the stick figure and the markers, measured (hollow) and estimated (filled), over one cycle."""
     cycle = middle_cycle(estimate)
     frames = np.linspace(cycle.start, cycle.stop - 1, _PICTURES).astype(int)
-    chain, carriers = chain_of(estimate), marker_segments(estimate)
+    chain, carriers = chain_of(estimate), estimate.marker_segments
     colours, key = painted(estimate, chain)
     measured = estimate.data["markers_measured"].values[:, :, :2]
     estimated = estimate.data["markers_estimated"].values[:, :, :2]

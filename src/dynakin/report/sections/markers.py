@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from dynakin.report.bars import Bar, value_bars
-from dynakin.report.body import marker_segments
 from dynakin.report.chart import Line, Panel, chart
 from dynakin.report.labels import short_marker_names
 from dynakin.report.plot import ESTIMATED, INK, MEASURED, QUIET
@@ -98,7 +97,7 @@ def _differences(page: Page, difference: np.ndarray, rms: dict[str, float | None
 
 
 def _displacements(page: Page) -> TextTable:
-    names, carriers = short_marker_names(page.estimate.marker_names), marker_segments(page.estimate)
+    names, carriers = short_marker_names(page.estimate.marker_names), page.estimate.marker_segments
     found = (page.metrics["soft_tissue"] or {"markers": {}})["markers"]
     rows = [
         (

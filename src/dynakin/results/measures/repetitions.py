@@ -11,7 +11,6 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import peaks, runs
-from dynakin.elements import element
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.landmarks import DEFAULT_PAIRS, find_marker
@@ -99,7 +98,7 @@ def body_paths(recording: Recording, ground: GroundFrame, pelvis: Iterable[str] 
 
 def repetitions_of(estimate: Estimate, movement: Movement | None = None) -> Found:
     """Whole repetitions of an estimate that lie after the adaptation; as `find_repetitions`."""
-    carriers = {element(p.name).owner: p.segment for p in estimate.parameters if p.kind == "marker"}
+    carriers = estimate.marker_segments
     pelvis = [name for name in estimate.marker_names if carriers.get(name) == "pelvis"]
     paths = body_paths(estimate.recording, estimate.ground, pelvis)
     return find_repetitions(paths, movement, evaluation_window(estimate.time))

@@ -55,7 +55,7 @@ def displacements(estimate: Estimate, window: np.ndarray) -> dict[str, MarkerDis
     """
     blocks = [state_paths(estimate, block) for block in ("marker", "soft_tissue")]
     initial = {p.name: p.initial for p in estimate.parameters}
-    segments = {element(p.name).owner: p.segment for p in estimate.parameters if p.kind == "marker"}
+    segments = estimate.marker_segments
     measured = estimate.data["markers_measured"].transpose("time", "marker", "axis").values
     seen = np.isfinite(measured[:, :, estimate.modelled_axes()]).all(axis=2)
     found = {}
@@ -121,7 +121,7 @@ def marker_sites(estimate: Estimate) -> list[tuple[str, str]]:
     """Recorded name and name in the state of each marker, both in the model's order; the same where they differ in
     number (a filter that does not estimate every place)."""
     names = estimate.marker_names
-    sites = list(dict.fromkeys(element(p.name).owner for p in estimate.parameters if p.kind == "marker"))
+    sites = list(estimate.marker_segments)
     if len(sites) == len(names):
         return list(zip(names, sites, strict=True))
     plain = {plain_name(site): site for site in sites}

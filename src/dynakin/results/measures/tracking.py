@@ -206,7 +206,7 @@ def _skin(estimate: Estimate) -> Array:
 
 def _worn(estimate: Estimate) -> dict[str, list[int]]:
     """Columns of the markers on each segment that wears two at least."""
-    segments = {p.name.split("/")[1]: p.segment for p in estimate.parameters if p.kind == "marker"}
+    segments = estimate.marker_segments
     worn: dict[str, list[int]] = {}
     for k, (_, site) in enumerate(marker_sites(estimate)):
         if site in segments:

@@ -8,7 +8,9 @@ from typing import Any
 import numpy as np
 import pylsl
 
+from dynakin.elements import element
 from dynakin.errors import ConfigError
+from dynakin.filter.parameters import element_units
 from dynakin.stream.sinks.base import LiveFrame, Sink, Started
 from dynakin.stream.sinks.picture import rotations
 
@@ -35,13 +37,14 @@ class LslSink(Sink):
         initial, model = started.initial, started.model
         names = list(model.coordinate_names)
         turns = rotations(initial.spec)
-        self._constants = [k for k, name in enumerate(initial.names) if name.split("/")[0] in _KINDS]
+        self._constants = [k for k, name in enumerate(initial.names) if element(name).kind in _KINDS]
+        constants, units_of = [initial.names[k] for k in self._constants], element_units(initial)
         kinds = {
             "coordinates": (names, ["rad" if turn else "m" for turn in turns]),
             "speeds": (names, ["rad/s" if turn else "m/s" for turn in turns]),
             "moments": (names, ["N m" if turn else "N" for turn in turns]),
             "moment-sources": (names, ["code"] * len(names)),
-            "parameters": ([initial.names[k] for k in self._constants], None),
+            "parameters": (constants, [units_of[name] for name in constants]),
         }
         for kind, (labels, units) in kinds.items():
             if not labels:
@@ -52,7 +55,7 @@ class LslSink(Sink):
             for k, label in enumerate(labels):
                 channel = channels.append_child("channel")
                 channel.append_child_value("label", label)
-                channel.append_child_value("unit", units[k] if units else _unit(label))
+                channel.append_child_value("unit", units[k])
             self._outlets[kind] = pylsl.StreamOutlet(info, max_buffered=10)
 
     def frame(self, frame: LiveFrame) -> None:
@@ -90,10 +93,3 @@ def lsl_sink(address: str, options: dict[str, str]) -> LslSink:
     if options:
         raise ConfigError(f"lsl: unknown options {', '.join(options)}, expected lsl or lsl:NAME")
     return LslSink(address or "dynakin")
-
-
-def _unit(name: str) -> str:
-    kind, *_, last = name.split("/")
-    if kind != "inertia":
-        return "m"
-    return {"mass": "kg", "mx": "kg m", "my": "kg m", "mz": "kg m"}.get(last, "kg m2")

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.bindings import _core
+from dynakin.elements import element
 from dynakin.filter.step import Labelled
 from dynakin.model.schema import kinds_of
 from dynakin.recordings.plates.ground_plate import level_pressure
@@ -19,7 +20,6 @@ from dynakin.stream.sinks.base import LiveFrame, Started, Status
 
 Array = npt.NDArray[np.float64]
 
-_SHOWN = ("length", "inertia")
 _NAMES, _NAME = 4, 40  # of a list of names, so many are shown, and so many characters of each
 
 
@@ -37,8 +37,8 @@ class Picture:
         self.initial, self.model = started.initial, started.model
         spec = self.initial.spec
         segments = [segment.name for segment in spec.segments]
-        self._constants = [k for k, name in enumerate(self.initial.names) if name.split("/")[0] in _SHOWN]
-        self._constants = [k for k in self._constants if self.initial.names[k].split("/")[-1] not in _SMALL]
+        elements = [element(name) for name in self.initial.names]
+        self._constants = [k for k, e in enumerate(elements) if e.kind == "length" or e[::2] == ("inertia", "mass")]
         markers, axes = 3 * len(spec.markers), len(spec.coordinates)
         sizes = (1, 3 * len(segments), markers, markers, 6 * (plates + 1), axes, axes, axes, len(self._constants))
         self.sizes = dict(zip(BLOCKS, sizes, strict=True))
@@ -133,7 +133,6 @@ BLOCKS = (
     "moment_sd",
     "constants",
 )
-_SMALL = ("mx", "my", "mz", "xx", "yy", "zz", "xy", "xz", "yz")  # moments of mass are little to look at
 
 
 def split(numbers: Array, sizes: Mapping[str, int]) -> dict[str, Array]:

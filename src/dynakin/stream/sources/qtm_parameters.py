@@ -65,10 +65,9 @@ class QtmPlate:
 
 @dataclass(frozen=True)
 class QtmParameters:
-    """Markers' labels in their order, the cameras' rate, and the plates."""
+    """Markers' labels in their order, and the plates."""
 
     labels: tuple[str, ...]
-    rate_hz: float
     up: str
     plates: tuple[QtmPlate, ...]
 
@@ -82,7 +81,6 @@ def parse_parameters(text: str | bytes, where: str) -> QtmParameters:
     try:
         root = ElementTree.fromstring(text)
         labels = tuple((label.findtext("Name") or "").strip() for label in root.iterfind(".//The_3D/Label"))
-        rate = float(root.findtext(".//General/Frequency", "nan"))
         up = (root.findtext(".//The_3D/AxisUpwards") or "").strip()
         plates = tuple(_plate(found, root) for found in root.iterfind(".//Force/Plate"))
     except (ElementTree.ParseError, ValueError, TypeError) as error:
@@ -92,11 +90,14 @@ def parse_parameters(text: str | bytes, where: str) -> QtmParameters:
     rates = sorted({plate.rate_hz for plate in plates})
     if len(rates) > 1:
         raise ConfigError(f"{where}: plates at {', '.join(f'{r:g}' for r in rates)} Hz, expected one rate for all")
-    return QtmParameters(labels, rate, up, plates)
+    return QtmParameters(labels, up, plates)
 
 
 def _plate(found: ElementTree.Element, root: ElementTree.Element) -> QtmPlate:
-    metre = length_factor(root.findtext(".//Force/Unit_Length", "mm")) or 1e-3
+    unit = root.findtext(".//Force/Unit_Length", "mm")
+    metre = length_factor(unit)
+    if metre is None:
+        raise ValueError(f"plates in the unknown unit {unit!r}, expected mm, cm or m")
     number = int(found.findtext("Plate_ID", "nan"))
     corners = np.array(
         [[float(found.findtext(f"Location/Corner{k}/{axis}", "nan")) for axis in "XYZ"] for k in range(1, 5)]

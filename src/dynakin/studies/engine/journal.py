@@ -21,7 +21,7 @@ class Journal:
 
     Args:
         path: the file; made when the first row comes, in a folder that exists.
-        belongs_to: with_nulls data: everything on which the rows depend. Its digest stands in the heading.
+        belongs_to: plain data: everything on which the rows depend. Its digest stands in the heading.
 
     Raises:
         OutputError: the file cannot be read, is none of ours, or belongs to something else.

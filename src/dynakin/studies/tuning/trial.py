@@ -91,7 +91,7 @@ def prepare(
     """
     initial = estimator.calibrate(recording, static=static)
     tracker = estimator.start(initial)
-    markers, wrench, _ = estimator.measured(recording, tracker.calibrated)
+    markers, wrench = estimator.measured(recording, tracker.calibrated)
     taken_out = 0
     if _doubts(estimator.noise):
         _, arrays, shift, _ = run_in_step(tracker, recording.time, markers, wrench)

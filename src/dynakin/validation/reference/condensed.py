@@ -25,8 +25,7 @@ Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
 DECLARED_SIGMA = (10.0, 20.0, 10.0)
-"""fx and fy (N), mz (N m): not the plates' own noise but the size of a planar model's error on a real squat (DESIGN
-section 3)."""
+"""fx and fy (N), mz (N m): not the plates' own noise but the size of a planar model's error on a real squat."""
 TOTAL_MASS_SD_KG = 0.01
 """Of the total mass as a soft constraint at each frame: the paper's R, 1e-4 kg^2 (Table I)."""
 
