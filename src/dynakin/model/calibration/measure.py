@@ -26,7 +26,7 @@ from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.model.plan import Geometry, ModelPlan
 from dynakin.model.schema import ModelFile
 from dynakin.model.table import BodyTable
-from dynakin.recordings.beside import another_person
+from dynakin.recordings.companions import another_person
 from dynakin.recordings.feet.contact import foot_contacts
 from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_laboratory_frame
 from dynakin.recordings.recording import Recording
