@@ -2,7 +2,7 @@
 
     OMP_NUM_THREADS=1 .venv/bin/python benchmarks/corpus.py [FOLDER...] [--jobs 2] [--out FILE.md] [--write]
 
-A second row has what lies beside a recording (`recordings.beside`: ground forces, the same person standing). Then the
+A second row has a recording's companions (`recordings.companions`: ground forces, the same person standing). Then the
 differences from what the files themselves hold: Vicon's angles, moments and powers, OpenSim's IK and ID. Runs are kept
 in ``build/recordings`` by their inputs and the source. ``--write`` puts the tables into
 ``docs/validation/recordings.md``.
@@ -25,7 +25,7 @@ from pages import put
 from source_digest import source_digest
 
 from dynakin.errors import DynakinError
-from dynakin.recordings.beside import STANDING_WORDS, forces_beside, static_beside
+from dynakin.recordings.companions import STANDING_WORDS, companion_forces, companion_static
 from dynakin.recordings.frame import find_laboratory_frame
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
@@ -45,7 +45,7 @@ _FROM = {
 
 @dataclass(frozen=True, eq=False)
 class Row:
-    """A recording, with nothing or with what lies beside it, and what came of it."""
+    """A recording, with nothing or with its companions, and what came of it."""
 
     path: Path
     extra: tuple[str, ...]
@@ -69,18 +69,18 @@ class Row:
 
 
 def rows_of(path: Path, source: str) -> list[Row]:
-    """The run without an option, and that with what lies beside the recording, if anything does."""
+    """The run without an option, and that with its companions, if it has any."""
     try:
         recording = read(path)
     except DynakinError:
         recording = None
-    beside: list[str] = []
-    if (forces := forces_beside(path)) is not None:
-        beside += ["--forces", str(forces)]
-    if recording is not None and (static := static_beside(path, recording)) is not None:
-        beside += ["--static", str(static)]
+    extra: list[str] = []
+    if (forces := companion_forces(path)) is not None:
+        extra += ["--forces", str(forces)]
+    if recording is not None and (static := companion_static(path, recording)) is not None:
+        extra += ["--static", str(static)]
     made = []
-    for options in ([], beside) if beside else ([],):
+    for options in ([], extra) if extra else ([],):
         inputs = [path, *(Path(value) for value in options[1::2])]
         made.append(Row(path, tuple(options), recording, *kept(path, options, inputs, source)))
     return made
@@ -91,7 +91,7 @@ def table(rows: list[Row]) -> Iterator[str]:
     ran = [sum(row.code == 0 for row in rows if bool(row.extra) == extra) for extra in (False, True)]
     count = [sum(bool(row.extra) == extra for row in rows) for extra in (False, True)]
     yield (
-        f"{ran[0]} of {count[0]} recordings run without an option; of {count[1]} with something beside them "
+        f"{ran[0]} of {count[0]} recordings run without an option; of {count[1]} with something next to them "
         f"{ran[1]} run with it."
     )
     yield ""

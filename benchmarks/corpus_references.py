@@ -16,7 +16,7 @@ import xarray as xr
 from recordings_references import JOINTS, SIDES, Array
 
 from dynakin.errors import DynakinError
-from dynakin.recordings.beside import STANDING_WORDS
+from dynakin.recordings.companions import STANDING_WORDS
 from dynakin.recordings.formats.c3d import read_c3d_results
 from dynakin.recordings.formats.mot import read_table
 from dynakin.recordings.frame import GroundFrame

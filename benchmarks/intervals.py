@@ -6,7 +6,7 @@
 A case is squat or walk with fullbody or an .osim (``truth3d``'s trials, in DIR: folders ``squat_s1_*`` with trial.trc,
 grf.mot, static.trc, model.osim, trial.json, truth.npz), or one of our own simulator (``own_squat``, ``own_gait``,
 ``sagittal7``, ``squat7``). Each is filtered once without systematic errors; what each kind of error of size 1 would add
-is worked out beside it, so that sizes are tried without filtering again. Both are kept in build/intervals by what they
+is worked out with it, so that sizes are tried without filtering again. Both are kept in build/intervals by what they
 depend on: trial, noise, package and this file (--again: made anew).
 
 Groups and figures are truth3d's: angles with their mean error taken off, means over coordinates and seeds; deviation
@@ -36,8 +36,8 @@ from dynakin.filter.systematic import (
     Parts,
     Sizes,
     Systematic,
+    any_off_plates,
     reported,
-    some_beside,
     states_of,
     usual_sizes,
 )
@@ -67,7 +67,7 @@ Array = np.ndarray
 class Run:
     """One estimate against the truth: by block errors (T, C), the filter's own deviations, and variances by kind of
     error at size 1; (T,) intensity of the movement and how far markers are moved; (T, C) where moments come from,
-    and whether some foot stands beside the plates. Frames that have no truth or no value are NaN. ``late``: whether
+    and whether some foot stands off the plates. Frames that have no truth or no value are NaN. ``late``: whether
     later frames helped."""
 
     case: str
@@ -79,7 +79,7 @@ class Run:
     parts: Parts
     intensity: Array
     sources: Array
-    beside: bool
+    off_plates: bool
     variance_scale: float
     moved_m: Array
     late: bool
@@ -187,7 +187,7 @@ def against(
         {kind: {block: part[block][window][:, mine] for block in blocks} for kind, part in parts.items()},
         systematic.intensity(data)[window],
         sources,
-        some_beside(data, len(tracker.calibrated.feet)),
+        any_off_plates(data, len(tracker.calibrated.feet)),
         tracker.noise.variance_scale,
         systematic.moved_m(states_of(data))[window],
         bool(tracked.estimate.config["lag_s"]),
@@ -218,7 +218,9 @@ def figures(run: Run, sizes: Sizes | None) -> dict[str, tuple[float, ...]]:
     said = run.own
     if sizes is not None:
         over_time = run.intensity, run.moved_m, run.sources
-        said = reported(sizes, run.variance_scale, run.own, run.parts, *over_time, beside=run.beside, late=run.late)
+        said = reported(
+            sizes, run.variance_scale, run.own, run.parts, *over_time, off_plates=run.off_plates, late=run.late
+        )
     for title, block, places in groups_of(run):
         e, sd = run.error[block][:, places], said[block][:, places]
         if block == "coordinates":

@@ -14,7 +14,7 @@ import numpy as np
 
 import dynakin
 from dynakin.simulation.trial import simulate_squat
-from dynakin.validation.reference.least_squares import bodies_of, identify
+from dynakin.validation.reference.least_squares import identify, inertia_of
 from dynakin.validation.reference.methods import plane_wrench, reference_methods
 from dynakin.validation.reference.regressor import table_dynamics
 from dynakin.validation.truth import FIGURES, LEG, truth_errors
@@ -34,7 +34,7 @@ def one_trial(seed: int) -> dict[str, tuple[float, ...]]:
     data["AT, 6 Hz"] = at.data
     fit = identify(at.chain, initial.plan, at.kinematics, plane_wrench(recording, initial), mass_kg=initial.mass_kg)
     for title, parameters in (("least squares, free", fit.free), ("least squares, ±20 %", fit.bounded)):
-        dynamics = table_dynamics(at.chain, at.kinematics, bodies_of(at.chain, parameters))
+        dynamics = table_dynamics(at.chain, at.kinematics, inertia_of(at.chain, parameters))
         data[title] = at.data.assign(
             moments=(("time", "coordinate"), dynamics.moments),
             wrench_estimated=(("time", "component"), dynamics.wrench),

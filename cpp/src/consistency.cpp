@@ -33,7 +33,7 @@ Consistency::Consistency(const Model& model) : model_(model) {
     // A start that is itself closer to impossible than the margin may stay where it is.
     const Eigen::SelfAdjointEigenSolver<Matrix4> eigen(pseudo_inertia(body, segment.inertia), Eigen::EigenvaluesOnly);
     body.margin = std::max(std::min(margin, 0.5 * eigen.eigenvalues()(0)), 1e-12);
-    bodies_.push_back(body);
+    estimated_.push_back(body);
   }
 }
 
@@ -61,7 +61,7 @@ Consistency::Matrix4 Consistency::pseudo_inertia(const Body& body, const Inertia
 }
 
 double Consistency::smallest_eigenvalue(int body, const Eigen::VectorXd& x) const {
-  const Matrix4 J = pseudo_inertia(bodies_[body], inertia_of(model_.segments()[bodies_[body].segment], x));
+  const Matrix4 J = pseudo_inertia(estimated_[body], inertia_of(model_.segments()[estimated_[body].segment], x));
   return Eigen::SelfAdjointEigenSolver<Matrix4>(J, Eigen::EigenvaluesOnly).eigenvalues()(0);
 }
 
@@ -72,7 +72,7 @@ bool Consistency::holds(const Eigen::VectorXd& x) const {
 }
 
 bool Consistency::cut(int which, const Eigen::VectorXd& x, HalfSpace& out) const {
-  const Body& body = bodies_[which];
+  const Body& body = estimated_[which];
   const InertiaVector phi = inertia_of(model_.segments()[body.segment], x);
   Matrix4 J = pseudo_inertia(body, phi);
   J.diagonal().array() -= body.margin * tolerated / margin;

@@ -28,7 +28,7 @@ void Correction::leave_out_refused() {
     measurement.leave_out(static_cast<int>(verdicts.size()) - 1);
 }
 
-// Largest standard deviation of the coordinates that move a marker of this frame: of others it tells nothing, however
+// Largest standard deviation of the coordinates that move a marker of this frame: of others it shows nothing, however
 // often it is linearised.
 double Correction::uncertainty_seen() const {
   double most = 0.0;
@@ -50,7 +50,7 @@ void Correction::correct(const MarkerRef& markers, const Vector6& wrench) {
 }
 
 void Correction::note_linearised() {
-  if (tape && tape->tells()) tape->linearised = now.x;
+  if (tape && tape->records_update()) tape->linearised = now.x;
 }
 
 void Correction::iterate(const MarkerRef& markers, const Vector6& wrench, int most) {

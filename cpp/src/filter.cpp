@@ -76,7 +76,7 @@ StepReport Filter::update(const MarkerRef& markers, const Vector6& wrench, const
   correction_.measure(markers, wrench);
   predicted_ = correction_.measurement.predicted();
   report.tracking = recovery_.correct(markers, wrench);
-  if (FrameTape* tape = correction_.tape; tape && tape->tells()) {
+  if (FrameTape* tape = correction_.tape; tape && tape->records_update()) {
     tape->before = state();
     const auto& blocks = correction_.measurement.blocks();
     for (std::size_t b = 0; b < blocks.size(); ++b) tape->used[b] = blocks[b].rows > 0;

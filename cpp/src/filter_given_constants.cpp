@@ -131,7 +131,7 @@ void FilterGivenConstants::predict(const Eigen::MatrixXd& S, const Eigen::Matrix
   }
 }
 
-// Rows that nothing moving has a part in tell nothing that the constants do not hold already.
+// Rows that nothing moving has a part in add nothing to what the constants hold already.
 void FilterGivenConstants::gather(const std::vector<RowBlock>& blocks, Frame& frame) {
   for (auto* of : {&frame.row_ends, &frame.columns, &frame.chunk_ends, &frame.block_first, &c_ends_, &c_columns_})
     of->clear();

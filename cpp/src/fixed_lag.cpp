@@ -65,7 +65,7 @@ const Eigen::MatrixXd& FixedLag::covariance() {
     int known = by_;  // until which frame; those after everything started again say nothing
     while (known > 0 && !back(known - 1).tape.cut) --known;
     covariance_.start(back(by_).filtered.P);
-    for (int k = by_; k-- > known;) covariance_.learn(back(k).tape, back(k).dt, k == known);
+    for (int k = by_; k-- > known;) covariance_.add_frame(back(k).tape, back(k).dt, k == known);
     covariance_.end(back(known).filtered.P);
     has_covariance_ = true;
   }

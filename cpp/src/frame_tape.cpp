@@ -12,7 +12,7 @@ FrameTape::FrameTape(int state_size, int max_rows, std::size_t sensors)
       forgotten(state_size, 0),
       pull(Eigen::VectorXd::Zero(state_size)),
       used(sensors, 0) {
-  if (tells()) before = linearised = moved = pull;
+  if (records_update()) before = linearised = moved = pull;
   const auto most = static_cast<std::size_t>(max_rows);
   chunks.reserve(most);
   blocks.reserve(most);

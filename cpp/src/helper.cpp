@@ -24,8 +24,8 @@ void pause() {
 
 }  // namespace
 
-Helper::Helper(bool beside) {
-  if (!beside) return;
+Helper::Helper(bool threaded) {
+  if (!threaded) return;
   try {
     thread_ = std::thread([this] { help(); });
   } catch (const std::system_error&) {  // the system has no thread left: one does it all

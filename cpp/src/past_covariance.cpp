@@ -55,7 +55,7 @@ void PastCovariance::start(const Eigen::MatrixXd& P) {
   }
 }
 
-void PastCovariance::learn(const FrameTape& tape, double dt, bool last) {
+void PastCovariance::add_frame(const FrameTape& tape, double dt, bool last) {
   how_.step = dt;
   how_.kept = (-dt * settings_.decay_rate.array()).exp();
   const Index n = model_.state_size();

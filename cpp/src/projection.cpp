@@ -59,7 +59,7 @@ ProjectionReport Projection::apply(Eigen::VectorXd& x, Eigen::MatrixXd& P, Frame
       for (int i = 0; i < active_[k].row.size; ++i)
         tape->pull(active_[k].row.index[i]) += active_[k].multiplier * active_[k].row.value[i];
   }
-  if (tape && tape->tells() && fell_back_) {
+  if (tape && tape->records_update() && fell_back_) {
     tape->fell_back = true;
     tape->moved = x - wanted_;
   }

@@ -5,9 +5,9 @@
 
 namespace dynakin {
 
-Reports::Reports(StateRecord& record, ContactRecord* contacts, bool beside, std::function<void()> first)
+Reports::Reports(StateRecord& record, ContactRecord* contacts, bool threaded, std::function<void()> first)
     : record_(record), contacts_(contacts) {
-  if (!beside || !record.deviation) return;
+  if (!threaded || !record.deviation) return;
   open_ = true;
   try {
     thread_ = std::thread([this, begun = begun_, first = std::move(first)] {

@@ -92,7 +92,7 @@ void ScalarFunction::join_by_spline() {
     diagonal[k] = 2.0 * (width[k - 1] + width[k]);
     sixth[k] = slope[k] - slope[k - 1];
   }
-  for (std::size_t k = 1; k < n; ++k) {  // a symmetric tridiagonal system, widths beside the diagonal
+  for (std::size_t k = 1; k < n; ++k) {  // a symmetric tridiagonal system, widths off the diagonal
     const double factor = width[k - 1] / diagonal[k - 1];
     diagonal[k] -= factor * width[k - 1];
     sixth[k] -= factor * sixth[k - 1];

@@ -53,7 +53,7 @@ void Smoother::forward(std::size_t first, std::size_t end, RunRecord& record, Co
   if (end == trial_.frames) filter_.save(checkpoints_.back());
 }
 
-// Of the frame that the tape tells of; last: the state after the frame before.
+// Of the frame on the tape; last: the state after the frame before.
 Decision Smoother::decision(std::size_t k, const Eigen::VectorXd& last) const {
   Decision out;
   out.cut = tape_.cut;
@@ -88,7 +88,7 @@ Eigen::Map<const Eigen::VectorXd> Smoother::state(std::size_t k, const RunRecord
   return {record.state.data() + static_cast<Eigen::Index>(k) * n, n};
 }
 
-// After frame k. Needed where a frame has nothing to learn from later ones, which is rare: the filter goes there again.
+// After frame k. Needed where a frame gains nothing from later ones, which is rare: the filter goes there again.
 Belief Smoother::belief_at(std::size_t k, const RunRecord& record) {
   if (k + 1 == trial_.frames) return checkpoints_.back().belief;
   if (decisions_[k].cut) return restarted_;

@@ -15,7 +15,7 @@ dynakin::ModelSpec with_contact(dynakin::ModelSpec spec);
 
 dynakin::FilterSettings settings_for(const dynakin::Model& model);
 Eigen::MatrixXd prior_for(const dynakin::Model& model);
-// Correlated errors, and effects of the contacts' states that are large beside them.
+// Correlated errors, and effects of the contacts' states that are large compared with them.
 dynakin::WrenchModel wrench_model_for(const dynakin::Model& model);
 // Markers that the model itself would show at x.
 Eigen::Matrix<double, 3, Eigen::Dynamic> markers_at(const dynakin::Model& model, const Eigen::VectorXd& x);

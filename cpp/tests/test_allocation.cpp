@@ -149,8 +149,8 @@ void check_recovery_allocates_nothing(const dynakin::ModelSpec& spec) {
   CHECK(doubtful > 0 && lost > 0 && found > 0);
 }
 
-// An impossible body is cut back to a possible one in each frame.
-void check_keeping_bodies_possible_allocates_nothing(const dynakin::ModelSpec& spec) {
+// Impossible inertia is cut back to possible one in each frame.
+void check_keeping_inertia_possible_allocates_nothing(const dynakin::ModelSpec& spec) {
   using namespace dynakin;
   const Model model(spec);
   const FilterSettings settings = settings_for(model);
@@ -275,9 +275,9 @@ TEST(recovery_allocates_nothing) {
   check_recovery_allocates_nothing(planar_chain());
   check_recovery_allocates_nothing(spatial_tree());
 }
-TEST(keeping_bodies_possible_allocates_nothing) {
-  check_keeping_bodies_possible_allocates_nothing(planar_chain());
-  check_keeping_bodies_possible_allocates_nothing(spatial_tree());
+TEST(keeping_inertia_possible_allocates_nothing) {
+  check_keeping_inertia_possible_allocates_nothing(planar_chain());
+  check_keeping_inertia_possible_allocates_nothing(spatial_tree());
 }
 TEST(the_moments_derivatives_allocate_nothing) {
   check_moments_allocate_nothing(planar_chain());

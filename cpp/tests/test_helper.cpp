@@ -8,8 +8,8 @@
 using namespace dynakin;
 
 TEST(each_part_is_done_once_whoever_does_it) {
-  for (const bool beside : {false, true}) {
-    Helper helper(beside);
+  for (const bool threaded : {false, true}) {
+    Helper helper(threaded);
     std::array<int, 24> done{};  // no atomics: a part is of one thread, and is done when share returns
     for (int loop = 1; loop <= 3000; ++loop) {
       const int count = loop % 25;

@@ -1,4 +1,4 @@
-// Panels give what Eigen gives, whatever is left over in the last panel and of the last columns.
+// Panels give what Eigen gives, with any number of rows and columns left over in the last ones.
 #include <Eigen/Cholesky>
 #include <vector>
 

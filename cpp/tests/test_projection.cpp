@@ -1,4 +1,4 @@
-// given bounds, equalities and bodies that must be possible, when a state is projected, then the result is the nearest
+// given bounds, equalities and inertia that must be possible, when a state is projected, then the result is the nearest
 // one in the metric of P^-1. Judged by the conditions of Karush, Kuhn and Tucker, which are sufficient here.
 #include <Eigen/Cholesky>
 #include <cmath>

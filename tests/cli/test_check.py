@@ -33,7 +33,7 @@ def test_what_is_there_and_what_run_would_do(data_dir: Path, capsys: Said) -> No
     for words in ("317 frames at 100 Hz", "2 force plates", "Vertical +Z", "RSHO seen in 78.5 %", "abdomen"):
         assert words in found
     assert "Marker set plug-in-gait" in found and "markers by name; next best" in found
-    assert "--static S1_StandingRef.c3d (found beside the recording)" in found
+    assert "--static S1_StandingRef.c3d (found next to the recording)" in found
     assert "Moments: absent in all 317 frames." in found  # the cable
 
 
@@ -80,10 +80,10 @@ def test_check_promises_what_run_keeps(data_dir: Path, tmp_path: Path, capsys: S
     for words in ("fullbody (the default", "plug-in-gait", "Mass 85.00 kg: from the file", "plate 2 and plate 4 under"):
         assert words in first and words in found
     assert "right: plate 4 0.34 to 1.07 s; plate 2 1.37 to 2.13 s; off the plates 2.48 to 2.68 s." in found
-    assert "--static Static_trial.c3d (found beside the recording)" in found
+    assert "--static Static_trial.c3d (found next to the recording)" in found
 
 
-def test_forces_beside_a_recording_are_named_and_do_what_is_said(tmp_path: Path, capsys: Said) -> None:
+def test_forces_next_to_a_recording_are_named_and_do_what_is_said(tmp_path: Path, capsys: Said) -> None:
     made = simulate("fullbody", "squat", 1, 5.0).recording
     trial = tmp_path / "squat1.trc"
     write_trc(trial, made.time, list(made.marker_names), made.markers, unit="mm")
@@ -95,7 +95,7 @@ def test_forces_beside_a_recording_are_named_and_do_what_is_said(tmp_path: Path,
     forces = tmp_path / "squat1_grf.mot"
     write_storage(forces, "forces", made.time, columns, np.hstack(values), in_degrees=False)
     main(["check", str(trial), "--mass", "70"])
-    assert "--forces squat1_grf.mot (found beside the recording)" in told(capsys)[0]
+    assert "--forces squat1_grf.mot (found next to the recording)" in told(capsys)[0]
     assert main(["check", str(trial), "--mass", "70", "--forces", str(forces)]) == 0
     found, _ = told(capsys)
     assert "Leg moments: measured in all" in found and "--forces" not in found

@@ -41,14 +41,14 @@ def test_step_by_step_moments_bands_and_the_delayed_are_those_of_the_run() -> No
         live.step(sample, replace(part, segments=("paw", "foot_l")))
 
 
-def test_a_session_counts_measured_moments_more_once_a_foot_has_stood_beside_the_plates() -> None:
+def test_a_session_counts_measured_moments_more_once_a_foot_has_stood_off_the_plates() -> None:
     """As a recording does: late ones, in all frames from then on."""
     recording = simulate("fullbody", "squat", 1, 5.0).recording.window(2.0, 2.2)
     model = load_model("fullbody", Subject(mass_kg=70.0, height_m=1.75, sex="male"))
-    for beside in (False, True):
+    for off_plates in (False, True):
         live = Estimator(model, presets.default()).start(recording, lag_s=0.04)
         samples, frames = _samples(recording), list(_frames(_feet(recording, live)))
-        if beside:
+        if off_plates:
             contact = frames[2].contact.copy()
             contact[0, 0] = UNMEASURED
             frames[2] = replace(frames[2], contact=contact)
@@ -56,11 +56,11 @@ def test_a_session_counts_measured_moments_more_once_a_foot_has_stood_beside_the
             live.step(sample, part)
         before = {late: live.deviations(delayed=late)["moments"].values for late in (True, False)}
         assert live.systematic is not None
-        live.systematic.sizes = replace(live.systematic.sizes, own_beside=25.0)
+        live.systematic.sizes = replace(live.systematic.sizes, own_off_plates=25.0)
         after = {late: live.deviations(delayed=late)["moments"].values for late in (True, False)}
         np.testing.assert_array_equal(after[False], before[False])
         knee = [coordinate.name for coordinate in live.calibrated.spec.coordinates].index("knee_angle_l")
-        assert (after[True][knee] > before[True][knee]) == beside
+        assert (after[True][knee] > before[True][knee]) == off_plates
 
 
 def _feet(recording: Recording, live: Tracker) -> ContactLoads:

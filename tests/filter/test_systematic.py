@@ -28,9 +28,9 @@ from dynakin.filter.systematic import (
     SPEEDS_STILL,
     Sizes,
     Systematic,
+    any_off_plates,
     movement_intensity,
     reported,
-    some_beside,
 )
 from dynakin.results.measures.sources import DERIVED, MEASURED, PRIOR
 from dynakin.settings.noise import Noise
@@ -46,8 +46,8 @@ QDD = np.array([1.0, 0.5, -1.0, 2.0, 1.0, -2.0, 5.0, -3.0, 2.0, 6.0])
 CONTACT = np.array([40.0, 500.0, -60.0, 30.0, -20.0, 90.0])
 """N, N m about the ground's origin, on the shank."""
 SIZES = (0.01, 0.02, 0.05, 0.04, 0.06, 0.07, 0.3, 0.015)
-MOVING, BESIDE = 0.1, 0.2
-NONE = Sizes(*np.zeros(len(SIZES)), placed=np.inf, own_speeds=MOVING, own_beside=BESIDE)
+MOVING, OFF_PLATES = 0.1, 0.2
+NONE = Sizes(*np.zeros(len(SIZES)), placed=np.inf, own_speeds=MOVING, own_off_plates=OFF_PLATES)
 DECLARED = np.repeat([0.014, 0.018, 0.010], 4)
 
 
@@ -236,7 +236,7 @@ def test_a_pelvis_frame_that_is_turned_mixes_its_angles_and_leaves_the_moments_o
     assert np.sqrt(parts["moments"][9]) < 1.0
 
 
-def test_a_centre_of_mass_beside_its_place_is_that_of_bodies_that_are_changed() -> None:
+def test_a_centre_of_mass_off_its_place_is_that_of_segments_that_are_changed() -> None:
     external = np.zeros((3, 6))
     external[2] = CONTACT
     x = np.r_[Q, QD, QDD]
@@ -264,7 +264,9 @@ def test_intensity_is_the_mean_square_of_accelerations_over_their_deviations_of_
 
 def test_reported_deviations_hold_both_parts_and_a_scale_of_zero_leaves_the_filters_own() -> None:
     """Its own part times what the movement makes of it."""
-    subject = Systematic(calibrated(), Noise(), Sizes(*SIZES, placed=np.inf, own_speeds=MOVING, own_beside=BESIDE))
+    subject = Systematic(
+        calibrated(), Noise(), Sizes(*SIZES, placed=np.inf, own_speeds=MOVING, own_off_plates=OFF_PLATES)
+    )
     x = np.r_[Q, QD, QDD]
     P = np.zeros((30, 30))
     own = {block: np.full(10, 0.02) for block in BLOCKS} | {"accelerations": np.full(10, 2.0)}
@@ -296,33 +298,33 @@ def test_a_calm_movement_is_known_better_than_an_intense_one() -> None:
         np.testing.assert_allclose(calm["coordinates"], 1.0)
 
 
-def test_a_foot_stands_beside_the_plates_in_some_frame() -> None:
+def test_a_foot_stands_off_the_plates_in_some_frame() -> None:
     data = xr.Dataset({"foot_contact": (("time", "foot"), np.array([[1, 1], [1, 2]]))})
-    assert some_beside(data, 2)
-    assert not some_beside(data.isel(time=[0]), 2)
-    assert not some_beside(data, 1)  # the second is a rail, say
-    assert not some_beside(xr.Dataset(), 2)
+    assert any_off_plates(data, 2)
+    assert not any_off_plates(data.isel(time=[0]), 2)
+    assert not any_off_plates(data, 1)  # the second is a rail, say
+    assert not any_off_plates(xr.Dataset(), 2)
 
 
-def test_measured_moments_count_more_where_some_foot_stands_beside_the_plates_and_priors_in_full() -> None:
+def test_measured_moments_count_more_where_some_foot_stands_off_the_plates_and_priors_in_full() -> None:
     """Measured ones late alone; derived ones as the movement has it."""
     source = np.array([[MEASURED, MEASURED], [DERIVED, PRIOR]])
     own = {"speeds": np.ones((2, 2)), "moments": np.ones((2, 2))}
     parts = {kind: {block: np.zeros((2, 2)) for block in own} for kind in (*KINDS, "inertia")}
     scale = 0.1  # of the noise that was found
 
-    def variances(scale: float, *, beside: bool, late: bool) -> dict[str, Array]:
-        found = reported(NONE, scale, own, parts, np.zeros(2), np.zeros(2), source, beside=beside, late=late)
+    def variances(scale: float, *, off_plates: bool, late: bool) -> dict[str, Array]:
+        found = reported(NONE, scale, own, parts, np.zeros(2), np.zeros(2), source, off_plates=off_plates, late=late)
         return {block: sd**2 for block, sd in found.items()}
 
-    still, more, now = OWN_LATE["moments"][0], BESIDE / scale, OWN_AT_ONCE["moments"][0]
-    late = variances(scale, beside=True, late=True)
+    still, more, now = OWN_LATE["moments"][0], OFF_PLATES / scale, OWN_AT_ONCE["moments"][0]
+    late = variances(scale, off_plates=True, late=True)
     np.testing.assert_allclose(late["moments"], [[more, more], [still, 1.0]])
     np.testing.assert_allclose(late["speeds"], SPEEDS_STILL)
-    for noise_scale, beside in ((1.0, True), (scale, False)):  # holds as much already; none stands beside
-        found = variances(noise_scale, beside=beside, late=True)["moments"]
+    for noise_scale, off_plates in ((1.0, True), (scale, False)):  # holds as much already; none stands off the plates
+        found = variances(noise_scale, off_plates=off_plates, late=True)["moments"]
         np.testing.assert_allclose(found, [[still, still], [still, 1.0]])
-    at_once = variances(scale, beside=True, late=False)["moments"]
+    at_once = variances(scale, off_plates=True, late=False)["moments"]
     np.testing.assert_allclose(at_once, [[now, now], [now, 1.0]])
 
 

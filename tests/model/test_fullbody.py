@@ -28,11 +28,11 @@ def test_a_symmetric_person_is_measured_symmetrically_and_upright() -> None:
         assert start[name] == pytest.approx(0.0, abs=1e-6)
     assert 0.38 < geometry.lengths["thigh"] < 0.44 and 0.38 < geometry.lengths["shank"] < 0.44
     assert initial.feet == {"right": "foot_r", "left": "foot_l"}
-    assert sum(body.mass for body in initial.plan.bodies.values()) == pytest.approx(70.0)
-    for name, body in initial.plan.bodies.items():
+    assert sum(body.mass for body in initial.plan.inertia.values()) == pytest.approx(70.0)
+    for name, body in initial.plan.inertia.items():
         assert body.possible(), name
         if name.endswith("_r"):
-            np.testing.assert_allclose(initial.plan.bodies[name[:-2] + "_l"].mirrored().vector, body.vector, atol=1e-9)
+            np.testing.assert_allclose(initial.plan.inertia[name[:-2] + "_l"].mirrored().vector, body.vector, atol=1e-9)
 
 
 def test_markers_stand_where_they_were_measured_and_knees_lie_inside() -> None:
@@ -165,7 +165,7 @@ def test_a_person_without_arms_or_head_markers_has_them_locked() -> None:
     initial = definition().calibrate(Recording("legs", None, whole.time, names, whole.markers[:, kept]))
     locked = {c.name for c in initial.spec.coordinates if c.locked}
     assert {"arm_flex_r", "elbow_flex_l", "neck_extension"} <= locked
-    assert sum(body.mass for body in initial.plan.bodies.values()) == pytest.approx(70.0)
+    assert sum(body.mass for body in initial.plan.inertia.values()) == pytest.approx(70.0)
 
 
 def test_a_movement_that_never_shows_most_markers_at_once_is_refused() -> None:

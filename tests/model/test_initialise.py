@@ -161,7 +161,7 @@ def test_an_arm_without_markers_hangs_and_is_locked(standing_person: Recording) 
     assert "upper_arm" in plan.fixed_lengths
     assert plan.geometry.lengths["upper_arm"] == pytest.approx(1.75 * 0.1618, rel=1e-3)
     assert any("Segment upper_arm has no markers: locked to trunk" in message for message in found.messages)
-    assert sum(body.mass for body in plan.bodies.values()) == pytest.approx(70.0)
+    assert sum(body.mass for body in plan.inertia.values()) == pytest.approx(70.0)
 
 
 def test_an_abdomen_without_markers_is_locked_to_the_thorax(standing_person: Recording) -> None:
@@ -237,7 +237,7 @@ def test_priors_are_finite_and_bounds_hold_the_start(standing_person: Recording)
     for name, value in values.items():
         assert bounds[name][0] <= value <= bounds[name][1], name
     assert bounds["length/thigh"] == pytest.approx((0.32, 0.48))
-    mass = plan.bodies["thigh"].mass
+    mass = plan.inertia["thigh"].mass
     assert bounds["inertia/thigh/mass"] == pytest.approx((0.8 * mass, 1.2 * mass))
     low, high = bounds["inertia/thigh/mx"]
     assert high - low == pytest.approx(2 * 0.2 * mass * 0.40)  # of mass times length, not of the value

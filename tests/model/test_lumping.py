@@ -47,12 +47,12 @@ def measured(request: pytest.FixtureRequest, standing_person: Recording) -> tupl
 
 def test_the_masses_add_up_to_the_person(measured: tuple[ModelPlan, CalibratedModel, str]) -> None:
     plan, _, _ = measured
-    assert sum(body.mass for body in plan.bodies.values()) == pytest.approx(70.0, rel=1e-14)
+    assert sum(body.mass for body in plan.inertia.values()) == pytest.approx(70.0, rel=1e-14)
 
 
 def test_every_segment_is_a_possible_body(measured: tuple[ModelPlan, CalibratedModel, str]) -> None:
     plan, _, _ = measured
-    for name, body in plan.bodies.items():
+    for name, body in plan.inertia.items():
         assert body.possible_in_plane(), name
         assert body.possible(), name
 
@@ -74,7 +74,7 @@ def test_each_segment_equals_the_points_of_its_parts_on_both_sides(
                 points.append(own @ part.rotation.T * [1.0, 1.0, mirror] + part.origin)
                 masses.append(weights)
         expected = planar_sum(np.vstack(points), np.concatenate(masses))
-        np.testing.assert_allclose(plan.bodies[segment.name].vector[[0, 1, 2, 6]], expected, rtol=1e-10, atol=1e-12)
+        np.testing.assert_allclose(plan.inertia[segment.name].vector[[0, 1, 2, 6]], expected, rtol=1e-10, atol=1e-12)
 
 
 def test_the_whole_body_is_where_the_parts_are(standing_person: Recording) -> None:
@@ -82,7 +82,9 @@ def test_the_whole_body_is_where_the_parts_are(standing_person: Recording) -> No
     frame."""
     found = load_model("sagittal7", PERSON, "opencap").calibrate(standing_person, side="right")
     plan = found.measured_plan()
-    height = sum(body.mass * (plan_pose(plan, name) @ [*body.centre[:2], 1.0])[1] for name, body in plan.bodies.items())
+    height = sum(
+        body.mass * (plan_pose(plan, name) @ [*body.centre[:2], 1.0])[1] for name, body in plan.inertia.items()
+    )
     assert 0.50 * 1.75 < height / 70.0 + 0.03 < 0.60 * 1.75  # 53 to 57 % of the height in women and men
     assert found.mass_kg == 70.0
 
@@ -116,7 +118,7 @@ def test_foot_frame_is_turned_from_heel_to_metatarsals(standing_person: Recordin
 def test_proximal_table_origin_goes_to_the_distal_joint(standing_person: Recording) -> None:
     """A shank of the table hangs from the knee; in the toe-rooted chain its origin is the ankle."""
     plan = load_model("sagittal7", PERSON, "opencap").calibrate(standing_person, side="right").measured_plan()
-    body, entry = plan.bodies["shank"], load_table("dumas", "female").part("shank")
+    body, entry = plan.inertia["shank"], load_table("dumas", "female").part("shank")
     length = plan.geometry.lengths["shank"]
     np.testing.assert_allclose(body.centre[:2], [entry.centre[0] * length, (1.0 + entry.centre[1]) * length])
     about_centre = body.inertia[2, 2] - body.mass * float(body.centre[:2] @ body.centre[:2])
@@ -148,5 +150,5 @@ def test_a_segments_own_inertia_may_stand_in_the_file(tmp_path: Path, standing_p
     path.write_text(text, encoding="utf-8")
     plan = load_model(path, PERSON, "opencap").calibrate(standing_person, side="right").measured_plan()
     np.testing.assert_allclose(
-        plan.bodies["forearm"].vector, RigidBody.from_vector([2, 0, -0.4, 0, 0.2, 0.01, 0.2, 0, 0, 0]).vector
+        plan.inertia["forearm"].vector, RigidBody.from_vector([2, 0, -0.4, 0, 0.2, 0.01, 0.2, 0, 0, 0]).vector
     )

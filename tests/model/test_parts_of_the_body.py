@@ -54,9 +54,9 @@ def test_without_the_upper_body_the_legs_are_the_same_and_the_mass_is_all_there(
             assert found.plan.start[f"{name}_{side}"] == pytest.approx(full.plan.start[f"{name}_{side}"], abs=2e-3)
     for name in ("thigh", "shank", "pelvis"):
         assert found.plan.geometry.lengths[name] == pytest.approx(full.plan.geometry.lengths[name], abs=1e-6)
-    assert sum(body.mass for body in found.plan.bodies.values()) == pytest.approx(70.0)
+    assert sum(body.mass for body in found.plan.inertia.values()) == pytest.approx(70.0)
     upper = {"torso", "head", *(f"{part}_{side}" for part in ("upper_arm", "forearm", "hand") for side in "rl")}
-    assert found.unmarked_kg == pytest.approx(sum(found.plan.bodies[name].mass for name in upper))
+    assert found.unmarked_kg == pytest.approx(sum(found.plan.inertia[name].mass for name in upper))
     assert full.unseen_kg == 0.0 < found.unseen_kg < found.unmarked_kg
     held = {"lumbar_extension", "arm_flex_l", "elbow_flex_r", "neck_bending"}
     assert held <= set(found.held) and not {f"{name}_r" for name in LEG} & set(found.held)
@@ -87,7 +87,7 @@ def test_a_leg_without_markers_takes_the_other_ones_lengths_and_hangs_as_it_does
         apart = found.plan.start[f"{name}_l"] - full.plan.start[f"{name}_l"]
         assert abs(np.rad2deg(apart)) < 3.5, name  # measured: ankle 3.1, how differently the two feet stand
     assert found.unmarked_feet == {"left": "foot_l"}
-    np.testing.assert_allclose(found.plan.bodies["thigh_l"].mass, found.plan.bodies["thigh_r"].mass)
+    np.testing.assert_allclose(found.plan.inertia["thigh_l"].mass, found.plan.inertia["thigh_r"].mass)
 
 
 @pytest.mark.parametrize("gone", [["RWRA", "RWRB"], ["RSHO", "LSHO"], ["LPSI", "RPSI"], ["RHEE"], ["RKNE"], ["LASI"]])

@@ -38,8 +38,8 @@ def test_squats1(data_dir: Path) -> None:
     }
     assert plan.geometry.lengths == pytest.approx(expected, abs=2e-3)
     assert not plan.geometry.locked
-    assert sum(body.mass for body in plan.bodies.values()) == pytest.approx(60.05, rel=1e-12)
-    assert all(body.possible_in_plane() for body in plan.bodies.values())
+    assert sum(body.mass for body in plan.inertia.values()) == pytest.approx(60.05, rel=1e-12)
+    assert all(body.possible_in_plane() for body in plan.inertia.values())
     # the other system's 3D angles of the same frame (radians in the file): a plane and another pelvis frame
     # apart
     other = read_table(data_dir / OPENCAP / "squats1_ik.mot")
@@ -121,7 +121,7 @@ def test_squat7_takes_opencap(data_dir: Path, table: str, markers: str) -> None:
     subject = Subject(mass_kg=60.05)
     plan = load_model("squat7", subject, markers, table).calibrate(opencap(data_dir, "squats1")).measured_plan()
     assert list(plan.geometry.locked) == ["thoracic"]
-    assert sum(body.mass for body in plan.bodies.values()) == pytest.approx(60.05, rel=1e-12)
+    assert sum(body.mass for body in plan.inertia.values()) == pytest.approx(60.05, rel=1e-12)
 
 
 def test_a_wrong_marker_set_names_what_there_is(data_dir: Path) -> None:

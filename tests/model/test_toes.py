@@ -39,14 +39,14 @@ def with_toes(recording: Recording, names: tuple[str, ...] = ("RHLX", "LHLX")) -
 def test_without_toe_markers_the_model_has_no_toes(marked: ModelDefinition) -> None:
     plain = load_model("fullbody", WHO, markers="plug-in-gait").calibrate(standing())
     same = marked.calibrate(standing())
-    assert "toes_r" not in same.plan.bodies
+    assert "toes_r" not in same.plan.inertia
     assert same.names == plain.names
     np.testing.assert_allclose(same.x0, plain.x0, atol=1e-12)
 
 
 def test_one_side_marked_has_toes_on_that_side(marked: ModelDefinition) -> None:
     found = marked.calibrate(with_toes(standing(), ("RHLX",)))
-    assert "toes_r" in found.plan.bodies and "toes_l" not in found.plan.bodies
+    assert "toes_r" in found.plan.inertia and "toes_l" not in found.plan.inertia
 
 
 def test_a_great_toe_that_is_never_seen_with_the_rest_gives_no_toes(marked: ModelDefinition) -> None:
@@ -55,7 +55,7 @@ def test_a_great_toe_that_is_never_seen_with_the_rest_gives_no_toes(marked: Mode
     markers[:80, recording.marker_names.index("RHLX")] = np.nan
     markers[80:, recording.marker_names.index("LANK")] = np.nan
     found = marked.calibrate(replace(recording, markers=markers))
-    assert "toes_r" not in found.plan.bodies and "toes_l" in found.plan.bodies
+    assert "toes_r" not in found.plan.inertia and "toes_l" in found.plan.inertia
     assert any("measured without RHLX" in text for text in found.messages)
 
 
@@ -64,7 +64,7 @@ def test_a_great_toe_without_metatarsals_stays_on_the_foot(marked: ModelDefiniti
     kept = [k for k, name in enumerate(recording.marker_names) if name[1:] not in ("TOE", "MT5")]
     names = tuple(recording.marker_names[k] for k in kept)
     found = marked.calibrate(replace(recording, marker_names=names, markers=recording.markers[:, kept]))
-    assert "toes_r" not in found.plan.bodies
+    assert "toes_r" not in found.plan.inertia
     assert next(site.segment for site in found.plan.sites if site.recorded == "RHLX") == "foot_r"
 
 

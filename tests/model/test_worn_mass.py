@@ -41,7 +41,7 @@ def test_bounds_leave_room_for_it_and_mass_stays_positive() -> None:
 def test_the_filter_starts_from_it() -> None:
     initial = measured()
     names = list(initial.names)
-    body = initial.measured_plan().bodies["foot_r"]
+    body = initial.measured_plan().inertia["foot_r"]
     at = [names.index(f"inertia/foot_r/{name}") for name in INERTIA_NAMES]
     worn_kg = Priors().worn_mass_sd_fraction * 70.0
     noise = Noise(total_mass_use="frame")

@@ -1,4 +1,4 @@
-"""Plates that are exchanged, beside their place, or drift: found by the feet, and said with what to do."""
+"""Plates that are exchanged, off their place, or drift: found by the feet, and said with what to do."""
 
 from __future__ import annotations
 
@@ -69,10 +69,10 @@ def test_exchanged_plates_are_named_and_their_loads_left_out() -> None:
 
 
 @pytest.mark.parametrize(("x", "z"), [(0.0, 0.25), (0.0, -0.16), (0.35, 0.1)])
-def test_a_plate_beside_its_place_is_said_with_its_offset(x: float, z: float) -> None:
+def test_a_plate_off_its_place_is_said_with_its_offset(x: float, z: float) -> None:
     """More than a shoe is wide, and beyond: what is then under no foot is left out."""
     made = walked(moved=(x, z))
-    said = [t for t in messages(made.recording) if "beside its place" in t]
+    said = [t for t in messages(made.recording) if "off its place" in t]
     assert len(said) == 1 and said[0].startswith("Warning: p1") and "left foot" in said[0]
     told = [float(part.split()[0].rstrip(",")) for part in (said[0].split("(X ")[1], said[0].split("Z ")[1])]
     np.testing.assert_allclose(told, [x, z], atol=0.03)

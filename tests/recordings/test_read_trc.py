@@ -120,7 +120,7 @@ def test_no_such_file_folder_and_unknown_kind(tmp_path: Path) -> None:
         RecordingError, match=r"found extension '\.xyz', expected a recording as \.c3d, \.csv or \.trc$"
     ):
         read(write(tmp_path, "a.xyz", TRC))
-    with pytest.raises(RecordingError, match=r"'\.MOT', expected .* \.trc; a table of ground forces goes beside"):
+    with pytest.raises(RecordingError, match=r"'\.MOT', expected .* \.trc; a table of ground forces goes with"):
         read(write(tmp_path, "a.MOT", TRC))
     with pytest.raises(
         RecordingError, match=r"found extension '\.trc', expected ground forces as \.csv, \.mot or \.sto"

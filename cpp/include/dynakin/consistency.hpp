@@ -16,12 +16,12 @@ class Consistency {
   explicit Consistency(const Model& model);
 
   // Segments of which something is estimated.
-  int size() const { return static_cast<int>(bodies_.size()); }
+  int size() const { return static_cast<int>(estimated_.size()); }
   // Smallest eigenvalue of a segment's pseudo-inertia, each axis in units of where it started: 0 or less is impossible.
   double smallest_eigenvalue(int body, const Eigen::VectorXd& x) const;
   bool holds(const Eigen::VectorXd& x) const;
-  // False where the body is possible. Else the half space v' J(phi) v >= margin, which holds all bodies that are
-  // possible by the margin and not this one; v belongs to the smallest eigenvalue.
+  // False where the segment's inertia is possible. Else the half space v' J(phi) v >= margin, which holds all inertia
+  // that is possible by the margin and not this one; v belongs to the smallest eigenvalue.
   bool cut(int body, const Eigen::VectorXd& x, HalfSpace& out) const;
 
   // What a projection aims at, and what passes: the distance between them ends the cutting after few rounds.
@@ -38,7 +38,7 @@ class Consistency {
   Matrix4 pseudo_inertia(const Body& body, const InertiaVector& phi) const;
 
   const Model& model_;
-  std::vector<Body> bodies_;
+  std::vector<Body> estimated_;
 };
 
 }  // namespace dynakin

@@ -26,7 +26,7 @@ enum class MomentSource : std::uint8_t {
 };
 
 // What is known of the contacts' wrenches in a frame, on the person, about the ground origin. Where nothing touches,
-// wrench and covariance do not count. What covariances of different contacts share stands beside the diagonal: two
+// wrench and covariance do not count. What covariances of different contacts share stands off the diagonal: two
 // feet on one plate have a sum that is known better than its parts.
 struct ContactLoads {
   // states: how many contacts, the first ones, have states.

@@ -11,7 +11,7 @@
 namespace dynakin {
 
 // Sized once for a filter (Filter::tape_rows); writing allocates nothing. With sensors (as many as Measurement has
-// blocks) it is also told how the update came about, so that its rows can be linearised again; with max_rows 0 nothing
+// blocks) it also records how the update came about, so that its rows can be linearised again; with max_rows 0 nothing
 // else is kept.
 struct FrameTape {
   FrameTape(int state_size, int max_rows, std::size_t sensors = 0);
@@ -55,7 +55,7 @@ struct FrameTape {
   bool cut = false;  // everything started again after the update
 
   // With sensors only.
-  bool tells() const { return !used.empty(); }
+  bool records_update() const { return !used.empty(); }
   std::vector<std::uint8_t> used;         // blocks that the update took
   Eigen::VectorXd before, linearised;     // (n,) the state that it corrected, and where its rows were linearised last
   double stirred = 0.0, stirred_s = 0.0;  // before it: what `stir` was asked for, times and seconds

@@ -56,7 +56,7 @@ struct FrameGivenConstants {
   Eigen::MatrixXd S, Vt;          // (d, d), V' (c, d), in the end V' from all frames
   bool anew = false;              // what goes backwards from frame to frame is formed anew here
   // H over d by its entries, row after row. With S = L L' of a chunk: Z = S_before H' L^-T, Dt = (H_c C + H V)' L^-T,
-  // w = L^-1 (innovation), a column or number a row; L stands beside its rows.
+  // w = L^-1 (innovation), a column or number a row; L stands next to its rows.
   std::vector<int> row_ends, columns, chunk_ends;
   std::vector<int> block_first;  // of a row: the first of its block, whose rows all have the same columns
   std::vector<double> values;

@@ -12,8 +12,8 @@ namespace dynakin {
 // What it has not begun the first thread does: where a busy machine keeps it away, nobody waits for it.
 class Helper {
  public:
-  // beside: whether there may be another thread (threads.hpp); else, or where the system has none, all is done alone.
-  explicit Helper(bool beside);
+  // threaded: whether there may be another thread (threads.hpp); else, or where the system has none, all is done alone.
+  explicit Helper(bool threaded);
   ~Helper();
   Helper(const Helper&) = delete;
   Helper& operator=(const Helper&) = delete;

@@ -20,7 +20,7 @@ class PastCovariance {
 
   void start(const Eigen::MatrixXd& P);  // the past frame, as it was filtered
   // The next frame, dt later, which may not be one with which everything started again. last: end() follows.
-  void learn(const FrameTape& tape, double dt, bool last);
+  void add_frame(const FrameTape& tape, double dt, bool last);
   void end(const Eigen::MatrixXd& P);  // of the filter after the last frame
 
   // (n, n), of all pairs of elements of which none is a marker's own, and of those that move the same marker; others

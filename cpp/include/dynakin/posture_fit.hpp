@@ -12,7 +12,7 @@ struct PostureProblem {
   Eigen::Matrix3Xd targets;      // (3, M) m, ground frame
   Eigen::VectorXd lower, upper;  // rad or m
   Eigen::VectorXd scale;         // what counts as a step of one
-  Eigen::VectorXd pull, rest;    // pull * (q - rest) stands beside the distances: what no marker shows stays there
+  Eigen::VectorXd pull, rest;    // pull * (q - rest) is minimised with the distances: what no marker shows stays there
 };
 
 struct PostureFit {

@@ -36,7 +36,7 @@ void decay(const Model& model, const FilterSettings& settings, double dt, Eigen:
 // P <- P + what white jerk, so many times as dense as declared, adds to the motion over dt.
 void stir(const Model& model, const FilterSettings& settings, double times, double dt, Eigen::MatrixXd& P);
 
-// x <- f(x) over dt alone: where the state is expected to be then, whatever is measured meanwhile.
+// x <- f(x) over dt alone: where the state is expected to be then, regardless of what is measured meanwhile.
 void predict_mean(const Model& model, const FilterSettings& settings, double dt, Eigen::VectorXd& x);
 
 // x <- F' x: the backward pass of a smoother.

@@ -17,9 +17,9 @@ namespace dynakin {
 // Of one thread, which adds and ends.
 class Reports {
  public:
-  // beside: whether another thread may help, which it does if the record has deviations. It does `first` before;
+  // threaded: whether another thread may help, which it does if the record has deviations. It does `first` before;
   // where it does not, or has not begun when the reports end, nobody does.
-  Reports(StateRecord& record, ContactRecord* contacts, bool beside, std::function<void()> first = {});
+  Reports(StateRecord& record, ContactRecord* contacts, bool threaded, std::function<void()> first = {});
   ~Reports();
   Reports(const Reports&) = delete;
   Reports& operator=(const Reports&) = delete;

@@ -48,7 +48,7 @@ def _listed(levels: list[str] | tuple[str, ...]) -> str:
 
 
 def _load(level: str) -> None:
-    """Make the file `_core_<level>`, beside that of `_cpu`, the module `_core`."""
+    """Make the file `_core_<level>`, next to that of `_cpu`, the module `_core`."""
     name, file = f"{__name__}._core", Path(_cpu.__file__)
     spec = spec_from_file_location(name, file.with_name(file.name.replace("_cpu", f"_core_{level}", 1)))
     assert spec is not None and spec.loader is not None

@@ -194,11 +194,11 @@ void bind_run(nb::class_<Filter>& filter) {
           "run, then backwards over the same frames: the arrays of run (of markers_estimated, wrench_estimated, "
           "moments and the feet with `outputs` alone, then with deviations), and smoothed_state, _markers, _wrench and "
           "_moments, each also with _sd, and backward_us. The filter then stands where run would have left it; after "
-          "an interruption it stands anywhere. progress counts both ways: total is twice the frames. Memory beside "
-          "the arrays: T / stretch checkpoints and stretch frames, twice as many where a second thread helps; 0: "
-          "sqrt(T). It helps where fewer threads smooth in this process than OMP_NUM_THREADS says (else: than the "
-          "machine has), and changes no bit. Raises ValueError where bounds are kept by constraint 'gain' or "
-          "'sigmoid'.")
+          "an interruption it stands anywhere. progress counts both ways: total is twice the frames. Memory in "
+          "addition to the arrays: T / stretch checkpoints and stretch frames, twice as many where a second thread "
+          "helps; 0: sqrt(T). It helps where fewer threads smooth in this process than OMP_NUM_THREADS says (else: "
+          "than the machine has), and changes no bit. Raises ValueError where bounds are kept by constraint 'gain' "
+          "or 'sigmoid'.")
       .def("run_lagged", &run_lagged, nb::arg("time"), nb::arg("markers"), nb::arg("wrench"), nb::arg("lag"),
            nb::arg("progress") = nb::none(), nb::arg("feet") = nb::none(), nb::arg("wrench_covariance") = nb::none(),
            nb::arg("wrench_effects") = nb::none(),

@@ -11,7 +11,7 @@ from dynakin.errors import DynakinError, ModelError
 from dynakin.filter.prepared import Prepared
 from dynakin.model.markers.recognise import fits
 from dynakin.pipeline.stages import prepare_case
-from dynakin.recordings.beside import forces_beside, static_beside
+from dynakin.recordings.companions import companion_forces, companion_static
 from dynakin.recordings.recording import Recording
 from dynakin.results.naming import sentence, words
 from dynakin.settings.settings import Settings
@@ -79,24 +79,24 @@ def _gaps(recording: Recording) -> str:
     gappy = sorted((part, name) for name, part in share.items() if part < 1.0)
     if not gappy:
         return "none: every marker is seen in every frame."
-    told = [
+    listed = [
         f"{name} {'never seen' if part == 0.0 else f'seen in {np.floor(1000 * part) / 10:.1f} %'}"
         for part, name in gappy
     ]
-    rest = f" and {len(told) - _LISTED} more" if len(told) > _LISTED else ""
-    return f"{len(gappy)} of {len(share)} markers have gaps: {', '.join(told[:_LISTED])}{rest}."
+    rest = f" and {len(listed) - _LISTED} more" if len(listed) > _LISTED else ""
+    return f"{len(gappy)} of {len(share)} markers have gaps: {', '.join(listed[:_LISTED])}{rest}."
 
 
 def model_rows(ready: Prepared, settings: Settings, refusal: DynakinError | None) -> Rows:
     """What `run` says first, with what it rests on, and what will come out."""
     calibrated = ready.calibrated
     sentences = calibrated.messages
-    told = {*starting(sentences, (*MARKERS, *GROUND, *SUBJECT, *_DETAILS))}
+    used = {*starting(sentences, (*MARKERS, *GROUND, *SUBJECT, *_DETAILS))}
     more = {
         "Model": _held(ready),
         "Markers": [
             f"{len(calibrated.spec.markers)} of {len(ready.recording.marker_names)} are used.",
-            *(short(text) for text in sentences if text not in told),
+            *(short(text) for text in sentences if text not in used),
         ],
         "Ground": starting(sentences, GROUND),
     }
@@ -110,7 +110,7 @@ def model_rows(ready: Prepared, settings: Settings, refusal: DynakinError | None
         return rows
     figures = ready.moment_figures()
     rows += [("Results", text) for text in (figures["verdict"], *figures["reasons"])]
-    known = {*figures["reasons"], *told, *(sentence(text.removeprefix("Warning: ")) for text in sentences)}
+    known = {*figures["reasons"], *used, *(sentence(text.removeprefix("Warning: ")) for text in sentences)}
     warnings = [text for text in ready.messages if text.startswith("Warning: ")]
     return rows + [("Doubts", text) for text in warnings if sentence(text.removeprefix("Warning: ")) not in known]
 
@@ -119,33 +119,33 @@ def _held(ready: Prepared) -> list[str]:
     """A sentence on the coordinates that are not estimated; those of both sides once."""
     locked = [coordinate.name for coordinate in ready.calibrated.spec.coordinates if coordinate.locked]
     stems = [name.removesuffix("_r").removesuffix("_l") for name in locked]
-    told = {
+    held = {
         stem: f"{words(stem)} (both sides)" if stems.count(stem) == 2 else words(name)
         for stem, name in zip(stems, locked, strict=True)
     }
-    return [f"Held: {', '.join(told.values())}."] if told else []
+    return [f"Held: {', '.join(held.values())}."] if held else []
 
 
 def nearest_sets(recording: Recording) -> list[str]:
     """The marker sets that the recording's names fit best, and what each lacks at least."""
-    told = []
+    rows = []
     for fit in fits(recording.seen_names)[:_SETS]:
         lacks = f"; lacks markers {', '.join(fit.lacking)}" if fit.lacking else ""
-        told.append(f"{fit.marker_set.name}: {fit.explained_n} of its {fit.expected_n} markers by name{lacks}.")
-    return told
+        rows.append(f"{fit.marker_set.name}: {fit.explained_n} of its {fit.expected_n} markers by name{lacks}.")
+    return rows
 
 
 def to_add(case: Case, ready: Prepared | None, refusal: DynakinError | None) -> list[str]:
-    """What would give more, with what lies beside the recording."""
+    """What would give more, with what lies next to the recording."""
     recording, settings = case.recording, case.config
     path, found = recording.path, list[str]()
-    forces = None if path is None or settings.forces is not None else forces_beside(path)
+    forces = None if path is None or settings.forces is not None else companion_forces(path)
     if forces is not None:
-        found.append(f"--forces {forces.name} (found beside the recording): the plates' forces.")
+        found.append(f"--forces {forces.name} (found next to the recording): the plates' forces.")
     elif not recording.plates:
         found.append("--forces FILE.mot: nothing measures the ground's reaction.")
-    if settings.static is None and path is not None and (static := static_beside(path, recording)) is not None:
-        found.append(f"--static {static.name} (found beside the recording): lengths and marker places of standing.")
+    if settings.static is None and path is not None and (static := companion_static(path, recording)) is not None:
+        found.append(f"--static {static.name} (found next to the recording): lengths and marker places of standing.")
     if refusal is not None and ready is not None and settings.mass_kg is None:
         found.append("--mass KG: neither plates nor file show it.")
     if ready is None:

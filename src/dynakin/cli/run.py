@@ -64,7 +64,7 @@ def run(
     print_rows(out(), assumed(next(iter(ready.values())), config))
     result = run_case(case, ready=ready, keep_lost=keep_lost, keep="--keep-lost")
     folder = result.save(config.output, keep_lost=keep_lost, check=False)
-    from dynakin.cli.summary import end, print_summary  # loaded beside the core, for the most part
+    from dynakin.cli.summary import end, print_summary  # loaded while the core works, for the most part
 
     failures = result.failures
     saved = len(failures.found)

@@ -1,11 +1,11 @@
 """Noise that calibrates itself: the scales of the declared noise that a recording's own innovations ask for.
 
-Two things are found. The jerk's density by group of joints, from how much accelerations change between frames beside
-what the filter expects of that (covariance matching). Then one factor on all variances but those of plates
-and residual, so that the normalised innovation squared is one a row: it leaves the movement as it is weighed, because
-the gain depends on the ratio of the variances only, and makes deviations and innovations agree (the variance of unit
-weight of adjustment theory). Priors are in it as well: what is wrong with a place, a length or a mass does not average
-out, and data that count for more would only bend them further.
+Two things are found. The jerk's density by group of joints, from how much accelerations change between frames
+compared with what the filter expects of that (covariance matching). Then one factor on all variances but those of
+plates and residual, so that the normalised innovation squared is one a row: it leaves the movement as it is weighed,
+because the gain depends on the ratio of the variances only, and makes deviations and innovations agree (the variance of
+unit weight of adjustment theory). Priors are in it as well: what is wrong with a place, a length or a mass does not
+average out, and data that count for more would only bend them further.
 """
 
 from __future__ import annotations
@@ -135,7 +135,7 @@ def jerk_ratios(
 
 
 def _scaled(noise: Noise, ratio: float, jerk: dict[JointGroup, float] | None = None) -> Noise:
-    """The noise with this factor on all of it, and the jerk's scales moved towards what groups ask for beside it."""
+    """The noise with this factor on all of it, and the jerk's scales moved towards what groups ask for in addition."""
     scales = dict(noise.jerk_scale)
     for group, wanted in (jerk or {}).items():
         scales[group] = scales.get(group, 1.0) * (wanted / ratio) ** JERK_SHARE

@@ -148,7 +148,7 @@ def _dataset(
     measured: tuple[Array, Array],
     feet: ContactLoads | None,
 ) -> xr.Dataset:
-    import xarray as xr  # while the core works it is loaded beside it
+    import xarray as xr  # it is loaded while the core works
 
     spec = initial.spec
     axes = np.array(spec.markers[0].measured)

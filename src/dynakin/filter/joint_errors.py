@@ -1,6 +1,6 @@
 """A model whose joints may be misplaced and turned: each error is a coordinate that stands still, so that the core's
-own derivatives say what it does to markers and moments ([derivations](derivations.md), section 17). Its bodies' centres
-of mass may be displaced too: their first moments are states."""
+own derivatives say what it does to markers and moments ([derivations](derivations.md), section 17). Centres of mass of
+its segments may be displaced too: their first moments are states."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from dynakin.model.inertia import INERTIA_NAMES
 
 Array = npt.NDArray[np.float64]
 Kind = Literal["hinge_centre", "ball_centre", "hinge_axes", "pair_axes", "ball_axes", "root"]
-"""The centre of a joint with one or two axes (hinge) or three (ball) beside where it is on its bones; its one axis, two
+"""The centre of a joint with one or two axes (hinge) or three (ball) off where it is on its bones; its one axis, two
 or three turned on both of them; the root's frame turned in its bone."""
 Column = dict[str, float]
 
@@ -37,7 +37,7 @@ class JointErrors:
         placed: (E,) places of the errors' coordinates among the same.
         sources: (E, S) how far each of these is moved by a unit of each source of error: m a m, rad a rad.
         kinds: (S,) what each source is.
-        first_moments: (3 B,) places in the state of first moments, three a body. masses: (3 B,) kg, of their bodies.
+        first_moments: (3 B,) places in the state of first moments, three a segment. masses: (3 B,) kg, of the segments.
     """
 
     model: _core.Model
@@ -65,15 +65,15 @@ class JointErrors:
         sources = np.array([[column.get(name, 0.0) for _, column in found] for name in added])
         model = _core.Model(larger)
         at = {name: k for k, name in enumerate(model.layout.names)}
-        bodies = [segment for segment in larger.segments if any(segment.inertia_estimated)]
+        estimated = [segment for segment in larger.segments if any(segment.inertia_estimated)]
         return cls(
             model,
             np.array([place[c.name] for c in spec.coordinates if c.name in place], dtype=np.intp),
             np.array([place[name] for name in added], dtype=np.intp),
             sources.reshape(len(added), len(found)),
             tuple(kind for kind, _ in found),
-            np.array([at[f"inertia/{body.name}/{name}"] for body in bodies for name in _FIRST], dtype=np.intp),
-            np.repeat([float(body.inertia[0]) for body in bodies], len(_FIRST)),
+            np.array([at[f"inertia/{segment.name}/{name}"] for segment in estimated for name in _FIRST], dtype=np.intp),
+            np.repeat([float(segment.inertia[0]) for segment in estimated], len(_FIRST)),
         )
 
     def state(self, q: Array, qd: Array, qdd: Array) -> Array:

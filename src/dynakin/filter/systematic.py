@@ -1,7 +1,7 @@
-"""What the filter's covariance cannot know: joints beside where they are, skin that follows them, bodies' centres of
+"""What the filter's covariance cannot know: joints off where they are, skin that follows them, segments' centres of
 mass, inertia that a recording leaves open, and how intense the movement is.
 
-A consider covariance (Schmidt 1966): nothing is learned of these errors; their effect on what is reported is worked out
+A consider covariance (Schmidt 1966): these errors are not estimated; their effect on what is reported is worked out
 afterwards and added to the filter's own variances ([derivations](derivations.md), section 17).
 """
 
@@ -65,14 +65,14 @@ class Sizes:
             three.
         root: rad, of the turn of the pelvis' frame in the pelvis.
         skin: of the displacement of a marker that follows a joint's angle, as a fraction of the declared size.
-        mass_centre: m, of the centre of mass of each body beside where the model has it.
+        mass_centre: m, of the centre of mass of each segment off where the model has it.
         placed: m, how far (mean) markers may be found from where the model has them, for centres of joints to be as
             sure as said: of a model that was scaled worse to the person both are off, in proportion.
         own_speeds: what the factor on the filter's own variance of smoothed speeds grows by with the movement's
             intensity (`OWN_LATE`).
-        own_beside: part of the variance by the declared noise that counts at least, of late moments that are measured
-            in a recording in which some foot stands beside the plates, or in a session in which one has: what plates do
-            not see they do not correct, and small innovations do not show it.
+        own_off_plates: part of the variance by the declared noise that counts at least, of late moments that are
+            measured in a recording in which some foot stands off the plates, or in a session in which one has: what
+            plates do not see they do not correct, and small innovations do not show it.
         inertia: whether what a recording leaves open of inertia counts in moments at least by the declared noise, as in
             `Estimate.parameters`, where the noise that was found in the recording takes it for better known.
     """
@@ -87,7 +87,7 @@ class Sizes:
     mass_centre: float
     placed: float
     own_speeds: float
-    own_beside: float
+    own_off_plates: float
     inertia: bool = True
 
     def scaled(self, factor: float) -> Sizes:
@@ -110,7 +110,7 @@ LANDMARKS = Sizes(
     mass_centre=0.02,
     placed=np.inf,
     own_speeds=0.17,
-    own_beside=0.14,
+    own_off_plates=0.14,
 )
 """Joints that are found from markers on the skin."""
 UNMARKED = replace(LANDMARKS, hinge_centre=0.015, hinge_axes=np.radians(6.0), pair_axes=np.radians(6.0))
@@ -127,7 +127,7 @@ SCALED = Sizes(
     mass_centre=0.003,
     placed=0.005,
     own_speeds=0.06,
-    own_beside=0.0,
+    own_off_plates=0.0,
     inertia=False,
 )
 """Joints of a skeleton that was scaled to the person (.osim): as well as can be where markers lie within ``placed``."""
@@ -159,7 +159,7 @@ def reported(
     moved_m: Array,
     sources: npt.NDArray[np.uint8] | None = None,
     *,
-    beside: bool = False,
+    off_plates: bool = False,
     late: bool,
 ) -> dict[str, Array]:
     """Standard deviations that are reported: block -> (..., C).
@@ -168,8 +168,8 @@ def reported(
         variance_scale: of the noise of the filter. own: the filter's own deviations, by block. parts: variances as of
             `Systematic.over_time`. intensity: (...,) as of `movement_intensity`. moved_m: (...,) as of
             `Systematic.moved_m`. sources: (..., C) of the moments (`results.measures.sources`): the filter's own part
-            of what rests on a prior counts in full, because how a jerk is seen has no part in that. beside: whether
-            `Sizes.own_beside` counts. late: whether later frames helped.
+            of what rests on a prior counts in full, because how a jerk is seen has no part in that. off_plates: whether
+            `Sizes.own_off_plates` counts. late: whether later frames helped.
     """
     factors = sizes.late() if late else OWN_AT_ONCE
     farther = np.maximum(moved_m / sizes.placed, 1.0)[..., None]
@@ -178,7 +178,7 @@ def reported(
         still, moving = factors[block]
         factor = still + moving * intensity[..., None]
         if sources is not None and block == "moments":
-            measured = sizes.own_beside / variance_scale if late and beside else 0.0
+            measured = sizes.own_off_plates / variance_scale if late and off_plates else 0.0
             least = np.select([sources == PRIOR, sources == MEASURED], [1.0, measured], 0.0)
             factor = np.maximum(factor, least)
         variance = factor * np.square(sd)
@@ -253,7 +253,7 @@ class Systematic:
 
     def _gain(self, x: Array) -> tuple[Array, Array]:
         """Minus the least squares gain (K, 3 M) of the markers, and the net displacements N (3 M, S) of the geometry:
-        markers sit where the reference posture showed them, whatever is wrong with the joints."""
+        markers sit where the reference posture showed them, regardless of what is wrong with the joints."""
         jacobian = _core.marker_jacobian(self._errors.model, x)
         turned = (_core.segment_poses(self._errors.model, x)[0] @ self._R0.swapaxes(-1, -2))[self._segment]
         carried = turned @ self._D0.reshape(len(self._segment), 3, -1)
@@ -379,13 +379,13 @@ class Systematic:
         segments: Sequence[str],
         *,
         sources: npt.NDArray[np.uint8] | None = None,
-        beside: bool = False,
+        off_plates: bool = False,
         late: bool,
     ) -> dict[str, Array]:
         """The filter's standard deviations of one frame (block -> (C,)) with these errors.
 
         Args:
-            x: (n,) state, of covariance (n, n). wrench: (F, 6) of the contacts on these segments. sources, beside,
+            x: (n,) state, of covariance (n, n). wrench: (F, 6) of the contacts on these segments. sources, off_plates,
                 late: as of `reported`.
         """
         inertia = covariance[np.ix_(self._inertia, self._inertia)] / self._variance_scale
@@ -394,7 +394,9 @@ class Systematic:
         intense = movement_intensity(x[2 * K : 3 * K], own["accelerations"][self._free])
         parts = self._at(x, inertia, wrench, segments)
         moved = self.moved_m(x)
-        return reported(self.sizes, self._variance_scale, own, parts, intense, moved, sources, beside=beside, late=late)
+        return reported(
+            self.sizes, self._variance_scale, own, parts, intense, moved, sources, off_plates=off_plates, late=late
+        )
 
     def added_over_time(self, data: xr.Dataset, *, late: bool) -> xr.Dataset:
         """The same of a recording: ``data`` with other ``coordinates_sd`` ... ``moments_sd``."""
@@ -402,8 +404,8 @@ class Systematic:
         own = {block: data[f"{block}_sd"].transpose(*order).values for block in BLOCKS}
         moved = self.moved_m(states_of(data))
         found = self.over_time(data), self.intensity(data), moved, moment_sources(data)
-        beside = some_beside(data, self._feet)
-        sd = reported(self.sizes, self._variance_scale, own, *found, beside=beside, late=late)
+        off_plates = any_off_plates(data, self._feet)
+        sd = reported(self.sizes, self._variance_scale, own, *found, off_plates=off_plates, late=late)
         return data.assign({f"{block}_sd": (order, sd[block]) for block in BLOCKS})
 
     def moved_m(self, x: Array) -> Array:
@@ -437,16 +439,16 @@ def states_of(data: xr.Dataset) -> Array:
     return np.asarray(data["state"].transpose("time", "element").values)
 
 
-def some_beside(data: xr.Dataset, feet: int) -> bool:
-    """Whether some foot stands beside the plates in a frame of a recording.
+def any_off_plates(data: xr.Dataset, feet: int) -> bool:
+    """Whether some foot stands off the plates in a frame of a recording.
 
     Args:
         feet: how many of the contacts are feet: the first ones, declared ones follow.
     """
-    return "foot_contact" in data and beside_plates(data["foot_contact"].transpose("time", "foot").values, feet)
+    return "foot_contact" in data and stands_off_plates(data["foot_contact"].transpose("time", "foot").values, feet)
 
 
-def beside_plates(contact: npt.NDArray[np.uint8], feet: int) -> bool:
+def stands_off_plates(contact: npt.NDArray[np.uint8], feet: int) -> bool:
     """The same of contacts (T, F)."""
     return bool((contact[:, :feet] == UNMEASURED).any())
 

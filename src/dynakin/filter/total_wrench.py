@@ -132,7 +132,7 @@ def known_ground(
     measured: Flags = np.asarray(np.isfinite(wrench).all(axis=1))
     claimed = measured if loads is None else loads.total_known
     undeclared = np.zeros(n, dtype=bool) if loads is None else loads.elsewhere.copy()
-    beside = np.zeros((n, len(initial.feet)), dtype=bool)
+    beyond = np.zeros((n, len(initial.feet)), dtype=bool)
     if not measured.all():
         reasons.append(f"The plates are not measured in {n - int(measured.sum())} of {n} frames.")
     if loads is not None:
@@ -153,11 +153,11 @@ def known_ground(
             found = replace(found, undeclared=found.undeclared & ~bears.any(axis=1))
         undeclared |= found.undeclared | _nearly_all(found)
         if found.undeclared.any():
-            text, beside = _undeclared_in_words(found, recording, initial, markers, wrench)
+            text, beyond = _undeclared_in_words(found, recording, initial, markers, wrench)
             reasons.append(text)
         if found.too_much is not None and loads is not None:
             undeclared |= claimed
-            beside = beside | claimed[:, None]
+            beyond = beyond | claimed[:, None]
             reasons.append(
                 f"Warning: the plates carry {found.too_much:.2f} times what the motion needs of "
                 f"{initial.weighed_kg:.1f} kg, all the time: their scale or the mass is wrong, or a load is not "
@@ -170,13 +170,13 @@ def known_ground(
     if loads is not None:
         before, loads = (
             loads,
-            loads.with_borne(np.asarray(bears.any(axis=1))).with_undeclared(undeclared).without(beside),
+            loads.with_borne(np.asarray(bears.any(axis=1))).with_undeclared(undeclared).without(beyond),
         )
         for k, foot in enumerate(loads.feet):
             light = (loads.reason[:, k] != before.reason[:, k]) & (before.reason[:, k] == on_plates.MEASURED)
-            if (light & ~beside[:, k]).any():
+            if (light & ~beyond[:, k]).any():
                 reasons.append(
-                    f"In {np.count_nonzero(light & ~beside[:, k])} of these frames the {foot} foot's plate reads less "
+                    f"In {np.count_nonzero(light & ~beyond[:, k])} of these frames the {foot} foot's plate reads less "
                     f"than {LOADED_N:g} N: what the foot carries there is not known."
                 )
     partly = undeclared if loads is None else ~loads.total_known
@@ -213,7 +213,7 @@ def _undeclared_in_words(
 ) -> tuple[str, Flags]:
     """A sentence on what the plates lack, with times, and the feet (T, F) under whose plates it acts."""
     time, feet = recording.time, foot_markers(initial)
-    beside = np.zeros((len(time), len(feet)), dtype=bool)
+    beyond = np.zeros((len(time), len(feet)), dtype=bool)
     judged = np.isfinite(found.excess[:, 1])
     weight = initial.weighed_kg * GRAVITY_M_S2
     if _nearly_all(found):
@@ -223,7 +223,7 @@ def _undeclared_in_words(
             f"(by the motion {load + float(np.nanmean(found.excess[judged, 1])) / GRAVITY_M_S2:.1f} kg): the mass is "
             "wrong, a plate is missing, or something that no plate measures bears or pulls the person (a seat, a "
             "weight, a cable, a rail). The plates are not used for the total."
-        ), beside
+        ), beyond
     spans, sizes, away = list[str](), list[tuple[float, int]](), list[float]()
     for first, end in runs(found.undeclared):
         spans.append(f"{time[first]:.2f} to {time[end - 1]:.2f} s")
@@ -243,16 +243,16 @@ def _undeclared_in_words(
             distance = distance_to_hull(place, markers[first:end][:, own][:, :, [0, 2]])
             if np.isfinite(distance).any():
                 away.append(float(np.nanmedian(distance)))
-                beside[first:end, k] = sizes[-1][0] > 0.0 and away[-1] < NEAR_M
+                beyond[first:end, k] = sizes[-1][0] > 0.0 and away[-1] < NEAR_M
     size, axis = max(sizes, key=lambda pair: abs(pair[0]))
-    near = f", {min(away):.2f} m or more from the feet" if away and not beside.any() else ""
+    near = f", {min(away):.2f} m or more from the feet" if away and not beyond.any() else ""
     return (
         f"Warning: the plates carry up to {abs(size):.0f} N {'less' if size > 0.0 else 'more'} "
         f"{'upwards' if axis == 1 else 'sideways'} than the motion needs ({abs(size) / weight:.0%} of the weight, "
         f"expected within {found.limits[0]:.0%}, and {found.limits[1]:.0%} for longer than a second): something that "
         "no plate measures bears or pulls the person there (a seat, a "
         f"rail, a box, a foot off its plate){near}, from {', '.join(spans)}. The plates' sum is not used there."
-    ), beside
+    ), beyond
 
 
 def doubtful_mass(wrench: Array, mass_kg: float, load_ratio: float | None, unseen_kg: float = 0.0) -> str | None:

@@ -18,7 +18,7 @@ from dynakin.filter.noise import prior_factor
 from dynakin.filter.samples import Sample, sample_arrays
 from dynakin.filter.sources import ContactSources
 from dynakin.filter.step import Codes, Labelled, Labels, StepEstimate, deviations_of, step_estimate
-from dynakin.filter.systematic import Systematic, beside_plates
+from dynakin.filter.systematic import Systematic, stands_off_plates
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.progress import Progress
 from dynakin.recordings.feet.contact import UNMEASURED
@@ -72,7 +72,7 @@ class Tracker:
         self._time: float | None = None
         self._latest: StepEstimate | None = None
         self._stepped: deque[_Stepped] = deque(maxlen=lag + 1)
-        self._beside = False  # whether some foot has stood beside the plates
+        self._off_plates = False  # whether some foot has stood off the plates
 
     def fresh(self) -> Tracker:
         """Another one, at the start of the same model."""
@@ -158,7 +158,7 @@ class Tracker:
         sources = self._sources.moments(feet)[0]
         unmeasured = feet is not None and bool((feet.contact == UNMEASURED).any())
         blind = feet is not None and bool(feet.blind.any())
-        self._beside |= feet is not None and beside_plates(feet.contact, len(self.calibrated.feet))
+        self._off_plates |= feet is not None and stands_off_plates(feet.contact, len(self.calibrated.feet))
         segments = () if feet is None else feet.segments
         self._stepped.append(_Stepped(sample.time_s, loads, sources, segments, unmeasured, blind))
         self._latest = step_estimate(self.core_model, self._labels, sample.time_s, self.state, report, sources, loads)
@@ -212,7 +212,7 @@ class Tracker:
             segments = () if step is None else step.segments
             sources = None if step is None else step.sources
             found |= self.systematic.added(
-                found, state, covariance, wrench, segments, sources=sources, beside=self._beside, late=late
+                found, state, covariance, wrench, segments, sources=sources, off_plates=self._off_plates, late=late
             )
         if step is not None:
             found["moments"] = np.where(step.sources == ABSENT, np.nan, found["moments"])

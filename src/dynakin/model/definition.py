@@ -202,7 +202,7 @@ class ModelDefinition:
             messages += begun.messages
             held = held | begun.held
         marked = plan.marked()
-        unmarked_kg = sum(body.mass for name, body in plan.bodies.items() if name not in marked)
+        unmarked_kg = sum(body.mass for name, body in plan.inertia.items() if name not in marked)
         held = _not_known(plan, held)
         spec = to_core(plan)
         core = _core.Model(spec)

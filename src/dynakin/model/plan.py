@@ -53,7 +53,7 @@ class ModelPlan:
     geometry: Geometry
     start: dict[str, float]  # coordinates at the first usable frame, locked ones too
     fixed_lengths: frozenset[str]
-    bodies: dict[str, RigidBody]
+    inertia: dict[str, RigidBody]  # of each segment
     reach: dict[str, float]  # length (m) that a segment's first moments are compared with
     sites: tuple[Site, ...]
 
@@ -65,7 +65,7 @@ class ModelPlan:
         """Which of the ten numbers are estimated: four in the plane, ten in space, none of a massless
         segment."""
         entry = next(s for s in self.model.segments if s.name == segment)
-        wanted = entry.inertia_estimated and self.bodies[segment].mass > 0.0
+        wanted = entry.inertia_estimated and self.inertia[segment].mass > 0.0
         return tuple(wanted and (not self.model.planar or name in PLANAR_INERTIA) for name in INERTIA_NAMES)
 
     def marked(self) -> set[str]:
@@ -83,7 +83,7 @@ class ModelPlan:
         """Standard deviation of every element that a state can have, by the core's name of it."""
         names = [site.name for site in self.sites]
         sd = state_prior(
-            kinds_of(self.model.segments), self.geometry.lengths, self._length_sd(), names, self.bodies, self.reach,
+            kinds_of(self.model.segments), self.geometry.lengths, self._length_sd(), names, self.inertia, self.reach,
             priors, self.worn_kg(priors),
         )  # fmt: skip
         if (together := self.joint_prior(priors)) is not None:
@@ -91,8 +91,8 @@ class ModelPlan:
         return sd
 
     def worn_kg(self, priors: Priors) -> float:
-        """Standard deviation of what a segment may weigh more or less than in the table, whatever its size."""
-        total = sum(body.mass for body in self.bodies.values())
+        """Standard deviation of what a segment may weigh more or less than in the table, regardless of its size."""
+        total = sum(body.mass for body in self.inertia.values())
         return priors.worn_mass_sd_fraction * total if self.model.sided else 0.0
 
     def joint_prior(self, priors: Priors) -> tuple[tuple[str, ...], Array] | None:
@@ -101,8 +101,8 @@ class ModelPlan:
         if not self.model.sided:
             return None
         worn_kg = self.worn_kg(priors)
-        names = [f"inertia/{name}/{each}" for name in self.bodies for each in INERTIA_NAMES]
-        blocks = [inertia_covariance(body, self.reach[name], priors, worn_kg) for name, body in self.bodies.items()]
+        names = [f"inertia/{name}/{each}" for name in self.inertia for each in INERTIA_NAMES]
+        blocks = [inertia_covariance(body, self.reach[name], priors, worn_kg) for name, body in self.inertia.items()]
         for segment in dict.fromkeys(site.segment for site in self.sites):
             own = [site for site in self.sites if site.segment == segment]
             names += [f"marker/{site.name}/{axis}" for site in own for axis in "xyz"]
@@ -114,7 +114,7 @@ class ModelPlan:
         limits = {c.name: c.limits for c in self.model.coordinates}
         places = {site.name: site.position for site in self.sites}
         found = state_bounds(
-            limits, self.geometry.lengths, self._length_sd(), places, self.bodies, self.reach, bounds,
+            limits, self.geometry.lengths, self._length_sd(), places, self.inertia, self.reach, bounds,
             self.worn_kg(priors or Priors()),
         )  # fmt: skip
         for length in self.model.lengths:
@@ -126,6 +126,6 @@ class ModelPlan:
         """What the table gives, by the core's names."""
         return {
             f"inertia/{segment}/{name}": float(value)
-            for segment, body in self.bodies.items()
+            for segment, body in self.inertia.items()
             for name, value in zip(INERTIA_NAMES, body.vector, strict=True)
         }

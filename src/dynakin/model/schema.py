@@ -41,8 +41,8 @@ class Axis(Strict):
 
 
 def kinds_of(joints: Iterable[Any]) -> dict[str, Kind]:
-    """What each coordinate does, of segments or joints with axes: one that turns anything is a rotation, whatever it
-    moves along besides (a knee that rolls)."""
+    """What each coordinate does, of segments or joints with axes: one that turns anything is a rotation, even if it
+    also moves along something (a knee that rolls)."""
     found: dict[str, Kind] = {}
     for axis in (axis for joint in joints for axis in joint.axes):
         if found.get(axis.coordinate) != "rotation":
@@ -52,7 +52,7 @@ def kinds_of(joints: Iterable[Any]) -> dict[str, Kind]:
 
 class Placement(Strict):
     """The joint lies at ``direction * length`` in the parent; a measured direction replaces the nominal one. Terms
-    beside a measured one correct it: their lengths start at zero."""
+    next to a measured one correct it: their lengths start at zero."""
 
     length: str
     direction: Vector3

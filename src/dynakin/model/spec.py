@@ -40,7 +40,7 @@ def to_core(plan: ModelPlan) -> _core.ModelSpec:
                 for term, direction in zip(s.placement, geometry.directions[s.name], strict=True)
             ],
             axes=axes_to_core(s),
-            inertia=plan.bodies[s.name].vector,
+            inertia=plan.inertia[s.name].vector,
             inertia_estimated=list(plan.estimated_inertia(s.name)),
         )
         for s in model.segments

@@ -24,7 +24,7 @@ def state_prior(
     lengths: Mapping[str, float],
     length_sd: Mapping[str, float],
     markers: Iterable[str],
-    bodies: Mapping[str, RigidBody],
+    inertia: Mapping[str, RigidBody],
     reach: Mapping[str, float],
     priors: Priors,
     worn_kg: float = 0.0,
@@ -35,7 +35,7 @@ def state_prior(
         kinds: "rotation" or "translation" of each coordinate. lengths: values of the geometry parameters.
         length_sd: of those that are known otherwise than to a part of their value.
         reach: length (m) that a segment's first moments are compared with.
-        worn_kg: standard deviation of what a segment may weigh more or less, whatever its size.
+        worn_kg: standard deviation of what a segment may weigh more or less, regardless of its size.
     """
     sd: dict[str, float] = {}
     for name, kind in kinds.items():
@@ -49,7 +49,7 @@ def state_prior(
         sd[f"length/{name}"] = length_sd.get(name, priors.length_sd_fraction * value)
     for marker in markers:
         sd |= {f"marker/{marker}/{axis}": priors.marker_sd_m for axis in "xyz"}
-    for segment, body in bodies.items():
+    for segment, body in inertia.items():
         entry = np.sqrt(np.diag(inertia_covariance(body, reach[segment], priors, worn_kg)))
         sd |= {f"inertia/{segment}/{name}": float(value) for name, value in zip(INERTIA_NAMES, entry, strict=True)}
     return sd
@@ -60,7 +60,7 @@ def state_bounds(
     lengths: Mapping[str, float],
     length_sd: Mapping[str, float],
     places: Mapping[str, Array],
-    bodies: Mapping[str, RigidBody],
+    inertia: Mapping[str, RigidBody],
     reach: Mapping[str, float],
     bounds: Bounds,
     worn_kg: float = 0.0,
@@ -78,7 +78,7 @@ def state_bounds(
         for axis, at in zip("xyz", place, strict=True):
             half = bounds.marker_threshold_m
             found[f"marker/{name}/{axis}"] = (float(at) - half, float(at) + half)
-    for segment, body in bodies.items():
+    for segment, body in inertia.items():
         entry = inertia_bounds(body, reach[segment], bounds, worn_kg)
         found |= {f"inertia/{segment}/{name}": interval for name, interval in entry.items()}
     return found

@@ -111,7 +111,7 @@ def configure(
 
 
 def prepare_case(case: Case) -> dict[str, Prepared]:
-    """All of `run_case` but the estimate, by the title of each preset: what `dynakin check` tells of a trial, and what
+    """All of `run_case` but the estimate, by the title of each preset: what `dynakin check` says of a trial, and what
     `dynakin run` says first.
 
     Raises:
@@ -146,8 +146,8 @@ def run_case(
     if ready is None:
         with stage("measuring the person"):
             ready = prepare_case(case)
-    beside = _Beside(next(iter(ready.values())).tracker if observability else None)
-    beside.start()
+    ahead = _Ahead(next(iter(ready.values())).tracker if observability else None)
+    ahead.start()
     with stage("estimating", progress) as report:
         estimates, _, trackers = estimate_each(
             case.recording,
@@ -161,10 +161,10 @@ def run_case(
     if not keep_lost:
         for estimate in estimates.values():
             refuse_lost(estimate, keep)
-    return judged(case, estimates, {}, trackers, failures, observability=observability, structure=beside.structure)
+    return judged(case, estimates, {}, trackers, failures, observability=observability, structure=ahead.structure)
 
 
-class _Beside(Thread):
+class _Ahead(Thread):
     """Loads what comes after an estimate, and looks at what the model can identify at all, while the core works, which
     leaves the interpreter free. What fails here is tried again where it is used, and said there.
 

@@ -95,7 +95,7 @@ def check_plates(
     Over all frames, no plate may be beyond the limits of friction or of its own edges.
 
     Where nobody stands still, the mean over all loaded frames takes its place for all but the mass, which is
-    only told.
+    only reported.
 
     Args:
         ground: gives the vertical; its origin does not matter.
@@ -118,7 +118,7 @@ def check_plates(
     if loads is None:
         loads = foot_loads(recording, ground, foot_markers or {})
     under: dict[str, str] = {}
-    beside = standing is not None and _over_the_edge(recording, ground, loads, frames, findings)
+    over_edge = standing is not None and _over_the_edge(recording, ground, loads, frames, findings)
     for p, plate in enumerate(recording.plates):
         if (beyond := beyond_limits(plate, recording, ground)) is not None:
             findings.refuse(beyond)
@@ -143,7 +143,7 @@ def check_plates(
     refusal = "; ".join(findings.refusals) or None
     ok = refusal is None and not any(text.startswith("Warning:") for text in findings.messages)
     standing_mass, mean_mass = (mass, None) if standing is not None else (None, mass)
-    if beside:
+    if over_edge:
         standing_mass = None
     return PlateCheck(ok, standing_mass, mean_mass, tuple(findings.messages), refusal)
 

@@ -17,7 +17,7 @@ class FacingPairs:
     Attributes:
         heel_toe: (back, front) of each foot.
         pelvis: (back, front), posterior and anterior iliac spine of each side.
-        across: (right, left) of places that lie beside each other on the body, such as both hips.
+        across: (right, left) of places that lie side by side on the body, such as both hips.
         above, below: markers of pelvis and trunk, and of the feet; where none are given, those of the pairs.
     """
 

@@ -69,7 +69,7 @@ def read(
     reader = READERS.get(path.suffix.casefold())
     require_file(path)
     if reader is None:
-        hint = "; a table of ground forces goes beside a recording" if path.suffix.casefold() in FORCE_READERS else ""
+        hint = "; a table of ground forces goes with a recording" if path.suffix.casefold() in FORCE_READERS else ""
         raise RecordingError(
             f"{path}: found extension {path.suffix!r}, expected a recording as {extensions(READERS)}{hint}"
         )

@@ -1,4 +1,4 @@
-"""What a file holds beside markers and plates: events, and analog channels (EMG, switches, the plates' own signals)."""
+"""What a file holds but markers and plates: events, and analog channels (EMG, switches, the plates' own signals)."""
 
 from __future__ import annotations
 

@@ -71,7 +71,7 @@ def share_bars(
 
 
 def _columns(bars: Sequence[Bar]) -> tuple[int, int]:
-    """Where bars begin and end, so that the longest label and text fit beside them."""
+    """Where bars begin and end, so that the longest label and text fit next to them."""
     left = _LETTER * max((len(bar.label) for bar in bars), default=0) + _GAP
     return left, max(_WIDTH - _LETTER * max((len(bar.text) for bar in bars), default=0) - _GAP, left + 300)
 

@@ -203,7 +203,7 @@ def _path(at: Array, values: Array, x: Place, y: Place) -> str:
 
 
 def _simplified(across: Array, down: Array) -> tuple[Array, Array]:
-    """The corners without which a line would be drawn more than `_UNSEEN` beside its place (Douglas and Peucker 1973,
+    """The corners without which a line would be drawn more than `_UNSEEN` off its place (Douglas and Peucker 1973,
     all stretches at once)."""
     if len(across) < 3:
         return across, down
@@ -215,8 +215,8 @@ def _simplified(across: Array, down: Array) -> tuple[Array, Array]:
         stretch = np.cumsum(kept) - 1
         stretch[-1] -= 1
         chords = np.diff(points[corners])
-        beside = ((points - points[corners][stretch]) * chords.conj()[stretch]).imag
-        away = np.abs(beside) / np.maximum(np.abs(chords), 1.0)[stretch]
+        lateral = ((points - points[corners][stretch]) * chords.conj()[stretch]).imag
+        away = np.abs(lateral) / np.maximum(np.abs(chords), 1.0)[stretch]
         worst = np.maximum.reduceat(away, corners[:-1])
         far = (away > _UNSEEN) & (away == worst[stretch])
         if not far.any():

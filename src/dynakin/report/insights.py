@@ -111,7 +111,7 @@ def _moments(estimate: Estimate, metrics: Metrics) -> Insight | None:
     if len(found["reasons"]) > 3:
         text.append(f"{plural(len(found['reasons']) - 3, 'more reason')} under Joint moments.")
     advice = "Give the forces of every contact (--forces), and plates under every step that is to be judged."
-    # steps beside the plates are usual and flagged; a leg without a measured frame is not what was recorded for
+    # steps off the plates are usual and flagged; a leg without a measured frame is not what was recorded for
     missed = any(not count["measured"] for count in found["legs"].values())
     return Insight("warning" if missed else "note", "Joint moments", " ".join(text), advice)
 

@@ -147,7 +147,7 @@ class Estimate:
 
     @property
     def contact_names(self) -> list[str]:
-        """The feet, and after them the contacts that were declared beside them: all of the dimension ``foot``."""
+        """The feet, and after them the contacts that were declared in addition: all of the dimension ``foot``."""
         return [str(name) for name in self.data["foot"].values] if "foot" in self.data.coords else []
 
     @property

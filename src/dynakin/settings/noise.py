@@ -108,8 +108,8 @@ class Noise(Strict, use_attribute_docstrings=True):
     soft_tissue_time_s: Seconds = scale(6.0, "s", "how long skin stays displaced")
     """Time constant of that displacement (first-order Gauss-Markov process)."""
     floating_soft_tissue_time_s: Seconds | None = scale(0.15, "s", "how long skin stays displaced")
-    """The same for a model that is fixed nowhere; not given: as ``soft_tissue_time_s``. What markers show beside the
-    model goes with the movement, and skin that takes longer to come back looks like other bones. For an .osim it is
+    """The same for a model that is fixed nowhere; not given: as ``soft_tissue_time_s``. What markers show apart from
+    the model goes with the movement, and skin that takes longer to come back looks like other bones. For an .osim it is
     10/3 times as long."""
 
     following_skin_fraction: NotNegative = 1.0
@@ -138,7 +138,7 @@ class Noise(Strict, use_attribute_docstrings=True):
     """Time constant of that slow error."""
     residual_force_sd_n: NotNegative = scale(12.0, "N", "what the model does not explain of the forces")
     """Of a model that is fixed nowhere: standard deviation, in each frame, of the force on its root that neither
-    contacts nor the model's bodies explain (soft mass, rigid segments, late accelerations). 0: the plates are changed
+    contacts nor the model's segments explain (soft mass, rigid segments, late accelerations). 0: the plates are changed
     until nothing is left."""
     residual_moment_sd_nm: NotNegative = scale(4.0, "N m", "what the model does not explain of the moments")
     """The same of the moment about the root. 0 with the one above."""
@@ -171,7 +171,7 @@ class Noise(Strict, use_attribute_docstrings=True):
     of a model that is fixed nowhere. A preset of one's own (a file) fixes them, unless it says true."""
     variance_scale: Positive = scale(1.0, "1", "all noise but that of the plates")
     """Factor on every variance, prior ones too, but those of plates and residual. The movement is weighed as
-    before: what changes is how sure of it the filter is, and how much it weighs beside the plates. A factor below 1
+    before: what changes is how sure of it the filter is, and how much it weighs against the plates. A factor below 1
     refuses no more markers: that, and when a coordinate counts as unseen, goes by the variances without it."""
     jerk_scale: dict[JointGroup, Positive] = Field(default_factory=dict)
     """Factor on the jerk's density of a group of joints, of a model that is fixed nowhere: pelvis, upper_body, hips,

@@ -137,12 +137,12 @@ def split_wrench(wrench: Array, right_z: float, left_z: float) -> tuple[Array, A
     zero = np.zeros_like(x)
     free = wrench[:, 4] - (z * force[:, 0] - x * force[:, 2])
     share = np.clip((z - left_z) / (right_z - left_z), 0.0, 1.0)
-    beside = z - (share * right_z + (1.0 - share) * left_z)  # 0 unless the whole leaves the feet sideways
+    excess = z - (share * right_z + (1.0 - share) * left_z)  # 0 unless the whole leaves the feet sideways
     feet = []
     for side, part, at in ((1.0, share, right_z), (-1.0, 1.0 - share, left_z)):
         own = part[:, None] * force
         # The push apart fades with the lesser loaded foot.
         own[:, 2] -= side * 2.0 * SIDEWAYS_SHARE * share * (1.0 - share) * force[:, 1]
-        point = np.stack([x, zero, at + beside], axis=1)
+        point = np.stack([x, zero, at + excess], axis=1)
         feet.append(np.hstack([own, cross(point, own) + np.outer(part * free, [0.0, 1.0, 0.0])]))
     return feet[0], feet[1]

@@ -145,9 +145,9 @@ def split_between(wrench: Array, support: Support) -> tuple[Array, Array]:
     if share is None:
         share = np.clip(np.sum((whole - support.left) * across, axis=1) / apart, 0.0, 1.0)
     more = share**2 + (1.0 - share) ** 2
-    beside = whole - (share[:, None] * support.right + (1.0 - share[:, None]) * support.left)
+    excess = whole - (share[:, None] * support.right + (1.0 - share[:, None]) * support.left)
     points = [
-        point + (part / more)[:, None] * beside for part, point in ((share, support.right), (1.0 - share, support.left))
+        point + (part / more)[:, None] * excess for part, point in ((share, support.right), (1.0 - share, support.left))
     ]
     line = points[0] - points[1]
     inward = (support.push * share * (1.0 - share) * force[:, 1] / np.linalg.norm(line, axis=1))[:, None] * line

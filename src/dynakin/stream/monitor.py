@@ -63,7 +63,7 @@ class Monitor:
 
         Args:
             whole: whether the plates carry all of the person. verdicts: of each marker and the plates, as the filter
-                tells them.
+                gives them.
         """
         names, report = self.initial.recorded_markers, estimate.report
         on_plates = "none"

@@ -1,4 +1,4 @@
-"""One trial worked on by every method, in arrays of the same shape: filters, and the classical methods beside them: the
+"""One trial worked on by every method, in arrays of the same shape: filters, and the classical methods as well: the
 table ("AT") and "classical" of a planar chain, inverse kinematics and dynamics ("IK + ID") of a whole body."""
 
 from __future__ import annotations
@@ -210,7 +210,7 @@ def trial_of(
             (`Tracker.calibrated`, `Estimator.model`).
         tolerant: a reference method that fails stops nothing: the notes say why it is left out. Else only a model
             that is no hinge chain in the plane is a note.
-        inverse: a model in space has inverse kinematics and dynamics beside it, which take 4 ms a frame; else no
+        inverse: a model in space has inverse kinematics and dynamics next to it, which take 4 ms a frame; else no
             reference.
 
     Raises:

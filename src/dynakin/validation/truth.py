@@ -39,7 +39,7 @@ FIGURES = (
 
 
 TRUTH = "truth.nc"
-"""Where `dynakin simulate` leaves the truth, beside the recording."""
+"""Where `dynakin simulate` leaves the truth, next to the recording."""
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import pytest
 
 from dynakin.errors import RecordingError
 from dynakin.settings.model import Bounds
-from dynakin.validation.reference.least_squares import bodies_of, identify, predicted_wrench
+from dynakin.validation.reference.least_squares import identify, inertia_of, predicted_wrench
 from dynakin.validation.reference.regressor import parameter_names, table_dynamics, table_parameters, wrench_regressor
 from support.perfect import MASS_KG, PLANE, Perfect, lively
 
@@ -31,7 +31,7 @@ def test_any_parameters_give_what_bodies_with_them_give(perfect: Perfect, which:
     parameters = perfect.parameters(names)
     if which == "impossible":
         parameters = parameters * np.random.default_rng(1).uniform(-2.0, 2.0, len(names))
-    expected = table_dynamics(perfect.chain, perfect.truth, bodies_of(perfect.chain, parameters)).wrench
+    expected = table_dynamics(perfect.chain, perfect.truth, inertia_of(perfect.chain, parameters)).wrench
     np.testing.assert_allclose(predicted_wrench(perfect.chain, perfect.truth, parameters), expected, atol=1e-8)
 
 

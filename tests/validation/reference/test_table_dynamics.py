@@ -10,13 +10,13 @@ import pytest
 from dynakin.recordings.smoothing import smooth
 from dynakin.validation.reference.chain import Kinematics
 from dynakin.validation.reference.classical import classical_angles, hinge_paths
-from dynakin.validation.reference.least_squares import bodies_of
+from dynakin.validation.reference.least_squares import inertia_of
 from dynakin.validation.reference.regressor import parameter_names, table_dynamics
 from support.perfect import PLANE, Perfect, lively
 
 
 def test_true_inertia_and_motion_give_the_true_wrench_and_moments(perfect: Perfect) -> None:
-    true = bodies_of(perfect.chain, perfect.parameters(parameter_names(perfect.chain)))
+    true = inertia_of(perfect.chain, perfect.parameters(parameter_names(perfect.chain)))
     forces = table_dynamics(perfect.chain, perfect.truth, true)
     data = perfect.trial.truth.data
     np.testing.assert_allclose(forces.wrench, perfect.wrench(), atol=1e-8)
@@ -36,7 +36,7 @@ def test_classical_kinematics_without_noise_err_by_differentiation_only(perfect:
             np.testing.assert_allclose(paths[:, k], np.tile(link.placement[:2], (len(time), 1)), atol=1e-12)
         still = np.zeros_like(paths)
         kinematics = replace(kinematics, hinges=np.stack([paths, still, still]))
-    true = bodies_of(perfect.chain, perfect.parameters(parameter_names(perfect.chain)))
+    true = inertia_of(perfect.chain, perfect.parameters(parameter_names(perfect.chain)))
     forces = table_dynamics(perfect.chain, kinematics, true)
     assert np.abs(forces.wrench - perfect.wrench())[:, PLANE].max() < 0.05  # N, N m
     assert np.abs(forces.moments - perfect.trial.truth.data["moments"].values).max() < 0.05

@@ -212,7 +212,7 @@ def _least(B: Array) -> Array:
 
 def _alike(B: Array) -> Array:
     """(c, c) weights: row k, of the entry that is seen best of those that are seen alike, holds what each of them is
-    worth beside it (1 or less; itself 1). Rows of the others are 0."""
+    worth compared with it (1 or less; itself 1). Rows of the others are 0."""
     c = len(B)
     Q = np.linalg.qr(B)[0]
     seen = np.eye(c) - Q @ Q.T  # columns as the measurements have them, but for one map

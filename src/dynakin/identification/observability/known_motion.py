@@ -145,13 +145,13 @@ class KnownMotion:
         """
         m, at = self._moving, self._seen
         past, across, present = self._process
-        past, beside, rest = information[:m, :m] + past, np.empty((m, len(self._order))), np.zeros_like(information)
-        beside[:, :m], beside[:, m:] = across, information[:m, m:]
+        past, between, rest = information[:m, :m] + past, np.empty((m, len(self._order))), np.zeros_like(information)
+        between[:, :m], between[:, m:] = across, information[:m, m:]
         rest[:m, :m], rest[m:, m:] = present, information[m:, m:]
         past[at.start :, at.start :] += shown[:own, :own]
-        beside[at.start :, at] += shown[:own, own:]
+        between[at.start :, at] += shown[:own, own:]
         rest[at, at] += shown[own:, own:]
-        eliminated = scipy.linalg.solve_triangular(np.linalg.cholesky(past), beside, lower=True, check_finite=False)
+        eliminated = scipy.linalg.solve_triangular(np.linalg.cholesky(past), between, lower=True, check_finite=False)
         return np.asarray(rest - eliminated.T @ eliminated)
 
     def _begun_again(self, information: Array) -> Array:

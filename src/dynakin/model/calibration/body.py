@@ -30,8 +30,8 @@ _STEADY = 0.3
 """Part of its mean by which the load may vary: squats do by a quarter. Running, a seat that bears part of the weight,
 a step off the plates or onto a box does by more."""
 _STRETCH_S, _SPEED_S = 0.15, 0.02
-"""Shortest stretch whose impulse counts: 0.05 m/s that the centre of mass gains beside the pelvis are 3 % of it; and
-the smoothing before the pelvis' path is differentiated."""
+"""Shortest stretch whose impulse counts: 0.05 m/s that the centre of mass gains relative to the pelvis are 3 % of it;
+and the smoothing before the pelvis' path is differentiated."""
 _APART = 0.15
 """Part of the weight, RMS, by which the load may differ from what the pelvis' motion needs: walks and stairs differ by
 0.03 to 0.08."""

@@ -61,7 +61,7 @@ class CalibratedModel:
         messages: sentences on what was found, left out, locked or assumed.
         plan: the same as plain data; None for an OpenSim model.
         feet: "right", "left" -> segment on which the ground acts; empty for a model fixed in the ground.
-        contacts: name -> segment, of the contacts that are declared beside the feet (a seat, hands on a rail).
+        contacts: name -> segment, of the contacts that are declared in addition to the feet (a seat, hands on a rail).
         foot_markers: "right", "left" -> the recording's names of the markers on that foot.
         unmodelled_m: (M,) standard deviation of what neither a state nor the cameras explain of each marker; it is
             added to the noise of the cameras.

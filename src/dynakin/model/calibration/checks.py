@@ -51,7 +51,7 @@ def reach(model: ModelFile, name: str, geometry: Geometry, parts: list[PlacedPar
 
 def check_masses(
     model: ModelFile,
-    bodies: dict[str, RigidBody],
+    inertia: dict[str, RigidBody],
     parts: dict[str, list[PlacedPart]],
     mass_kg: float,
     height_m: float | None,
@@ -72,7 +72,7 @@ def check_masses(
             text = f"Length of {part.name} for the inertia table: {1000 * part.length:.0f} mm, from the height."
             if text not in messages:  # right and left say the same
                 messages.append(text)
-    total = sum(body.mass for body in bodies.values())
+    total = sum(body.mass for body in inertia.values())
     if abs(total - mass_kg) > 1e-9 * mass_kg:
         messages.append(f"The segments of model {model.name} hold {total:.2f} kg of the body's {mass_kg:.2f} kg.")
 
@@ -81,7 +81,7 @@ def report(model: ModelFile, plan: ModelPlan, mass_kg: float, messages: list[str
     """Say the lengths and masses that were found."""
     known = plan.geometry.lengths.items()
     lengths = ", ".join(f"{name} {1000 * value:.0f}" for name, value in known if value)  # corrections start at 0
-    masses = ", ".join(f"{name} {body.mass:.2f}" for name, body in plan.bodies.items())
+    masses = ", ".join(f"{name} {body.mass:.2f}" for name, body in plan.inertia.items())
     messages.append(f"Lengths (mm): {lengths}.")
     messages.append(f"Masses (kg, {'both sides; ' if model.planar else ''}{mass_kg:.2f} in all): {masses}.")
     if model.planar:

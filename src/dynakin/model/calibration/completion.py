@@ -40,7 +40,7 @@ _LEAST = 2
 @dataclass(frozen=True, eq=False)
 class Proportions:
     """Places in parts of the height, of landmarks by their names with side, and of markers by set name with segment;
-    and landmarks beside a hinge, with the limb's and which way it bends."""
+    and landmarks next to a hinge, with the limb's and which way it bends."""
 
     landmarks: dict[str, Array]
     markers: dict[str, tuple[str, Array]]
@@ -174,7 +174,7 @@ def completed(
         for name in missing:
             found.landmarks[name] = turn @ shape[name] + shift
             found.added[name] = segment.name
-            _beside_hinge(name, segment.side, known, found.landmarks)
+            _at_hinge(name, segment.side, known, found.landmarks)
         new = set(missing) & set(frame_landmarks(segment))
         for floor in (name for name in frame_landmarks(segment) if new and name.startswith("floor")):
             up = next(name for name in frame_landmarks(segment) if name.startswith("over_floor"))
@@ -202,7 +202,7 @@ def completed(
 
 
 def _on_the_skin(model: ModelFile, known: Mapping[str, Array]) -> set[str]:
-    """Joint centres that for want of anything better are taken to be where a marker beside them is."""
+    """Joint centres that for want of anything better are taken to be where a marker near them is."""
     found = set()
     for segment in model.segments:
         for axis in ("x", "y", "z") if isinstance(segment.frame, Frame) else ():
@@ -270,8 +270,8 @@ def laid(source: Array, target: Array, weights: Array, hold: Array, height_m: fl
     return turn, b - turn @ a
 
 
-def _beside_hinge(name: str, side: str | None, known: Mapping[str, Array], found: dict[str, Array]) -> None:
-    """Turns a completed landmark beside a hinge, in place, to where the measured limb's plane has it."""
+def _at_hinge(name: str, side: str | None, known: Mapping[str, Array], found: dict[str, Array]) -> None:
+    """Turns a completed landmark next to a hinge, in place, to where the measured limb's plane has it."""
     suffix = SUFFIXES.get(side or "", "")
     limb, forward = Proportions.load().hinges.get(name.removesuffix(suffix), ((), 0.0))
     ends = [f"{end}{suffix}" for end in limb]
@@ -280,9 +280,9 @@ def _beside_hinge(name: str, side: str | None, known: Mapping[str, Array], found
     upper, middle, lower = (known[end] for end in ends)
     line, rest = upper - middle, lower - middle
     plane = forward * np.cross(rest, line) / (np.linalg.norm(rest) * np.linalg.norm(line))  # to the right
-    beside = found[name] - middle
-    size = float(np.linalg.norm(beside))
-    across = beside / size + BENT * (plane if side == "right" else -plane)
+    offset = found[name] - middle
+    size = float(np.linalg.norm(offset))
+    across = offset / size + BENT * (plane if side == "right" else -plane)
     line = line / np.linalg.norm(line)
     across = across - line * float(across @ line)
     found[name] = middle + size * across / np.linalg.norm(across)

@@ -20,7 +20,7 @@ from dynakin.model.calibration.joint_motion import (
 )
 from dynakin.model.calibration.landmarks import LandmarkFinder
 from dynakin.model.markers.match import match_markers
-from dynakin.recordings.beside import another_person
+from dynakin.recordings.companions import another_person
 from dynakin.recordings.landmarks import find_marker
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.rigidity import RigidMotion, distance_sd_m, rigid_motion
@@ -286,10 +286,10 @@ def _markers_of(
             if own in taken or other is None or not np.isfinite(place).all():
                 continue
             at = float((place - start) @ along)
-            beside = float(np.linalg.norm(place - start - at * along))
+            across = float(np.linalg.norm(place - start - at * along))
             share = at / float(np.linalg.norm(end - start))
-            if _ALONG_BONE[0] <= share <= _ALONG_BONE[1] and _NEAR_BONE_M[0] <= beside <= _NEAR_BONE_M[1]:
-                near.append((beside, own, other))
+            if _ALONG_BONE[0] <= share <= _ALONG_BONE[1] and _NEAR_BONE_M[0] <= across <= _NEAR_BONE_M[1]:
+                near.append((across, own, other))
         for _, own, other in sorted(near):
             apart = [distance_sd_m(trial.marker(other), trial.marker(member)) for member in names.values()]
             if all(sd < _MOVES_WITH_M for sd in apart):

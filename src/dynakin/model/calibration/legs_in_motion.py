@@ -43,8 +43,8 @@ most of a trial has many."""
 _BONE = 0.25
 """How far thigh and shank may be from the length that an adult of this height has, as a part of it."""
 _FOOT_SD_M = 0.015
-"""How far an ankle is from where a foot of usual shape has it, beside what the movement says of its own error: standing
-people have it 9 to 50 mm off, but the movement says half of its own error."""
+"""How far an ankle is from where a foot of usual shape has it, on top of what the movement says of its own error:
+standing people have it 9 to 50 mm off, but the movement says half of its own error."""
 
 
 @dataclass

@@ -126,7 +126,7 @@ def lump(segment: Segment, placed: list[PlacedPart]) -> RigidBody:
     return total
 
 
-def segment_bodies(
+def segment_inertia(
     model: ModelFile,
     table: BodyTable,
     landmarks: Mapping[str, Array],
@@ -135,16 +135,16 @@ def segment_bodies(
     height_m: float,
 ) -> tuple[dict[str, RigidBody], dict[str, list[PlacedPart]]]:
     """Inertia of all segments about their origins, and the parts in each."""
-    bodies: dict[str, RigidBody] = {}
+    inertia: dict[str, RigidBody] = {}
     parts: dict[str, list[PlacedPart]] = {}
     for segment in model.segments:
         parts[segment.name] = place_parts(segment, table, landmarks, posture, mass_kg, height_m)
-        bodies[segment.name] = (
+        inertia[segment.name] = (
             RigidBody.from_vector(segment.inertia) if segment.inertia else lump(segment, parts[segment.name])
         )
-        if bodies[segment.name].mass > 0.0 and model.planar and not bodies[segment.name].possible_in_plane():
+        if inertia[segment.name].mass > 0.0 and model.planar and not inertia[segment.name].possible_in_plane():
             raise ModelError(
                 f'segments "{segment.name}": the inertial parameters belong to no '
                 "real body (expected m izz > mx^2 + my^2)"
             )
-    return bodies, parts
+    return inertia, parts

@@ -17,7 +17,7 @@ from dynakin.model.calibration.frames import Trial, choose_side
 from dynakin.model.calibration.functional import functional_landmarks
 from dynakin.model.calibration.landmarks import SIDES, LandmarkFinder, slope
 from dynakin.model.calibration.legs_in_motion import LEG_JOINTS, Legs, legs_in_motion
-from dynakin.model.calibration.lumping import PlacedPart, segment_bodies
+from dynakin.model.calibration.lumping import PlacedPart, segment_inertia
 from dynakin.model.calibration.posture import Posture, find_geometry, find_posture, frame_landmarks
 from dynakin.model.calibration.sites import Candidate, as_marked, candidates, find_locks, place_sites
 from dynakin.model.markers.match import MarkerKey, MarkerMatch
@@ -26,7 +26,7 @@ from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.model.plan import Geometry, ModelPlan
 from dynakin.model.schema import ModelFile
 from dynakin.model.table import BodyTable
-from dynakin.recordings.beside import another_person
+from dynakin.recordings.companions import another_person
 from dynakin.recordings.feet.contact import foot_contacts
 from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_laboratory_frame
 from dynakin.recordings.recording import Recording
@@ -176,13 +176,13 @@ def measure(
     geometry, posture = find_geometry(model, landmarks, locks, unmeasured)
     sites, placed = place_sites(chosen, (source, posture, frames), trial, finder, geometry, model, needed)
     messages += placed
-    bodies, parts = segment_bodies(
+    inertia, parts = segment_inertia(
         model, table, landmarks, posture, mass_kg, height_m if height_m is not None else np.nan
     )
-    check_masses(model, bodies, parts, mass_kg, height_m, messages)
+    check_masses(model, inertia, parts, mass_kg, height_m, messages)
     start = posture if model.sided else _first_posture(model, geometry, finder, trial, needed, posture, messages)
     plan = ModelPlan(
-        model, geometry, start.coordinates, fixed_lengths(model, set(bare), set(found.added)), bodies,
+        model, geometry, start.coordinates, fixed_lengths(model, set(bare), set(found.added)), inertia,
         {s.name: reach(model, s.name, geometry, parts[s.name]) for s in model.segments}, tuple(sites),
     )  # fmt: skip
     report(model, plan, mass_kg, messages)

@@ -16,7 +16,7 @@ from dynakin.model.spec import to_core
 Array = npt.NDArray[np.float64]
 
 MARKER_SD_M, LOOSE_SD_M, LOOSE_FROM_M = 0.005, 0.015, 0.020
-"""Skin beside noise; and of what moves by 20 mm or more, such as joint centres that cameras guess."""
+"""Skin with noise; and of what moves by 20 mm or more, such as joint centres that cameras guess."""
 PRIOR_SD_RAD, PRIOR_SD_M = np.deg2rad(60.0), 1.0
 """Of each coordinate, before any marker."""
 HELD_SD_RAD = 0.2

@@ -130,7 +130,7 @@ class MarkerMatch:
         )
 
 
-# Places of the body (anatomy.toml) that tell directions where the set's own pairs are not seen.
+# Places of the body (anatomy.toml) that give directions where the set's own pairs are not seen.
 _HEELS = ("HEE", "HEL", "HEM")
 _ANKLES = ("AJ", "ANK", "AJC", "ANM")
 _TOES = ("TOE", "MT1", "MT5", "HAL", "SMT")
@@ -179,7 +179,7 @@ class Spellings:
 
 def without_prefix(names: tuple[str, ...]) -> dict[str, str]:
     """Each name without what stands before a colon and without the prefix that all of them share ("S01_LASI"), or
-    that tells persons apart ("S1_LASI", "S2_LASI"); ones without a label are left away."""
+    that distinguishes persons ("S1_LASI", "S2_LASI"); ones without a label are left away."""
     own = {name: name.rsplit(":", 1)[-1].strip() for name in names if not is_unlabelled(name)}
     if len(own) < _FEWEST_OF_A_PERSON:
         return own

@@ -44,7 +44,7 @@ _SHORT = 0.05  # of a trial: exchanged labels that the filter's own outlier rule
 
 @dataclass(frozen=True)
 class Fit:
-    """A built-in set beside a recording's names.
+    """A built-in set compared with a recording's names.
 
     Attributes:
         names: of the markers that are there. doubled: aliases that several names fit.
@@ -95,8 +95,8 @@ def _segment(marker_set: MarkerSetFile, name: str) -> str:
 
 
 def fits(recorded: Iterable[str]) -> list[Fit]:
-    """The built-in sets beside names, the one that explains most of them first, of equals the one with fewest markers
-    that are not there; ``-all`` variants, which are for who asks for them, are left away."""
+    """The built-in sets compared with names, the one that explains most of them first, of equals the one with fewest
+    markers that are not there; ``-all`` variants, which are for who asks for them, are left away."""
     spelt = Spellings.of(recorded)
     found = []
     for name in available_marker_sets():

@@ -258,11 +258,11 @@ def _swaps_for_a_while(
             # An exchange makes no new lengths, only of others; it changes nothing for who is on neither's segment.
             order = np.arange(len(keys))
             order[[i, j]] = j, i
-            beside = np.array(sorted({i, j} | partners[i] | partners[j]))
-            changed = lengths[either][:, order[beside]][:, :, order]
+            concerned = np.array(sorted({i, j} | partners[i] | partners[j]))
+            changed = lengths[either][:, order[concerned]][:, :, order]
             after = off.copy()
-            after[np.flatnonzero(either)[:, None], beside] = _off(
-                changed, found.distance[beside], expected.rigid[beside]
+            after[np.flatnonzero(either)[:, None], concerned] = _off(
+                changed, found.distance[concerned], expected.rigid[concerned]
             )
             mended = either & (after[:, [i, j]].max(axis=1) < _MENDED * off[:, [i, j]].max(axis=1))
             gain = float(whole - after.sum())

@@ -43,7 +43,7 @@ _MODEL_M = 0.003
 """Standard deviation of a marker for what a generic skeleton, scaled, gets wrong of a person's joints: on `squats1` the
 normalised innovations are consistent with it (1.1), and far too large with the cameras' noise alone (1.9 to 18)."""
 _SKIN_LASTS = 10.0 / 3.0
-"""The skeleton's joints do not hang on the markers, so that what these show beside it is skin, which moves slowly:
+"""The skeleton's joints do not hang on the markers, so that what these show apart from it is skin, which moves slowly:
 0.5 s with the default noise (`docs/validation/held_out.md`)."""
 
 

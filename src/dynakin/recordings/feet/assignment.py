@@ -325,7 +325,7 @@ class _Assignment:
         )
         if missing := [foot for foot in self.feet if foot not in self.contacts]:
             said.append(
-                f"No markers of the {' and '.join(missing)} foot: nobody sees whether it stands beside the plates."
+                f"No markers of the {' and '.join(missing)} foot: nobody sees whether it stands off the plates."
             )
         return replace(loads, messages=(*said, *reasons), reasons=tuple(reasons))
 

@@ -13,7 +13,7 @@ Flags = npt.NDArray[np.bool_]
 WINDOW_S = 4.0
 """Stretch over which a belt's speed is taken for one: some strides. It may change from one to the next."""
 SEEN_S = 0.6
-"""Shorter stretches tell no belt: in them a foot may do nothing but swing, which takes up to 0.5 s, low over the floor
+"""Shorter stretches show no belt: in them a foot may do nothing but swing, which takes up to 0.5 s, low over the floor
 and at one speed for a tenth of a second."""
 STILL_M_S = 0.3
 """Slower than this no belt is looked for: a foot on it is slow enough to stand."""

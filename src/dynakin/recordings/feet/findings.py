@@ -1,4 +1,4 @@
-"""What is wrong with plates that only the feet show: one beside its place, two exchanged, one that drifts.
+"""What is wrong with plates that only the feet show: one off its place, two exchanged, one that drifts.
 
 Each is said in one sentence, with what to do. Nothing is put right here: a load that lies under no foot is left out.
 """
@@ -21,7 +21,7 @@ from dynakin.recordings.recording import Array
 
 Flags = npt.NDArray[np.bool_]
 
-BESIDE_M = 0.06
+OFF_PLACE_M = 0.06
 """Distance of centres of pressure from a foot's markers that is kept for three quarters of its load: no shoe is so
 wide. Ours stay within 0.05, those with two markers a foot among them."""
 TOGETHER = 0.7
@@ -54,7 +54,7 @@ def plate_findings(
         for p, q in swapped
     ]
     for p, plate in enumerate(plates):
-        if not any(p in pair for pair in swapped) and (text := _beside(plate, feet, contacts, soles, on, p)):
+        if not any(p in pair for pair in swapped) and (text := _off_place(plate, feet, contacts, soles, on, p)):
             said.append(text)
         if text := _drift(time, plate, soles, on[:, :, p]):
             said.append(text)
@@ -100,8 +100,10 @@ def _carried_over(points: Array, source: Array, target: Array) -> Array:
     return np.asarray((points - a) @ turn_a.T @ turn_b + b)
 
 
-def _beside(plate: GroundPlate, feet: Sequence[str], contacts: Contacts, soles: Soles, on: Flags, p: int) -> str | None:
-    """Whether a plate's load comes and goes with a foot, but lies beside it."""
+def _off_place(
+    plate: GroundPlate, feet: Sequence[str], contacts: Contacts, soles: Soles, on: Flags, p: int
+) -> str | None:
+    """Whether a plate's load comes and goes with a foot, but lies off it."""
     offsets: dict[int, list[Array]] = {}
     for first, end in runs(plate.push > JUDGED_N):
         press = slice(first, end)
@@ -113,14 +115,14 @@ def _beside(plate: GroundPlate, feet: Sequence[str], contacts: Contacts, soles: 
             if others or shared or with_it.mean() < TOGETHER or not _covers(foot, first, end):
                 continue
             away = distance_to_hull(plate.cop[press], foot.outline[press])[with_it]
-            if np.isfinite(away).any() and np.nanpercentile(away, 25.0) > BESIDE_M:
+            if np.isfinite(away).any() and np.nanpercentile(away, 25.0) > OFF_PLACE_M:
                 offsets.setdefault(k, []).append((plate.cop[press] - soles.middle[press, k][:, [0, 2]])[with_it])
     if len(offsets) != 1:
         return None
     k, found = next(iter(offsets.items()))
     x, z = np.nanmedian(np.concatenate(found), axis=0)
     return (
-        f"Warning: {plate.name} lies beside its place: its centre of pressure is {np.hypot(x, z):.2f} m (X {x:+.2f}, "
+        f"Warning: {plate.name} lies off its place: its centre of pressure is {np.hypot(x, z):.2f} m (X {x:+.2f}, "
         f"Z {z:+.2f} m of the ground frame) from the middle of the {feet[k]} foot's sole while its load comes and goes "
         "with that foot. Correct the plate's place (its corners or origin) in the file."
     )

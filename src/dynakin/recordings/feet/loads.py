@@ -75,7 +75,7 @@ class FootLoads:
         )
 
     def with_borne(self, frames: Flags) -> FootLoads:
-        """The same where contacts that are declared bear the person in these frames (T,) beside the plates."""
+        """The same where contacts that are declared bear the person in these frames (T,) in addition to the plates."""
         return replace(self, total_known=self.total_known & ~frames, all_measured=self.all_measured & ~frames)
 
     def without(self, feet: Flags) -> FootLoads:
@@ -94,7 +94,7 @@ class FootLoads:
 
 
 def _alone_is_unknown(reason: npt.NDArray[np.int8]) -> None:
-    """A foot that shares its plate with one that may also stand beside it has no sum to share, in place (T, F)."""
+    """A foot that shares its plate with one that may also stand off it has no sum to share, in place (T, F)."""
     shared = reason == SHARED
     reason[shared & (shared.sum(axis=1, keepdims=True) == 1)] = UNKNOWN
 

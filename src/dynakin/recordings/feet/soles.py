@@ -39,7 +39,7 @@ not 0.34 (`squats1`)."""
 ROLLED_SD, FLAT_SD, ACROSS_SD = 0.42, 0.52, 0.63
 """How far it may lie from there, as parts of half the sole's length once the foot has rolled, of that more while it is
 flat, where some mm of skin decide, and of half its width. Three times what the plates of these recordings show: a foot
-that is not of these keeps its say, and moments of a leg beside a plate are best so (`truth3d`)."""
+that is not of these keeps its say, and moments of a leg off the plates are best so (`truth3d`)."""
 _LEAST_STANCE = 1e-9
 _UNSEEN_SD = 0.6  # of half the length, where a foot's markers do not show how it lies
 

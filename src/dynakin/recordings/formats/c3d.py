@@ -17,7 +17,7 @@ from dynakin.recordings.formats.c3d_records import Correction, check_c3d_file
 from dynakin.recordings.formats.c3d_signals import first_frame, read_analog, read_events
 from dynakin.recordings.formats.c3d_subject import read_subject
 from dynakin.recordings.formats.textfile import check_unique, trial_name
-from dynakin.recordings.formats.trajectories import clean_markers, length_unit, told_apart
+from dynakin.recordings.formats.trajectories import clean_markers, distinct_names, length_unit
 from dynakin.recordings.limits import FASTEST_HZ, SLOWEST_HZ
 from dynakin.recordings.recording import Array, Recording
 from dynakin.recordings.resampling import ReadOptions
@@ -97,7 +97,7 @@ def _recording(data: Any, path: Path, options: ReadOptions, notes: list[str]) ->
         raise RecordingError(f"{path}: found {frames} frames of {len(found.names)} labelled markers, expected some")
     raw = points[:, found.markers].transpose(2, 1, 0)  # (T, M, 3)
     factor, unit, unit_notes = length_unit(parameters.text("POINT", "UNITS"), raw)
-    names, markers, doubled_notes = told_apart(found.names, raw * factor)
+    names, markers, doubled_notes = distinct_names(found.names, raw * factor)
     check_unique(names, "marker", path)
     markers, missing_notes = clean_markers(names, markers)
     first = first_frame(parameters, int(data["header"]["points"]["first_frame"]))

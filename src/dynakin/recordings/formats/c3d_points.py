@@ -42,7 +42,7 @@ class Points:
 def sort_points(parameters: Parameters, points: Array) -> Points:
     """Sort the points (3, N, T), NaN where missing, into markers and what is none, with notes on the latter.
 
-    Modelled markers (a knee's marker that a static trial gave, say) stay: nothing else tells them from measured ones.
+    Modelled markers (a knee's marker that a static trial gave, say) stay: nothing marks them off from measured ones.
     """
     count = points.shape[1]
     labels = parameters.texts("POINT", "LABELS")[:count]

@@ -62,7 +62,7 @@ def parse_rows(
 ) -> tuple[Array, list[int], list[str]]:
     """Numbers (R, K) of rows of cells, the line of each, and notes.
 
-    Decimal commas are read where the file has no decimal point beside them.
+    Decimal commas are read where the file has no decimal points as well.
 
     Args:
         lines: number and cells of each line; those without any filled cell are passed over.

@@ -44,7 +44,7 @@ def length_unit(word: str, raw: Array) -> tuple[float, Literal["mm", "m"], list[
     return factor, ("mm" if factor == 1e-3 else "m"), notes
 
 
-def told_apart(names: tuple[str, ...], markers: Array) -> tuple[tuple[str, ...], Array, list[str]]:
+def distinct_names(names: tuple[str, ...], markers: Array) -> tuple[tuple[str, ...], Array, list[str]]:
     """Names that are each used once, their markers (T, K, 3) m, and notes on those that were used more often.
 
     Of markers of one name, those that are never seen, or where the other is, go; those that are never seen together

@@ -20,7 +20,7 @@ from pathlib import Path
 
 from dynakin.errors import RecordingError
 from dynakin.recordings.formats.textfile import check_unique, read_lines, split_cells, timed_rows, trial_name
-from dynakin.recordings.formats.trajectories import clean_markers, length_unit, timing_notes, told_apart
+from dynakin.recordings.formats.trajectories import clean_markers, distinct_names, length_unit, timing_notes
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.resampling import ReadOptions
 
@@ -52,7 +52,7 @@ def read_trc(path: Path, options: ReadOptions | None = None) -> Recording:
     raw = table[:, 2:].reshape(len(table), len(names), 3)
     factor, unit, unit_notes = length_unit(header.get("units", ""), raw)
     notes = row_notes + _count_notes(header, len(table), len(names)) + time_notes + timing_notes(time, rate)
-    names, markers, doubled_notes = told_apart(names, raw * factor)
+    names, markers, doubled_notes = distinct_names(names, raw * factor)
     check_unique(names, "marker", path)
     markers, marker_notes = clean_markers(names, markers)
     return Recording(

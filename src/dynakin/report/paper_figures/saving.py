@@ -28,7 +28,7 @@ def save_each(figures: Mapping[str, Figure], folder: Path, formats: Sequence[str
 
     jobs = min(joblib.cpu_count() - 1, len(figures))  # a worker takes seconds to start: two cores gain nothing
     save = partial(_save, folder=folder, formats=formats)
-    # The largest first: it takes half of all, and the others find room beside it.
+    # The largest first: it takes half of all, and the others find room next to it.
     order = sorted(figures, key=lambda name: -len(figures[name].axes))
     tasks = (joblib.delayed(save)(name, figures[name]) for name in order)
     found: dict[str, list[Path] | Exception] = {}

@@ -173,7 +173,7 @@ def _write(
     values: np.ndarray,
     notes: list[str],
 ) -> None:
-    """Loads, and the places beside them."""
+    """Loads, and the places that go with them."""
     write_storage(
         path,
         title,

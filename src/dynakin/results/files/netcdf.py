@@ -111,7 +111,7 @@ def full_dataset(estimate: Estimate) -> xr.Dataset:
 
 def write_netcdf(estimate: Estimate, path: Path) -> None:
     """Write `full_dataset`, compressed, tables over time in single precision (6e-8 of each value) and what has a
-    deviation beside it in steps of 1e-4 of that at most, those of `_STEPS` in whole steps, deviations and test
+    deviation with it in steps of 1e-4 of that at most, those of `_STEPS` in whole steps, deviations and test
     ratios to 1e-4 and covariances to 1e-10 of each entry.
 
     Times and constants stay as they are.

@@ -19,7 +19,7 @@ DIGITS_OF_RATES = 6
 DIGITS_OF_LOADS = 6
 """Of forces, moments and powers: 1 mN of a body's weight."""
 DECIMALS_OF_LOADS = 6
-"""Of these and the places beside them: less than 1 uN, 1 um is rounding, where nothing acts."""
+"""Of these and the places that go with them: less than 1 uN, 1 um is rounding, where nothing acts."""
 DIGITS_OF_SD = 3
 """Of a standard deviation, which itself is not known to two."""
 _TIME = "%.12g"

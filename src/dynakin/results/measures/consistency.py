@@ -4,7 +4,7 @@ Innovations of single frames are mostly the cameras' noise, which hardly moves a
 lasts longer. Averaged over `AVERAGED_S`, the noise falls and the rest stays. Which statistic speaks for which word, and
 from where on, was found on trials with known truth: ``verdicts.toml``, chosen and judged by
 ``benchmarks/verdicts.py``. Noise that was calibrated (`dynakin.filter.adapt`) has limits of its own: it makes the
-innovations of single frames right whatever the recording is like.
+innovations of single frames right however the recording is.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ NoiseFrom = Literal["declared", "calibrated"]
 SD_OVER_ERROR = (0.5, 2.5)
 """Standard deviations over errors that are called consistent: what a laboratory can plan with. Below, overconfident."""
 INSIDE = 0.85
-"""Truth in the 95 % interval at least this often; less is overconfident whatever the ratio is."""
+"""Truth in the 95 % interval at least this often; less is overconfident regardless of the ratio."""
 CONSISTENT = (SD_OVER_ERROR[1] ** -2, SD_OVER_ERROR[0] ** -2)
 """The same of mean normalised squares."""
 AVERAGED_S = 0.3

@@ -48,9 +48,9 @@ def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str,
     )
     remainder = estimate.data["wrench_remainder"].transpose("time", "component").values[window]
     codes = foot_sources(estimate.data)[window]
-    told = np.isfinite(remainder).all(axis=1)
-    flight = (contact == NO_CONTACT).all(axis=1) & told
-    grounded = (contact != UNMEASURED).all(axis=1) & (contact != NO_CONTACT).any(axis=1) & told
+    given = np.isfinite(remainder).all(axis=1)
+    flight = (contact == NO_CONTACT).all(axis=1) & given
+    grounded = (contact != UNMEASURED).all(axis=1) & (contact != NO_CONTACT).any(axis=1) & given
     grounded &= _nothing_else_bears(estimate)[window]
     known = (contact == ON_PLATE) & grounded[:, None] & np.isfinite(adjusted).all(axis=2)  # not where it is lost
     rms = {

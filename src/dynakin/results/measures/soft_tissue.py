@@ -130,7 +130,7 @@ def marker_sites(estimate: Estimate) -> list[tuple[str, str]]:
 
 def _expected(estimate: Estimate, index: int, marker: str, segment: str) -> tuple[float | None, str]:
     """Size in mm and who says so: the published one, or what was declared to the filter where that is more. Less, as
-    for the pelvis in space, says how little its markers should give way beside others, not what skin does."""
+    for the pelvis in space, says how little its markers should give way relative to others, not what skin does."""
     sizes = []
     if (published := published_amplitude_mm(marker, segment)) is not None:
         sizes.append((published[0], f"published: {published[1]}"))

@@ -125,7 +125,7 @@ def marker_positions(sites: Sequence[Site], moving: TreeMotion, displacement: Ar
 class HipCentres:
     """Virtual hip centres: the pelvis markers that they rest on (right and left ASIS, right and left PSIS), their
     names (right, left), the regression's distance from the midline, m, and the middle between them (3,) m in the
-    pelvis' frame. The joint may lie beside it."""
+    pelvis' frame. The joint may lie off it."""
 
     pelvis: tuple[str, str, str, str]
     names: tuple[str, str]

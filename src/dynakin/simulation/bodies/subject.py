@@ -38,7 +38,7 @@ FRACTIONS: Mapping[str, float] = {
     "hip_width": 0.110,  # between the hip joint centres, and the feet below them
     "shoulder_width": 0.220,
 }
-# Joints of a body in space that lie beside their landmarks, and coordinates about axes of the person's own.
+# Joints of a body in space that lie off their landmarks, and coordinates about axes of the person's own.
 JOINTS = ("hip", "lumbar", "knee", "ankle")
 HINGES = ("knee_angle", "ankle_angle", "subtalar_angle")
 T12_ON_TORSO = 0.30  # T12/L1 from L5/S1 up, over the torso
@@ -52,7 +52,7 @@ class Spread:
 
     length: of each length; mass: of each part's mass; size: of the stretch of a part's mass distribution
     along each axis (second moments go with its square); centre: of the centre of mass, over the part's
-    length. Of a body in space: joint, of the centres of hips, L5/S1, knees and ankles beside where landmarks have
+    length. Of a body in space: joint, of the centres of hips, L5/S1, knees and ankles off where landmarks have
     them, an axis, over the body height (5 mm: regressions err by 5 to 8 mm, the middle of two landmarks by 4 to 8;
     Harrington et al. 2007, J Biomech 40:595; Della Croce et al. 2005, Gait Posture 21:226); axis, of the turn of the
     axes of knees, ankles and feet, rad (5 deg: between a knee's 3 and the 4 to 11 of ankle and foot, Isman and Inman

@@ -78,10 +78,10 @@ def ankle_height(subject: SimulatedSubject) -> float:
 
 def hip_in_pelvis(subject: SimulatedSubject, sign: float) -> Array:
     """The hip centre (3,) m in the pelvis' frame; sign: 1 right, -1 left, 0 the middle of both."""
-    return _regressed_hip(subject, sign) + _beside(subject, "hip", sign)
+    return _regressed_hip(subject, sign) + _off_landmark(subject, "hip", sign)
 
 
-def _beside(subject: SimulatedSubject, joint: str, sign: float) -> Array:
+def _off_landmark(subject: SimulatedSubject, joint: str, sign: float) -> Array:
     """(3,) m from where landmarks have a joint to where it is; ``sign`` as of `hip_in_pelvis`."""
     return np.asarray(subject.centres[joint] * [1.0, 1.0, sign])
 
@@ -94,12 +94,12 @@ def _regressed_hip(subject: SimulatedSubject, sign: float) -> Array:
 
 def _lumbar_in_pelvis(subject: SimulatedSubject) -> Array:
     middle = _regressed_hip(subject, 0.0) + subject.lengths["pelvis"] * LUMBAR_DIRECTION
-    return middle + _beside(subject, "lumbar", 0.0)
+    return middle + _off_landmark(subject, "lumbar", 0.0)
 
 
 def _below(subject: SimulatedSubject, segment: str, joint: str, sign: float) -> Array:
     """The joint (3,) m at the lower end of thigh or shank, in its frame."""
-    return _beside(subject, joint, sign) - subject.lengths[segment] * np.array(Y)
+    return _off_landmark(subject, joint, sign) - subject.lengths[segment] * np.array(Y)
 
 
 def _shoulder_in_torso(subject: SimulatedSubject, sign: float) -> Array:

@@ -109,7 +109,7 @@ _CLUSTERS: Mapping[str, tuple[str, str, float, float, float]] = {
     "hand": ("hand", "forearm", 0.015, -0.020, -0.040),
     "head": ("head", "head", 0.050, 0.070, 0.110),
 }
-_BESIDE = 0.014
+_OFF_MIDLINE_M = 0.014
 _TURN = 2.4  # rad from one marker of a cluster to the next, so that no two lie on a line along the segment
 
 
@@ -138,7 +138,7 @@ def worn_sites(
             rows.append(Row(marker.centre[0], part, region, x, y, 0.0, landmark))
             continue
         if lateral == 0.0 and part not in PAIRED:
-            lateral = _BESIDE  # of a pair about the midline
+            lateral = _OFF_MIDLINE_M  # of a pair about the midline
         names |= {(marker.name, side): marker.aliases(side)[0] for side in ("right", "left")}
         rows.append(Row(marker.name, part, region, x, y, lateral, landmark))
     drawn = draw_sites(rng, subject, MarkerList(lambda row, side: names[row.stem, side], tuple(rows)))

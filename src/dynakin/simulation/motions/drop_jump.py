@@ -125,8 +125,8 @@ class _Posed:
         """With the centre of mass over the middle of the feet."""
         L = body.lengths
         leg = np.sqrt(L["shank"] ** 2 + L["thigh"] ** 2 + 2.0 * L["shank"] * L["thigh"] * np.cos(np.deg2rad(_KNEE_DEG)))
-        beside = jumper.half_width_m - hip_in_pelvis(body.subject, 1.0)[2]
-        hips = np.array([0.0, ankle_height(body.subject) + np.sqrt(leg**2 - beside**2 - 0.02**2), 0.0])
+        lateral = jumper.half_width_m - hip_in_pelvis(body.subject, 1.0)[2]
+        hips = np.array([0.0, ankle_height(body.subject) + np.sqrt(leg**2 - lateral**2 - 0.02**2), 0.0])
         target = _PRESSES[0] * Sole.of(body.subject).ball[0] * np.cos(jumper.toe_out)
         start = np.zeros(1)
         for _ in range(30):

@@ -62,8 +62,8 @@ def hold_rail(
     if movement.support is None:
         raise ConfigError(f"simulation: rail is {size:g}, expected 0 but for the motions of fullbody")
     weight = -float(GRAVITY[1]) * body.subject.mass_kg
-    ahead, beside = rng.uniform([0.0, -0.10], [0.25, 0.10])
-    direction = np.array([ahead, 1.0, beside]) / np.sqrt(1.0 + ahead**2 + beside**2)
+    ahead, lateral = rng.uniform([0.0, -0.10], [0.25, 0.10])
+    direction = np.array([ahead, 1.0, lateral]) / np.sqrt(1.0 + ahead**2 + lateral**2)
     holds = [
         (r.start_s, r.end_s, float(rng.uniform(0.7, 1.0))) for r in movement.repetitions
     ] or [(0.25 * duration_s, 0.85 * duration_s, 1.0)]  # fmt: skip
@@ -117,7 +117,7 @@ def _grips(movement: Movement, body: SimulatedBody, duration_s: float) -> tuple[
     slope = np.array([np.polyfit(np.linspace(0.0, duration_s, 41), shift[:, k], 1)[0] for k in range(3)])
     velocity = np.where(np.abs(slope) > _SLOW_M_S, slope, 0.0)
     if np.abs(slope[0]) > _SLOW_M_S and movement.refitted is None:
-        raise ConfigError(f"simulation: rail along {movement.name!r}, expected one beside a motion on the level")
+        raise ConfigError(f"simulation: rail along {movement.name!r}, expected one next to a motion on the level")
     walks = movement.belt_m_s > 0.0 or bool(np.any(velocity != 0.0))
     grips = []
     for side, sign in SIDES:

@@ -183,9 +183,9 @@ def mid_hip(body: SimulatedBody, stance: Stance, level: Jet) -> Point:
     }
     thigh, upright = (kinematics(plane, in_order(("ankle", "knee"), j)).segments["thigh"] for j in (jets, standing))
     top = L["thigh"] * up
-    beside = stance.half_width_m - hip_in_pelvis(body.subject, 1.0)[2]
+    lateral = stance.half_width_m - hip_in_pelvis(body.subject, 1.0)[2]
     high = float(upright.point(top)[0, 1])
-    lower = high - np.sqrt(high**2 - beside**2)
+    lower = high - np.sqrt(high**2 - lateral**2)
     place = STANDS_AT + np.array([0.0, ankle_height(body.subject) - lower, 0.0])
     x, y, z = point_of(
         SegmentMotion(

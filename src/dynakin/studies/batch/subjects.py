@@ -28,7 +28,7 @@ from dynakin.validation.case import case_of
 FILE = "subject.toml"
 """What identification writes into a subject's folder, and what its trials take as `parameters`."""
 MOST_TRIALS = 8
-"""Each trial more costs a fit of all others; a person's first eight tell what a table does not know."""
+"""Each trial more costs a fit of all others; a person's first eight show what a table does not know."""
 _OWN = ("trial", "forces", "output")  # keys by which the trials of one person differ
 
 

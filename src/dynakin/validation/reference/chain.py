@@ -76,21 +76,21 @@ class PlanarChain:
                 None if s.parent == "ground" else s.parent,
                 geometry.placement(s),
                 *_hinge(model, s),
-                plan.bodies[s.name],
+                plan.inertia[s.name],
             )
             for s in model.segments
         )
         return cls(links, tuple(c.name for c in model.coordinates), geometry.locked)
 
-    def tree(self, bodies: Mapping[str, RigidBody] | None = None, *, sliding: bool = False) -> Tree:
-        """The same chain for `dynakin.simulation.mechanics`; ``bodies`` instead of the table's where given.
+    def tree(self, inertia: Mapping[str, RigidBody] | None = None, *, sliding: bool = False) -> Tree:
+        """The same chain for `dynakin.simulation.mechanics`; ``inertia`` instead of the table's where given.
 
         The hinge's axis has the link's name. With ``sliding`` it is carried along the parent's X and Y first, by axes
         named link/x and link/y.
         """
         segments = []
         for link in self.links:
-            body = (bodies or {}).get(link.name, link.body)
+            body = (inertia or {}).get(link.name, link.body)
             com = body.centre if body.mass != 0.0 else np.zeros(3)  # least squares may find negative masses
             central = body.inertia - body.mass * (com @ com * np.eye(3) - np.outer(com, com))
             slides = tuple(mechanics.Axis(name, d, translation=True) for name, d in _slides(link)) if sliding else ()

@@ -74,8 +74,8 @@ def identify(
     base = base_parameters(problem)
     free = free_parameters(problem, base.rank)
     bounded, at_bound = _bounded(problem, plan, bounds or Bounds())
-    bodies = bodies_of(chain, free)
-    impossible = tuple(name for name, body in bodies.items() if body.mass != 0.0 and not body.possible_in_plane())
+    fitted = inertia_of(chain, free)
+    impossible = tuple(name for name, body in fitted.items() if body.mass != 0.0 and not body.possible_in_plane())
     return LeastSquares(
         problem.names, problem.table, free, bounded, at_bound, impossible, base, problem.frames
     )  # fmt: skip
@@ -114,13 +114,13 @@ def predicted_wrench(chain: PlanarChain, kinematics: Kinematics, parameters: Arr
     return wrench
 
 
-def bodies_of(chain: PlanarChain, parameters: Array) -> dict[str, RigidBody]:
-    """Rigid bodies with these parameters (p,), the numbers out of the plane as the table has them."""
+def inertia_of(chain: PlanarChain, parameters: Array) -> dict[str, RigidBody]:
+    """Inertia of each segment with these parameters (p,), the numbers out of the plane as the table has them."""
     values = dict(zip(parameter_names(chain), parameters, strict=True))
-    bodies = {}
+    found = {}
     for link in chain.links:
         m, mx, my, izz = (values[f"inertia/{link.name}/{k}"] for k in ("mass", "mx", "my", "izz"))
         first, inertia = link.body.first_moment.copy(), link.body.inertia.copy()
         first[:2], inertia[2, 2] = (mx, my), izz
-        bodies[link.name] = RigidBody(float(m), first, inertia)
-    return bodies
+        found[link.name] = RigidBody(float(m), first, inertia)
+    return found

@@ -90,12 +90,12 @@ class ChainDynamics:
 
 
 def table_dynamics(
-    chain: PlanarChain, kinematics: Kinematics, bodies: Mapping[str, RigidBody] | None = None
+    chain: PlanarChain, kinematics: Kinematics, inertia: Mapping[str, RigidBody] | None = None
 ) -> ChainDynamics:
-    """Inverse dynamics (1) of the chain with the table's inertia, or with other ``bodies``; frames with an unknown
+    """Inverse dynamics (1) of the chain with the table's inertia, or with another ``inertia``; frames with an unknown
     coordinate are NaN."""
     motion = chain.motion(kinematics)
-    forces = mechanics.dynamics(chain.tree(bodies, sliding=kinematics.hinges is not None), motion)
+    forces = mechanics.dynamics(chain.tree(inertia, sliding=kinematics.hinges is not None), motion)
     wrench = np.full((len(motion.q), 6), np.nan)
     wrench[:, IN_PLANE] = forces.wrench[:, IN_PLANE]
     return ChainDynamics(wrench, chain.generalised(forces.moments))

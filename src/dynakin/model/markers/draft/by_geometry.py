@@ -1,4 +1,4 @@
-"""Which place a marker may have by where it lies on a person who stands, whatever its name."""
+"""Which place a marker may have by where it lies on a person who stands, regardless of its name."""
 
 from __future__ import annotations
 

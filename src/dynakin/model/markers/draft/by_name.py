@@ -97,7 +97,7 @@ def said(name: str) -> Said | None:
         place = _place(rest)
         if place is not None:
             centre = place in standing_at() and standing_at()[place][0][2] == 0.0
-            if centre and own_side is not None:  # beside the middle: a clavicle's own marker
+            if centre and own_side is not None:  # off the middle: a clavicle's own marker
                 segment = anatomy()["places"][place].get("segment")
                 return Said(None, segment, own_side, "likely", f"its name: {rest}, on one side")
             return Said(place, None, "centre" if centre else own_side, "likely", f"its name: {rest}")

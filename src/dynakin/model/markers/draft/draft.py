@@ -86,12 +86,12 @@ def guess_markers(recording: Recording) -> list[Guess]:
     person = _person(recording, at, {k: (str(place), str(side)) for k, (place, side) in named.items()})
     guesses = []
     for k, name in enumerate(names):
-        told = by_name.get(k)
+        spelt = by_name.get(k)
         lies = _placed(name, person, k, stands)
-        if told is not None and told.segment == "head" and _segment_of(lies) == "head" and lies.place:
-            guesses.append(replace(lies, why=f"{told.why}, and {lies.why}"))  # a head needs places, not only markers
-        elif told is not None:
-            guess = Guess(name, told.place, told.segment, told.side or "", told.sure, told.why)
+        if spelt is not None and spelt.segment == "head" and _segment_of(lies) == "head" and lies.place:
+            guesses.append(replace(lies, why=f"{spelt.why}, and {lies.why}"))  # a head needs places, not only markers
+        elif spelt is not None:
+            guess = Guess(name, spelt.place, spelt.segment, spelt.side or "", spelt.sure, spelt.why)
             guesses.append(_checked(guess, person, k, stands))
         else:
             guesses.append(lies)
@@ -147,7 +147,7 @@ def _person(recording: Recording, at: Array, named: dict[int, tuple[str, str]]) 
             ahead = turned @ find_forward(recording, turned[1], DEFAULT_PAIRS)[0]
             forward = ahead[[0, 2]]
         except RecordingError:
-            pass  # nobody walks: the posture tells
+            pass  # nobody walks: the posture shows it
     person = fit_person(at @ turned.T, named, forward)
     if person is None or person.cost > _FIT * len(at):
         return None
@@ -197,13 +197,13 @@ def _placed(name: str, person: Stature | None, marker: int, stands: bool) -> Gue
 
 
 _ALONE = ("CLAV", "STRN")  # places of one kind: a marker there alone may as well be at the other, or between
-_OUTWARD = {"ANK": 1.0, "ANM": -1.0}  # beside the line from heel to toe, which tells better than where the foot stands
-_BESIDE = 0.006  # of the height
+_OUTWARD = {"ANK": 1.0, "ANM": -1.0}  # side of the line from heel to toe, which shows better than where the foot stands
+_OFF_LINE = 0.006  # of the height
 _TURNED_OUT = np.array([0.98, 0.0, 0.17])  # a right foot, as people stand
 
 
 def _without_rivals(guesses: list[Guess], names: list[str], person: Stature | None) -> list[Guess]:
-    """Places that only where markers lie tells, as markers that follow the segment where a neighbour of the place is as
+    """Places known only by where markers lie, as markers that follow the segment where a neighbour of the place is as
     good a reading."""
     if person is None:
         return guesses
@@ -212,8 +212,8 @@ def _without_rivals(guesses: list[Guess], names: list[str], person: Stature | No
     for guess in guesses:
         doubt = ""
         if guess.place in _ALONE and sum((place, "centre") in at for place in _ALONE) == 1:
-            doubt = f"; {' or '.join(_ALONE)}, or beside them"
-        if guess.place in _OUTWARD and not _beside(guess, at):
+            doubt = f"; {' or '.join(_ALONE)}, or near them"
+        if guess.place in _OUTWARD and not _on_its_side(guess, at):
             doubt = f"; {' or '.join(_OUTWARD)}"
         if doubt and guess.sure == "likely" and said(guess.recorded) is None:
             segment = str(anatomy()["places"][guess.place]["segment"])
@@ -222,7 +222,7 @@ def _without_rivals(guesses: list[Guess], names: list[str], person: Stature | No
     return found
 
 
-def _beside(guess: Guess, at: Mapping[tuple[str, str], Array]) -> bool:
+def _on_its_side(guess: Guess, at: Mapping[tuple[str, str], Array]) -> bool:
     """Whether an ankle's marker lies on its place's side of the foot."""
     heel, toe = at.get(("HEE", guess.side)), at.get(("TOE", guess.side))
     if heel is None:
@@ -231,7 +231,7 @@ def _beside(guess: Guess, at: Mapping[tuple[str, str], Array]) -> bool:
     ahead, _, aside = (_TURNED_OUT if toe is None else toe - heel) * [1.0, 1.0, right if toe is None else 1.0]
     own = at[str(guess.place), guess.side] - heel
     outward = right * (own[2] * ahead - own[0] * aside) / np.hypot(ahead, aside)
-    return bool(outward * _OUTWARD[str(guess.place)] > _BESIDE)
+    return bool(outward * _OUTWARD[str(guess.place)] > _OFF_LINE)
 
 
 def _one_each(guesses: list[Guess]) -> list[Guess]:

@@ -1,4 +1,4 @@
-"""What lies beside a recording and belongs to it: its ground forces, the same person standing.
+"""What lies in a recording's folder and belongs to it: its ground forces, the same person standing.
 
 By names, then by what is in the files. It is offered, never taken: a name is no proof.
 """
@@ -37,7 +37,7 @@ _PAIRS = 6
 _FRAMES = 1000  # spread over a trial, enough for these
 
 
-def forces_beside(trial: Path) -> Path | None:
+def companion_forces(trial: Path) -> Path | None:
     """A table of ground forces in the trial's folder whose name is the trial's but for words such as "grf"."""
     own = _words(trial)
     found = []
@@ -48,7 +48,7 @@ def forces_beside(trial: Path) -> Path | None:
     return max(found, key=lambda pair: (pair[0], pair[1].name))[1] if found else None
 
 
-def static_beside(trial: Path, recording: Recording) -> Path | None:
+def companion_static(trial: Path, recording: Recording) -> Path | None:
     """A recording in the trial's folder of the same person, with the same markers, who stands; None where the trial is
     one itself."""
     if _words(trial) & STANDING_WORDS or _still(recording) > _STILL:

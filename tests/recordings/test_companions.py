@@ -1,4 +1,4 @@
-"""What lies beside a recording is found by its name and by what is in it."""
+"""What belongs to a recording in its folder is found by its name and by what is in it."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from dynakin.recordings.beside import forces_beside, static_beside
+from dynakin.recordings.companions import companion_forces, companion_static
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
 from dynakin.results.files.markers import write_trc
@@ -21,7 +21,7 @@ PAIRS = {
     "rajagopal/motion_capture_walk.trc": ("grf_walk.mot", "static_walk_2.trc"),
     "rajagopal/static_run.trc": (None, None),
     "gait2354/subject01_walk1.trc": ("subject01_walk1_grf.mot", "subject01_static.trc"),
-    "plugin_gait/GaitNormal_1.c3d": (None, None),  # another person stands beside it
+    "plugin_gait/GaitNormal_1.c3d": (None, None),  # another person stands next to it
     "plugin_gait/S1_FlywheelSquat.c3d": (None, "S1_StandingRef.c3d"),
     "c3d_parser/RBWH/bfnd w1.c3d": (None, "Max Cal 01.c3d"),
     "functional/right_knee.c3d": (None, "anat_pose_ECH.c3d"),
@@ -32,7 +32,7 @@ PAIRS = {
 def test_of_recordings(trial: str, data_dir: Path) -> None:
     path = data_dir / trial
     recording = read(path)
-    found = forces_beside(path), static_beside(path, recording)
+    found = companion_forces(path), companion_static(path, recording)
     assert tuple(each and each.name for each in found) == PAIRS[trial]
 
 
@@ -50,9 +50,9 @@ def _write(path: Path, recording: Recording, frames: slice = slice(None)) -> Non
 def test_another_person_is_not_taken(people: dict[str, Recording], tmp_path: Path) -> None:
     _write(tmp_path / "squat.trc", people["one"])
     _write(tmp_path / "static.trc", people["other"], slice(0, 80))
-    assert static_beside(tmp_path / "squat.trc", people["one"]) is None
+    assert companion_static(tmp_path / "squat.trc", people["one"]) is None
     _write(tmp_path / "standing.trc", people["one"], slice(0, 80))
-    found = static_beside(tmp_path / "squat.trc", people["one"])
+    found = companion_static(tmp_path / "squat.trc", people["one"])
     assert found is not None and found.name == "standing.trc"
 
 
@@ -61,9 +61,9 @@ def test_who_stands_is_found_under_any_name(people: dict[str, Recording], tmp_pa
     _write(tmp_path / "t02.trc", people["one"], slice(0, 80))
     _write(tmp_path / "t03.trc", people["one"], slice(150, 400))
     (tmp_path / "t04.trc").write_text("no recording")
-    found = static_beside(tmp_path / "t07.trc", people["one"])
+    found = companion_static(tmp_path / "t07.trc", people["one"])
     assert found is not None and found.name == "t02.trc"
-    assert static_beside(tmp_path / "t02.trc", read(tmp_path / "t02.trc")) is None
+    assert companion_static(tmp_path / "t02.trc", read(tmp_path / "t02.trc")) is None
 
 
 @pytest.mark.parametrize(
@@ -78,11 +78,11 @@ def test_who_stands_is_found_under_any_name(people: dict[str, Recording], tmp_pa
 def test_forces_by_their_names(names: list[str], expected: str | None, tmp_path: Path) -> None:
     for name in names:
         (tmp_path / name).write_text("")
-    found = forces_beside(tmp_path / "walk1.trc")
+    found = companion_forces(tmp_path / "walk1.trc")
     assert (found and found.name) == expected
 
 
 def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
-    assert forces_beside(tmp_path / "none" / "walk.trc") is None
+    assert companion_forces(tmp_path / "none" / "walk.trc") is None
     still = Recording("a", None, np.arange(3.0), ("x",), np.zeros((3, 1, 3)))
-    assert static_beside(tmp_path / "none" / "walk.trc", still) is None
+    assert companion_static(tmp_path / "none" / "walk.trc", still) is None
