@@ -100,7 +100,7 @@ def contradicted(delay_s: float, misfit_n: float, misfit_then_n: float) -> str:
     """That a delay which the fit asks for is not taken off, because the motion of the centre of mass is against it."""
     where = "behind" if delay_s >= 0.0 else "ahead of"
     return (
-        f"Warning: the fit asks for plates that are {1000.0 * abs(delay_s):.0f} ms {where} the markers, but the motion "
-        f"of the centre of mass does not: their sum would be {misfit_then_n:.0f} N off it, not {misfit_n:.0f} N. "
-        "No more was taken off."
+        f"By the fit the plates are {1000.0 * abs(delay_s):.0f} ms {where} the markers, by the motion of the centre of "
+        f"mass they are not (their sum would be {misfit_then_n:.0f} N off it, not {misfit_n:.0f} N): no more was taken "
+        "off."
     )

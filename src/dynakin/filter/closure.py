@@ -98,7 +98,7 @@ def closure(initial: CalibratedModel, time: Array, markers: Array, wrench: Array
     too_much = _too_much(need[:, 1], wrench[:, 1], judged, weight, rate)
     need *= 1.0 if ratio is None else ratio  # a mass that is somewhat wrong is no contact
     missing = np.where(axes, need - wrench[:, :3], 0.0)
-    excess = _smooth(missing, judged, rate)
+    excess = smoothed(missing, judged, rate)
     zmp = centre - centre[:, [1]] * acceleration / (acceleration[:, [1]] + GRAVITY_M_S2).clip(1.0)
     about = np.stack([-need[:, 1] * zmp[:, 2] - wrench[:, 3], need[:, 1] * zmp[:, 0] - wrench[:, 5]], axis=1)
     size = np.abs(np.nan_to_num(excess)).max(axis=1) / weight
@@ -110,7 +110,7 @@ def closure(initial: CalibratedModel, time: Array, markers: Array, wrench: Array
         if end - first > _UNSEEN_S * rate and abs(load - weight) > EXCESS * weight:
             undeclared[first:end] = True
     return Closure(
-        excess, _smooth(about, judged, rate), undeclared, int(np.sum(claimed & ~judged)), ratio,
+        excess, smoothed(about, judged, rate), undeclared, int(np.sum(claimed & ~judged)), ratio,
         (float(large), float(lasting)), too_much,
     )  # fmt: skip
 
@@ -189,8 +189,8 @@ def _with_edges(core: Flags, some: Flags, judged: Flags, claimed: Flags, rate: f
     return found
 
 
-def _smooth(values: Array, judged: Flags, rate: float) -> Array:
-    """Gaussian mean over the judged frames alone; NaN elsewhere."""
+def smoothed(values: Array, judged: Flags, rate: float) -> Array:
+    """Gaussian mean (`SMOOTH_S`) of values (T, C) over the judged frames alone; NaN elsewhere."""
     reach = round(4.0 * SMOOTH_S * rate)
     kernel = np.exp(-0.5 * (np.arange(-reach, reach + 1) / (SMOOTH_S * rate)) ** 2)
     weighed = np.column_stack([np.where(judged[:, None], values, 0.0), judged])

@@ -13,6 +13,7 @@ from dynakin.errors import RecordingError
 from dynakin.filter.closure import Closure, closure
 from dynakin.filter.declared import bearing, may_bear
 from dynakin.filter.expected import ContactPaths
+from dynakin.filter.plate_motion import Needed, turned_axes
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.checks import PlateCheck, check_plates
 from dynakin.recordings.feet import loads as on_plates
@@ -128,6 +129,9 @@ def known_ground(
     check = check_plates(recording, initial.ground, mass, foot_markers(initial), loads)
     if check.refusal:
         raise RecordingError(f"{recording.path or recording.name}: {check.refusal}")
+    needed = Needed(initial, recording.time, markers)
+    if loads is not None and (wrong := turned_axes(needed, recording, initial, loads.total_known)):
+        raise RecordingError(f"{recording.path or recording.name}: {wrong}")
     notes, reasons = list(check.messages), list[str]()
     measured: Flags = np.asarray(np.isfinite(wrench).all(axis=1))
     claimed = measured if loads is None else loads.total_known

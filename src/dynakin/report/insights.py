@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from dynakin.arrays import runs
 from dynakin.filter.tracker import SMOOTHED_WITH
 from dynakin.report.labels import COMPONENT_LABELS, parameter_label, short_marker_names
 from dynakin.results.estimate import Estimate
@@ -16,10 +17,11 @@ from dynakin.results.measures.adaptation import convergence
 from dynakin.results.measures.bounds import counts_in_words
 from dynakin.results.measures.consistency import Consistency, limits
 from dynakin.results.measures.metrics import ADAPTATION_S, evaluation_window, speed_consistency, window_consistency
-from dynakin.results.measures.soft_tissue import excess_in_words
+from dynakin.results.measures.soft_tissue import excess_in_words, marker_sites
 from dynakin.results.measures.tracking import why_lost
 from dynakin.results.naming import listed, number, plural, sentence, words
 from dynakin.results.records import REFUSED, doubts_mass
+from dynakin.units import GRAVITY_M_S2
 
 # RMS distance of the model's markers, mm, below which they fit: the paper's own figure.
 FITTING_MM = 15.0
@@ -31,6 +33,22 @@ FOLLOWING = 4.0
 NOISY = 2.0
 # A marker is named where it fits worse than half of all by this factor.
 STANDS_OUT = 3.0
+# Part of the weight that no contact gives, from which it is said: good recordings leave 0.03 to 0.16 for a frame, one
+# frame that was filled 0.4.
+LEFT = 0.25
+# Words of warnings that a finding of their own says, or that are no doubt of the estimate.
+_SAID_ELSEWHERE = (
+    "no marker set has these names",
+    "no marker shows ",
+    "frames are no estimate",
+    "EKF (",
+    "left out: ",
+    "tilt and rotation cannot be separated",
+    " clamps them",
+)
+# Longest time, s, without any marker of a segment over which its motion is carried on: by truth a foot in a walk is 20
+# to 30 deg off after 0.3 s.
+UNSEEN_S = 0.2
 # A sensor that is refused for less than this, s, is a note.
 BRIEF_S = 0.1
 
@@ -39,7 +57,7 @@ Metrics = dict[str, Any]
 
 
 # How the sentences begin that a run says of its plates as a whole.
-PLATE_WORDS = ("The plates are ", "Warning: the plates carry ")
+PLATE_WORDS = ("The plates are ", "By the motion of the centre of mass the plates are ")
 
 # What to do, in the words of a laboratory.
 ADVICE = {
@@ -58,9 +76,15 @@ ADVICE = {
     "speeds": "Run it without --live-like or --lag: a live estimate steps where a measurement corrects it.",
     "speeds, no smoother": "Take --preset default, which is smoothed: with these settings an estimate steps where a "
     "measurement corrects it.",
-    "speeds, smoothed": "Use angles and moments only; before you use speeds, fit the noise to your laboratory with "
-    "dynakin tune.",
-    "plates": "Look with dynakin check which plates are read, where they lie, and what bears on them.",
+    "speeds, smoothed": "Use angles only: speeds, accelerations and the moments that rest on them jump there. Look in "
+    "the recording at these times for frames that were filled, or markers that jump.",
+    "plates": "Look with dynakin check which plates are read, where they lie, and what bears on them; declare what "
+    "else does (--contact).",
+    "unseen": "Do not use the angles and moments of these segments' joints there, or fill the gap from what you know.",
+    "recording": "Correct it in the file, or look at the film at these times, before you use what lies there.",
+    "subject": "Give the mass and the height as measured (--mass, --height).",
+    "left": "Look in the recording at that time for markers that jump or frames that were filled; moments there are "
+    "wrong.",
     "markers": "Check that the standing trial is this person's, with the same markers in the same places.",
     "limits": "Look at the film at that joint: where it does not go so far, a marker is swapped or off its place.",
     "left out": "Look at the film at these times: correct labels that are swapped, delete what is no marker.",
@@ -122,6 +146,40 @@ def _mass(estimate: Estimate, metrics: Metrics) -> Insight | None:
     if not doubts:
         return None
     return Insight("warning", "Mass", sentence(" ".join(doubts)), "Give the mass as weighed, with all that is worn.")
+
+
+def _warned(estimate: Estimate, metrics: Metrics) -> list[Insight]:
+    """What the reading, the calibration and the plates warned of, and no other finding says."""
+    warnings = [text.removeprefix("Warning: ") for text in estimate.messages if text.startswith("Warning: ")]
+    elsewhere = {text for text in warnings if doubts_mass(text) or any(part in text for part in _SAID_ELSEWHERE)}
+    warnings = [text for text in dict.fromkeys(warnings) if text not in elsewhere]
+    found = []
+    for title, advice, belongs in (
+        ("Subject", "subject", lambda text: text.startswith(("mass ", "height "))),
+        ("Force plates", "plates", lambda text: "plate" in text),
+        ("Recording", "recording", lambda text: True),
+    ):
+        own = [text for text in warnings if belongs(text)]
+        warnings = [text for text in warnings if text not in own]
+        if title == "Subject":
+            own = [text for text in own if " assumed, " in text]  # one that was measured is said, and no doubt
+        if own:
+            found.append(Insight("warning", title, " ".join(sentence(text) for text in own), ADVICE[advice]))
+    return found
+
+
+def _left(estimate: Estimate, metrics: Metrics) -> Insight | None:
+    """A force that no contact gives while the feet are on plates: a jump in the motion, as a filled frame makes one."""
+    feet = metrics["feet"]
+    largest = feet and feet["left_at_root"]["grounded"]
+    weight = GRAVITY_M_S2 * (estimate.mass_kg or 0.0)
+    if not largest or not weight or largest["force_n"] < LEFT * weight:
+        return None
+    text = (
+        f"At one time the motion needs {number(largest['force_n'], 'N')} more or less than the feet's plates give "
+        f"({number(100.0 * largest['force_n'] / weight, '%', digits=2)} of the weight)."
+    )
+    return Insight("warning", "Left at the pelvis", text, ADVICE["left"])
 
 
 def _guessed(estimate: Estimate, metrics: Metrics) -> Insight | None:
@@ -199,8 +257,6 @@ def _wrench(estimate: Estimate, metrics: Metrics) -> Insight | None:
     about_plates = [text for text in estimate.messages if text.startswith(PLATE_WORDS) and not doubts_mass(text)]
     if not rms:
         why = " ".join(about_plates) or "No wrench was compared: none was measured, or none is modelled."
-        if about_plates:
-            return Insight("warning", "Force plates", why.removeprefix("Warning: "), ADVICE["plates"])
         return Insight("note", "Force plates", why)
     text = [
         f"{COMPONENT_LABELS[name][0].lower()} {number(value, COMPONENT_LABELS[name][1])}"
@@ -409,6 +465,11 @@ def _joint_limits(estimate: Estimate, metrics: Metrics) -> Insight | None:
 
 
 def _missing(estimate: Estimate, metrics: Metrics) -> Insight | None:
+    """Gaps; a warning where no marker of a segment is seen for so long that its joints are carried on, not measured."""
+    unseen = _unseen(estimate)
+    if unseen:
+        whose = listed([f"{words(segment)} from {times}" for segment, times in unseen.items()])
+        return Insight("warning", "Unseen", f"No marker is seen of {whose}.", ADVICE["unseen"])
     gaps: dict[str, int] = metrics["events"]["missing_frames"]
     if not gaps:
         return Insight("good", "Gaps", "Every marker in use was measured in every frame.")
@@ -418,6 +479,24 @@ def _missing(estimate: Estimate, metrics: Metrics) -> Insight | None:
         for name, gap in sorted(gaps.items(), key=lambda item: -item[1])
     ]
     return Insight("note", "Gaps", f"Markers missing for part of the recording: {listed(text)}.")
+
+
+def _unseen(estimate: Estimate) -> dict[str, str]:
+    """Segments, and the times in which none of their markers is seen although some are at other times."""
+    carriers = dict(zip(estimate.marker_names, (site for _, site in marker_sites(estimate)), strict=True))
+    seen = np.isfinite(estimate.data["markers_measured"].transpose("time", "marker", "axis").values).any(axis=2)
+    owners = np.array([estimate.marker_segments.get(carriers[name], "") for name in estimate.marker_names])
+    found: dict[str, str] = {}
+    for segment in dict.fromkeys(owners[owners != ""]):
+        hidden = ~seen[:, owners == segment].any(axis=1)
+        spans = [
+            f"{estimate.time[a]:.2f} to {estimate.time[b - 1]:.2f} s"
+            for a, b in runs(hidden)
+            if estimate.time[b - 1] - estimate.time[a] > UNSEEN_S
+        ]
+        if spans and not hidden.all():
+            found[str(segment)] = listed(spans, 3)
+    return found
 
 
 def _gated(estimate: Estimate, metrics: Metrics) -> Insight | None:
@@ -465,6 +544,8 @@ FINDINGS: tuple[tuple[Callable[[Estimate, Metrics], Insight | list[Insight] | No
     (_guessed, ()),
     (_unmarked, ()),
     (_mass, ()),
+    (_warned, ()),
+    (_left, ("feet",)),
     (_failed, ()),
     (_tracking, ()),
     (_moments, ("moments",)),

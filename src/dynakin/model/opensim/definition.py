@@ -29,7 +29,7 @@ from dynakin.model.opensim.description import OpenSimModel
 from dynakin.model.opensim.read import read_osim
 from dynakin.model.opensim.scales import scale_names
 from dynakin.model.opensim.sites import sites, skin_of
-from dynakin.model.opensim.spec import to_spec, unseen
+from dynakin.model.opensim.spec import moved_by, to_spec, unseen
 from dynakin.model.schema import kinds_of
 from dynakin.model.spec import in_layout
 from dynakin.model.state_priors import state_bounds, state_prior
@@ -204,6 +204,8 @@ class OpenSimDefinition:
             unmodelled_m=np.full(len(skin), _MODEL_M),
             skin_lasts=_SKIN_LASTS,
             dimensionless=frozenset(lengths),
+            unmarked_kg=sum(bodies[name].mass for name in moved_by(source, lock)),
+            held=dict.fromkeys(lock, "it moves no measured marker"),
         )
 
 

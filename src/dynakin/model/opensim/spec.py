@@ -38,6 +38,18 @@ def unseen(model: OpenSimModel, bodies: Collection[str]) -> list[str]:
     return [c.name for c in free_coordinates(model) if c.name not in seen and not c.locked]
 
 
+def moved_by(model: OpenSimModel, coordinates: Collection[str]) -> set[str]:
+    """Bodies that one of these coordinates moves."""
+    placed = placements(model, {})
+    parents = {joint.child: joint.parent for joint in model.joints}
+
+    def moved(body: str) -> bool:
+        own = any(axis.coordinate in coordinates for axis in placed[body].axes)
+        return own or (parents[body] != GROUND and moved(parents[body]))
+
+    return {body for body in parents if moved(body)}
+
+
 def used_scales(placed: Mapping[str, Placed]) -> list[str]:
     """Scale parameters that place something, in the order of the tree."""
     names: dict[str, None] = {}

@@ -99,7 +99,7 @@ def _recording(data: Any, path: Path, options: ReadOptions, notes: list[str]) ->
     factor, unit, unit_notes = length_unit(parameters.text("POINT", "UNITS"), raw)
     names, markers, doubled_notes = distinct_names(found.names, raw * factor)
     check_unique(names, "marker", path)
-    markers, missing_notes = clean_markers(names, markers)
+    markers, missing_notes = clean_markers(names, markers, np.arange(frames) / rate, path)
     first = first_frame(parameters, int(data["header"]["points"]["first_frame"]))
     start_notes = []
     if first:

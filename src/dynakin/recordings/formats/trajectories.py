@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
+import numpy.typing as npt
 
+from dynakin.arrays import runs
+from dynakin.errors import RecordingError
 from dynakin.recordings.recording import Array, rate_of
 from dynakin.units import length_factor
 
@@ -15,6 +19,14 @@ _METRES_BELOW, _CENTIMETRES_BELOW = 5.0, 300.0
 0.3 m. Only a foot in mm (300) and a person with arms raised in cm (260) come near each other."""
 _SAME_M = 3e-3
 """Distance up to which two trajectories are one marker's, rounded or filtered otherwise: balls of 6 mm touch there."""
+_MOVES_M_S = 0.1
+"""Speed of the fastest marker from which the person moves."""
+_STRAIGHT, _ROUNDED_M = 0.02, 2e-9
+"""A line is straight where it bends by so much less than the marker does half of the time it moves, or not at all."""
+_MOST_REPEATED = 0.2
+"""Part of the frames that may repeat others: more is another rate, written as this one."""
+_LINE_FRAMES, _LINE_S, _LINE_M = 6, 0.06, 0.01
+"""How long and how far it is at least."""
 _MOSTLY = 2.0
 """How many times as often as any other of its name a marker is seen to be the one that is meant."""
 
@@ -110,12 +122,15 @@ def _labels(name: str, places: list[Array], taken: set[str]) -> list[str]:
     return labels
 
 
-def clean_markers(names: tuple[str, ...], markers: Array) -> tuple[Array, list[str]]:
-    """Markers (T, M, 3) with a point that has any coordinate missing, or is exactly 0, 0, 0, made NaN as a
-    whole.
+def clean_markers(names: tuple[str, ...], markers: Array, time: Array, path: Path) -> tuple[Array, list[str]]:
+    """Markers (T, M, 3) without what was never measured: a point that has any coordinate missing, or is exactly 0, 0,
+    0, is NaN as a whole, and so are frames that repeat the one before and gaps that were filled by straight lines.
 
     Several systems export an occluded marker as the laboratory's origin; no marker is ever there to the last
     bit.
+
+    Raises:
+        RecordingError: so many frames repeat others that the rate is another.
     """
     markers = markers.copy()  # infinite stays: `Recording` refuses it
     notes: list[str] = []
@@ -125,7 +140,31 @@ def clean_markers(names: tuple[str, ...], markers: Array) -> tuple[Array, list[s
         notes.append(f"Markers at exactly 0, 0, 0 taken as missing ({int(origin.sum())} samples: {who}).")
     partial = np.isnan(markers).any(axis=2)
     markers[origin | partial] = np.nan
-    missing = np.isnan(markers[:, :, 0]) if markers.size else np.zeros(markers.shape[:2], dtype=bool)
+    rate = rate_of(time)
+    again, lines = _repeated(markers, rate), _straight(markers, rate)
+    if again.any():
+        first = int(np.flatnonzero(again)[0])
+        text = (
+            f"frames repeat the one before to the last digit while the person moves: {np.count_nonzero(again)} of "
+            f"{len(markers)}, the first is frame {first + 1} ({time[first]:.3f} s)"
+        )
+        if again.mean() > _MOST_REPEATED:
+            raise RecordingError(
+                f"{path}: {text}; expected each frame once, at the rate of the cameras "
+                f"({rate * (1 - again.mean()):.0f} Hz?): export it so"
+            )
+        notes.append(f"Warning: {text}. They are taken as missing; export the recording without filled frames.")
+        markers[again] = np.nan
+    if lines.any():
+        who = ", ".join(name for name, hit in zip(names, np.asarray(lines.any(axis=0)), strict=True) if hit)
+        notes.append(
+            f"Warning: gaps were filled by straight lines: {who}. They are taken as missing ({np.count_nonzero(lines)} "
+            "samples)."
+        )
+        markers[lines] = np.nan
+    missing: npt.NDArray[np.bool_] = (
+        np.isnan(markers[:, :, 0]) if markers.size else np.zeros(markers.shape[:2], dtype=bool)
+    )
     if missing.any():
         share = ", ".join(
             f"{name} {100 * part:.3g} %" for name, part in zip(names, missing.mean(axis=0), strict=True) if part
@@ -135,6 +174,40 @@ def clean_markers(names: tuple[str, ...], markers: Array) -> tuple[Array, list[s
         empty = np.flatnonzero(missing.all(axis=1))
         notes.append(f"{len(empty)} frames have no marker at all, the first is frame {empty[0] + 1}.")
     return markers, notes
+
+
+def _repeated(markers: Array, rate: float) -> npt.NDArray[np.bool_]:
+    """(T,) frames that are the one before to the last bit while the person moves on both sides of them: dropped ones
+    that a system filled, or a rate that was doubled by writing each frame twice."""
+    seen: npt.NDArray[np.bool_] = np.asarray(np.isfinite(markers).all(axis=2))
+    steps = np.linalg.norm(np.where((seen[1:] & seen[:-1])[..., None], np.diff(markers, axis=0), 0.0), axis=2)
+    step = np.concatenate([[np.inf], steps.max(axis=1, initial=0.0)])
+    same = (step == 0.0) & np.concatenate([[False], (seen[1:] == seen[:-1]).all(axis=1)]) & (seen.sum(axis=1) > 2)
+    found = np.zeros(len(markers), dtype=bool)
+    for first, end in runs(same):
+        found[first:end] = first > 1 and end < len(step) and min(step[first - 1], step[end]) * rate > _MOVES_M_S
+    return found
+
+
+def _straight(markers: Array, rate: float) -> npt.NDArray[np.bool_]:
+    """(T, M) samples within straight lines at a steady speed, which no marker goes: gaps that a system filled."""
+    found = np.zeros(markers.shape[:2], dtype=bool)
+    if len(markers) < 3 or not np.isfinite(rate):
+        return found
+    bend = np.linalg.norm(np.diff(markers, n=2, axis=0), axis=2)
+    step = np.linalg.norm(np.diff(markers, axis=0), axis=2)
+    for m in range(markers.shape[1]):
+        moving = bend[(step[1:, m] * rate > _MOVES_M_S) & np.isfinite(bend[:, m]), m]
+        if len(moving) < _LINE_FRAMES:
+            continue
+        with np.errstate(invalid="ignore"):
+            straight = bend[:, m] <= max(_STRAIGHT * float(np.median(moving)), _ROUNDED_M)
+        for first, end in runs(straight):
+            length = end - first
+            moved = float(np.linalg.norm(markers[end + 1, m] - markers[first, m]))
+            if length >= max(_LINE_FRAMES, _LINE_S * rate) and moved > _LINE_M:
+                found[first + 1 : end + 1, m] = True
+    return found
 
 
 def timing_notes(time: Array, rate_in_header: float | None = None) -> list[str]:

@@ -54,7 +54,7 @@ def read_trc(path: Path, options: ReadOptions | None = None) -> Recording:
     notes = row_notes + _count_notes(header, len(table), len(names)) + time_notes + timing_notes(time, rate)
     names, markers, doubled_notes = distinct_names(names, raw * factor)
     check_unique(names, "marker", path)
-    markers, marker_notes = clean_markers(names, markers)
+    markers, marker_notes = clean_markers(names, markers, time, path)
     return Recording(
         name=trial_name(path),
         path=path,

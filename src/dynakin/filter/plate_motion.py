@@ -1,0 +1,140 @@
+"""Plates against what the centre of mass needs, by the markers alone: their clock and their axes.
+
+A filter cannot ask itself either: what plates that are out of step, or whose axes are turned, say of a walk is taken up
+by accelerations and inertia. Newton's second law in every frame is enough to know (`filter.closure`, `mass_centre`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import product
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.filter.closure import smoothed
+from dynakin.filter.mass_centre import mass_centre
+from dynakin.filter.samples import in_step
+from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.recordings.recording import Plate, Recording, rate_of
+from dynakin.results.naming import listed
+from dynakin.units import GRAVITY_M_S2
+
+Array = npt.NDArray[np.float64]
+Flags = npt.NDArray[np.bool_]
+
+LONGEST_S, STEP_S = 0.1, 0.005
+"""Delays that are looked for, and how finely."""
+LEAST_S = 0.008
+"""A lesser delay is left to the filter's state."""
+LESS, NEAR = 0.75, 0.05
+"""In step the sum must be off what the motion needs by so much less, and by less than this part of the weight."""
+TURNED, LARGE_N = 0.4, 4.0
+"""With other axes the horizontal force must be off by so much less, where as it is it is off by more than so many N:
+0.9 to 1 times of 16 real recordings whose plates are right, 0.07 to 0.24 where they are not. Judged where the vertical
+force is within `NEAR` of what the motion needs, or else something that no plate measures pulls (a flywheel's cable)."""
+_SHORTEST_S = 0.3
+
+_TURNS: tuple[tuple[str, Array], ...] = (
+    ("the first horizontal axis points the other way", np.diag([-1.0, 1.0])),
+    ("the second horizontal axis points the other way", np.diag([1.0, -1.0])),
+    ("both horizontal axes point the other way (turned by half a turn)", -np.eye(2)),
+    ("the horizontal axes are turned by a quarter turn", np.array([[0.0, -1.0], [1.0, 0.0]])),
+    ("the horizontal axes are turned by a quarter turn", np.array([[0.0, 1.0], [-1.0, 0.0]])),
+)
+
+
+class Needed:
+    """The force (T, 3) N that the motion of the centre of mass needs, ground axes."""
+
+    def __init__(self, initial: CalibratedModel, time: Array, markers: Array) -> None:
+        found = mass_centre(initial, time, markers)
+        self.time, self.rate, self.weight = time, rate_of(time), initial.weighed_kg * GRAVITY_M_S2
+        self.known: Flags = np.zeros(len(time), dtype=bool) if found is None else found.known
+        acceleration = np.zeros((len(time), 3)) if found is None else found.acceleration
+        self.force: Array = initial.weighed_kg * (acceleration + np.array([0.0, GRAVITY_M_S2, 0.0]))
+
+    def misfit(self, force: Array) -> float:
+        """RMS, N, of what forces (T, 3) lack beyond a constant (a mass or a zero that is off), smoothed, where both
+        are known; inf where these frames are too few."""
+        judged = self.known & np.isfinite(force).all(axis=1)
+        if np.count_nonzero(judged) < _SHORTEST_S * self.rate:
+            return float("inf")
+        lacks = smoothed(np.where(judged[:, None], self.force - force, 0.0), judged, self.rate)[judged]
+        return float(np.sqrt(np.sum(lacks.var(axis=0))))
+
+
+def plates_delay(needed: Needed, wrench: Array) -> float | None:
+    """By how much plates lag, s, whose total wrench (T, 6) is known where it is no NaN; None where they are in step, or
+    nothing can be said."""
+    delays = np.arange(-LONGEST_S, LONGEST_S + 0.5 * STEP_S, STEP_S)
+    misfits = np.array([needed.misfit(in_step(needed.time, wrench[:, :3], delay)) for delay in delays])
+    k, now = int(np.argmin(misfits)), misfits[len(delays) // 2]
+    if not 0 < k < len(delays) - 1 or not np.isfinite(misfits[k - 1 : k + 2]).all():
+        return None
+    before, least, after = misfits[k - 1 : k + 2]
+    delay = float(delays[k] + 0.5 * STEP_S * (before - after) / max(before - 2.0 * least + after, 1e-12))
+    if abs(delay) < LEAST_S or least > LESS * now or least > NEAR * needed.weight:
+        return None
+    return delay
+
+
+def brought_into_step(recording: Recording, delay_s: float) -> Recording:
+    """The recording with what its plates say so much later at each time."""
+
+    def of(plate: Plate) -> Plate:
+        values = [plate.force, plate.moment, plate.cop, plate.free_moment]
+        force, moment, cop, free = (in_step(recording.time, each, delay_s) for each in values)
+        return replace(plate, force=force, moment=moment, cop=cop, free_moment=free)
+
+    return recording.with_plates(tuple(of(plate) for plate in recording.plates))
+
+
+def turned_axes(needed: Needed, recording: Recording, initial: CalibratedModel, known: Flags) -> str | None:
+    """A sentence on plates whose horizontal force fits the motion once their axes are others; None where none are.
+
+    Args:
+        known: (T,) frames in which the sum over the plates is all that bears the person.
+    """
+    forces = np.stack([initial.ground.vectors_to_ground(plate.force) for plate in recording.plates])
+    total = np.where(known[:, None], forces.sum(axis=0), np.nan)
+    upright = needed.force.copy()
+    upright[:, 1] = total[:, 1]
+    if needed.misfit(upright) > NEAR * needed.weight:
+        return None
+    total[:, 1] = needed.force[:, 1]  # axes are judged by the horizontal force alone
+    now = needed.misfit(total)
+    if now < LARGE_N:
+        return None
+    every = range(len(forces))
+    subsets: list[Sequence[int]] = [every, *([k] for k in every if len(forces) > 1)]
+    best, how = now, ""
+    which: Sequence[int] = every
+    for subset, (words, turn) in product(subsets, _TURNS):
+        changed = total.copy()
+        for k in subset:
+            axes = _axes(recording.plates[k], initial)
+            horizontal = forces[k][:, [0, 2]]
+            changed[:, [0, 2]] += horizontal @ axes.T @ turn.T @ axes - horizontal
+        if (misfit := needed.misfit(changed)) < best:
+            best, which, how = misfit, subset, words
+    if best > TURNED * now:
+        return None
+    names = listed([recording.plates[k].name for k in which])
+    return (
+        f"the horizontal force of {names} does not fit the motion: it is {now:.0f} N off what the centre of mass "
+        f"needs, and {best:.0f} N if {how}. Correct the axes in the file (corners, signs of the channels or "
+        "calibration)"
+    )
+
+
+def _axes(plate: Plate, initial: CalibratedModel) -> Array:
+    """(2, 2) the plate's horizontal axes, rows, in the ground's X and Z; the ground's own where it has no corners."""
+    if plate.corners is None:
+        return np.eye(2)
+    along = initial.ground.vectors_to_ground(plate.corners[0] - plate.corners[1])[[0, 2]]
+    if not np.linalg.norm(along) > 1e-6:
+        return np.eye(2)
+    along = along / np.linalg.norm(along)
+    return np.array([along, [-along[1], along[0]]])

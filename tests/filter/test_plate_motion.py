@@ -1,0 +1,88 @@
+"""Plates out of step, and plates whose axes are others, by the motion of the centre of mass."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import dynakin
+from dynakin import Estimator, Subject, load_model
+from dynakin.errors import RecordingError
+from dynakin.filter.plate_motion import Needed, brought_into_step, plates_delay
+from dynakin.recordings.recording import Plate, Recording
+from dynakin.simulation.trial import simulate as simulate_anew
+
+simulate = cache(simulate_anew)
+
+
+def person() -> Estimator:
+    return Estimator(load_model("fullbody", Subject(mass_kg=70.0, height_m=1.75, sex="male")))
+
+
+def with_forces(
+    recording: Recording, change: Callable[[np.ndarray], np.ndarray], which: int | None = None
+) -> Recording:
+    """Plates (one of them) with other axes of their own; centres of pressure stay."""
+
+    def of(k: int, plate: Plate) -> Plate:
+        if which not in (None, k):
+            return plate
+        force = change(plate.force)
+        moment = np.cross(np.nan_to_num(plate.cop), force) + plate.free_moment
+        return replace(plate, force=force, moment=np.where(np.isfinite(plate.cop), moment, 0.0))
+
+    return recording.with_plates(tuple(of(k, plate) for k, plate in enumerate(recording.plates)))
+
+
+@pytest.mark.parametrize(("motion", "delay_s"), [("gait", 0.03), ("gait", -0.02), ("squat", 0.04)])
+def test_plates_that_are_out_of_step_are_brought_into_it(motion: str, delay_s: float) -> None:
+    whole = simulate("fullbody", motion, 7, 4.0).recording
+    late = brought_into_step(whole, -delay_s)
+    ready, before = person().prepare(late), person().prepare(whole)
+    text = next(text for text in ready.messages if "By the motion of the centre of mass" in text)
+    side = "behind" if delay_s > 0.0 else "ahead of"
+    (found,) = re.findall(rf"([0-9]+) ms {side} the markers", text)
+    assert int(found) == pytest.approx(1000.0 * abs(delay_s), abs=2.0)
+    both = np.isfinite(ready.wrench).all(axis=1) & np.isfinite(before.wrench).all(axis=1)
+    assert both.sum() > 0.9 * np.isfinite(before.wrench).all(axis=1).sum()
+    assert np.abs(ready.wrench[both] - before.wrench[both])[:, :3].mean() < 2.0
+
+
+def test_plates_that_are_in_step_are_left_alone(data_dir: Path) -> None:
+    folder = data_dir / "opencap_subject4"
+    walk = dynakin.read(folder / "walking1.trc", folder / "walking1_grf.mot")
+    for recording in (simulate("fullbody", "gait", 7, 4.0).recording, walk):
+        ready = person().prepare(recording)
+        assert plates_delay(Needed(ready.calibrated, recording.time, ready.markers), ready.wrench) is None
+        assert not any("into step" in text for text in ready.messages)
+
+
+@pytest.mark.parametrize(
+    ("turn", "which", "said"),
+    [
+        ([1.0, 1.0, -1.0], None, "axis points the other way"),
+        ([-1.0, 1.0, 1.0], 1, "horizontal force of plate 2 .* axis points the other way"),
+        ([-1.0, 1.0, -1.0], None, "half a turn"),
+    ],
+)
+def test_plates_with_a_reversed_axis_are_refused(turn: list[float], which: int | None, said: str) -> None:
+    walk = simulate("fullbody", "gait", 7, 4.0).recording
+    up = int(np.argmax(np.abs(walk.plates[0].force).mean(axis=0)))
+    signs = np.ones(3)
+    signs[[k for k in range(3) if k != up]] = np.array(turn)[[0, 2]]
+    with pytest.raises(RecordingError, match=f"does not fit the motion.*{said}|{said}"):
+        person().prepare(with_forces(walk, lambda force: force * signs, which))
+
+
+def test_a_quarter_turn_is_named(data_dir: Path) -> None:
+    folder = data_dir / "opencap_subject4"
+    walk = dynakin.read(folder / "walking1.trc", folder / "walking1_grf.mot")
+    turned = with_forces(walk, lambda force: force[:, [2, 1, 0]] * [1.0, 1.0, -1.0])
+    with pytest.raises(RecordingError, match=r"quarter turn.*Correct the axes in the file"):
+        person().prepare(turned)

@@ -1,0 +1,65 @@
+"""Frames and gaps that a system filled are no measurements."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from dynakin.errors import RecordingError
+from dynakin.recordings.formats.trajectories import clean_markers
+
+RATE = 100.0
+NAMES = ("a", "b", "c", "d")
+
+
+def moving(frames: int = 200, noise_m: float = 1e-4) -> tuple[np.ndarray, np.ndarray]:
+    time = np.arange(frames) / RATE
+    swing = 0.3 * np.sin(2.0 * np.pi * 0.8 * time[:, None] + np.arange(4))
+    markers = np.stack([swing, 0.2 * swing**2, 1.2 * time[:, None] + 0.0 * swing], axis=2)
+    return time, markers + np.random.default_rng(0).normal(0.0, noise_m, markers.shape)
+
+
+def cleaned(time: np.ndarray, markers: np.ndarray) -> tuple[np.ndarray, list[str]]:
+    return clean_markers(NAMES, markers, time, Path("walk.trc"))
+
+
+def test_a_frame_that_repeats_the_one_before_is_missing() -> None:
+    time, markers = moving()
+    markers[100] = markers[99]
+    found, notes = cleaned(time, markers)
+    assert np.isnan(found[100]).all() and np.isfinite(np.delete(found, 100, axis=0)).all()
+    assert any("1 of 200, the first is frame 101 (1.000 s)" in text for text in notes)
+
+
+def test_a_rate_that_was_doubled_is_refused() -> None:
+    time, markers = moving()
+    markers[1::2] = markers[::2]
+    with pytest.raises(RecordingError, match=r"walk\.trc: frames repeat .* expected each frame once, .* \(5\d Hz\?\)"):
+        cleaned(time, markers)
+
+
+def test_somebody_who_stands_as_a_statue_is_no_repetition() -> None:
+    time, markers = moving()
+    found, notes = cleaned(time, np.tile(markers[:1], (200, 1, 1)))
+    assert np.isfinite(found).all() and not notes
+
+
+@pytest.mark.parametrize("noise_m", [0.0, 1e-4])
+def test_a_gap_that_was_filled_by_a_straight_line_is_one(noise_m: float) -> None:
+    time, markers = moving(noise_m=noise_m)
+    span = slice(81, 111)
+    for axis in range(3):
+        markers[span, 1, axis] = np.interp(time[span], time[[80, 111]], markers[[80, 111], 1, axis])
+    found, notes = cleaned(time, markers)
+    assert np.isnan(found[span, 1]).all()
+    assert np.isfinite(np.delete(found, 1, axis=1)).all() and np.isfinite(found[:80, 1]).all()
+    assert any("filled by straight lines: b." in text for text in notes)
+
+
+def test_smooth_markers_of_a_fast_system_are_no_lines() -> None:
+    time = np.arange(2000) / 1000.0
+    markers = np.stack([np.sin(2.0 * np.pi * time) + 0.1 * k for k in range(4)], axis=1)[..., None] * [0.3, 0.1, 0.2]
+    found, notes = cleaned(time, np.round(markers, 5))
+    assert np.isfinite(found).all() and not notes
