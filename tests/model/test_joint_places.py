@@ -15,7 +15,8 @@ from dynakin.filter.estimator import Estimator
 from dynakin.filter.parameters import parameters_of
 from dynakin.model.calibration.checks import fixed_lengths
 from dynakin.model.schema import Length, ModelFile, Segment, kinds_of
-from dynakin.report.insights import Insight, insights
+from dynakin.report.findings.finding import Insight
+from dynakin.report.insights import insights
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.results.naming import shown_unit

@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from dynakin.report.insights import Insight, insights
+from dynakin.report.findings.finding import Insight
+from dynakin.report.insights import insights
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.metrics import compute_metrics
 

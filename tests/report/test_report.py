@@ -13,7 +13,8 @@ import pytest
 
 from dynakin.report import insights as insights_module
 from dynakin.report.figure import new_axes, to_svg
-from dynakin.report.insights import Insight, in_short, insights
+from dynakin.report.findings.finding import Insight
+from dynakin.report.insights import in_short, insights
 from dynakin.report.labels import moment_note, short_marker_names
 from dynakin.report.page import SECTIONS, render_report
 from dynakin.report.plot import thin

@@ -11,7 +11,8 @@ from rich.table import Table
 
 from dynakin.cli.console import out, print_error, table
 from dynakin.pipeline.result import Result
-from dynakin.report.insights import Insight, in_short, insights
+from dynakin.report.findings.finding import Insight
+from dynakin.report.insights import in_short, insights
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.bounds import counts_in_words
 from dynakin.results.measures.sources import MEANINGS, UNKNOWN

@@ -8,7 +8,7 @@ from typing import Any, Literal
 import numpy as np
 import tomli_w
 
-from dynakin.report.insights import Insight
+from dynakin.report.findings.finding import Insight
 from dynakin.report.page import render_page
 from dynakin.report.sections.methods import ABOUT_TABLE2, about_methods, angle_part, moment_part, wrench_part
 from dynakin.report.sections.repetitions import method_repetitions

@@ -1,0 +1,1 @@
+"""What a reader should know before using a run, by what it is about."""

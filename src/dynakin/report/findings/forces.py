@@ -1,0 +1,84 @@
+"""Plates, mass and moments: what is measured, and what contradicts it."""
+
+from __future__ import annotations
+
+from dynakin.report.findings.finding import Insight, Metrics
+from dynakin.report.labels import COMPONENT_LABELS
+from dynakin.results.estimate import Estimate
+from dynakin.results.naming import listed, number, plural, sentence
+from dynakin.results.records import doubts_mass
+from dynakin.units import GRAVITY_M_S2
+
+# Part of the weight that no contact gives, from which it is said: good recordings leave 0.03 to 0.16 for a frame, one
+# frame that was filled 0.4.
+LEFT = 0.25
+# How the sentences begin that a run says of its plates as a whole.
+PLATE_WORDS = ("The plates are ", "By the motion of the centre of mass the plates are ")
+
+# What to do, in the words of a laboratory.
+ADVICE = {
+    "left": "Look in the recording at that time for markers that jump or frames that were filled; moments there are "
+    "wrong.",
+}
+
+
+def moments(estimate: Estimate, metrics: Metrics) -> Insight | None:
+    """Why moments are not measured, and what that leaves out; how many are is said before all findings."""
+    found = metrics["moments"]
+    if all(count["measured"] == found["frames"] for count in found["legs"].values()):
+        return None
+    text = ["Peaks, work, symmetry and mean curves are of measured moments only."]
+    if any(count["absent"] for count in found["legs"].values()):
+        text.append("Absent moments, powers and joint reactions are nan in the files.")
+    flagged = {"derived": "derived ones (dashed in the figures)", "prior": "those that take a prior (dotted)"}
+    if shown := [how for meaning, how in flagged.items() if any(count[meaning] for count in found["legs"].values())]:
+        text.append(f"{sentence(listed(shown))} are in the files with their flag (moments_source.sto).")
+    text += found["reasons"][:3]
+    if len(found["reasons"]) > 3:
+        text.append(f"{plural(len(found['reasons']) - 3, 'more reason')} under Joint moments.")
+    advice = "Give the forces of every contact (--forces), and plates under every step that is to be judged."
+    # steps off the plates are usual and flagged; a leg without a measured frame is not what was recorded for
+    missed = any(not count["measured"] for count in found["legs"].values())
+    return Insight("warning" if missed else "note", "Joint moments", " ".join(text), advice)
+
+
+def mass(estimate: Estimate, metrics: Metrics) -> Insight | None:
+    """Plates that contradict the mass: forces, moments and inertia are all wrong then."""
+    doubts = [text.removeprefix("Warning: ") for text in estimate.messages if doubts_mass(text)]
+    if not doubts:
+        return None
+    return Insight("warning", "Mass", sentence(" ".join(doubts)), "Give the mass as weighed, with all that is worn.")
+
+
+def left(estimate: Estimate, metrics: Metrics) -> Insight | None:
+    """A force that no contact gives while the feet are on plates: a jump in the motion, as a filled frame makes one."""
+    feet = metrics["feet"]
+    largest = feet and feet["left_at_root"]["grounded"]
+    weight = GRAVITY_M_S2 * (estimate.mass_kg or 0.0)
+    if not largest or not weight or largest["force_n"] < LEFT * weight:
+        return None
+    text = (
+        f"At one time the motion needs {number(largest['force_n'], 'N')} more or less than the feet's plates give "
+        f"({number(100.0 * largest['force_n'] / weight, '%', digits=2)} of the weight)."
+    )
+    return Insight("warning", "Left at the pelvis", text, ADVICE["left"])
+
+
+def wrench(estimate: Estimate, metrics: Metrics) -> Insight | None:
+    """How far the model's total wrench is from the plates'."""
+    rms = metrics["wrench"]["rms"]
+    about_plates = [text for text in estimate.messages if text.startswith(PLATE_WORDS) and not doubts_mass(text)]
+    if not rms:
+        why = " ".join(about_plates) or "No wrench was compared: none was measured, or none is modelled."
+        return Insight("note", "Force plates", why)
+    text = [
+        f"{COMPONENT_LABELS[name][0].lower()} {number(value, COMPONENT_LABELS[name][1])}"
+        + (f" ({number(share, digits=2)} %)" if (share := metrics["wrench"]["nrms_percent"][name]) is not None else "")
+        for name, value in rms.items()
+    ]
+    return Insight(
+        "note",
+        "Force plates",
+        f"RMS difference between the model’s wrench and the plates’: {listed(text)}; percent of the measured RMS."
+        + "".join(f" {sentence}" for sentence in about_plates),
+    )

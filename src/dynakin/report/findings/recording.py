@@ -1,0 +1,140 @@
+"""What was recorded: names, gaps, frames that were filled, what was left out."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from dynakin.arrays import runs
+from dynakin.report.findings.finding import Insight, Level, Metrics
+from dynakin.report.labels import short_marker_names
+from dynakin.results.estimate import Estimate
+from dynakin.results.measures.soft_tissue import marker_sites
+from dynakin.results.naming import listed, sentence, words
+from dynakin.results.records import REFUSED, doubts_mass
+
+# Words of warnings that a finding of their own says, or that are no doubt of the estimate.
+_SAID_ELSEWHERE = (
+    "no marker set has these names",
+    "no marker shows ",
+    "frames are no estimate",
+    "EKF (",
+    "left out: ",
+    "tilt and rotation cannot be separated",
+    " clamps them",
+)
+# Longest time, s, without any marker of a segment over which its motion is carried on: by truth a foot in a walk is 20
+# to 30 deg off after 0.3 s.
+UNSEEN_S = 0.2
+# A sensor that is refused for less than this, s, is a note.
+BRIEF_S = 0.1
+
+# What to do, in the words of a laboratory.
+ADVICE = {
+    "plates": "Look with dynakin check which plates are read, where they lie, and what bears on them; declare what "
+    "else does (--contact).",
+    "unseen": "Do not use the angles and moments of these segments' joints there, or fill the gap from what you know.",
+    "recording": "Correct it in the file, or look at the film at these times, before you use what lies there.",
+    "subject": "Give the mass and the height as measured (--mass, --height).",
+    "left out": "Look at the film at these times: correct labels that are swapped, delete what is no marker.",
+}
+
+
+def guessed(estimate: Estimate, metrics: Metrics) -> Insight | None:
+    """Places that no name says: joint centres and all that rests on them are as wrong as these may be."""
+    if estimate.marker_places != "guessed":
+        return None
+    text = (
+        "No marker set has the names of this recording: where the markers sit on the body is guessed from their names "
+        "and from where they lie. Joint centres, angles and moments are as wrong as a place that is guessed wrongly."
+    )
+    return Insight("warning", "Guessed marker places", text, "Look at them: dynakin markers new TRIAL -o my.toml.")
+
+
+def unmarked(estimate: Estimate, metrics: Metrics) -> Insight | None:
+    """Joints that are known to centimetres."""
+    if not estimate.unmarked_joints:
+        return None
+    names = listed([words(name) for name in estimate.unmarked_joints])
+    text = (
+        f"No marker shows {names}: they are where the movement, or else the proportions of an adult who stands, has "
+        "them, to one or two centimetres. The zeros of the legs' angles may be 10 deg off, and moments at knee and "
+        "ankle are two to five times less sure; the deviations say so."
+    )
+    return Insight(
+        "warning", "Joint centres", text, "Give a standing trial with markers on knees and ankles (--static)."
+    )
+
+
+def warned(estimate: Estimate, metrics: Metrics) -> list[Insight]:
+    """What the reading, the calibration and the plates warned of, and no other finding says."""
+    warnings = [text.removeprefix("Warning: ") for text in estimate.messages if text.startswith("Warning: ")]
+    elsewhere = {text for text in warnings if doubts_mass(text) or any(part in text for part in _SAID_ELSEWHERE)}
+    warnings = [text for text in dict.fromkeys(warnings) if text not in elsewhere]
+    found = []
+    for title, advice, belongs in (
+        ("Subject", "subject", lambda text: text.startswith(("mass ", "height "))),
+        ("Force plates", "plates", lambda text: "plate" in text),
+        ("Recording", "recording", lambda text: True),
+    ):
+        own = [text for text in warnings if belongs(text)]
+        warnings = [text for text in warnings if text not in own]
+        if title == "Subject":
+            own = [text for text in own if " assumed, " in text]  # one that was measured is said, and no doubt
+        if own:
+            found.append(Insight("warning", title, " ".join(sentence(text) for text in own), ADVICE[advice]))
+    return found
+
+
+def missing(estimate: Estimate, metrics: Metrics) -> Insight | None:
+    """Gaps; a warning where no marker of a segment is seen for so long that its joints are carried on, not measured."""
+    unseen = _unseen(estimate)
+    if unseen:
+        whose = listed([f"{words(segment)} from {times}" for segment, times in unseen.items()])
+        return Insight("warning", "Unseen", f"No marker is seen of {whose}.", ADVICE["unseen"])
+    gaps: dict[str, int] = metrics["events"]["missing_frames"]
+    if not gaps:
+        return Insight("good", "Gaps", "Every marker in use was measured in every frame.")
+    names, frames = short_marker_names(estimate.marker_names), len(estimate.time)
+    text = [
+        f"{names[name]} ({100 * gap / frames:.2g} % of the frames)" if gap < frames else f"{names[name]} (always)"
+        for name, gap in sorted(gaps.items(), key=lambda item: -item[1])
+    ]
+    return Insight("note", "Gaps", f"Markers missing for part of the recording: {listed(text)}.")
+
+
+def _unseen(estimate: Estimate) -> dict[str, str]:
+    """Segments, and the times in which none of their markers is seen although some are at other times."""
+    carriers = dict(zip(estimate.marker_names, (site for _, site in marker_sites(estimate)), strict=True))
+    seen = np.isfinite(estimate.data["markers_measured"].transpose("time", "marker", "axis").values).any(axis=2)
+    owners = np.array([estimate.marker_segments.get(carriers[name], "") for name in estimate.marker_names])
+    found: dict[str, str] = {}
+    for segment in dict.fromkeys(owners[owners != ""]):
+        hidden = ~seen[:, owners == segment].any(axis=1)
+        spans = [
+            f"{estimate.time[a]:.2f} to {estimate.time[b - 1]:.2f} s"
+            for a, b in runs(hidden)
+            if estimate.time[b - 1] - estimate.time[a] > UNSEEN_S
+        ]
+        if spans and not hidden.all():
+            found[str(segment)] = listed(spans, 3)
+    return found
+
+
+def gated(estimate: Estimate, metrics: Metrics) -> Insight | None:
+    """Sensors that were refused, and motion that was found again."""
+    refused = [event for event in estimate.events if event.kind in ("gated", "reset")]
+    if not refused:
+        return None
+    shown = [e.message if not e.subject or e.subject in e.message else f"{e.subject} {e.message}" for e in refused]
+    sensors = all(event.kind == "gated" and event.subject != "motion" for event in refused)
+    level: Level = "note" if sensors and _briefly(estimate) else "warning"
+    return Insight(level, "Left out or reset", f"{listed(shown, 4)}.", ADVICE["left out"])
+
+
+def _briefly(estimate: Estimate) -> bool:
+    """Whether no sensor was refused for `BRIEF_S` or more, all its stretches together."""
+    if "verdict" not in estimate.data:
+        return False
+    frame_s = float(np.median(np.diff(estimate.time)))
+    refused = (estimate.data["verdict"].transpose("time", "sensor").values == REFUSED).sum(axis=0)
+    return bool(refused.max() * frame_s < BRIEF_S)
