@@ -10,10 +10,13 @@ from rich.table import Table
 from rich.text import Text
 
 from dynakin.arrays import runs
+from dynakin.errors import DynakinError
 from dynakin.filter.prepared import Prepared
+from dynakin.recordings.companions import companion_forces, companion_static
 from dynakin.recordings.feet.loads import MEASURED, REASONS, SHARED, SWING, FootLoads
 from dynakin.results.naming import listed, plural
 from dynakin.settings.settings import Settings
+from dynakin.validation.case import Case
 
 Rows = list[tuple[str, str]]
 """Topics and their sentences; rows of one topic stand together."""
@@ -53,7 +56,20 @@ def assumed(ready: Prepared, settings: Settings) -> Rows:
     rows += [("Subject", " ".join(starting(messages, SUBJECT)))]
     ahead = ", ".join(f"{value:.2f}" for value in calibrated.ground.forward + 0.0)
     rows += [("Ground", f"{calibrated.ground.vertical} is up; the person faces ({ahead}); {_sides(ready)}.")]
-    return [*rows, ("Plates", _plates(ready))]
+    plates = _plates(ready)
+    path = ready.recording.path
+    if not ready.recording.plates and path is not None and (forces := companion_forces(path)) is not None:
+        plates = f"none; --forces {forces.name} lies next to the recording."
+    return [*rows, ("Plates", plates)]
+
+
+def naming_static(refusal: DynakinError, case: Case) -> DynakinError:
+    """A refusal that asks for a standing trial, with the one that lies next to the recording."""
+    path = case.recording.path
+    if "(--static)" not in refusal.message or path is None or case.config.static is not None:
+        return refusal
+    static = companion_static(path, case.recording)
+    return refusal if static is None else type(refusal)(f"{refusal.message} Give --static {static.name}?")
 
 
 def contacts(ready: Prepared) -> Rows:

@@ -9,6 +9,7 @@ import typer
 
 from dynakin.cli.console import out
 from dynakin.cli.options import OF_A_MODEL, OF_THE_LABORATORY, OF_THE_PLATES, Given, with_settings
+from dynakin.errors import DynakinError
 from dynakin.progress import stage
 
 
@@ -41,7 +42,7 @@ def run(
 ) -> None:
     """Estimate coordinates, moments, lengths and masses from a recording, and write a report."""
     with stage("loading"):  # the libraries alone take seconds on a busy machine
-        from dynakin.cli.prepared import assumed, print_rows
+        from dynakin.cli.prepared import assumed, naming_static, print_rows
         from dynakin.pipeline.stages import configure, prepare_case, run_case
         from dynakin.results.files.folder import check_folder_writable, check_output_writable
         from dynakin.validation.case import case_of
@@ -60,7 +61,10 @@ def run(
     with stage("reading the recording"):
         case = case_of(config)
     with stage("measuring the person"):
-        ready = prepare_case(case)
+        try:
+            ready = prepare_case(case)
+        except DynakinError as refusal:
+            raise naming_static(refusal, case) from None
     print_rows(out(), assumed(next(iter(ready.values())), config))
     result = run_case(case, ready=ready, keep_lost=keep_lost, keep="--keep-lost")
     folder = result.save(config.output, keep_lost=keep_lost, check=False)

@@ -116,6 +116,8 @@ LANDMARKS = Sizes(
 UNMARKED = replace(LANDMARKS, hinge_centre=0.015, hinge_axes=np.radians(6.0), pair_axes=np.radians(6.0))
 """Knees and ankles that no marker shows: on simulated squats their moments err two to five times as much
 (`docs/validation/geometry.md`)."""
+ONE_SIDED = replace(LANDMARKS, hinge_centre=0.008)
+"""Knees and ankles with a lateral marker alone, and no width that somebody measured (`docs/validation/geometry.md`)."""
 SCALED = Sizes(
     hinge_centre=0.0014,
     ball_centre=0.0016,
@@ -137,7 +139,9 @@ def usual_sizes(calibrated: CalibratedModel) -> Sizes:
     """By where the joints of a model come from."""
     if calibrated.plan is None:
         return SCALED
-    return UNMARKED if calibrated.unmarked_joints else LANDMARKS
+    if calibrated.unmarked_joints:
+        return UNMARKED
+    return ONE_SIDED if calibrated.one_sided_joints else LANDMARKS
 
 
 def movement_intensity(acceleration: Array, sd: Array) -> Array:

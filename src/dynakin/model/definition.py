@@ -249,6 +249,7 @@ class ModelDefinition:
             joint_prior=None if together is None else JointPrior(*together),
             guessed_places=self.marker_set is None and rest.trial.match.marker_set.name == GUESSED,
             unmarked_joints=rest.unmarked_joints,
+            one_sided_joints=rest.one_sided_joints,
         )
 
 

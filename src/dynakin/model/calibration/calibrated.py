@@ -73,6 +73,7 @@ class CalibratedModel:
         guessed_places: whether the places of the markers were guessed, because no marker set has their names.
         unmarked_joints: knees and ankles that no marker shows, where the movement (`legs_in_motion`) or proportions
             have them.
+        one_sided_joints: knees and ankles with a lateral marker alone, half as wide as an adult's of this height.
         joint_prior: how elements hang together at first; the others are independent.
     """
 
@@ -104,6 +105,7 @@ class CalibratedModel:
     held: dict[str, str] = field(default_factory=dict)
     guessed_places: bool = False
     unmarked_joints: tuple[str, ...] = ()
+    one_sided_joints: tuple[str, ...] = ()
     joint_prior: JointPrior | None = None
     contacts: dict[str, str] = field(default_factory=dict)
 

@@ -47,6 +47,7 @@ class LandmarkFinder:
     height_m: float | None = None  # for joint widths
     widths_m: Mapping[str, float] = field(default_factory=dict)  # of joints as somebody measured them: "knee_r"
     sole: Mapping[str, float] = field(default_factory=dict)  # side -> slope (rad) of heel to toe on a flat foot
+    usual_widths: set[str] = field(default_factory=set)  # joints whose width is that of an adult of this height
     _chosen: dict[tuple[str, str], Recipe | None] = field(default_factory=dict)
 
     @property
@@ -251,6 +252,7 @@ class LandmarkFinder:
         size = self.height_m if scale is None else float(np.linalg.norm(self._apart(scale, side, positions)))
         if size is None:
             raise ModelError(f"{self.match.where}: height_m is needed: the joint under {offset.origin} has one marker")
+        self.usual_widths.add(f"{offset.width}{SUFFIXES[side]}")
         fraction = offset.per_height if offset.per_height is not None else offset.per_scale
         assert fraction is not None
         return offset_point(offset, point, across, side, fraction * size)

@@ -51,6 +51,7 @@ class Measured:
     unplaced: tuple[Candidate, ...]  # markers of a model in space that the calibration frames do not show
     held: dict[str, str]  # coordinate -> why nothing shows it
     unmarked_joints: tuple[str, ...]  # knees and ankles that no marker shows
+    one_sided_joints: tuple[str, ...]  # those with a lateral marker alone and no measured width
     still: bool  # the person stands still in the calibration frames
 
 
@@ -190,8 +191,9 @@ def measure(
     left = tuple(c for c in chosen if c.recorded not in placed_names)
     held = {name: f"segment {segment} has no markers" for segment, names in bare.items() for name in names}
     trial = as_asked if model.floating else trial
+    one_sided = tuple(name for name in LEG_JOINTS if name in finder.usual_widths - {*(functional or ())})
     return plan, Measured(
-        trial.ground, side, mass_kg, height_m, parts, tuple(messages), trial, left, held, unmarked, still
+        trial.ground, side, mass_kg, height_m, parts, tuple(messages), trial, left, held, unmarked, one_sided, still
     )
 
 

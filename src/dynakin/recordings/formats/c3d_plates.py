@@ -24,6 +24,7 @@ from dynakin.recordings.resampling import CausalLowPass, ReadOptions, filled, lo
 from dynakin.units import force_factor, moment_factor
 
 _CERTAIN_LOAD_N = 50.0  # a push that no offset of an idle plate reaches: from it the sign is judged
+_CENTRED_M = 0.003
 _OFFSET_WORTH_A_NOTE_N = 5.0
 _MOST_PLATES = 100
 _LEAST_SURFACE_M2 = 1e-4
@@ -125,13 +126,22 @@ def _raw(
             raise RecordingError(f"it has type {kind} and no calibration in FORCE_PLATFORM:CAL_MATRIX")
         kind = plain
         notes.append(f"{name} has no calibration in the file: its channels are taken as calibrated.")
-    force, moment = plate_wrench(
-        kind,
-        analog[channels],
-        origin=_origin(parameters, k, kind) * unit_m,
-        calibration=calibration,
-        units=_factors(parameters, channels, unit_m, kind, calibration),
-    )
+    units, known = _factors(parameters, channels, unit_m, kind, calibration)
+    if (
+        calibration is None
+        and TYPES[kind].outputs.count("moment") == 3
+        and _at_centre(analog[channels] * units[:, None])
+    ):
+        stays = f"the centre of pressure would stay within {1000.0 * _CENTRED_M:.0f} mm of the plate's centre"
+        if known:
+            notes.append(
+                f"Warning: {name}: by the unit that the file gives for its moments {stays}: they are given in another."
+            )
+        else:
+            units = np.where([signal == "moment" for signal in TYPES[kind].outputs], 1.0, units)
+            notes.append(f"{name}: the file gives no unit for its moments: N m taken, as else {stays}.")
+    origin = _origin(parameters, k, kind) * unit_m
+    force, moment = plate_wrench(kind, analog[channels], origin=origin, calibration=calibration, units=units)
     z = np.cross(axis_x, axis_y)
     y = np.cross(z, axis_x)
     R_LP = np.column_stack([v / np.linalg.norm(v) for v in (axis_x, y, z)])
@@ -194,10 +204,20 @@ def _calibration(parameters: Parameters, k: int, kind: int) -> Array | None:
     return np.asarray(matrix[:rows, :columns])
 
 
+def _at_centre(wrench: Array) -> bool:
+    """Whether a wrench (6, N), N and N m, acts at the middle of its plate all the time: nobody stands so still."""
+    loaded = wrench[:, np.abs(wrench[2]) > _CERTAIN_LOAD_N]
+    if not loaded.size:
+        return False
+    away = np.hypot(loaded[3], loaded[4]) / np.abs(loaded[2])
+    return bool(np.percentile(away, 95.0) < _CENTRED_M)
+
+
 def _factors(
     parameters: Parameters, channels: Sequence[int], unit_m: float, kind: int, calibration: Array | None
-) -> Array:
-    """Factor to N, N m or m of each output; by default forces are in N, moments in N times the points' length unit.
+) -> tuple[Array, bool]:
+    """Factor to N, N m or m of each output, and whether the file gives the moments' unit; by default forces are in N,
+    moments in N times the points' length unit.
 
     Channels that go through a calibration are in volts, so the unit is that of the calibration, which the file does
     not name: the default.
@@ -206,13 +226,14 @@ def _factors(
     outputs = TYPES[kind].outputs
     found = [factors[signal] for signal in outputs]
     if calibration is not None:
-        return np.array(found)
-    words = parameters.texts("ANALOG", "UNITS")
+        return np.array(found), False
+    words, given = parameters.texts("ANALOG", "UNITS"), True
     for spot, (channel, signal) in enumerate(zip(channels, outputs, strict=True)):
         word = words[channel] if channel < len(words) else ""
         known = None if signal == "point" else force_factor(word) if signal == "force" else moment_factor(word)
         found[spot] = found[spot] if known is None else known
-    return np.array(found)
+        given &= signal != "moment" or known is not None
+    return np.array(found), given
 
 
 def _stores_action(raws: Sequence[_Raw]) -> bool:
