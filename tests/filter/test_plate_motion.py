@@ -42,7 +42,7 @@ def with_forces(
 
 @pytest.mark.parametrize(("motion", "delay_s"), [("gait", 0.03), ("gait", -0.02), ("squat", 0.04)])
 def test_plates_that_are_out_of_step_are_brought_into_it(motion: str, delay_s: float) -> None:
-    whole = simulate("fullbody", motion, 7, 4.0).recording
+    whole = simulate("fullbody", motion, 7, 4.0 if motion == "gait" else 8.0).recording
     late = brought_into_step(whole, -delay_s)
     ready, before = person().prepare(late), person().prepare(whole)
     text = next(text for text in ready.messages if "By the motion of the centre of mass" in text)

@@ -377,7 +377,7 @@ def test_inertia_that_small_innovations_leave_open_is_known_by_the_declared_nois
 def test_the_scale_of_systematic_errors_is_that_of_joints_and_skin() -> None:
     """What is not known of inertia has no usual size: another scale leaves it."""
     subject, x = with_inertia()
-    subject.plan, subject.unmarked_joints = SimpleNamespace(), ()  # joints found from markers
+    subject.plan, subject.unmarked_joints, subject.one_sided_joints = SimpleNamespace(), (), ()  # from markers
     P = np.zeros((34, 34))
     P[30:, 30:] = 0.01 * np.eye(4)
     own = {block: np.zeros(10) for block in ("coordinates", "speeds", "accelerations", "moments")}

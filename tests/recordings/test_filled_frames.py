@@ -17,7 +17,7 @@ NAMES = ("a", "b", "c", "d")
 def moving(frames: int = 200, noise_m: float = 1e-4) -> tuple[np.ndarray, np.ndarray]:
     time = np.arange(frames) / RATE
     swing = 0.3 * np.sin(2.0 * np.pi * 0.8 * time[:, None] + np.arange(4))
-    markers = np.stack([swing, 0.2 * swing**2, 1.2 * time[:, None] + 0.0 * swing], axis=2)
+    markers = np.stack([swing, 0.9 + 0.2 * swing**2, 1.2 * time[:, None] + 0.0 * swing], axis=2)
     return time, markers + np.random.default_rng(0).normal(0.0, noise_m, markers.shape)
 
 
@@ -60,6 +60,6 @@ def test_a_gap_that_was_filled_by_a_straight_line_is_one(noise_m: float) -> None
 
 def test_smooth_markers_of_a_fast_system_are_no_lines() -> None:
     time = np.arange(2000) / 1000.0
-    markers = np.stack([np.sin(2.0 * np.pi * time) + 0.1 * k for k in range(4)], axis=1)[..., None] * [0.3, 0.1, 0.2]
+    markers = np.stack([np.sin(2.0 * np.pi * time) + 0.1 * k + 2.0 for k in range(4)], axis=1)[..., None] * [0.3, 0.1, 0.2]
     found, notes = cleaned(time, np.round(markers, 5))
     assert np.isfinite(found).all() and not notes

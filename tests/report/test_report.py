@@ -11,8 +11,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from dynakin.report import insights as insights_module
 from dynakin.report.figure import new_axes, to_svg
+from dynakin.report.findings import fit, forces, recording, run, uncertainty
 from dynakin.report.findings.finding import Insight
 from dynakin.report.insights import in_short, insights
 from dynakin.report.labels import moment_note, short_marker_names
@@ -236,16 +236,17 @@ def test_advice_can_be_followed(estimate: Estimate) -> None:
     assert "live-like" in said
     words: dict[str, Judgement] = {"motion": "consistent", "moments": "overconfident"}
     plates = Consistency(1.0, None, 1, None, None, "calibrated", judgements=words)
-    assert insights_module._case(plates, fixed=False) == "overconfident, plates"
+    assert uncertainty._case(plates, fixed=False) == "overconfident, plates"
     both = replace(plates, judgements=dict.fromkeys(words, "overconfident"))
-    assert insights_module._case(both, fixed=True) == "overconfident, fixed scales"
+    assert uncertainty._case(both, fixed=True) == "overconfident, fixed scales"
 
 
 def test_every_warning_names_an_action() -> None:
     """By the source, as no estimate has all of them."""
     calls = [
         node
-        for node in ast.walk(ast.parse(inspect.getsource(insights_module)))
+        for module in (fit, forces, recording, run, uncertainty)
+        for node in ast.walk(ast.parse(inspect.getsource(module)))
         if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "Insight"
     ]
     may_warn = [c for c in calls if not (isinstance(c.args[0], ast.Constant) and c.args[0].value in ("good", "note"))]

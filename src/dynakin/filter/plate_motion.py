@@ -59,7 +59,7 @@ class Needed:
         """RMS, N, of what forces (T, 3) lack beyond a constant (a mass or a zero that is off), smoothed, where both
         are known; inf where these frames are too few."""
         judged = self.known & np.isfinite(force).all(axis=1)
-        if np.count_nonzero(judged) < _SHORTEST_S * self.rate:
+        if not np.count_nonzero(judged) >= _SHORTEST_S * self.rate:  # a rate that is NaN, too
             return float("inf")
         lacks = smoothed(np.where(judged[:, None], self.force - force, 0.0), judged, self.rate)[judged]
         return float(np.sqrt(np.sum(lacks.var(axis=0))))

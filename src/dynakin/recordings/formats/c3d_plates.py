@@ -126,11 +126,11 @@ def _raw(
             raise RecordingError(f"it has type {kind} and no calibration in FORCE_PLATFORM:CAL_MATRIX")
         kind = plain
         notes.append(f"{name} has no calibration in the file: its channels are taken as calibrated.")
-    units, known = _factors(parameters, channels, unit_m, kind, calibration)
+    factors, known = _factors(parameters, channels, unit_m, kind, calibration)
     if (
         calibration is None
         and TYPES[kind].outputs.count("moment") == 3
-        and _at_centre(analog[channels] * units[:, None])
+        and _at_centre(analog[channels] * factors[:, None])
     ):
         stays = f"the centre of pressure would stay within {1000.0 * _CENTRED_M:.0f} mm of the plate's centre"
         if known:
@@ -138,10 +138,10 @@ def _raw(
                 f"Warning: {name}: by the unit that the file gives for its moments {stays}: they are given in another."
             )
         else:
-            units = np.where([signal == "moment" for signal in TYPES[kind].outputs], 1.0, units)
+            factors = np.where([signal == "moment" for signal in TYPES[kind].outputs], 1.0, factors)
             notes.append(f"{name}: the file gives no unit for its moments: N m taken, as else {stays}.")
     origin = _origin(parameters, k, kind) * unit_m
-    force, moment = plate_wrench(kind, analog[channels], origin=origin, calibration=calibration, units=units)
+    force, moment = plate_wrench(kind, analog[channels], origin=origin, calibration=calibration, units=factors)
     z = np.cross(axis_x, axis_y)
     y = np.cross(z, axis_x)
     R_LP = np.column_stack([v / np.linalg.norm(v) for v in (axis_x, y, z)])

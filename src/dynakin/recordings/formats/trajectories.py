@@ -21,8 +21,9 @@ _SAME_M = 3e-3
 """Distance up to which two trajectories are one marker's, rounded or filtered otherwise: balls of 6 mm touch there."""
 _MOVES_M_S = 0.1
 """Speed of the fastest marker from which the person moves."""
-_STRAIGHT, _ROUNDED_M = 0.02, 2e-9
-"""A line is straight where it bends by so much less than the marker does half of the time it moves, or not at all."""
+_STRAIGHT, _BENDS_M, _FINE = 0.02, 2e-5, 50.0
+"""A line is straight where it bends by so much less than the marker does half of the time it moves. Where that is less
+than so many m, or than so many of the file's smallest steps, a smooth path looks straight and nothing is judged."""
 _MOST_REPEATED = 0.2
 """Part of the frames that may repeat others: more is another rate, written as this one."""
 _LINE_FRAMES, _LINE_S, _LINE_M = 6, 0.06, 0.01
@@ -200,12 +201,15 @@ def _straight(markers: Array, rate: float) -> npt.NDArray[np.bool_]:
         moving = bend[(step[1:, m] * rate > _MOVES_M_S) & np.isfinite(bend[:, m]), m]
         if len(moving) < _LINE_FRAMES:
             continue
+        usual = float(np.median(moving))
+        steps = np.abs(np.diff(markers[:, m], axis=0))
+        if usual < max(_BENDS_M, _FINE * float(np.min(steps, where=steps > 1e-9, initial=np.inf))):
+            continue
         with np.errstate(invalid="ignore"):
-            straight = bend[:, m] <= max(_STRAIGHT * float(np.median(moving)), _ROUNDED_M)
+            straight = bend[:, m] <= _STRAIGHT * usual
         for first, end in runs(straight):
-            length = end - first
             moved = float(np.linalg.norm(markers[end + 1, m] - markers[first, m]))
-            if length >= max(_LINE_FRAMES, _LINE_S * rate) and moved > _LINE_M:
+            if end - first >= max(_LINE_FRAMES, _LINE_S * rate) and moved > _LINE_M:
                 found[first + 1 : end + 1, m] = True
     return found
 
