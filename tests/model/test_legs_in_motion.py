@@ -14,7 +14,7 @@ import pytest
 import dynakin
 from dynakin.errors import ModelError
 from dynakin.filter.estimator import Tracked
-from dynakin.filter.systematic import LANDMARKS, UNMARKED, usual_sizes
+from dynakin.filter.systematic import LANDMARKS, ONE_SIDED, UNMARKED, usual_sizes
 from dynakin.model.definition import load_model
 from dynakin.recordings.recording import Recording
 from dynakin.report.insights import insights
@@ -138,3 +138,13 @@ def test_a_real_walk_without_its_standing_trial(data_dir: Path) -> None:
     angles = np.degrees(of_legs(by_motion, "coordinates") - of_legs(by_standing, "coordinates"))
     assert np.all(np.nanstd(angles, axis=0) < 2.0)
     assert np.all(np.abs(np.nanmean(angles, axis=0)) < 12.0)
+
+
+def test_a_joint_with_a_lateral_marker_alone_is_less_sure() -> None:
+    whole = simulate("fullbody", "squat", 3, 6.0).recording
+    kept = [k for k, name in enumerate(whole.marker_names) if name[1:] not in ("_mknee", "_mankle")]
+    assert len(kept) == len(whole.marker_names) - 4
+    half = replace(whole, marker_names=tuple(whole.marker_names[k] for k in kept), markers=whole.markers[:, kept])
+    both, one = (dynakin.Estimator(load_model("fullbody", subject=WHO)).calibrate(each) for each in (whole, half))
+    assert both.one_sided_joints == () and usual_sizes(both) is LANDMARKS
+    assert set(one.one_sided_joints) == {*JOINTS} and usual_sizes(one) is ONE_SIDED

@@ -60,6 +60,10 @@ def test_a_gap_that_was_filled_by_a_straight_line_is_one(noise_m: float) -> None
 
 def test_smooth_markers_of_a_fast_system_are_no_lines() -> None:
     time = np.arange(2000) / 1000.0
-    markers = np.stack([np.sin(2.0 * np.pi * time) + 0.1 * k + 2.0 for k in range(4)], axis=1)[..., None] * [0.3, 0.1, 0.2]
+    markers = np.stack([np.sin(2.0 * np.pi * time) + 0.1 * k + 2.0 for k in range(4)], axis=1)[..., None] * [
+        0.3,
+        0.1,
+        0.2,
+    ]
     found, notes = cleaned(time, np.round(markers, 5))
     assert np.isfinite(found).all() and not notes

@@ -116,7 +116,7 @@ LANDMARKS = Sizes(
 UNMARKED = replace(LANDMARKS, hinge_centre=0.015, hinge_axes=np.radians(6.0), pair_axes=np.radians(6.0))
 """Knees and ankles that no marker shows: on simulated squats their moments err two to five times as much
 (`docs/validation/geometry.md`)."""
-ONE_SIDED = replace(LANDMARKS, hinge_centre=0.008)
+ONE_SIDED = replace(LANDMARKS, hinge_centre=0.010)
 """Knees and ankles with a lateral marker alone, and no width that somebody measured (`docs/validation/geometry.md`)."""
 SCALED = Sizes(
     hinge_centre=0.0014,

@@ -175,3 +175,13 @@ def test_too_few_markers_for_a_posture_are_refused(folder: Path, squats: Recordi
     poor = replace(squats, marker_names=tuple(squats.marker_names[k] for k in few), markers=squats.markers[:, few])
     with pytest.raises(ModelError, match=r"squats1.*3 of the 49 markers .*C7.*expected at least \d+ for its \d+ free"):
         load_model(folder / FILE, Subject(mass_kg=60.05)).calibrate(poor, forward=(1.0, 0.0, 0.0))
+
+
+def test_what_no_marker_moves_is_held_and_its_mass_unseen(folder: Path, squats: Recording) -> None:
+    upper = ("C7", "Sternum", "Shoulder", "humerus", "elbow", "forearm", "wrist", "clav", "head")
+    kept = [k for k, name in enumerate(squats.marker_names) if not any(part in name for part in upper)]
+    legs = replace(squats, marker_names=tuple(squats.marker_names[k] for k in kept), markers=squats.markers[:, kept])
+    whole, found = (load_model(folder / FILE, Subject(mass_kg=60.05)).calibrate(each) for each in (squats, legs))
+    assert {"lumbar_extension", "arm_flex_r", "elbow_flex_l"} <= set(found.held)
+    assert not {"lumbar_extension", "arm_flex_r"} & set(whole.held) and whole.unseen_kg == 0.0
+    assert 0.3 * found.mass_kg < found.unseen_kg < 0.6 * found.mass_kg
