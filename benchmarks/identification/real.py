@@ -26,7 +26,7 @@ from dynakin.identification.subject import identify_subject
 from dynakin.identification.trials import Common, MeasuredTrial, Movement, about
 from dynakin.model.identified import IdentifiedSubject
 from dynakin.recordings.recording import Recording
-from dynakin.results.estimate import COMPONENTS
+from dynakin.units import COMPONENTS
 from dynakin.validation.held_out import halves, marker_paths
 
 Array = np.ndarray

@@ -21,9 +21,9 @@ from dynakin.identification.observability.base import base_of
 from dynakin.identification.observability.measured import MeasuredModel
 from dynakin.identification.trials import Common, MeasuredTrial, measure_all
 from dynakin.identification.unknowns import Unknowns
-from dynakin.results.estimate import COMPONENTS
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.trial import simulate
+from dynakin.units import COMPONENTS
 
 TASKS = {"sagittal7": ("squat", "sit-to-stand", "sway"), "fullbody": ("squat", "gait")}
 TASKS["squat7"] = TASKS["sagittal7"]

@@ -8,6 +8,8 @@ from collections.abc import Mapping
 GRAVITY_M_S2 = 9.80665
 """Standard gravity, m/s^2 (CGPM 1901): the value in every model's gravity vector (0, -9.80665, 0)."""
 
+COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
+"""Of a wrench: N, N m."""
 _LENGTH = {
     1.0: ("m", "meter", "meters", "metre", "metres"),
     1e-2: ("cm", "centimeter", "centimeters", "centimetre", "centimetres"),

@@ -10,10 +10,10 @@ from dynakin.filter.estimator import Estimator
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.recording import Recording
-from dynakin.results.estimate import COMPONENTS
 from dynakin.results.measures.metrics import evaluation_window
 from dynakin.simulation.trial import simulate
 from dynakin.studies.tuning.trial import prepare
+from dynakin.units import COMPONENTS
 from dynakin.validation.held_out import Blind, judge, measured_wrench
 from dynakin.validation.setup import Setup
 from dynakin.validation.unseen import _Trial

@@ -130,7 +130,7 @@ def _figures(estimate: Estimate, metrics: dict[str, Any]) -> Table:
         rows.add_row("settled after", "-" if after is None else f"{after:.1f} s", "")
     stuck = [p for p in estimate.parameters if p.at_bound]
     free = sum(p.estimated and p.lower is not None for p in estimate.parameters)
-    by_kind = counts_in_words(metrics["bounds"]["by_kind"], "at_end") if stuck and metrics["bounds"] else ""
+    by_kind = counts_in_words(metrics["bounds"]["by_kind"]) if stuck and metrics["bounds"] else ""
     rows.add_row("parameters on a bound", f"{len(stuck)} of {free}", by_kind)
     moved = (metrics["soft_tissue"] or {}).get("markers", {})
     moved = {name: m for name, m in moved.items() if m["max_mm"] is not None}

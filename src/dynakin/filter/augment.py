@@ -15,6 +15,7 @@ from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.schema import kinds_of
 from dynakin.settings.model import QUANTITIES, Quantity
 from dynakin.settings.noise import Noise
+from dynakin.units import COMPONENTS
 
 Array = npt.NDArray[np.float64]
 
@@ -95,11 +96,8 @@ def _added_sd(spec: _core.ModelSpec, noise: Noise, soft_tissue: Array) -> dict[s
         for marker, value in zip(spec.markers, soft_tissue, strict=True)
         for axis in "xyz"
     }
-    sd |= {
-        f"plates/{name}": float(value)
-        for name, value in zip(("fx", "fy", "fz", "mx", "my", "mz"), plate_sd(noise), strict=True)
-    }
-    sd |= {f"contact/{name}/{axis}": 1.0 for name in spec.contacts for axis in ("fx", "fy", "fz", "mx", "my", "mz")}
+    sd |= {f"plates/{name}": float(value) for name, value in zip(COMPONENTS, plate_sd(noise), strict=True)}
+    sd |= {f"contact/{name}/{axis}": 1.0 for name in spec.contacts for axis in COMPONENTS}
     return sd | {"plates/delay": noise.plate_delay_sd_s}
 
 

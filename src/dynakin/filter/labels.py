@@ -12,7 +12,8 @@ from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.sources import moved_segments
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.schema import kinds_of
-from dynakin.results.estimate import AXES, COMPONENTS
+from dynakin.results.estimate import AXES
+from dynakin.units import COMPONENTS
 
 
 def labels(

@@ -14,12 +14,13 @@ from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.results.measures.sources import ABSENT
 from dynakin.settings.strict import nearest
+from dynakin.units import COMPONENTS
 
 Array = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.uint8]
 Places = Mapping[str, int]
 
-_WRENCH: Places = {name: k for k, name in enumerate(("fx", "fy", "fz", "mx", "my", "mz"))}
+_WRENCH: Places = {name: k for k, name in enumerate(COMPONENTS)}
 
 
 class Labelled(NDArrayOperatorsMixin):

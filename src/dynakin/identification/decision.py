@@ -18,7 +18,7 @@ from dynakin.identification.batch import SHORTEST_S, Posterior, at_start, identi
 from dynakin.identification.trials import Common, MeasuredTrial, about, middle_of
 from dynakin.identification.unknowns import Unknowns
 from dynakin.progress import Progress
-from dynakin.results.estimate import COMPONENTS
+from dynakin.units import COMPONENTS
 
 Array = npt.NDArray[np.float64]
 Use = Literal["table", "bodies"]

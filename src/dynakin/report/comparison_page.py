@@ -14,9 +14,9 @@ from dynakin.report.sections.methods import ABOUT_TABLE2, about_methods, angle_p
 from dynakin.report.sections.repetitions import method_repetitions
 from dynakin.report.sections.section import Section
 from dynakin.report.text_tables import angle_text, moment_text, name_of, table2_text, truth_text, unseen_text
-from dynakin.results.estimate import COMPONENTS
 from dynakin.results.files.config import plain, versions
 from dynakin.results.naming import listed, number, plural, sentence
+from dynakin.units import COMPONENTS
 from dynakin.validation.methods import Trial
 from dynakin.validation.table2 import MARKERS, Row
 from dynakin.validation.unseen import UnseenRow

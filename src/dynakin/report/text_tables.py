@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from dynakin.results.estimate import COMPONENTS
+from dynakin.units import COMPONENTS
 from dynakin.validation.differences import AngleDifference, MomentDifference
 from dynakin.validation.table2 import MARKERS, Row, Spread
 from dynakin.validation.truth import TruthRow

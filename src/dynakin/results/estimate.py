@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     import xarray as xr
 
 AXES = ("x", "y", "z")
-COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
 
 
 @dataclass(frozen=True, repr=False)

@@ -21,7 +21,6 @@ NOT_SMOOTHED = "Not smoothed:"
 _MASS_DOUBTED = ("check the mass", "the mass is wrong")
 
 EventKind = Literal["missing", "gated", "at_bound", "reset", "note"]
-EVENT_KINDS: tuple[EventKind, ...] = ("missing", "gated", "at_bound", "reset", "note")
 
 
 def doubts_mass(message: str) -> bool:

@@ -17,6 +17,7 @@ from dynakin.simulation.mechanics import Segment
 from dynakin.simulation.motions.movement import Repetition
 from dynakin.simulation.sensors.faults import Fault
 from dynakin.simulation.sensors.plates import PlateErrors
+from dynakin.units import COMPONENTS
 
 Array = NDArray[np.float64]
 
@@ -98,7 +99,7 @@ def label_arrays(
         coords={
             "time": ("time", time, {"units": "s"}),
             "coordinate": list(motion.names),
-            "component": ["fx", "fy", "fz", "mx", "my", "mz"],
+            "component": list(COMPONENTS),
             "contact": list(carried),
             **({"contact_segment": ("contact", list(state.segments.values()))} if state.segments else {}),
             "marker": [site.name for site in sites],

@@ -19,9 +19,9 @@ def persisted(signal: Array, frames: int) -> Array:
     return found
 
 
-def extrapolated(time: Array, signal: Array, frames: int, slope_s: float = SLOPE_S) -> Array:
-    """Each frame (T, ...) as the line through the signal ``frames`` before and ``slope_s`` earlier says it."""
-    span = span_frames(time, slope_s)
+def extrapolated(time: Array, signal: Array, frames: int) -> Array:
+    """Each frame (T, ...) as the line through the signal ``frames`` before and `SLOPE_S` earlier says it."""
+    span = span_frames(time, SLOPE_S)
     rate = (signal - persisted(signal, span)) / _column(time - persisted(time, span), signal)
     ahead = _column(time - persisted(time, frames), signal)
     return persisted(signal, frames) + persisted(rate, frames) * ahead

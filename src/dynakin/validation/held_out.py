@@ -18,12 +18,13 @@ from dynakin.model.definition import Definition
 from dynakin.model.identified import IdentifiedSubject
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Recording
-from dynakin.results.estimate import COMPONENTS, Estimate
+from dynakin.results.estimate import Estimate
 from dynakin.results.measures.fit import signal_fit
 from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.measures.tracking import why_lost, without_lost
 from dynakin.settings.lag import frames_later
 from dynakin.settings.model import Bounds, Priors
+from dynakin.units import COMPONENTS
 from dynakin.validation.freeze import final_values, freeze, initial_values
 from dynakin.validation.reference.inverse_dynamics import inverse_name, rigid_motions, usual_cutoffs
 from dynakin.validation.reference.least_squares import identify, predicted_wrench

@@ -19,7 +19,7 @@ from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition
 from dynakin.progress import Progress, stage
 from dynakin.recordings.recording import Recording
-from dynakin.results.estimate import COMPONENTS, Estimate
+from dynakin.results.estimate import Estimate
 from dynakin.results.failures import Failures
 from dynakin.results.measures.facing import facing
 from dynakin.results.measures.mean_curves import MEASURED, MeanCurve, mean_curves, signals
@@ -29,6 +29,7 @@ from dynakin.results.measures.sources import measured_only, moment_sources, wren
 from dynakin.results.measures.tracking import why_lost
 from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.settings.lag import in_words
+from dynakin.units import COMPONENTS
 from dynakin.validation.reference.inverse_dynamics import (
     INVERSE,
     inverse_name,

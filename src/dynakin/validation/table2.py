@@ -9,8 +9,8 @@ from typing import NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.results.estimate import COMPONENTS
 from dynakin.results.measures.fit import SignalFit, signal_fit
+from dynakin.units import COMPONENTS
 from dynakin.validation.methods import Mask, Trial
 
 Array = npt.NDArray[np.float64]

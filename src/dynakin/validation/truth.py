@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.results.estimate import COMPONENTS
 from dynakin.results.measures.adaptation import constant_groups
 from dynakin.results.measures.sources import legs_of
 from dynakin.results.records import Parameter
+from dynakin.units import COMPONENTS
 from dynakin.validation.methods import Trial
 from dynakin.validation.table2 import Spread, spread
 

@@ -16,10 +16,10 @@ from dynakin.filter.estimator import Estimator
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.progress import Progress
 from dynakin.recordings.recording import Recording
-from dynakin.results.estimate import COMPONENTS
 from dynakin.results.measures.fit import marker_rms_mm, signal_fit
 from dynakin.results.measures.metrics import evaluation_window
 from dynakin.settings.defaults import HORIZON_S
+from dynakin.units import COMPONENTS
 from dynakin.validation.extrapolation import extrapolated, held, line, persisted, span_frames
 from dynakin.validation.held_out import halves, identify_on, judge, predict_blind
 from dynakin.validation.setup import Setup

@@ -17,9 +17,10 @@ from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.progress import Progress
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.smoothing import smooth
-from dynakin.results.estimate import COMPONENTS, Estimate
+from dynakin.results.estimate import Estimate
 from dynakin.results.measures.fit import marker_rms_mm, signal_fit
 from dynakin.results.measures.metrics import evaluation_window
+from dynakin.units import COMPONENTS
 from dynakin.validation.extrapolation import extrapolated, persisted, span_frames
 from dynakin.validation.reference.inverse_dynamics import (
     RigidMotion,

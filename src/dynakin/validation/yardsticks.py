@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dynakin.results.estimate import COMPONENTS
+from dynakin.units import COMPONENTS
 from dynakin.validation.table2 import MARKERS, spread
 
 Figures = dict[tuple[str, str, str], float | None]  # (yardstick, quantity, method) -> RMS in the quantity's unit

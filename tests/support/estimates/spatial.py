@@ -7,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from dynakin.recordings.feet.contact import UNMEASURED
-from dynakin.results.estimate import COMPONENTS, Estimate
+from dynakin.results.estimate import Estimate
 from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED
+from dynakin.units import COMPONENTS
 from support.estimates.synthetic import make_estimate
 
 COORDINATES = {

@@ -9,8 +9,9 @@ import xarray as xr
 
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Plate, Recording
-from dynakin.results.estimate import AXES, COMPONENTS, Estimate
+from dynakin.results.estimate import AXES, Estimate
 from dynakin.results.records import Event, Parameter, Timing
+from dynakin.units import COMPONENTS
 
 COORDINATES = ("toe", "ankle", "knee", "hip", "lumbar", "shoulder", "elbow", "slide")
 SEGMENTS = ("foot", "shank", "thigh", "pelvis", "trunk", "upper_arm", "forearm")

@@ -15,6 +15,7 @@ import scipy
 
 from dynakin.errors import ModelError
 from dynakin.identification.observability.measured import MeasuredModel
+from dynakin.units import COMPONENTS
 
 Array = npt.NDArray[np.float64]
 
@@ -51,12 +52,12 @@ class Gauges:
     found: tuple[Gauge, ...]
 
 
-def gauges_of(measured: MeasuredModel, postures: int = _POSTURES) -> Gauges:
+def gauges_of(measured: MeasuredModel) -> Gauges:
     """Stack, decompose, and write the null space in directions of few names."""
     names, sd, columns = _columns(measured)
     last = np.array([name.startswith(("soft_tissue/", "plates/")) for name in names])
     rows = []
-    for x in measured.random_states(postures, seed=1):
+    for x in measured.random_states(_POSTURES, seed=1):
         wrench = _with_offsets(measured, measured.wrench_rows(x)) / measured.wrench_sigma()[:, None]
         rows.append(np.vstack([measured.marker_rows(x), wrench])[:, columns] * sd)
     triangle = np.linalg.qr(np.vstack(rows), mode="r")  # columns that are all 0 stay so
@@ -81,9 +82,7 @@ def _columns(measured: MeasuredModel) -> tuple[tuple[str, ...], Array, list[int]
 def _with_offsets(measured: MeasuredModel, rows: Array) -> Array:
     """A plate's constant error is added to its component."""
     components = [
-        f"plates/{name}"
-        for name, seen in zip(("fx", "fy", "fz", "mx", "my", "mz"), measured.initial.spec.wrench_measured, strict=True)
-        if seen
+        f"plates/{name}" for name, seen in zip(COMPONENTS, measured.initial.spec.wrench_measured, strict=True) if seen
     ]
     for k, name in enumerate(components):
         if name in measured.names:

@@ -122,7 +122,7 @@ def bounds(estimate: Estimate, metrics: Metrics) -> Insight | None:
         )
     if not stuck:
         return Insight("good", "Bounds", f"None of the {len(free)} estimated parameters ends on its bound.{for_a_time}")
-    counts = counts_in_words(metrics["bounds"]["by_kind"], "at_end")
+    counts = counts_in_words(metrics["bounds"]["by_kind"])
     return Insight(
         "warning",
         "Bounds",

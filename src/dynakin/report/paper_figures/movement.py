@@ -31,7 +31,7 @@ from dynakin.report.sections.repetitions import (
 )
 from dynakin.report.sides import joints_of, side_lines, values_of
 from dynakin.report.styles import BAND, LineStyle, method_styles, source_key
-from dynakin.results.estimate import COMPONENTS, Estimate
+from dynakin.results.estimate import Estimate
 from dynakin.results.measures.fit import signal_fit
 from dynakin.results.measures.mean_curves import PERCENT, estimate_curves
 from dynakin.results.measures.metrics import evaluation_window
@@ -39,6 +39,7 @@ from dynakin.results.measures.pressure import floor_height
 from dynakin.results.measures.repetitions import repetitions_of
 from dynakin.results.measures.sources import moment_sources, wrench_sources
 from dynakin.results.naming import number, sentence, words
+from dynakin.units import COMPONENTS
 from dynakin.validation.differences import angle_differences, moment_differences
 from dynakin.validation.methods import AT, CLASSICAL, Method, Trial
 

@@ -14,13 +14,14 @@ from dynakin.report.sections.section import Page, Section
 from dynakin.report.sides import side_key, values_of
 from dynakin.report.styles import BAND, ESTIMATED_LINE, MEASURED_LINE, SIDE_COLOURS, source_key
 from dynakin.report.text_tables import TextTable
-from dynakin.results.estimate import AXES, COMPONENTS, Estimate
+from dynakin.results.estimate import AXES, Estimate
 from dynakin.results.measures.feet import foot_sources
 from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.measures.pressure import centre_of_pressure, support_height
 from dynakin.results.measures.sources import measured_only, wrench_sources
 from dynakin.results.measures.stances import compared_stances
 from dynakin.results.naming import number, sentence
+from dynakin.units import COMPONENTS
 
 DIRECTIONS = {"x": "forward", "y": "up", "z": "to the right"}
 

@@ -12,10 +12,10 @@ from dynakin.report.labels import COMPONENT_LABELS, moment_note
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.styles import LineStyle, method_styles, source_key
 from dynakin.report.text_tables import table2_text
-from dynakin.results.estimate import COMPONENTS
 from dynakin.results.measures.mean_curves import MEASURED
 from dynakin.results.measures.sources import moment_sources, wrench_sources
 from dynakin.results.naming import number, sentence, words
+from dynakin.units import COMPONENTS
 from dynakin.validation.differences import AngleDifference, MomentDifference, angle_differences, moment_differences
 from dynakin.validation.methods import AT, CLASSICAL, Trial
 from dynakin.validation.reference.inverse_dynamics import INVERSE

@@ -12,10 +12,11 @@ from dynakin.report.labels import COMPONENT_LABELS, moment_note
 from dynakin.report.sections.section import Page, Section
 from dynakin.report.sides import Joint, joints_of, side_key, side_lines
 from dynakin.report.styles import ESTIMATED_LINE, MEASURED_LINE, LineStyle, method_styles
-from dynakin.results.estimate import COMPONENTS, Estimate
+from dynakin.results.estimate import Estimate
 from dynakin.results.measures.mean_curves import MEASURED, PERCENT, MeanCurve
 from dynakin.results.measures.repetitions import Found
 from dynakin.results.naming import listed, sentence, words
+from dynakin.units import COMPONENTS
 
 KINDS = {"angles": "Coordinates", "moments": "Moments, per kg", "wrench": "Ground reaction, per kg"}
 ONE_SD = "± 1 standard deviation"

@@ -7,13 +7,14 @@ from pathlib import Path
 import numpy as np
 
 from dynakin.recordings.plates.pressure import LOADED_N
-from dynakin.results.estimate import AXES, COMPONENTS, Estimate
+from dynakin.results.estimate import AXES, Estimate
 from dynakin.results.files.motion import force_stem, write_sources
 from dynakin.results.files.storage import DECIMALS_OF_LOADS, DIGITS, DIGITS_OF_LOADS, write_storage
 from dynakin.results.measures.angles import angle_columns
 from dynakin.results.measures.feet import foot_sources
 from dynakin.results.measures.pressure import foot_pressure
 from dynakin.results.measures.sources import joint_sources
+from dynakin.units import COMPONENTS
 
 
 def write_body_files(estimate: Estimate, folder: Path) -> None:

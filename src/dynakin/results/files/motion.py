@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from dynakin.results.estimate import AXES, COMPONENTS, Estimate
+from dynakin.results.estimate import AXES, Estimate
 from dynakin.results.files.storage import (
     DECIMALS_OF_LOADS,
     DIGITS,
@@ -17,6 +17,7 @@ from dynakin.results.files.storage import (
 )
 from dynakin.results.measures.feet import foot_sources
 from dynakin.results.measures.sources import ABSENT, NOTES, moment_sources
+from dynakin.units import COMPONENTS
 
 _SIDES = {"right": "r", "left": "l"}
 """OpenSim's names of the sides in the columns of ground forces; another foot keeps its own name."""

@@ -8,8 +8,9 @@ from typing import Any, Literal
 
 import numpy as np
 
-from dynakin.results.estimate import COMPONENTS, Estimate
+from dynakin.results.estimate import Estimate
 from dynakin.results.records import Parameter
+from dynakin.units import COMPONENTS
 
 # A constant has settled once all that it still moves is this share of its size at the start. The filter's own standard
 # deviation is no yardstick: where the data teach nothing it is wider than everything that happens.

@@ -59,9 +59,9 @@ def parameter_bounds(estimate: Estimate, window: np.ndarray) -> dict[str, Any]:
     }
 
 
-def counts_in_words(by_kind: dict[str, dict[str, int]], key: str) -> str:
-    """`1 of 6 lengths, 0 of 20 marker places`: counts ``key`` ("at_end" or "ever") of each kind."""
-    return ", ".join(f"{n[key]} of {n['estimated']} {KIND_WORDS[kind]}" for kind, n in _kinds(by_kind))
+def counts_in_words(by_kind: dict[str, dict[str, int]]) -> str:
+    """`1 of 6 lengths, 0 of 20 marker places`: how many of each kind end on a bound."""
+    return ", ".join(f"{n['at_end']} of {n['estimated']} {KIND_WORDS[kind]}" for kind, n in _kinds(by_kind))
 
 
 def _kinds(by_kind: dict[str, dict[str, int]]) -> list[tuple[ParameterKind, dict[str, int]]]:

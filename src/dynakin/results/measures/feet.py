@@ -8,10 +8,10 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
-from dynakin.results.estimate import COMPONENTS, Estimate
+from dynakin.results.estimate import Estimate
 from dynakin.results.measures import sources
 from dynakin.results.naming import plural
-from dynakin.units import GRAVITY_M_S2
+from dynakin.units import COMPONENTS, GRAVITY_M_S2
 
 if TYPE_CHECKING:
     import xarray as xr

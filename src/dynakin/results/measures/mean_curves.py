@@ -11,11 +11,12 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.results.estimate import COMPONENTS, Estimate
+from dynakin.results.estimate import Estimate
 from dynakin.results.measures.facing import facing
 from dynakin.results.measures.repetitions import Movement, Repetition, repetitions_of
 from dynakin.results.measures.sources import measured_moments, measured_wrench
 from dynakin.results.naming import plural
+from dynakin.units import COMPONENTS
 
 Array = npt.NDArray[np.float64]
 

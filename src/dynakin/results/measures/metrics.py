@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from dynakin.results.estimate import COMPONENTS, Estimate
+from dynakin.results.estimate import Estimate
 from dynakin.results.failures import Failures
 from dynakin.results.measures.adaptation import adaptation
 from dynakin.results.measures.bounds import parameter_bounds
@@ -33,6 +33,7 @@ from dynakin.results.measures.stances import counted
 from dynakin.results.measures.symmetry import asymmetry
 from dynakin.results.measures.tracking import lost_in_words, tracking_figures, why_lost
 from dynakin.results.records import REFUSED
+from dynakin.units import COMPONENTS
 
 SCHEMA_VERSION = 2
 """Version of ``metrics.json``, ``parameters.json`` and ``estimate.nc``; it grows when a key changes its meaning."""

@@ -96,12 +96,12 @@ def body_paths(recording: Recording, ground: GroundFrame, pelvis: Iterable[str] 
     return BodyPaths(recording.time, ground.points_to_ground(middle), heels)
 
 
-def repetitions_of(estimate: Estimate, movement: Movement | None = None) -> Found:
+def repetitions_of(estimate: Estimate) -> Found:
     """Whole repetitions of an estimate that lie after the adaptation; as `find_repetitions`."""
     carriers = estimate.marker_segments
     pelvis = [name for name in estimate.marker_names if carriers.get(name) == "pelvis"]
     paths = body_paths(estimate.recording, estimate.ground, pelvis)
-    return find_repetitions(paths, movement, evaluation_window(estimate.time))
+    return find_repetitions(paths, window=evaluation_window(estimate.time))
 
 
 def find_repetitions(

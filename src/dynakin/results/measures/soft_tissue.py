@@ -22,6 +22,7 @@ from dynakin.results.naming import words
 EXCESS = 2.0
 # The least size that is compared with, even if less is declared (0 mm for a toe on the floor): cameras have noise too.
 FLOOR_MM = 3.0
+_NAMED = 3
 
 
 @dataclass(frozen=True)
@@ -103,7 +104,7 @@ def soft_tissue(estimate: Estimate, window: np.ndarray) -> dict[str, Any]:
     }
 
 
-def excess_in_words(markers: Mapping[str, Mapping[str, Any]], limit: int = 3) -> str:
+def excess_in_words(markers: Mapping[str, Mapping[str, Any]]) -> str:
     """One sentence on the markers of that block that move too far, the worst first; empty where all are within."""
     excess = [(name, m["max_mm"], m["expected_mm"], m["segment"]) for name, m in markers.items() if m["exceeds"]]
     if not excess:
@@ -111,9 +112,9 @@ def excess_in_words(markers: Mapping[str, Mapping[str, Any]], limit: int = 3) ->
     worst = sorted(excess, key=lambda entry: entry[1] - entry[2], reverse=True)
     parts = [
         f"{name} moves {largest:.0f} mm on the {words(segment)} (usual {expected:.0f} mm)"
-        for name, largest, expected, segment in worst[:limit]
+        for name, largest, expected, segment in worst[:_NAMED]
     ]
-    more = f" and {len(worst) - limit} more" if len(worst) > limit else ""
+    more = f" and {len(worst) - _NAMED} more" if len(worst) > _NAMED else ""
     return f"{', '.join(parts)}{more}: more than soft tissue does, so the model does not fit there."
 
 

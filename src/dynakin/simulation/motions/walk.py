@@ -155,7 +155,10 @@ def _turned(yaw: float) -> Array:
     return np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
 
 
-def support_of(walk: Walk, sole: Sole, time: Array, push: float = 0.5) -> Support:
+_PUSH = 0.5
+
+
+def support_of(walk: Walk, sole: Sole, time: Array) -> Support:
     """Where either foot presses as it rolls from heel to ball, and how the load goes over while both stand."""
     share = constant(time, 0.0)
     presses = {}
@@ -174,7 +177,7 @@ def support_of(walk: Walk, sole: Sole, time: Array, push: float = 0.5) -> Suppor
         forward = _turned(-sign * walk.toe_out)[:, 0]
         place = walk.foothold(steps[0]) + np.outer(start + length * along.value, forward)
         presses[side] = place + np.outer(onward.value, [1.0, 0.0, 0.0]) + np.outer(climbed.value, [0.0, 1.0, 0.0])
-    return Support(presses["r"], presses["l"], np.clip(share.value, 0.0, 1.0), push)
+    return Support(presses["r"], presses["l"], np.clip(share.value, 0.0, 1.0), _PUSH)
 
 
 def walking_motion(walk: Walk, body: SimulatedBody, time: Array, fitted: Mapping[str, Array]) -> Motion:

@@ -17,13 +17,12 @@ import pylsl
 
 from dynakin.errors import ConfigError, StreamError
 from dynakin.stream.sources.packets import MarkerPacket, Packet, PlatePacket, StreamInfo, Streams
-from dynakin.units import force_factor, length_factor, moment_factor
+from dynakin.units import COMPONENTS, force_factor, length_factor, moment_factor
 
 Array = npt.NDArray[np.float64]
 
 _AXIS = re.compile(r"^(?P<name>.+?)[ _.:\-]?(?P<axis>[xyz])$", re.IGNORECASE)
 _LOAD = re.compile(r"^(?P<name>.+?)[ _.:\-]?(?P<axis>[fm][xyz])$", re.IGNORECASE)
-_LOADS = ("fx", "fy", "fz", "mx", "my", "mz")
 _CORRECT_S = 5.0  # how often the offset of the sender's clock is asked for
 
 
@@ -64,7 +63,7 @@ class LslSource:
         rate = info.nominal_srate()
         if not rate > 0.0:
             raise ConfigError(f"lsl:{self.name}: an irregular stream, expected one with a nominal rate")
-        loads = _grouped(labels, _LOAD, _LOADS)
+        loads = _grouped(labels, _LOAD, COMPONENTS)
         if loads:
             names, columns, self._plates = tuple(loads), [loads[name] for name in loads], True
         else:

@@ -10,7 +10,6 @@ from typing import Any
 from dynakin.errors import DynakinError
 from dynakin.pipeline.stages import judged
 from dynakin.progress import Progress
-from dynakin.results.estimate import COMPONENTS
 from dynakin.results.failures import Failures
 from dynakin.results.files.config import versions
 from dynakin.results.measures.fit import SignalFit
@@ -23,6 +22,7 @@ from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import Pool
 from dynakin.studies.engine.tasks import Failure, Task
 from dynakin.studies.engine.work import work
+from dynakin.units import COMPONENTS
 from dynakin.validation.case import case_of
 from dynakin.validation.files import flat
 from dynakin.validation.methods import estimate_each

@@ -12,7 +12,6 @@ import numpy.typing as npt
 
 from dynakin.errors import ConfigError, DynakinError
 from dynakin.progress import Progress
-from dynakin.results.estimate import COMPONENTS
 from dynakin.results.files.config import versions
 from dynakin.settings.noise import Noise
 from dynakin.studies.engine.journal import Journal
@@ -21,6 +20,7 @@ from dynakin.studies.engine.tasks import Task
 from dynakin.studies.engine.work import work
 from dynakin.studies.tuning.score import CRITERIA, Shared, score_task
 from dynakin.studies.tuning.settings import check_effect, check_setting
+from dynakin.units import COMPONENTS
 
 Array = npt.NDArray[np.float64]
 

@@ -13,9 +13,9 @@ from dynakin.bindings import _core
 from dynakin.filter.augment import extended
 from dynakin.filter.core_filter import core_filter
 from dynakin.filter.noise import marker_variance, wrench_covariance
-from dynakin.results.estimate import COMPONENTS
 from dynakin.settings.noise import Noise
 from dynakin.studies.tuning.trial import TuningTrial, undoubting
+from dynakin.units import COMPONENTS
 
 Array = npt.NDArray[np.float64]
 
@@ -67,12 +67,11 @@ def score_task(shared: Shared, payload: tuple[int, Mapping[str, float]]) -> dict
     return figures
 
 
-def run_score(trial: TuningTrial, noise: Noise, markers: Array | None = None, trace: bool = False) -> dict[str, Any]:
+def run_score(trial: TuningTrial, noise: Noise, trace: bool = False) -> dict[str, Any]:
     """The core's sums over the trial's frames that count; see `_core.Filter.score`."""
     _, _, core = core_filter(trial.initial, noise, trial.estimate)
-    given = trial.markers if markers is None else markers
     found: dict[str, Any] = core.score(
-        trial.time, given, trial.wrench, trial.first, trial.end, ahead=trial.ahead, lost_m=LOST_M, trace=trace
+        trial.time, trial.markers, trial.wrench, trial.first, trial.end, ahead=trial.ahead, lost_m=LOST_M, trace=trace
     )
     return found
 

@@ -13,8 +13,8 @@ from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition, ModelDefinition
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.smoothing import MAX_GAP_S, smooth
-from dynakin.results.estimate import COMPONENTS
 from dynakin.settings.defaults import CUTOFF_HZ
+from dynakin.units import COMPONENTS
 from dynakin.validation.reference.chain import Kinematics, PlanarChain
 from dynakin.validation.reference.classical import classical_angles, hinge_paths, landmark_paths
 from dynakin.validation.reference.regressor import IN_PLANE, table_dynamics
