@@ -117,3 +117,13 @@ def test_a_planar_model_is_checked_as_it_runs(tmp_path: Path, capsys: Said) -> N
     trial.write_text("nothing")
     assert main(["check", *options]) == 1
     assert main(["check", *options, "--side", "middle"]) == 2
+
+
+def test_run_names_what_lies_next_to_a_recording(data_dir: Path, tmp_path: Path, capsys: Said) -> None:
+    assert main(["run", str(data_dir / "rajagopal" / "motion_capture_run.trc"), "-o", str(tmp_path / "out")]) == 2
+    _, refusal = told(capsys)
+    assert refusal.endswith("Give --static static_run.trc?")
+    walk = str(data_dir / "opencap_subject4" / "walking1.trc")
+    assert main(["check", walk]) == 0
+    found, _ = told(capsys)
+    assert "--forces walking1_grf.mot lies next to the recording" in found

@@ -17,6 +17,7 @@ from dynakin.errors import RecordingError
 from dynakin.filter.plate_motion import Needed, brought_into_step, plates_delay
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.simulation.trial import simulate as simulate_anew
+from dynakin.validation.held_out import measured_wrench
 
 simulate = cache(simulate_anew)
 
@@ -40,7 +41,7 @@ def with_forces(
     return recording.with_plates(tuple(of(k, plate) for k, plate in enumerate(recording.plates)))
 
 
-@pytest.mark.parametrize(("motion", "delay_s"), [("gait", 0.03), ("gait", -0.02), ("squat", 0.04)])
+@pytest.mark.parametrize(("motion", "delay_s"), [("gait", 0.03), ("gait", 0.09), ("gait", -0.06), ("squat", 0.04)])
 def test_plates_that_are_out_of_step_are_brought_into_it(motion: str, delay_s: float) -> None:
     whole = simulate("fullbody", motion, 7, 4.0 if motion == "gait" else 8.0).recording
     late = brought_into_step(whole, -delay_s)
@@ -50,7 +51,7 @@ def test_plates_that_are_out_of_step_are_brought_into_it(motion: str, delay_s: f
     (found,) = re.findall(rf"([0-9]+) ms {side} the markers", text)
     assert int(found) == pytest.approx(1000.0 * abs(delay_s), abs=2.0)
     both = np.isfinite(ready.wrench).all(axis=1) & np.isfinite(before.wrench).all(axis=1)
-    assert both.sum() > 0.9 * np.isfinite(before.wrench).all(axis=1).sum()
+    assert both.sum() > 0.8 * np.isfinite(before.wrench).all(axis=1).sum()
     assert np.abs(ready.wrench[both] - before.wrench[both])[:, :3].mean() < 2.0
 
 
@@ -59,16 +60,20 @@ def test_plates_that_are_in_step_are_left_alone(data_dir: Path) -> None:
     walk = dynakin.read(folder / "walking1.trc", folder / "walking1_grf.mot")
     for recording in (simulate("fullbody", "gait", 7, 4.0).recording, walk):
         ready = person().prepare(recording)
-        assert plates_delay(Needed(ready.calibrated, recording.time, ready.markers), ready.wrench) is None
+        assert plates_delay(Needed(ready.calibrated, recording.time, ready.markers), ready.wrench[:, :3]) is None
         assert not any("into step" in text for text in ready.messages)
 
 
 @pytest.mark.parametrize(
     ("turn", "which", "said"),
     [
-        ([1.0, 1.0, -1.0], None, "axis points the other way"),
-        ([-1.0, 1.0, 1.0], 1, "horizontal force of plate 2 .* axis points the other way"),
-        ([-1.0, 1.0, -1.0], None, "half a turn"),
+        (
+            [1.0, 1.0, -1.0],
+            None,
+            r"plate 1, plate 2 and plate 3 does not .* if its first axis \(.* points the other way",
+        ),
+        ([-1.0, 1.0, 1.0], 1, r"plate 2 does not .* if its second axis \(.* points the other way"),
+        ([-1.0, 1.0, -1.0], None, r"plate 1, plate 2 and plate 3 does not .*half a turn"),
     ],
 )
 def test_plates_with_a_reversed_axis_are_refused(turn: list[float], which: int | None, said: str) -> None:
@@ -76,7 +81,7 @@ def test_plates_with_a_reversed_axis_are_refused(turn: list[float], which: int |
     up = int(np.argmax(np.abs(walk.plates[0].force).mean(axis=0)))
     signs = np.ones(3)
     signs[[k for k in range(3) if k != up]] = np.array(turn)[[0, 2]]
-    with pytest.raises(RecordingError, match=f"does not fit the motion.*{said}|{said}"):
+    with pytest.raises(RecordingError, match=f"horizontal force of {said}"):
         person().prepare(with_forces(walk, lambda force: force * signs, which))
 
 
@@ -84,5 +89,21 @@ def test_a_quarter_turn_is_named(data_dir: Path) -> None:
     folder = data_dir / "opencap_subject4"
     walk = dynakin.read(folder / "walking1.trc", folder / "walking1_grf.mot")
     turned = with_forces(walk, lambda force: force[:, [2, 1, 0]] * [1.0, 1.0, -1.0])
-    with pytest.raises(RecordingError, match=r"quarter turn.*Correct the axes in the file"):
+    with pytest.raises(RecordingError, match=r"walking1_grf.mot: .* quarter turn.*Correct the signs"):
         person().prepare(turned)
+
+
+def test_who_judges_takes_plates_in_step_too() -> None:
+    """Held-out trials and identification ask for the plates by themselves."""
+    whole = simulate("fullbody", "gait", 7, 4.0).recording
+    late = brought_into_step(whole, -0.04)
+    calibrated = person().prepare(whole).calibrated
+    there, before = measured_wrench(late, calibrated), measured_wrench(whole, calibrated)
+    both = np.isfinite(there).all(axis=1) & np.isfinite(before).all(axis=1)
+    assert np.abs(there[both] - before[both])[:, :3].mean() < 2.0
+
+
+def test_where_plates_end_before_they_are_not_known() -> None:
+    whole = simulate("fullbody", "gait", 7, 4.0).recording
+    there = brought_into_step(whole, 0.05)
+    assert np.isnan(there.plates[0].force[-5:]).all() and np.isfinite(there.plates[0].force[:-5]).all()

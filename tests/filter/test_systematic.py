@@ -100,6 +100,8 @@ def changed(**errors: Array) -> _core.Model:
 def calibrated() -> Any:
     model = spec()
     return SimpleNamespace(
+        unmarked_joints=(),
+        one_sided_joints=(),
         spec=model,
         names=tuple(_core.Model(model).layout.names),
         x0=_core.Model(model).initial_state(),
@@ -377,7 +379,7 @@ def test_inertia_that_small_innovations_leave_open_is_known_by_the_declared_nois
 def test_the_scale_of_systematic_errors_is_that_of_joints_and_skin() -> None:
     """What is not known of inertia has no usual size: another scale leaves it."""
     subject, x = with_inertia()
-    subject.plan, subject.unmarked_joints, subject.one_sided_joints = SimpleNamespace(), (), ()  # from markers
+    subject.plan = SimpleNamespace()  # joints found from markers
     P = np.zeros((34, 34))
     P[30:, 30:] = 0.01 * np.eye(4)
     own = {block: np.zeros(10) for block in ("coordinates", "speeds", "accelerations", "moments")}

@@ -14,11 +14,12 @@ import pytest
 import dynakin
 from dynakin.errors import ModelError
 from dynakin.filter.estimator import Tracked
-from dynakin.filter.systematic import LANDMARKS, ONE_SIDED, UNMARKED, usual_sizes
+from dynakin.filter.systematic import LANDMARKS, ONE_SIDED, UNMARKED, Systematic, less_sure_joints, usual_sizes
 from dynakin.model.definition import load_model
 from dynakin.recordings.recording import Recording
 from dynakin.report.insights import insights
 from dynakin.results.measures.metrics import compute_metrics
+from dynakin.settings.noise import Noise
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.trial import simulate
 
@@ -146,5 +147,10 @@ def test_a_joint_with_a_lateral_marker_alone_is_less_sure() -> None:
     assert len(kept) == len(whole.marker_names) - 4
     half = replace(whole, marker_names=tuple(whole.marker_names[k] for k in kept), markers=whole.markers[:, kept])
     both, one = (dynakin.Estimator(load_model("fullbody", subject=WHO)).calibrate(each) for each in (whole, half))
-    assert both.one_sided_joints == () and usual_sizes(both) is LANDMARKS
-    assert set(one.one_sided_joints) == {*JOINTS} and usual_sizes(one) is ONE_SIDED
+    assert both.one_sided_joints == () and less_sure_joints(both) == {}
+    assert set(one.one_sided_joints) == {*JOINTS}
+    legs = ("shank_r", "shank_l", "foot_r", "foot_l")
+    assert less_sure_joints(one) == dict.fromkeys(legs, ONE_SIDED)
+    moments = [Systematic(each, Noise()) for each in (both, one)]
+    spread = [np.linalg.norm(each._errors.sources, axis=0).max() for each in moments]
+    assert spread[1] > 1.5 * spread[0]

@@ -67,3 +67,22 @@ def test_smooth_markers_of_a_fast_system_are_no_lines() -> None:
     ]
     found, notes = cleaned(time, np.round(markers, 5))
     assert np.isfinite(found).all() and not notes
+
+
+def test_somebody_who_stands_in_a_coarse_file_is_no_repetition() -> None:
+    rng = np.random.default_rng(1)
+    time = np.arange(3000) / 1000.0
+    sway = 0.004 * np.sin(2.0 * np.pi * 0.3 * time)[:, None, None] + rng.normal(0.0, 2e-4, (3000, 4, 3))
+    found, notes = cleaned(time, np.round(np.arange(1.0, 5.0)[:, None] + sway, 3))
+    assert np.isfinite(found).all() and not notes
+
+
+@pytest.mark.parametrize("noise_m", [2e-6, 1e-4])
+def test_a_foot_on_a_moving_belt_is_no_line(noise_m: float) -> None:
+    rng = np.random.default_rng(2)
+    time = np.arange(400) / RATE
+    stands = (np.sin(2.0 * np.pi * time) > -0.2)[:, None]
+    step = np.where(stands, -1.2 / RATE, 2.0 / RATE) * np.ones((1, 4))
+    path = np.stack([np.cumsum(step, axis=0), 0.1 + np.where(stands, 0.0, 0.05) * np.ones((1, 4)), 0.1 + 0.0 * step], 2)
+    found, notes = cleaned(time, np.round(path + rng.normal(0.0, noise_m, path.shape), 8))
+    assert np.isfinite(found).all() and not notes

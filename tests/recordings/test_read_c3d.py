@@ -345,3 +345,27 @@ def test_causal_reading_says_its_delay(tmp_path: Path) -> None:
     assert any("ms late" in note for note in recording.notes)
     with pytest.raises(RecordingError, match="expected less than 500 Hz"):
         read(path, plate_filter_hz=600.0)
+
+
+@pytest.mark.parametrize(
+    ("word", "said"), [("", "no unit for its moments: N m taken"), ("Nmm", "Warning: plate 1: by the unit")]
+)
+def test_moments_in_another_unit_than_the_file_says(tmp_path: Path, word: str, said: str) -> None:
+    """A person 0.2 m beside the middle of a plate, whose moments are in N m."""
+    t = np.arange(1000) / 1000.0
+    push = -600.0 - 50.0 * np.sin(2.0 * np.pi * 2.0 * t)
+    channels = np.stack([0.0 * t, 0.0 * t, push, 0.05 * push, -0.2 * push, 0.0 * t])
+    corners = np.array([[300.0, 300, 0], [-300, 300, 0], [-300, -300, 0], [300, -300, 0]])
+    path = write_c3d(
+        tmp_path / "a.c3d",
+        {"LASI": np.full((100, 3), 900.0)},
+        kinds=[2],
+        channels=channels,
+        corners=[corners],
+        origins=[[0.0, 0.0, -40.0]],
+        analog_units=["N"] * 3 + [word] * 3,
+    )
+    recording = read(path)
+    assert any(said in note for note in recording.notes)
+    away = np.abs(np.nanmedian(recording.plates[0].cop, axis=0)).max()
+    assert away == pytest.approx(0.2, abs=0.01) if not word else away < 0.003

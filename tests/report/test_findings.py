@@ -6,10 +6,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from dynakin.report.findings import forces
 from dynakin.report.findings.finding import Insight
 from dynakin.report.insights import insights
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.metrics import compute_metrics
+from dynakin.results.measures.soft_tissue import marker_sites
 
 
 def found(estimate: Estimate) -> dict[str, Insight]:
@@ -56,3 +58,43 @@ def test_bounds_are_counted_by_kind_and_those_touched_for_a_time_are_told(estima
     told = found(with_element(estimate, "length/shank", path))["Bounds"].text
     assert "(1 of 6 lengths, 0 of 20 marker places, 1 of 21 inertial numbers)" in told
     assert "1 other touched a bound and left it (longest: shank length, 50 % of the time)" in told
+
+
+def test_what_was_warned_of_is_a_finding_by_its_subject(estimate: Estimate) -> None:
+    warned = replace(
+        estimate,
+        messages=[
+            "Warning: plate 1 lies off its place: 0.1 m.",
+            "Warning: gaps were filled by straight lines: r_toe.",
+            "Warning: mass 70.0 kg assumed, of a mean adult of 1.70 m.",
+            "Warning: mass 70.0 kg from the plates.",
+            "Warning: no marker shows left knee.",
+            "A note.",
+        ],
+    )
+    made = {i.title: i for i in insights(warned, compute_metrics(warned)) if i.level == "warning"}
+    assert {"Force plates", "Recording", "Subject"} <= set(made)
+    assert "lies off its place" in made["Force plates"].text and "r_toe" in made["Recording"].text
+    assert "assumed" in made["Subject"].text and "from the plates" not in made["Subject"].text
+    assert all("left knee" not in insight.text for insight in made.values())
+    assert not {"Recording", "Subject"} & set(found(replace(estimate, messages=[])))
+
+
+def test_a_segment_that_nobody_sees_for_long_is_a_finding(estimate: Estimate) -> None:
+    sites = [site for _, site in marker_sites(estimate)]
+    segment = estimate.marker_segments[sites[0]]
+    own = [k for k, site in enumerate(sites) if estimate.marker_segments.get(site) == segment]
+    for frames, expected in ((slice(300, 315), False), (slice(300, 340), True)):
+        measured = estimate.data["markers_measured"].copy(deep=True)
+        measured[frames, own] = np.nan
+        made = found(replace(estimate, data=estimate.data.assign(markers_measured=measured)))
+        assert ("Unseen" in made) == expected
+    assert f"{segment} from 3.00 to 3.39 s" in made["Unseen"].text and made["Unseen"].level == "warning"
+
+
+def test_a_force_that_no_contact_gives_is_a_finding(estimate: Estimate) -> None:
+    metrics = compute_metrics(estimate)
+    heavy = replace(estimate, config=estimate.config | {"mass_kg": 70.0})
+    for newton, expected in ((100.0, False), (300.0, True)):
+        metrics["feet"] = {"left_at_root": {"grounded": {"force_n": newton, "moment_nm": 1.0}, "flight": None}}
+        assert (forces.left(heavy, metrics) is not None) == expected

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +16,6 @@ from dynakin.filter.assemble import assemble
 from dynakin.filter.augment import initial_covariance
 from dynakin.filter.contacts import ContactLoads
 from dynakin.filter.expected import ContactPaths, expected_loads
-from dynakin.filter.plate_motion import Needed, brought_into_step, plates_delay
 from dynakin.filter.prepared import Prepared
 from dynakin.filter.samples import in_step, recording_arrays
 from dynakin.filter.skin import following_skin, may_follow
@@ -315,20 +314,7 @@ class Estimator:
         markers, wrench = recording_arrays(recording, calibrated, gaps=self.noise.recover)
         tolerance = self.noise.plate_load_tolerance
         ground, known = known_ground(recording, calibrated, markers, wrench, self.plates, tolerance)
-        if not (calibrated.feet and recording.plates):
-            return markers, known, ground
-        delay = plates_delay(Needed(calibrated, recording.time, markers), known)
-        if delay is None:
-            return markers, known, ground
-        there = brought_into_step(recording, delay)
-        _, wrench = recording_arrays(there, calibrated, gaps=self.noise.recover)
-        ground, known = known_ground(there, calibrated, markers, wrench, self.plates, tolerance)
-        where = "behind" if delay > 0.0 else "ahead of"
-        text = (
-            f"By the motion of the centre of mass the plates are {1000.0 * abs(delay):.0f} ms {where} the markers; "
-            "they were brought into step."
-        )
-        return markers, known, replace(ground, notes=(text, *ground.notes))
+        return markers, known, ground
 
     def measured(self, recording: Recording, calibrated: CalibratedModel) -> tuple[Array, Array]:
         """What the filter takes of a recording: markers (T, M, 3) m, and wrench (T, 6), NaN where it is not known (all

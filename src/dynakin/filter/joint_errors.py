@@ -4,7 +4,7 @@ its segments may be displaced too: their first moments are states."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass
 from typing import Literal
@@ -49,18 +49,25 @@ class JointErrors:
     masses: Array
 
     @classmethod
-    def of(cls, spec: _core.ModelSpec, reference: Array, held: Collection[str] = ()) -> JointErrors:
+    def of(
+        cls,
+        spec: _core.ModelSpec,
+        reference: Array,
+        held: Collection[str] = (),
+        less_sure: Mapping[str, float] | None = None,
+    ) -> JointErrors:
         """Those of a model.
 
         Args:
             reference: (C,) posture in which the bones were found: there a misplaced joint displaces no bone but its
                 own.
             held: coordinates that are locked because no marker shows them: a hip stays a joint with three axes.
+            less_sure: segment -> how many times as far off the centre of its joint may be as those of others.
         """
         spec = bare(copy(spec))
         orientations = _orientations(spec, reference)
         larger, added = _with_errors(spec)
-        found = _sources(spec, orientations, set(held))
+        found = _sources(spec, orientations, set(held), less_sure or {})
         place = {name: k for k, name in enumerate(c.name for c in larger.coordinates if not c.locked)}
         sources = np.array([[column.get(name, 0.0) for _, column in found] for name in added])
         model = _core.Model(larger)
@@ -146,7 +153,9 @@ def _names(segment: str, place: str) -> list[str]:
     return [f"{segment}_{place}_{axis}" for axis in "xyz"]
 
 
-def _sources(spec: _core.ModelSpec, orientations: dict[str, Array], held: set[str]) -> list[tuple[Kind, Column]]:
+def _sources(
+    spec: _core.ModelSpec, orientations: dict[str, Array], held: set[str], less_sure: Mapping[str, float]
+) -> list[tuple[Kind, Column]]:
     """Unit errors along the ground's axes in the reference posture, by the errors' coordinates that they move."""
     planar = not all(spec.markers[0].measured)
     joints = _turning(spec)
@@ -169,7 +178,8 @@ def _sources(spec: _core.ModelSpec, orientations: dict[str, Array], held: set[st
             column = _along(name, "moved", R_J, e)
             for child in children:
                 column |= _along(child.name, "moved", R_B @ child.rotation, -e)
-            found.append(("ball_centre" if axes == 3 else "hinge_centre", column))
+            times = less_sure.get(name, 1.0)
+            found.append(("ball_centre" if axes == 3 else "hinge_centre", {k: times * v for k, v in column.items()}))
         if not planar:
             found += [(_TURNED[axes], _along(name, "turned", R_J, e) | _along(name, "behind", R_B, -e)) for e in _AXES]
     return found

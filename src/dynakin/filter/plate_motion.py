@@ -15,7 +15,6 @@ import numpy.typing as npt
 
 from dynakin.filter.closure import smoothed
 from dynakin.filter.mass_centre import mass_centre
-from dynakin.filter.samples import in_step
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.recording import Plate, Recording, rate_of
 from dynakin.results.naming import listed
@@ -27,26 +26,38 @@ Flags = npt.NDArray[np.bool_]
 LONGEST_S, STEP_S = 0.1, 0.005
 """Delays that are looked for, and how finely."""
 LEAST_S = 0.008
-"""A lesser delay is left to the filter's state."""
-LESS, NEAR = 0.75, 0.05
-"""In step the sum must be off what the motion needs by so much less, and by less than this part of the weight."""
-TURNED, LARGE_N = 0.4, 4.0
-"""With other axes the horizontal force must be off by so much less, where as it is it is off by more than so many N:
-0.9 to 1 times of 16 real recordings whose plates are right, 0.07 to 0.24 where they are not. Judged where the vertical
-force is within `NEAR` of what the motion needs, or else something that no plate measures pulls (a flywheel's cable)."""
-_SHORTEST_S = 0.3
+"""A lesser delay is left to the filter's state: recordings in step have their minimum at up to 6 ms."""
+LESS = 0.75
+"""So much less must the sum be off what the motion needs once it is in step; 0.12 to 0.2 where plates were moved, 0.84
+and more of real recordings in step."""
+NEAR = 0.05
+"""Part of the weight within which the force must then be what the motion needs; real recordings 0.007 to 0.04."""
+KEPT = 0.7
+"""Part of the frames that must be left to judge it by."""
+TURNED = 0.4
+"""With other axes the horizontal force must be off by so much less: 0.9 to 1 times of 16 real recordings whose plates
+are right, 0.07 to 0.24 where they are not. Judged where the vertical force is within `NEAR` of what the motion needs:
+else something that no plate measures pulls (a flywheel's cable)."""
+LARGE, SMALL_N = 0.02, 4.0
+"""And as it is by more than this part of the weight; where a second or more is judged by so many N."""
+_SHORTEST_S, _LONG_S = 0.3, 1.0
 
 _TURNS: tuple[tuple[str, Array], ...] = (
-    ("the first horizontal axis points the other way", np.diag([-1.0, 1.0])),
-    ("the second horizontal axis points the other way", np.diag([1.0, -1.0])),
-    ("both horizontal axes point the other way (turned by half a turn)", -np.eye(2)),
+    ("{first} points the other way", np.diag([-1.0, 1.0])),
+    ("{second} points the other way", np.diag([1.0, -1.0])),
+    ("both horizontal axes point the other way (half a turn)", -np.eye(2)),
     ("the horizontal axes are turned by a quarter turn", np.array([[0.0, -1.0], [1.0, 0.0]])),
     ("the horizontal axes are turned by a quarter turn", np.array([[0.0, 1.0], [-1.0, 0.0]])),
 )
 
 
 class Needed:
-    """The force (T, 3) N that the motion of the centre of mass needs, ground axes."""
+    """What the motion of the centre of mass needs.
+
+    Attributes:
+        time: (T,) s. rate: Hz. weight: N, with what is carried.
+        force: (T, 3) N, ground axes. known: (T,) frames in which it is.
+    """
 
     def __init__(self, initial: CalibratedModel, time: Array, markers: Array) -> None:
         found = mass_centre(initial, time, markers)
@@ -55,21 +66,26 @@ class Needed:
         acceleration = np.zeros((len(time), 3)) if found is None else found.acceleration
         self.force: Array = initial.weighed_kg * (acceleration + np.array([0.0, GRAVITY_M_S2, 0.0]))
 
+    def judged_s(self, force: Array) -> float:
+        """How long both this and forces (T, 3) are known."""
+        return float(np.count_nonzero(self.known & np.isfinite(force).all(axis=1)) / self.rate)
+
     def misfit(self, force: Array) -> float:
         """RMS, N, of what forces (T, 3) lack beyond a constant (a mass or a zero that is off), smoothed, where both
         are known; inf where these frames are too few."""
-        judged = self.known & np.isfinite(force).all(axis=1)
-        if not np.count_nonzero(judged) >= _SHORTEST_S * self.rate:  # a rate that is NaN, too
+        if not self.judged_s(force) >= _SHORTEST_S:  # a rate that is NaN, too
             return float("inf")
+        judged = self.known & np.isfinite(force).all(axis=1)
         lacks = smoothed(np.where(judged[:, None], self.force - force, 0.0), judged, self.rate)[judged]
         return float(np.sqrt(np.sum(lacks.var(axis=0))))
 
 
-def plates_delay(needed: Needed, wrench: Array) -> float | None:
-    """By how much plates lag, s, whose total wrench (T, 6) is known where it is no NaN; None where they are in step, or
+def plates_delay(needed: Needed, force: Array) -> float | None:
+    """By how much plates lag, s, whose sum (T, 3) N is known where it is no NaN; None where they are in step, or
     nothing can be said."""
     delays = np.arange(-LONGEST_S, LONGEST_S + 0.5 * STEP_S, STEP_S)
-    misfits = np.array([needed.misfit(in_step(needed.time, wrench[:, :3], delay)) for delay in delays])
+    moved = [_later(needed.time, force, delay) for delay in delays]
+    misfits = np.array([needed.misfit(each) for each in moved])
     k, now = int(np.argmin(misfits)), misfits[len(delays) // 2]
     if not 0 < k < len(delays) - 1 or not np.isfinite(misfits[k - 1 : k + 2]).all():
         return None
@@ -77,26 +93,37 @@ def plates_delay(needed: Needed, wrench: Array) -> float | None:
     delay = float(delays[k] + 0.5 * STEP_S * (before - after) / max(before - 2.0 * least + after, 1e-12))
     if abs(delay) < LEAST_S or least > LESS * now or least > NEAR * needed.weight:
         return None
-    return delay
+    return delay if needed.judged_s(moved[k]) > KEPT * needed.judged_s(force) else None
 
 
 def brought_into_step(recording: Recording, delay_s: float) -> Recording:
-    """The recording with what its plates say so much later at each time."""
+    """The recording with what its plates say so much later at each time; not known (NaN) where they end before."""
 
     def of(plate: Plate) -> Plate:
-        values = [plate.force, plate.moment, plate.cop, plate.free_moment]
-        force, moment, cop, free = (in_step(recording.time, each, delay_s) for each in values)
+        values = (plate.force, plate.moment, plate.cop, plate.free_moment)
+        force, moment, cop, free = (_later(recording.time, each, delay_s) for each in values)
         return replace(plate, force=force, moment=moment, cop=cop, free_moment=free)
 
     return recording.with_plates(tuple(of(plate) for plate in recording.plates))
 
 
+def _later(time: Array, values: Array, delay_s: float) -> Array:
+    """Values (T, 3) at times so much later; NaN beyond the recording."""
+    then = time + delay_s
+    inside = (then >= time[0] - 1e-9) & (then <= time[-1] + 1e-9)
+    columns = [np.interp(then, time, column) for column in values.T]
+    return np.where(inside[:, None], np.stack(columns, axis=1), np.nan)
+
+
 def turned_axes(needed: Needed, recording: Recording, initial: CalibratedModel, known: Flags) -> str | None:
-    """A sentence on plates whose horizontal force fits the motion once their axes are others; None where none are.
+    """A sentence on plates whose horizontal force fits the motion once their axes are others; None where none are, or
+    something was declared that pushes or pulls as well.
 
     Args:
         known: (T,) frames in which the sum over the plates is all that bears the person.
     """
+    if initial.contacts:
+        return None
     forces = np.stack([initial.ground.vectors_to_ground(plate.force) for plate in recording.plates])
     total = np.where(known[:, None], forces.sum(axis=0), np.nan)
     upright = needed.force.copy()
@@ -105,7 +132,7 @@ def turned_axes(needed: Needed, recording: Recording, initial: CalibratedModel, 
         return None
     total[:, 1] = needed.force[:, 1]  # axes are judged by the horizontal force alone
     now = needed.misfit(total)
-    if now < LARGE_N:
+    if now < (SMALL_N if needed.judged_s(total) > _LONG_S else LARGE * needed.weight):
         return None
     every = range(len(forces))
     subsets: list[Sequence[int]] = [every, *([k] for k in every if len(forces) > 1)]
@@ -122,10 +149,15 @@ def turned_axes(needed: Needed, recording: Recording, initial: CalibratedModel, 
     if best > TURNED * now:
         return None
     names = listed([recording.plates[k].name for k in which])
+    if recording.plates[which[0]].corners is None:  # columns of a table
+        first, second, where = "X", "Z", "Correct the signs or columns in this file"
+    else:
+        first, second = "its first axis (from corner 2 to 1)", "its second axis (from corner 4 to 1)"
+        where = "Correct it in this file (order of the corners, signs of the channels, calibration)"
+    how = how.format(first=first, second=second)
     return (
         f"the horizontal force of {names} does not fit the motion: it is {now:.0f} N off what the centre of mass "
-        f"needs, and {best:.0f} N if {how}. Correct the axes in the file (corners, signs of the channels or "
-        "calibration)"
+        f"needs, and {best:.0f} N if {how}. {where}; if something else pulls the person, declare it (--contact)"
     )
 
 

@@ -116,8 +116,9 @@ LANDMARKS = Sizes(
 UNMARKED = replace(LANDMARKS, hinge_centre=0.015, hinge_axes=np.radians(6.0), pair_axes=np.radians(6.0))
 """Knees and ankles that no marker shows: on simulated squats their moments err two to five times as much
 (`docs/validation/geometry.md`)."""
-ONE_SIDED = replace(LANDMARKS, hinge_centre=0.010)
-"""Knees and ankles with a lateral marker alone, and no width that somebody measured (`docs/validation/geometry.md`)."""
+ONE_SIDED = 0.010 / 0.0042
+"""Times as far off as others is the centre of a knee or ankle with a lateral marker alone and no width that somebody
+measured (`docs/validation/geometry.md`)."""
 SCALED = Sizes(
     hinge_centre=0.0014,
     ball_centre=0.0016,
@@ -139,9 +140,15 @@ def usual_sizes(calibrated: CalibratedModel) -> Sizes:
     """By where the joints of a model come from."""
     if calibrated.plan is None:
         return SCALED
+    return UNMARKED if calibrated.unmarked_joints else LANDMARKS
+
+
+def less_sure_joints(calibrated: CalibratedModel) -> dict[str, float]:
+    """Segment -> how many times as far off the centre of its joint may be as those of others."""
+    turns = {f"{joint[:-2]}_angle{joint[-2:]}" for joint in calibrated.one_sided_joints}  # knee_r: knee_angle_r
     if calibrated.unmarked_joints:
-        return UNMARKED
-    return ONE_SIDED if calibrated.one_sided_joints else LANDMARKS
+        return {}
+    return {s.name: ONE_SIDED for s in calibrated.spec.segments if turns & {axis.coordinate for axis in s.axes}}
 
 
 def movement_intensity(acceleration: Array, sd: Array) -> Array:
@@ -222,7 +229,7 @@ class Systematic:
         self._count = len(spec.coordinates)
         self._feet = len(calibrated.feet)
         reference = neutral(calibrated)
-        self._errors = JointErrors.of(spec, reference, calibrated.held)
+        self._errors = JointErrors.of(spec, reference, calibrated.held, less_sure_joints(calibrated))
         self._reference = reference[self._free]
         first = {name: k for k, name in enumerate(calibrated.names)}
         axes = [[f"marker/{marker.name}/{axis}" for axis in "xyz"] for marker in spec.markers]

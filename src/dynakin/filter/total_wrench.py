@@ -13,7 +13,7 @@ from dynakin.errors import RecordingError
 from dynakin.filter.closure import Closure, closure
 from dynakin.filter.declared import bearing, may_bear
 from dynakin.filter.expected import ContactPaths
-from dynakin.filter.plate_motion import Needed, turned_axes
+from dynakin.filter.plate_motion import Needed, brought_into_step, plates_delay, turned_axes
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.checks import PlateCheck, check_plates
 from dynakin.recordings.feet import loads as on_plates
@@ -86,12 +86,14 @@ def known_ground(
     wrench: Array,
     assigned: Mapping[str, str] | None = None,
     tolerance: float | None = None,
+    in_step: bool = False,
 ) -> tuple[Ground, Array]:
     """What is known of the ground, and the total wrench (T, 6) without (NaN) the frames in which the plates do not
     carry all of the person.
 
     Args:
         markers: (T, M, 3) m, of the model, ground frame. assigned: plate -> foot, as for `foot_loads`.
+        in_step: whether nobody need ask any more if the plates lag behind the markers.
         tolerance: part of the weight by which the plates' mean may differ where `closure` cannot judge; None: nobody
             asks.
 
@@ -129,9 +131,14 @@ def known_ground(
     check = check_plates(recording, initial.ground, mass, foot_markers(initial), loads)
     if check.refusal:
         raise RecordingError(f"{recording.path or recording.name}: {check.refusal}")
-    needed = Needed(initial, recording.time, markers)
-    if loads is not None and (wrong := turned_axes(needed, recording, initial, loads.total_known)):
-        raise RecordingError(f"{recording.path or recording.name}: {wrong}")
+    if loads is not None:
+        needed = Needed(initial, recording.time, markers)
+        if wrong := turned_axes(needed, recording, initial, loads.total_known):
+            source = recording.read_with.get("forces") or recording.path or recording.name
+            raise RecordingError(f"{source}: {wrong}")
+        delay = None if in_step else plates_delay(needed, np.where(loads.total_known[:, None], wrench[:, :3], np.nan))
+        if delay is not None:
+            return _brought_into_step(recording, initial, markers, delay, assigned, tolerance)
     notes, reasons = list(check.messages), list[str]()
     measured: Flags = np.asarray(np.isfinite(wrench).all(axis=1))
     claimed = measured if loads is None else loads.total_known
@@ -190,6 +197,26 @@ def known_ground(
         notes.append(f"The total wrench is measured in {used} of {n} frames.")
     ratio = None if found is None else found.load_ratio
     return Ground(loads, undeclared, bears, used > 0, ratio, (*notes, *reasons), tuple(reasons)), wrench
+
+
+def _brought_into_step(
+    recording: Recording,
+    initial: CalibratedModel,
+    markers: Array,
+    delay_s: float,
+    assigned: Mapping[str, str] | None,
+    tolerance: float | None,
+) -> tuple[Ground, Array]:
+    """`known_ground` of what the plates say so much later, with a sentence on it."""
+    there = brought_into_step(recording, delay_s)
+    wrench = initial.ground.wrench_to_ground(there.total_wrench())
+    ground, known = known_ground(there, initial, markers, wrench, assigned, tolerance, in_step=True)
+    where = "behind" if delay_s > 0.0 else "ahead of"
+    text = (
+        f"By the motion of the centre of mass the plates are {1000.0 * abs(delay_s):.0f} ms {where} the markers; they "
+        "were brought into step."
+    )
+    return replace(ground, notes=(text, *ground.notes)), known
 
 
 def _nearly_all(found: Closure) -> bool:
@@ -269,8 +296,8 @@ def doubtful_mass(wrench: Array, mass_kg: float, load_ratio: float | None, unsee
     return (
         f"Warning: the plates carry {load:.1f} kg on average where the person weighs {mass_kg:.1f} kg "
         f"({100.0 * abs(load - mass_kg) / mass_kg:.1f} % apart, expected within {100.0 * within:.0f} %): check the "
-        "mass. Forces, moments and inertia take the error on, and no delay of the plates is taken off, because a wrong "
-        "mass looks like one."
+        "mass. Forces, moments and inertia take the error on, and no further delay of the plates is sought, because a "
+        "wrong mass looks like one."
     )
 
 
@@ -280,6 +307,7 @@ def _foreign_load(
     """A sentence where the plates' mean load is not the person's weight, for recordings that `closure` cannot judge.
 
     Args:
+        in_step: whether nobody need ask any more if the plates lag behind the markers.
         tolerance: part of the weight by which they may differ; None: nobody asks.
     """
     mass_kg = initial.weighed_kg

@@ -73,7 +73,8 @@ class CalibratedModel:
         guessed_places: whether the places of the markers were guessed, because no marker set has their names.
         unmarked_joints: knees and ankles that no marker shows, where the movement (`legs_in_motion`) or proportions
             have them.
-        one_sided_joints: knees and ankles with a lateral marker alone, half as wide as an adult's of this height.
+        one_sided_joints: knees and ankles with a lateral marker alone: their centres lie half an adult's joint width
+            inwards.
         joint_prior: how elements hang together at first; the others are independent.
     """
 

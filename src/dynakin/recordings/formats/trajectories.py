@@ -20,13 +20,18 @@ _METRES_BELOW, _CENTIMETRES_BELOW = 5.0, 300.0
 _SAME_M = 3e-3
 """Distance up to which two trajectories are one marker's, rounded or filtered otherwise: balls of 6 mm touch there."""
 _MOVES_M_S = 0.1
-"""Speed of the fastest marker from which the person moves."""
-_STRAIGHT, _BENDS_M, _FINE = 0.02, 2e-5, 50.0
-"""A line is straight where it bends by so much less than the marker does half of the time it moves. Where that is less
-than so many m, or than so many of the file's smallest steps, a smooth path looks straight and nothing is judged."""
+"""Speed, median over the markers, from which the person moves."""
+_ROUNDED = 4.0
+"""Of the file's smallest steps of a marker: by more no line bends that was drawn over a gap. Feet on a moving belt, raw
+or low-passed, bend by 28 and more."""
+_KINK = 20.0
+"""By so many the marker bends at an end of such a line."""
+_FINE, _FINEST_M = 50.0, 1e-7
+"""By so many it bends half of the time it moves, or the file is too coarse to tell; a smallest step is at least as
+large, which is what single precision leaves of 1 m."""
 _MOST_REPEATED = 0.2
 """Part of the frames that may repeat others: more is another rate, written as this one."""
-_LINE_FRAMES, _LINE_S, _LINE_M = 6, 0.06, 0.01
+_LINE_FRAMES, _LINE_S, _LINE_M = 8, 0.08, 0.01
 """How long and how far it is at least."""
 _MOSTLY = 2.0
 """How many times as often as any other of its name a marker is seen to be the one that is meant."""
@@ -181,17 +186,24 @@ def _repeated(markers: Array, rate: float) -> npt.NDArray[np.bool_]:
     """(T,) frames that are the one before to the last bit while the person moves on both sides of them: dropped ones
     that a system filled, or a rate that was doubled by writing each frame twice."""
     seen: npt.NDArray[np.bool_] = np.asarray(np.isfinite(markers).all(axis=2))
-    steps = np.linalg.norm(np.where((seen[1:] & seen[:-1])[..., None], np.diff(markers, axis=0), 0.0), axis=2)
-    step = np.concatenate([[np.inf], steps.max(axis=1, initial=0.0)])
-    same = (step == 0.0) & np.concatenate([[False], (seen[1:] == seen[:-1]).all(axis=1)]) & (seen.sum(axis=1) > 2)
+    both = seen[1:] & seen[:-1] & (seen.sum(axis=1) > 2)[1:, None]
+    steps = np.where(both, np.linalg.norm(np.diff(markers, axis=0), axis=2), np.inf)
+    half = np.maximum(both.sum(axis=1) - 1, 0) // 2
+    middle = np.take_along_axis(np.sort(steps, axis=1), half[:, None], axis=1)[:, 0]
+    step = np.concatenate([[np.inf], middle])  # of half of the markers: of one it may be a rounded digit
+    still = both.any(axis=1) & (seen[1:] == seen[:-1]).all(axis=1) & (np.where(both, steps, 0.0) == 0.0).all(axis=1)
+    same = np.concatenate([[False], still])
+    moved = np.abs(np.diff(markers, axis=0))
+    tick = float(np.min(moved, where=moved > 1e-9, initial=np.inf))
+    least = max(_MOVES_M_S / rate, _ROUNDED * tick)
     found = np.zeros(len(markers), dtype=bool)
     for first, end in runs(same):
-        found[first:end] = first > 1 and end < len(step) and min(step[first - 1], step[end]) * rate > _MOVES_M_S
+        found[first:end] = first > 1 and end < len(step) and min(step[first - 1], step[end]) > least
     return found
 
 
 def _straight(markers: Array, rate: float) -> npt.NDArray[np.bool_]:
-    """(T, M) samples within straight lines at a steady speed, which no marker goes: gaps that a system filled."""
+    """(T, M) samples within straight lines at a steady speed, to the file's last digit: gaps that a system filled."""
     found = np.zeros(markers.shape[:2], dtype=bool)
     if len(markers) < 3 or not np.isfinite(rate):
         return found
@@ -201,15 +213,17 @@ def _straight(markers: Array, rate: float) -> npt.NDArray[np.bool_]:
         moving = bend[(step[1:, m] * rate > _MOVES_M_S) & np.isfinite(bend[:, m]), m]
         if len(moving) < _LINE_FRAMES:
             continue
-        usual = float(np.median(moving))
-        steps = np.abs(np.diff(markers[:, m], axis=0))
-        if usual < max(_BENDS_M, _FINE * float(np.min(steps, where=steps > 1e-9, initial=np.inf))):
+        moved = np.abs(np.diff(markers[:, m], axis=0))
+        tick = max(float(np.min(moved, where=moved > 1e-9, initial=np.inf)), _FINEST_M)
+        if not float(np.median(moving)) > _FINE * tick:
             continue
         with np.errstate(invalid="ignore"):
-            straight = bend[:, m] <= _STRAIGHT * usual
+            straight = bend[:, m] <= _ROUNDED * tick
         for first, end in runs(straight):
-            moved = float(np.linalg.norm(markers[end + 1, m] - markers[first, m]))
-            if end - first >= max(_LINE_FRAMES, _LINE_S * rate) and moved > _LINE_M:
+            ends = bend[[k for k in (first - 1, end) if 0 <= k < len(bend)], m]
+            kinks = bool(np.nanmax(ends, initial=0.0) > _KINK * tick)
+            length = float(np.linalg.norm(markers[end + 1, m] - markers[first, m]))
+            if kinks and end - first >= max(_LINE_FRAMES, _LINE_S * rate) and length > _LINE_M:
                 found[first + 1 : end + 1, m] = True
     return found
 
