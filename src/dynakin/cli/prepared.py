@@ -56,11 +56,7 @@ def assumed(ready: Prepared, settings: Settings) -> Rows:
     rows += [("Subject", " ".join(starting(messages, SUBJECT)))]
     ahead = ", ".join(f"{value:.2f}" for value in calibrated.ground.forward + 0.0)
     rows += [("Ground", f"{calibrated.ground.vertical} is up; the person faces ({ahead}); {_sides(ready)}.")]
-    plates = _plates(ready)
-    path = ready.recording.path
-    if not ready.recording.plates and path is not None and (forces := companion_forces(path)) is not None:
-        plates = f"none; --forces {forces.name} lies next to the recording."
-    return [*rows, ("Plates", plates)]
+    return [*rows, ("Plates", _plates(ready))]
 
 
 def naming_static(refusal: DynakinError, case: Case) -> DynakinError:
@@ -116,6 +112,10 @@ def _sides(ready: Prepared) -> str:
 def _plates(ready: Prepared) -> str:
     plates, loads = ready.recording.plates, ready.ground.loads
     if not plates:
+        path = ready.recording.path
+        forces = None if path is None else companion_forces(path)
+        if forces is not None:
+            return f"none; --forces {forces.name} lies next to the recording."
         return "none: ground reactions follow from the motion."
     if loads is None:
         return f"{plural(len(plates), 'plate')}, their sum is used."

@@ -93,7 +93,7 @@ def closure(initial: CalibratedModel, time: Array, markers: Array, wrench: Array
     centre, acceleration, rate = found.path, found.acceleration, rate_of(time)
     axes = np.array(initial.spec.wrench_measured[:3])
     weight = initial.weighed_kg * GRAVITY_M_S2
-    need = initial.weighed_kg * (acceleration + np.array([0.0, GRAVITY_M_S2, 0.0]))
+    need = found.needed_force(initial.weighed_kg)
     ratio = _load_ratio(need[:, 1], wrench[:, 1], judged, weight, round(LASTING_S * rate))
     too_much = _too_much(need[:, 1], wrench[:, 1], judged, weight, rate)
     need *= 1.0 if ratio is None else ratio  # a mass that is somewhat wrong is no contact

@@ -14,6 +14,7 @@ from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.schema import kinds_of
 from dynakin.recordings.recording import rate_of
 from dynakin.recordings.resampling import low_pass
+from dynakin.units import GRAVITY_M_S2
 
 Array = npt.NDArray[np.float64]
 Flags = npt.NDArray[np.bool_]
@@ -43,6 +44,10 @@ class MassCentre:
     path: Array
     acceleration: Array
     known: Flags
+
+    def needed_force(self, mass_kg: float) -> Array:
+        """(T, 3) N of all that pushes the person: m (g + a)."""
+        return np.asarray(mass_kg * (self.acceleration + np.array([0.0, GRAVITY_M_S2, 0.0])))
 
 
 def mass_centre(initial: CalibratedModel, time: Array, markers: Array) -> MassCentre | None:

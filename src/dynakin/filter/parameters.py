@@ -61,11 +61,12 @@ def parameters_of(
                 skin_sd=unseen,
             )
         )
+    of_lengths = _length_units(initial)
     for length in initial.spec.parameters:
         if not length.estimated:
             value = float(length.value)
             name = f"length/{length.name}"
-            unit = _length_units(initial).get(length.name, "m")
+            unit = of_lengths.get(length.name, "m")
             found.append(
                 Parameter(name, "length", length.name, unit, value, 0.0, value, None, None, None, False, False)
             )

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from dynakin.filter.closure import smoothed
 from dynakin.filter.mass_centre import mass_centre
+from dynakin.filter.samples import in_step
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.recording import Plate, Recording, rate_of
 from dynakin.results.naming import listed
@@ -63,19 +64,22 @@ class Needed:
         found = mass_centre(initial, time, markers)
         self.time, self.rate, self.weight = time, rate_of(time), initial.weighed_kg * GRAVITY_M_S2
         self.known: Flags = np.zeros(len(time), dtype=bool) if found is None else found.known
-        acceleration = np.zeros((len(time), 3)) if found is None else found.acceleration
-        self.force: Array = initial.weighed_kg * (acceleration + np.array([0.0, GRAVITY_M_S2, 0.0]))
+        self.force = np.zeros((len(time), 3)) if found is None else found.needed_force(initial.weighed_kg)
+
+    def judged(self, force: Array) -> Flags:
+        """(T,) frames in which both this and forces (T, 3) are known."""
+        return np.asarray(self.known & np.isfinite(force).all(axis=1))
 
     def judged_s(self, force: Array) -> float:
-        """How long both this and forces (T, 3) are known."""
-        return float(np.count_nonzero(self.known & np.isfinite(force).all(axis=1)) / self.rate)
+        """How long that is."""
+        return float(np.count_nonzero(self.judged(force)) / self.rate)
 
     def misfit(self, force: Array) -> float:
         """RMS, N, of what forces (T, 3) lack beyond a constant (a mass or a zero that is off), smoothed, where both
         are known; inf where these frames are too few."""
         if not self.judged_s(force) >= _SHORTEST_S:  # a rate that is NaN, too
             return float("inf")
-        judged = self.known & np.isfinite(force).all(axis=1)
+        judged = self.judged(force)
         lacks = smoothed(np.where(judged[:, None], self.force - force, 0.0), judged, self.rate)[judged]
         return float(np.sqrt(np.sum(lacks.var(axis=0))))
 
@@ -108,11 +112,10 @@ def brought_into_step(recording: Recording, delay_s: float) -> Recording:
 
 
 def _later(time: Array, values: Array, delay_s: float) -> Array:
-    """Values (T, 3) at times so much later; NaN beyond the recording."""
+    """`in_step` of values (T, 3), but NaN beyond the recording."""
     then = time + delay_s
     inside = (then >= time[0] - 1e-9) & (then <= time[-1] + 1e-9)
-    columns = [np.interp(then, time, column) for column in values.T]
-    return np.where(inside[:, None], np.stack(columns, axis=1), np.nan)
+    return np.where(inside[:, None], in_step(time, values, delay_s), np.nan)
 
 
 def turned_axes(needed: Needed, recording: Recording, initial: CalibratedModel, known: Flags) -> str | None:

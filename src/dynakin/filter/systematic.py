@@ -116,7 +116,7 @@ LANDMARKS = Sizes(
 UNMARKED = replace(LANDMARKS, hinge_centre=0.015, hinge_axes=np.radians(6.0), pair_axes=np.radians(6.0))
 """Knees and ankles that no marker shows: on simulated squats their moments err two to five times as much
 (`docs/validation/geometry.md`)."""
-ONE_SIDED = 0.010 / 0.0042
+ONE_SIDED = 0.010 / LANDMARKS.hinge_centre
 """Times as far off as others is the centre of a knee or ankle with a lateral marker alone and no width that somebody
 measured (`docs/validation/geometry.md`)."""
 SCALED = Sizes(
@@ -145,9 +145,9 @@ def usual_sizes(calibrated: CalibratedModel) -> Sizes:
 
 def less_sure_joints(calibrated: CalibratedModel) -> dict[str, float]:
     """Segment -> how many times as far off the centre of its joint may be as those of others."""
-    turns = {f"{joint[:-2]}_angle{joint[-2:]}" for joint in calibrated.one_sided_joints}  # knee_r: knee_angle_r
-    if calibrated.unmarked_joints:
+    if calibrated.unmarked_joints:  # all are said to be as unsure
         return {}
+    turns = {f"{joint[:-2]}_angle{joint[-2:]}" for joint in calibrated.one_sided_joints}  # knee_r: knee_angle_r
     return {s.name: ONE_SIDED for s in calibrated.spec.segments if turns & {axis.coordinate for axis in s.axes}}
 
 

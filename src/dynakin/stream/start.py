@@ -186,12 +186,11 @@ def begin(
 def _continued(initial: CalibratedModel, known: Mapping[str, tuple[float, float]]) -> CalibratedModel:
     """The same model with constants as they were found before, as sure as they were."""
     x0, sd0 = initial.x0.copy(), initial.sd0.copy()
-    names = [name for name in known if name in initial.names and element(name).kind in _KINDS]
-    if not names:
+    places = {k: name for k, name in enumerate(initial.names) if name in known and element(name).kind in _KINDS}
+    if not places:
         raise ModelError("the saved parameters are another model's: none of their names is in this model")
     beyond = []
-    for name in names:
-        k = initial.names.index(name)
+    for k, name in places.items():
         value, sd = known[name]
         if initial.lower[k] <= value <= initial.upper[k]:
             x0[k], sd0[k] = value, sd

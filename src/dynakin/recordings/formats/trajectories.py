@@ -29,10 +29,10 @@ _KINK = 20.0
 _FINE, _FINEST_M = 50.0, 1e-7
 """By so many it bends half of the time it moves, or the file is too coarse to tell; a smallest step is at least as
 large, which is what single precision leaves of 1 m."""
+_LINE_FRAMES, _LINE_S, _LINE_M = 8, 0.08, 0.01
+"""How long and how far such a line is at least."""
 _MOST_REPEATED = 0.2
 """Part of the frames that may repeat others: more is another rate, written as this one."""
-_LINE_FRAMES, _LINE_S, _LINE_M = 8, 0.08, 0.01
-"""How long and how far it is at least."""
 _MOSTLY = 2.0
 """How many times as often as any other of its name a marker is seen to be the one that is meant."""
 
@@ -193,13 +193,17 @@ def _repeated(markers: Array, rate: float) -> npt.NDArray[np.bool_]:
     step = np.concatenate([[np.inf], middle])  # of half of the markers: of one it may be a rounded digit
     still = both.any(axis=1) & (seen[1:] == seen[:-1]).all(axis=1) & (np.where(both, steps, 0.0) == 0.0).all(axis=1)
     same = np.concatenate([[False], still])
-    moved = np.abs(np.diff(markers, axis=0))
-    tick = float(np.min(moved, where=moved > 1e-9, initial=np.inf))
-    least = max(_MOVES_M_S / rate, _ROUNDED * tick)
+    least = max(_MOVES_M_S / rate, _ROUNDED * _smallest_step(markers))
     found = np.zeros(len(markers), dtype=bool)
     for first, end in runs(same):
         found[first:end] = first > 1 and end < len(step) and min(step[first - 1], step[end]) > least
     return found
+
+
+def _smallest_step(places: Array) -> float:
+    """Of any coordinate (T, ...) from frame to frame, m: what the file rounds to; inf where nothing moves."""
+    steps = np.abs(np.diff(places, axis=0))
+    return float(np.min(steps, where=steps > 1e-9, initial=np.inf))
 
 
 def _straight(markers: Array, rate: float) -> npt.NDArray[np.bool_]:
@@ -213,8 +217,7 @@ def _straight(markers: Array, rate: float) -> npt.NDArray[np.bool_]:
         moving = bend[(step[1:, m] * rate > _MOVES_M_S) & np.isfinite(bend[:, m]), m]
         if len(moving) < _LINE_FRAMES:
             continue
-        moved = np.abs(np.diff(markers[:, m], axis=0))
-        tick = max(float(np.min(moved, where=moved > 1e-9, initial=np.inf)), _FINEST_M)
+        tick = max(_smallest_step(markers[:, m]), _FINEST_M)
         if not float(np.median(moving)) > _FINE * tick:
             continue
         with np.errstate(invalid="ignore"):

@@ -22,6 +22,7 @@ _SAID_ELSEWHERE = (
     "tilt and rotation cannot be separated",
     " clamps them",
 )
+_SUBJECT = ("mass ", "height ")
 # Longest time, s, without any marker of a segment over which its motion is carried on: by truth a foot in a walk is 20
 # to 30 deg off after 0.3 s.
 UNSEEN_S = 0.2
@@ -68,21 +69,24 @@ def unmarked(estimate: Estimate, metrics: Metrics) -> Insight | None:
 def warned(estimate: Estimate, metrics: Metrics) -> list[Insight]:
     """What the reading, the calibration and the plates warned of, and no other finding says."""
     warnings = [text.removeprefix("Warning: ") for text in estimate.messages if text.startswith("Warning: ")]
-    elsewhere = {text for text in warnings if doubts_mass(text) or any(part in text for part in _SAID_ELSEWHERE)}
-    warnings = [text for text in dict.fromkeys(warnings) if text not in elsewhere]
+    warnings = [text for text in dict.fromkeys(warnings) if not (doubts_mass(text) or _said_elsewhere(text))]
     found = []
     for title, advice, belongs in (
-        ("Subject", "subject", lambda text: text.startswith(("mass ", "height "))),
+        ("Subject", "subject", lambda text: text.startswith(_SUBJECT)),
         ("Force plates", "plates", lambda text: "plate" in text),
         ("Recording", "recording", lambda text: True),
     ):
         own = [text for text in warnings if belongs(text)]
         warnings = [text for text in warnings if text not in own]
-        if title == "Subject":
-            own = [text for text in own if " assumed, " in text]  # one that was measured is said, and no doubt
         if own:
             found.append(Insight("warning", title, " ".join(sentence(text) for text in own), ADVICE[advice]))
     return found
+
+
+def _said_elsewhere(text: str) -> bool:
+    """A mass or height that was measured is no doubt, either."""
+    measured = text.startswith(_SUBJECT) and " assumed, " not in text
+    return measured or any(part in text for part in _SAID_ELSEWHERE)
 
 
 def missing(estimate: Estimate, metrics: Metrics) -> Insight | None:
@@ -104,9 +108,9 @@ def missing(estimate: Estimate, metrics: Metrics) -> Insight | None:
 
 def _unseen(estimate: Estimate) -> dict[str, str]:
     """Segments, and the times in which none of their markers is seen although some are at other times."""
-    carriers = dict(zip(estimate.marker_names, (site for _, site in marker_sites(estimate)), strict=True))
+    segments = estimate.marker_segments
+    owners = np.array([segments.get(site, "") for _, site in marker_sites(estimate)])
     seen = np.isfinite(estimate.data["markers_measured"].transpose("time", "marker", "axis").values).any(axis=2)
-    owners = np.array([estimate.marker_segments.get(carriers[name], "") for name in estimate.marker_names])
     found: dict[str, str] = {}
     for segment in dict.fromkeys(owners[owners != ""]):
         hidden = ~seen[:, owners == segment].any(axis=1)
