@@ -85,6 +85,36 @@ def test_plates_with_a_reversed_axis_are_refused(turn: list[float], which: int |
         person().prepare(with_forces(walk, lambda force: force * signs, which))
 
 
+@pytest.mark.parametrize(
+    ("matrix", "said"),
+    [
+        (np.diag([1.0, -1.0]), r"if its (first|second) axis \(.* points the other way"),
+        (-np.eye(2), "if (its .* points the other way|both horizontal axes .*half a turn)"),
+        (np.array([[0.0, -1.0], [1.0, 0.0]]), "if the horizontal axes are turned by a quarter turn"),
+    ],
+)
+def test_feet_that_push_against_each_other_show_the_axes_though_their_sum_does_not(
+    matrix: np.ndarray, said: str
+) -> None:
+    """Only the lateral force, which a squat's centre of mass does not need."""
+    squat = simulate("fullbody", "squat", 7, 8.0).recording
+    person().prepare(squat)  # as it is nothing is wrong
+    up = int(np.argmax(np.abs(squat.plates[0].force).mean(axis=0)))
+    level = [k for k in range(3) if k != up]
+    mean = squat.plates[0].force[:, level].mean(axis=0)
+    assert abs(mean[1]) > 5.0 * abs(mean[0])  # the second is the lateral one
+
+    def change(force: np.ndarray) -> np.ndarray:
+        lateral = np.zeros_like(force)
+        lateral[:, level[1]] = force[:, level[1]]
+        changed = force - lateral
+        changed[:, level] += lateral[:, level] @ matrix.T
+        return changed
+
+    with pytest.raises(RecordingError, match=rf"plate 1 and plate 2 lies .* deg off the direction.*{said}"):
+        person().prepare(with_forces(squat, change))
+
+
 def test_a_quarter_turn_is_named(data_dir: Path) -> None:
     folder = data_dir / "opencap_subject4"
     walk = dynakin.read(folder / "walking1.trc", folder / "walking1_grf.mot")

@@ -13,7 +13,7 @@ from dynakin.errors import RecordingError
 from dynakin.filter.closure import Closure, closure
 from dynakin.filter.declared import bearing, may_bear
 from dynakin.filter.expected import ContactPaths
-from dynakin.filter.plate_motion import Needed, brought_into_step, plates_delay, turned_axes
+from dynakin.filter.plate_motion import Needed, brought_into_step, out_of_step_in_words, plates_delay, turned_axes
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.checks import PlateCheck, check_plates
 from dynakin.recordings.feet import loads as on_plates
@@ -133,7 +133,7 @@ def known_ground(
         raise RecordingError(f"{recording.path or recording.name}: {check.refusal}")
     if loads is not None:
         needed = Needed(initial, recording.time, markers)
-        if wrong := turned_axes(needed, recording, initial, loads.total_known):
+        if wrong := turned_axes(needed, recording.plates, initial, loads.total_known):
             source = recording.read_with.get("forces") or recording.path or recording.name
             raise RecordingError(f"{source}: {wrong}")
         delay = None if in_step else plates_delay(needed, np.where(loads.total_known[:, None], wrench[:, :3], np.nan))
@@ -211,11 +211,7 @@ def _brought_into_step(
     there = brought_into_step(recording, delay_s)
     wrench = initial.ground.wrench_to_ground(there.total_wrench())
     ground, known = known_ground(there, initial, markers, wrench, assigned, tolerance, in_step=True)
-    where = "behind" if delay_s > 0.0 else "ahead of"
-    text = (
-        f"By the motion of the centre of mass the plates are {1000.0 * abs(delay_s):.0f} ms {where} the markers; they "
-        "were brought into step."
-    )
+    text = f"{out_of_step_in_words(delay_s)}; they were brought into step."
     return replace(ground, notes=(text, *ground.notes)), known
 
 

@@ -71,6 +71,8 @@ class Fusion:
         self._head: tuple[float, MarkerPacket] | None = None
         self._marker_arrived = self._plate_arrived = -np.inf
         self._last_s: float | None = None
+        self.plates_behind_s = 0.0
+        """By how much the plates lag behind the markers: what they say so much later is of a frame."""
         self.without_plates = 0  # frames that went without the wrench though plates were declared
 
     @property
@@ -185,7 +187,14 @@ class Fusion:
     def _plates_ready(self, time_s: float, arrived_s: float, now_s: float) -> bool:
         if self._resampled is None or self._offset_s is None:
             return True
-        return self._resampled.covers(time_s) or self.plates_silent(now_s) or now_s - arrived_s >= self.delay_s
+        covered = self._resampled.covers(time_s + self.plates_behind_s)
+        longest = self.delay_s + max(self.plates_behind_s, 0.0)
+        return covered or self.plates_silent(now_s) or now_s - arrived_s >= longest
+
+    def _wrenches_at(self, time_s: float) -> Array | None:
+        if self._resampled is None or self._offset_s is None:
+            return None
+        return self._resampled.at(time_s + self.plates_behind_s)
 
     def _plates_alone(self) -> list[Fused]:
         """Samples without markers, at the markers' rate, as far as the plates reach."""
@@ -195,7 +204,7 @@ class Fusion:
             return found
         missing = np.full((len(self.markers.names), 3), np.nan)
         while self._resampled.newest_s - (time := self._last_s + self.period_s) > self.delay_s:
-            if self._resampled.at(time) is None:
+            if self._wrenches_at(time) is None:
                 break
             found.append(self._fused(time, missing, self._plate_arrived))
             self._frames.skip_to(time)
@@ -204,7 +213,7 @@ class Fusion:
     def _fused(self, time_s: float, positions: Array, arrived_s: float) -> Fused:
         wrenches = None
         if self._resampled is not None and self.plates is not None:
-            wrenches = self._resampled.at(time_s) if self._offset_s is not None else None
+            wrenches = self._wrenches_at(time_s)
             if wrenches is not None:  # an empty plate, as offline
                 idle = np.linalg.norm(wrenches[:, :3], axis=1) < UNLOADED_N
                 wrenches = (

@@ -27,14 +27,14 @@ class Monitor:
     """What a session's status shows, kept cheap: a step pays for some sums only.
 
     Args:
-        plates: whether there are plates. used: whether the filter takes them. holds: whether the filter holds a motion
-            that it does not see, instead of carrying it on.
+        plates: whether there are plates. used: whether the filter takes them, for as long as it does. holds: whether it
+            holds a motion that it does not see, instead of carrying it on.
     """
 
     def __init__(self, initial: CalibratedModel, rate_hz: float, plates: bool, used: bool, holds: bool = True) -> None:
         self.initial, self.rate_hz = initial, rate_hz
         self.last = Status(phase="running")
-        self._plates, self._used, self._holds = plates, used, holds
+        self._plates, self.used, self._holds = plates, used, holds
         self._recent: deque[tuple[float, float]] = deque()
         kinds = [element(name).kind for name in initial.names]
         self._constants = np.flatnonzero([kind in ("length", "inertia") for kind in kinds])
@@ -70,7 +70,7 @@ class Monitor:
         if self._plates:
             others = "left out" if whole else "incomplete"
             plates = {"accepted": "used" if whole else "incomplete", "refused": "refused"}.get(verdicts[-1], others)
-            on_plates = "silent" if fused.wrenches is None else plates if self._used else "left out"
+            on_plates = "silent" if fused.wrenches is None else plates if self.used else "left out"
         at = [k for k in self._bounded if not self.initial.lower[k] < state[k] < self.initial.upper[k]]
         recent = self._recent
         rows = 0 if report is None else report.n_rows
@@ -170,4 +170,4 @@ class Monitor:
             return "the motion is held until they are back"
         if not self._plates or fusion.plates_silent(now_s):
             return "the estimate waits for them"
-        return "going on with plates alone" if self._used else "the movement is only predicted meanwhile"
+        return "going on with plates alone" if self.used else "the movement is only predicted meanwhile"

@@ -7,9 +7,11 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
+import numpy.typing as npt
 
 from dynakin.errors import DivergenceError, DynakinError, ModelError, StreamError
 from dynakin.filter.estimator import Estimator
+from dynakin.filter.plate_motion import out_of_step_in_words
 from dynakin.filter.samples import Sample, sample_arrays
 from dynakin.filter.tracker import Tracker, live_lag
 from dynakin.recordings.recording import Recording
@@ -17,10 +19,13 @@ from dynakin.settings.defaults import DELAY_S
 from dynakin.stream.feet import LiveFeet
 from dynakin.stream.fusion import Fused, Fusion
 from dynakin.stream.monitor import Monitor
+from dynakin.stream.plate_motion import LivePlateMotion
 from dynakin.stream.sinks.base import LiveFrame, Sink, Started, Status
 from dynakin.stream.sources.packets import Source
 from dynakin.stream.sources.reader import Notice, Reader
 from dynakin.stream.start import begin, check_labels, quietest, recording_of, stands, unknown_mass
+
+Array = npt.NDArray[np.float64]
 
 _POLL_S = 0.005
 _ASK_S = 0.1  # how often sinks are asked for wishes, and the standing person is looked at
@@ -82,6 +87,7 @@ class Live:
         self._monitor: Monitor | None = None
         self._use_plates = True
         self._feet: LiveFeet | None = None
+        self._plate_motion: LivePlateMotion | None = None
         self._running = False
         self._labels_checked = False
         self._subject: dict[str, float] = {}
@@ -315,9 +321,10 @@ class Live:
         plates = self.fusion.plates is not None
         rate, holds = self.fusion.markers.rate_hz, self.estimator.noise.recover
         self._monitor = Monitor(initial, rate, plates, plates and self._use_plates, holds)
-        self._feet = None
+        self._feet = self._plate_motion = None
         if initial.feet:  # without plates too: what depends on the ground is then a prior
             names = () if self.fusion.plates is None else self.fusion.plates.names
+            self._plate_motion = LivePlateMotion(initial, names) if plates and self._use_plates else None
             self._feet = LiveFeet(initial, self.estimator.noise, names, self.estimator.plates)
         self._running = True
         self._ready_s = time.monotonic()
@@ -335,6 +342,8 @@ class Live:
             wrenches = fused.wrenches if self._use_plates else None
             markers, _ = sample_arrays(sample, tracker.calibrated)
             feet, whole = self._feet.look(tracker.core_model, tracker.state, sample.time_s, wrenches, markers)
+            if self._plate_motion is not None and wrenches is not None:
+                self._ask_plates(self._plate_motion, sample.time_s, markers, wrenches, whole)
         if not (whole and self._use_plates):
             sample = Sample(sample.time_s, sample.markers)
         try:
@@ -361,6 +370,19 @@ class Live:
         motion = monitor.motion(estimate, fused)
         for text in [*news, *motion, *monitor.settling(sample.time_s, state, tracker)]:
             self.say(text)
+
+    def _ask_plates(self, asked: LivePlateMotion, time_s: float, markers: Array, wrenches: Array, whole: bool) -> None:
+        """Plates out of step are brought into it; of plates with other axes nothing is taken any more."""
+        if not asked.look(time_s, markers, wrenches, whole):
+            return
+        if asked.turned is not None:
+            self.say(f"Warning: {asked.turned}. The plates are not used any more.")
+            self._use_plates, self._plate_motion = False, None
+            assert self._monitor is not None
+            self._monitor.used = False
+        elif asked.delay_s is not None:
+            self.fusion.plates_behind_s += asked.delay_s
+            self.say(f"{out_of_step_in_words(asked.delay_s)}; from {time_s:.2f} s on they are brought into step.")
 
     def say(self, text: str) -> None:
         """Say something to the user."""

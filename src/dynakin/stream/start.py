@@ -73,11 +73,11 @@ def recording_of(
     none = np.full((len(plates), 6), np.nan)
     wrenches = np.stack([none if one.wrenches is None else one.wrenches for one in fused])
     up = axis_vector(find_vertical(made, DEFAULT_PAIRS)[0])
-    return made.with_plates(tuple(_plate(name, wrenches[:, k], up) for k, name in enumerate(plates)))
+    return made.with_plates(tuple(floor_plate(name, wrenches[:, k], up) for k, name in enumerate(plates)))
 
 
-def _plate(name: str, wrench: np.ndarray, up: np.ndarray) -> Plate:
-    """A plate that lies in the floor, through the laboratory's origin: streams give no corners."""
+def floor_plate(name: str, wrench: np.ndarray, up: np.ndarray) -> Plate:
+    """A plate of wrenches (T, 6) that lies in the floor, through the laboratory's origin: streams give no corners."""
     floor = Surface(np.zeros(3), up)
     with np.errstate(invalid="ignore"):
         return plate_from_wrench(

@@ -1,0 +1,79 @@
+"""Are the plates in step with the markers, and are their axes right? What `filter.plate_motion` asks of a recording, of
+the last seconds of a session."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+
+import numpy as np
+import numpy.typing as npt
+
+from dynakin.filter.plate_motion import Needed, plates_delay, turned_axes
+from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.recordings.orientation import axis_vector
+from dynakin.stream.start import floor_plate
+
+Array = npt.NDArray[np.float64]
+
+WINDOW_S, EVERY_S = 8.0, 4.0
+"""The last seconds are asked, and how often: some 40 ms of computing."""
+LEAST_S = 0.5
+"""So much of them must be known: less may have come about by chance."""
+_STEP_S = 0.0095
+"""No more than some 100 frames a second are kept: forces of the body's mass are below 6 Hz."""
+_REMEDY = "Correct the plates' axes in the capture system"
+
+
+class LivePlateMotion:
+    """Keeps what was measured of late, and asks it.
+
+    Attributes:
+        delay_s: by how much the plates lag behind the markers as they come now, s; None where that is not known or they
+            are in step. turned: a sentence where their axes are others.
+    """
+
+    def __init__(self, initial: CalibratedModel, plates: Sequence[str]) -> None:
+        self._initial, self._plates = initial, tuple(plates)
+        self._kept: deque[tuple[float, Array, Array, bool]] = deque()
+        self._asked_s: float | None = None
+        self.delay_s: float | None = None
+        self.turned: str | None = None
+
+    def look(self, time_s: float, markers: Array, wrenches: Array, whole: bool) -> bool:
+        """The next frame; whether something was found.
+
+        Args:
+            markers: (M, 3) m, of the model, ground frame, NaN missing. wrenches: (P, 6) N and N m, laboratory frame.
+            whole: whether their sum is all that bears the person.
+        """
+        if self._kept and 0.0 <= time_s - self._kept[-1][0] < _STEP_S:
+            return False
+        if self._kept and time_s < self._kept[-1][0]:
+            self._kept.clear()
+        self._kept.append((time_s, markers, wrenches, whole))
+        while time_s - self._kept[0][0] > WINDOW_S:
+            self._kept.popleft()
+        if self._asked_s is None or time_s < self._asked_s:
+            self._asked_s = time_s
+        if time_s - self._asked_s < EVERY_S:
+            return False
+        self._asked_s = time_s
+        self.delay_s, self.turned = self._ask()
+        if self.delay_s is not None:
+            self._kept.clear()  # of plates as they came until now
+        return self.delay_s is not None or self.turned is not None
+
+    def _ask(self) -> tuple[float | None, str | None]:
+        time = np.array([at for at, *_ in self._kept])
+        known = np.array([whole for *_, whole in self._kept])
+        needed = Needed(self._initial, time, np.stack([markers for _, markers, _, _ in self._kept]))
+        wrenches = np.stack([wrenches for _, _, wrenches, _ in self._kept])  # (T, P, 6)
+        total = self._initial.ground.vectors_to_ground(wrenches[:, :, :3].sum(axis=1))
+        total = np.where(known[:, None], total, np.nan)
+        if not needed.judged_s(total) >= LEAST_S:
+            return None, None
+        up = axis_vector(self._initial.ground.vertical)
+        plates = [floor_plate(name, wrenches[:, p], up) for p, name in enumerate(self._plates)]
+        turned = turned_axes(needed, plates, self._initial, known, _REMEDY)
+        return (None if turned else plates_delay(needed, total)), turned

@@ -1,0 +1,75 @@
+"""A session asks whether plates are in step and have the right axes, as a recording is asked."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+import dynakin
+from dynakin.filter.plate_motion import brought_into_step
+from dynakin.recordings.recording import Plate, Recording
+from dynakin.simulation.trial import simulate
+from dynakin.stream.session import Live
+from dynakin.stream.sinks.base import Callback, LiveFrame
+from dynakin.stream.sources.replay import Replay
+
+
+@cache
+def squat() -> Recording:
+    return simulate("fullbody", "squat", 7, 9.0).recording
+
+
+def session(recording: Recording) -> tuple[list[LiveFrame], list[str], Live]:
+    frames: list[LiveFrame] = []
+    said: list[str] = []
+    subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
+    estimator = dynakin.Estimator(dynakin.load_model("fullbody", subject))
+    source = Replay(recording, speed=0.0)
+    live = Live(estimator, [source], [Callback(frames.append)], standing_s=1.0, say=said.append)
+    live.run()
+    return frames, said, live
+
+
+@cache
+def as_it_is() -> tuple[list[LiveFrame], list[str], Live]:
+    return session(squat())
+
+
+def test_plates_in_step_are_left_alone() -> None:
+    frames, said, live = as_it_is()
+    assert live.fusion.plates_behind_s == 0.0 and not any("centre of mass" in text for text in said)
+    assert frames[-1].status.plates == "used"
+
+
+@pytest.mark.parametrize("delay_s", [0.04, -0.03])
+def test_plates_that_are_late_are_brought_into_step(delay_s: float) -> None:
+    frames, said, live = session(brought_into_step(squat(), -delay_s))
+    (text,) = [text for text in said if "centre of mass" in text]
+    side = "behind" if delay_s > 0.0 else "ahead of"
+    (at,) = re.findall(rf"ms {side} the markers; from ([0-9.]+) s on they are brought into step", text)
+    assert live.fusion.plates_behind_s == pytest.approx(delay_s, abs=0.003)
+    whole = {round(frame.fused.sample.time_s, 4): frame.fused.wrenches for frame in as_it_is()[0]}
+    after = [frame.fused for frame in frames if frame.fused.sample.time_s > float(at) + 0.2]
+    assert len(after) > 200
+    apart = [one.wrenches - whole[round(one.sample.time_s, 4)] for one in after if one.wrenches is not None]
+    assert len(apart) > 0.9 * len(after) and np.abs(np.stack(apart)[:, :, :3]).mean() < 3.0
+
+
+def test_plates_with_other_axes_are_left_out_from_then_on() -> None:
+    whole = squat()
+    up = int(np.argmax(np.abs(whole.plates[0].force).mean(axis=0)))
+    signs = np.where(np.arange(3) == up, 1.0, -1.0)
+
+    def half_a_turn(plate: Plate) -> Plate:
+        force = plate.force * signs
+        moment = np.cross(np.nan_to_num(plate.cop), force) + plate.free_moment
+        return replace(plate, force=force, moment=moment)
+
+    frames, said, _ = session(whole.with_plates(tuple(half_a_turn(plate) for plate in whole.plates)))
+    (text,) = [text for text in said if "horizontal force" in text]
+    assert text.startswith("Warning: ") and "capture system" in text and "not used any more" in text
+    assert frames[100].status.plates == "used" and frames[-1].status.plates == "left out"
