@@ -18,8 +18,8 @@ Array = npt.NDArray[np.float64]
 
 WINDOW_S, EVERY_S = 8.0, 4.0
 """The last seconds are asked, and how often: some 40 ms of computing."""
-LEAST_S = 0.5
-"""So much of them must be known: less may have come about by chance."""
+LEAST_S = 1.0
+"""So much of them must be judged: by half of it a walk in step was 10 ms late."""
 _STEP_S = 0.0095
 """No more than some 100 frames a second are kept: forces of the body's mass are below 6 Hz."""
 _REMEDY = "Correct the plates' axes in the capture system"
