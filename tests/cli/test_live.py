@@ -110,3 +110,16 @@ def test_what_is_wrong_is_said_in_one_line(arguments: list[str], words: str, tmp
     assert main(["live", *finish]) == 2
     said = capsys.readouterr().err
     assert words in said and said.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (["--delay", "-1"], "--delay is -1, expected seconds, more than 0"),
+        (["--standing-wait", "nan"], "--standing-wait is nan"),
+        (["--port", "99999"], "--port is 99999, expected 1 to 65535"),
+    ],
+)
+def test_numbers_that_cannot_be_are_refused(words: list[str], said: str, capsys: Said) -> None:
+    assert main(["live", "--source", "simulate:squat,duration=5,speed=0", *words]) == 2
+    assert said in " ".join(capsys.readouterr().err.replace("│", " ").split())

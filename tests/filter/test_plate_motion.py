@@ -111,7 +111,9 @@ def test_feet_that_push_against_each_other_show_the_axes_though_their_sum_does_n
         changed[:, level] += lateral[:, level] @ matrix.T
         return changed
 
-    with pytest.raises(RecordingError, match=rf"plate 1 and plate 2 lies .* deg off the direction.*{said}"):
+    with pytest.raises(
+        RecordingError, match=rf"plate 1 and plate 2 pushes the feet apart or across: it lies .* deg off .*{said}"
+    ):
         person().prepare(with_forces(squat, change))
 
 

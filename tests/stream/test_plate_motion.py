@@ -70,6 +70,19 @@ def test_plates_with_other_axes_are_left_out_from_then_on() -> None:
         return replace(plate, force=force, moment=moment)
 
     frames, said, _ = session(whole.with_plates(tuple(half_a_turn(plate) for plate in whole.plates)))
-    (text,) = [text for text in said if "horizontal force" in text]
-    assert text.startswith("Warning: ") and "capture system" in text and "not used any more" in text
+    (text,) = [text for text in said if "not used any more" in text]
+    assert text.startswith("Warning: the horizontal force of plate 1 and plate 2") and "capture system" in text
     assert frames[100].status.plates == "used" and frames[-1].status.plates == "left out"
+
+
+def test_a_mass_that_the_plates_contradict_is_said_once() -> None:
+    """At the start, of who stands on them; and later, of who did not."""
+    heavy = tuple(replace(p, force=1.09 * p.force, moment=1.09 * p.moment) for p in squat().plates)
+    _, said, _ = session(squat().with_plates(heavy))
+    assert len([text for text in said if "the plates carry" in text and "check the mass" in text]) >= 1
+    late = tuple(
+        replace(p, force=np.where(squat().time[:, None] > 2.5, p.force, 0.0)) for p in heavy
+    )  # nobody has stood on them
+    _, said, _ = session(squat().with_plates(late))
+    (text,) = [text for text in said if "check the mass" in text]
+    assert "Warning: the plates carry 76." in text and "weighs 70.0 kg" in text

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import time
 from collections.abc import Callable
 from dataclasses import replace
@@ -109,6 +110,21 @@ def test_half_of_the_markers_gone_for_three_seconds(squat: Recording) -> None:
     last = np.rad2deg(frames[-1].estimate.coordinates - whole[-1].estimate.coordinates)
     assert np.abs(last).max() < 3.0  # once they are back; in between a segment without markers is only guessed
     assert all(np.isfinite(f.estimate.coordinates).all() for f in frames)
+
+
+@pytest.mark.parametrize("blank", [np.nan, 0.0])
+def test_while_the_motion_is_lost_moments_are_absent(squat: Recording, blank: float) -> None:
+    """Zeros in all three places are some systems' word for missing."""
+    markers = squat.markers.copy()
+    markers[(squat.time > 4.0) & (squat.time < 6.0)] = blank
+    frames, said, _ = run(Replay(replace(squat, markers=markers), speed=0.0), lag_s=0.0)
+    lost = [frame for frame in frames if frame.status.tracking in ("doubtful", "lost", "restarted")]
+    assert len(lost) > 100
+    for frame in lost:
+        assert np.isnan(frame.estimate.moments).all() and (np.array(frame.estimate.moment_sources) == 3).all()
+    sure = [frame for frame in frames if frame.status.tracking == "following"]
+    assert len(sure) > 200 and all(np.isfinite(frame.estimate.moments).any() for frame in sure)
+    assert re.fullmatch(rf"Of {len(frames)} frames: {len(lost)} with the motion lost\.", said[-1])
 
 
 class Edited(Replay):

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gc
 from datetime import datetime
+from math import inf
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -27,8 +28,8 @@ if TYPE_CHECKING:
     from dynakin.stream.sources.replay import Replay
 
 # Seconds of standing that are asked for, and how long they are waited for.
-_LIVE_STANDING_S, _REPLAY_STANDING_S, _SHORT_STANDING_S = (2.0, 20.0), (2.0, 3.0), (0.4, 0.4)
-_SHORT_S = 6.0
+_LIVE_STANDING_S, _REPLAY_STANDING_S = (2.0, 20.0), (2.0, 3.0)
+_SHORT_S, _SHORT_STANDING_S = 6.0, 0.4
 
 
 @with_settings(
@@ -100,6 +101,11 @@ def live(
         raise typer.BadParameter(
             "--source is missing, expected simulate:squat, replay:FILE, lsl:NAME, qtm:HOST or a plug-in's KIND:..."
         )
+    for option, seconds in (("--delay", delay), ("--standing-wait", standing_wait)):
+        if seconds is not None and not 0.0 < seconds < inf:
+            raise typer.BadParameter(f"{option} is {seconds:g}, expected seconds, more than 0")
+    if not 0 < port < 65536:
+        raise typer.BadParameter(f"--port is {port}, expected 1 to 65535")
     static = given.pop("static", None)
     if parameters is not None and parameters.suffix.casefold() == ".toml":
         given["parameters"], parameters = str(parameters.absolute()), None
@@ -133,8 +139,8 @@ def live(
     try:
         session.run()
     except KeyboardInterrupt:
-        out().print("Stopped.")
-    if session.failures:
+        out().print("Stopped." if session.measured else "Stopped before anybody was measured.")
+    if session.failures or not session.measured:
         raise typer.Exit(1)
     if record is not None:
         out().print(f"Recorded in {record}; results from it: dynakin live --finish {record} -o OUT", soft_wrap=True)
@@ -147,7 +153,9 @@ def _for_replay(replay: Replay, address: str, again: bool) -> tuple[float, float
         replay.loop = True
         out().print("Played again and again until Ctrl-C (loop=no: once).")
     length = replay.recording.time[-1] - replay.recording.time[0]
-    return _SHORT_STANDING_S if length < _SHORT_S else _REPLAY_STANDING_S
+    if length >= _SHORT_S:
+        return _REPLAY_STANDING_S
+    return _SHORT_STANDING_S, max(_SHORT_STANDING_S, 0.5 * length)
 
 
 def _sources(source: str, forces: str | None) -> list[Any]:

@@ -21,6 +21,7 @@ from dynakin.filter.noise import marker_variance, soft_tissue_sd
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet.contact import UNMEASURED
 from dynakin.results.measures.sources import MEASURED, PRIOR, moment_sources
+from dynakin.results.records import MISPLACED
 from dynakin.settings.noise import Noise
 
 if TYPE_CHECKING:
@@ -432,9 +433,9 @@ class Systematic:
         if not moved_m > self.sizes.placed * MISFIT:
             return []
         return [
-            f"Markers lie {1000.0 * moved_m:.0f} mm (mean) from where the model has them, of a model that fits the "
-            f"person at most {1000.0 * self.sizes.placed:.0f} mm: the centres of its joints count as "
-            f"{moved_m / self.sizes.placed:.1f} times less sure. Scale the model to the person, or take fullbody."
+            f"Warning: {MISPLACED} {1000.0 * moved_m:.0f} mm (mean) from where the model has them, of a model that "
+            f"fits the person at most {1000.0 * self.sizes.placed:.0f} mm: the centres of its joints count as "
+            f"{moved_m / self.sizes.placed:.1f} times less sure, and axes that are turned as well do not."
         ]
 
     def intensity(self, data: xr.Dataset) -> Array:

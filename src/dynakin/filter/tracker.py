@@ -23,7 +23,7 @@ from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.progress import Progress
 from dynakin.recordings.feet.contact import UNMEASURED
 from dynakin.results.measures.sources import ABSENT, MEASURED
-from dynakin.results.records import NOT_SMOOTHED
+from dynakin.results.records import NO_ESTIMATE, NOT_SMOOTHED
 from dynakin.settings.lag import ALL_FRAMES, LIVE_LAG_S, check_lag
 from dynakin.settings.model import QUANTITIES, Quantity
 from dynakin.settings.noise import Noise
@@ -156,6 +156,8 @@ class Tracker:
             raise DivergenceError(f"the filter diverged at {sample.time_s} s: {report.status}")
         self._time = sample.time_s
         sources = self._sources.moments(feet)[0]
+        if report.tracking in NO_ESTIMATE:
+            sources = np.full_like(sources, ABSENT)
         unmeasured = feet is not None and bool((feet.contact == UNMEASURED).any())
         blind = feet is not None and bool(feet.blind.any())
         self._off_plates |= feet is not None and stands_off_plates(feet.contact, len(self.calibrated.feet))

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from itertools import combinations, pairwise
+from itertools import pairwise
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from dynakin.recordings.feet.contact import NEAR_M, foot_places
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
+from dynakin.recordings.plates.axes import turned_feet
 from dynakin.recordings.plates.limits import beyond_limits
 from dynakin.recordings.plates.pressure import JUDGED_N
 from dynakin.recordings.recording import Array, Plate, Recording
@@ -32,10 +33,6 @@ MASS_REFUSED_KG = (5.0, 400.0)
 COP_REFUSED_M = 0.30
 """Centre of pressure outside the outline of the markers of the nearest foot, from which the plate's place or unit must
 be wrong. From `NEAR_M` on it is said."""
-APART_WARNING, APART_FRAMES, APART_S = 0.03, 0.95, 0.5
-"""Forces on two plates that push the feet apart: by which part of the load, in which part of the frames, for how long.
-Legs push outwards, so the ground pushes the feet together: by 0.07 to 0.2 of the load in all frames of all of our
-recordings, standing, squatting and in double support."""
 TILT_WARNING_DEG = 10.0
 """Standing force against the vertical; flat standing gives 1 to 3 deg."""
 OVER_EDGE_M = 0.01
@@ -138,8 +135,8 @@ def check_plates(
             findings.warn(f"{under[foot]} and {plate.name} both have their centre of pressure under the {foot} foot.")
         if foot:
             under[foot] = plate.name
-    for one, other in combinations(recording.plates, 2):
-        _check_together(one, other, recording, ground, findings)
+    if turned := turned_feet(recording.plates, ground, recording.rate):
+        findings.warn(f"{turned}.")
     refusal = "; ".join(findings.refusals) or None
     ok = refusal is None and not any(text.startswith("Warning:") for text in findings.messages)
     standing_mass, mean_mass = (mass, None) if standing is not None else (None, mass)
@@ -309,27 +306,6 @@ def _check_pressure(
     else:
         findings.warn(f"{text}, expected at most {1000 * NEAR_M:.0f} mm.")
     return None
-
-
-def _check_together(one: Plate, other: Plate, recording: Recording, ground: GroundFrame, findings: _Findings) -> None:
-    """Whether two plates that stand side by side have been exchanged: each one's forces at the other's place.
-
-    With feet alike loaded, centres of pressure and total wrench hardly show it; that the feet are pushed apart does.
-    """
-    forces = [np.nan_to_num(ground.vectors_to_ground(plate.force)) for plate in (one, other)]
-    apart = ground.points_to_ground(other.cop) - ground.points_to_ground(one.cop)
-    both = (forces[0][:, 1] > JUDGED_N) & (forces[1][:, 1] > JUDGED_N) & np.isfinite(apart).all(axis=1)
-    if recording.n_frames < 2 or np.count_nonzero(both) < APART_S * recording.rate:
-        return
-    along = apart[both][:, [0, 2]]
-    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-9)
-    outwards = 0.5 * ((forces[1] - forces[0])[both][:, [0, 2]] * along).sum(axis=1)
-    load = 0.5 * float((forces[0] + forces[1])[both, 1].mean())
-    if np.mean(outwards > 0.0) > APART_FRAMES and outwards.mean() > APART_WARNING * load:
-        findings.warn(
-            f"{one.name} and {other.name} push the feet apart, with {outwards.mean():.0f} N each on average over "
-            f"{len(outwards)} frames, expected to push them together: have the two plates been exchanged?"
-        )
 
 
 def _check_free_moment(plate: Plate, loaded: np.ndarray, ground: GroundFrame, findings: _Findings) -> None:

@@ -16,6 +16,10 @@ TRACKING = ("following", "doubtful", "lost", "found", "restarted")
 """Words of the core's tracking states, by their number."""
 FOLLOWING = TRACKING.index("following")
 """Value of tracking where nothing is wrong."""
+NO_ESTIMATE = ("doubtful", "lost", "restarted")
+"""Those of a frame whose numbers are no estimate."""
+MISPLACED = "markers lie"
+"""How the warning begins of a model that does not fit the person."""
 NOT_SMOOTHED = "Not smoothed:"
 """How the message begins of a run whose settings have no smoother."""
 _MASS_DOUBTED = ("check the mass", "the mass is wrong")

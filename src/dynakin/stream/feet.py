@@ -94,6 +94,8 @@ class LiveFeet:
         self._owners = np.zeros((F, P), dtype=bool)  # of the plates that are pressed
         self._range = _Range(P)
         self._closure: LiveClosure | None = None
+        self.claimed = False
+        """Whether in the last frame the plates carried all of the person by what feet and plates show."""
         self._said: set[str] = set()
         self._to_say: list[str] = []
 
@@ -124,6 +126,7 @@ class LiveFeet:
         self._highest = max(self._highest, float(paths[0, 0, 1]))
         bears = may_bear(self.initial, paths, self._lowest, self._highest - self._lowest)
         bears &= ~np.array([name in loads.others for name in self.initial.contacts], dtype=bool)
+        self.claimed = bool(loads.total_known[0] and not bears.any())
         if markers is not None and wrenches is not None:
             loads = self._closed(loads, time_s, np.where(np.isfinite(markers), markers, places), wrenches, bears)
         undeclared = loads.elsewhere & (wrenches is not None)

@@ -121,7 +121,8 @@ class Fusion:
             self._frames.counts.invalid += 1
             return
         seen = (np.abs(packet.positions) <= FARTHEST_M).all(axis=1, keepdims=True)
-        positions = np.where(seen, packet.positions, np.nan)  # infinite, say: some systems' word for missing
+        seen &= packet.positions.any(axis=1, keepdims=True)
+        positions = np.where(seen, packet.positions, np.nan)  # infinite or 0, 0, 0: some systems' words for missing
         self._frames.push(time, time, packet.arrived_s, MarkerPacket(time, positions, packet.arrived_s))
 
     def _push_plates(self, packet: PlatePacket) -> None:

@@ -13,6 +13,8 @@ from dynakin.elements import element
 from dynakin.filter.step import StepEstimate
 from dynakin.filter.tracker import Tracker
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.results.naming import listed
+from dynakin.results.records import NO_ESTIMATE
 from dynakin.stream.fusion import Fused, Fusion
 from dynakin.stream.sinks.base import Status
 
@@ -44,6 +46,7 @@ class Monitor:
         self._silent = {"markers": False, "plates": False}
         self._restarts = 0
         self.left_out = self._said_left_out = 0
+        self.steps = self.lost_frames = 0
         self._said_s = -np.inf
         self.stepped_s = -np.inf  # time of the last step
         self._followed_s = np.nan  # time of the last step with markers that fitted
@@ -98,6 +101,8 @@ class Monitor:
     def motion(self, estimate: StepEstimate, fused: Fused) -> list[str]:
         """A sentence where the motion is lost, and where it is found again: then the markers fit."""
         word, at, before = self.last.tracking, estimate.time_s, self._followed_s
+        self.steps += 1
+        self.lost_frames += word in NO_ESTIMATE
         if np.isfinite(fused.positions).any() and word in ("following", "found"):
             self._followed_s = at
         if word in ("lost", "restarted") and not self._lost:
@@ -143,6 +148,20 @@ class Monitor:
             return []
         self.last = replace(self.last, settled=True)
         return [f"Lengths and masses have settled, {time_s - self._begun:.0f} s after the start."]
+
+    def summary(self, fusion: Fusion) -> str:
+        """A sentence at the end, on what was left out, lost or not measured; "" where nothing was."""
+        markers, blocks = fusion.marker_counts, fusion.plate_counts
+        counts = {
+            "of too slow a computer left out": self.left_out,
+            "without the plates": fusion.without_plates,
+            "with the motion lost": self.lost_frames,
+            "come late": markers.late + blocks.late,
+            "lost on the way": markers.lost + blocks.lost,
+            "not as declared": markers.invalid + blocks.invalid,
+        }
+        found = [f"{count} {how}" for how, count in counts.items() if count]
+        return f"Of {self.steps + self.left_out} frames: {listed(found)}." if found else ""
 
     def changes(self, fusion: Fusion, now_s: float) -> list[str]:
         """Sentences on frames left out, streams that fell silent or came back, and clocks that were set back."""

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.filter.plate_motion import Needed, plates_delay, turned_axes
+from dynakin.filter.total_wrench import doubtful_mass
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.orientation import axis_vector
 from dynakin.stream.start import floor_plate
@@ -30,7 +31,7 @@ class LivePlateMotion:
 
     Attributes:
         delay_s: by how much the plates lag behind the markers as they come now, s; None where that is not known or they
-            are in step. turned: a sentence where their axes are others.
+            are in step. turned, mass: sentences where their axes are others, where they carry another mass.
     """
 
     def __init__(self, initial: CalibratedModel, plates: Sequence[str]) -> None:
@@ -39,6 +40,7 @@ class LivePlateMotion:
         self._asked_s: float | None = None
         self.delay_s: float | None = None
         self.turned: str | None = None
+        self.mass: str | None = None
 
     def look(self, time_s: float, markers: Array, wrenches: Array, whole: bool) -> bool:
         """The next frame; whether something was found.
@@ -59,12 +61,13 @@ class LivePlateMotion:
         if time_s - self._asked_s < EVERY_S:
             return False
         self._asked_s = time_s
-        self.delay_s, self.turned = self._ask()
+        self._ask()
         if self.delay_s is not None:
             self._kept.clear()  # of plates as they came until now
-        return self.delay_s is not None or self.turned is not None
+        return any(found is not None for found in (self.delay_s, self.turned, self.mass))
 
-    def _ask(self) -> tuple[float | None, str | None]:
+    def _ask(self) -> None:
+        self.delay_s = self.turned = self.mass = None
         time = np.array([at for at, *_ in self._kept])
         known = np.array([whole for *_, whole in self._kept])
         needed = Needed(self._initial, time, np.stack([markers for _, markers, _, _ in self._kept]))
@@ -72,8 +75,11 @@ class LivePlateMotion:
         total = self._initial.ground.vectors_to_ground(wrenches[:, :, :3].sum(axis=1))
         total = np.where(known[:, None], total, np.nan)
         if not needed.judged_s(total) >= LEAST_S:
-            return None, None
+            return
         up = axis_vector(self._initial.ground.vertical)
         plates = [floor_plate(name, wrenches[:, p], up) for p, name in enumerate(self._plates)]
-        turned = turned_axes(needed, plates, self._initial, known, _REMEDY)
-        return (None if turned else plates_delay(needed, total)), turned
+        self.turned = turned_axes(needed, plates, self._initial, known, _REMEDY)
+        self.delay_s = None if self.turned else plates_delay(needed, total)
+        judged = needed.judged(total)
+        ratio = float(total[judged, 1].mean() / needed.force[judged, 1].mean())
+        self.mass = doubtful_mass(total, self._initial.weighed_kg, ratio, self._initial.unseen_kg)

@@ -88,6 +88,7 @@ class Live:
         self._use_plates = True
         self._feet: LiveFeet | None = None
         self._plate_motion: LivePlateMotion | None = None
+        self._mass_doubted = False
         self._running = False
         self._labels_checked = False
         self._subject: dict[str, float] = {}
@@ -117,6 +118,11 @@ class Live:
         return self._tracker
 
     @property
+    def measured(self) -> bool:
+        """Whether somebody has been measured."""
+        return self._tracker is not None
+
+    @property
     def status(self) -> Status:
         """How it goes, as of the last step."""
         return Status() if self._monitor is None else self._monitor.last
@@ -139,6 +145,8 @@ class Live:
                     f"{self.standing_s:g} s of standing"
                 )
         finally:
+            if self._monitor is not None and (text := self._monitor.summary(self.fusion)):
+                self.say(text)
             self._reader.close()
             for sink in self.sinks:
                 sink.close()
@@ -294,9 +302,10 @@ class Live:
             if not waited:
                 return
             whole = recording_of(list(self._window), info.names, plates, subject=self._subject)
-            recording, quiet, text = quietest(whole)
+            recording, quiet, text = quietest(whole, weigh=not self.estimator.model.has_mass)
             static = static or quiet
-            self.say(f"Nobody stood still for {self.standing_s:g} s: {text}")
+            self.say(f"Nobody stood still for {self.standing_s:g} s.")
+            self.say(text)
         try:
             self._tracker, said, self._use_plates = begin(
                 self.estimator,
@@ -321,7 +330,7 @@ class Live:
         plates = self.fusion.plates is not None
         rate, holds = self.fusion.markers.rate_hz, self.estimator.noise.recover
         self._monitor = Monitor(initial, rate, plates, plates and self._use_plates, holds)
-        self._feet = self._plate_motion = None
+        self._feet, self._plate_motion, self._mass_doubted = None, None, False
         if initial.feet:  # without plates too: what depends on the ground is then a prior
             names = () if self.fusion.plates is None else self.fusion.plates.names
             self._plate_motion = LivePlateMotion(initial, names) if plates and self._use_plates else None
@@ -341,9 +350,10 @@ class Live:
         if self._feet is not None:
             wrenches = fused.wrenches if self._use_plates else None
             markers, _ = sample_arrays(sample, tracker.calibrated)
+            markers[np.array(tracker.verdicts[: len(markers)]) == "refused"] = np.nan
             feet, whole = self._feet.look(tracker.core_model, tracker.state, sample.time_s, wrenches, markers)
             if self._plate_motion is not None and wrenches is not None:
-                self._ask_plates(self._plate_motion, sample.time_s, markers, wrenches, whole)
+                self._ask_plates(self._plate_motion, sample.time_s, markers, wrenches)
         if not (whole and self._use_plates):
             sample = Sample(sample.time_s, sample.markers)
         try:
@@ -371,18 +381,22 @@ class Live:
         for text in [*news, *motion, *monitor.settling(sample.time_s, state, tracker)]:
             self.say(text)
 
-    def _ask_plates(self, asked: LivePlateMotion, time_s: float, markers: Array, wrenches: Array, whole: bool) -> None:
-        """Plates out of step are brought into it; of plates with other axes nothing is taken any more."""
-        if not asked.look(time_s, markers, wrenches, whole):
+    def _ask_plates(self, asked: LivePlateMotion, time_s: float, markers: Array, wrenches: Array) -> None:
+        """Plates out of step are brought into it; of plates with other axes nothing is taken any more; that they carry
+        another mass is said."""
+        assert self._feet is not None and self._monitor is not None
+        if not asked.look(time_s, markers, wrenches, self._feet.claimed):
             return
         if asked.turned is not None:
             self.say(f"Warning: {asked.turned}. The plates are not used any more.")
-            self._use_plates, self._plate_motion = False, None
-            assert self._monitor is not None
-            self._monitor.used = False
+            self._use_plates = self._monitor.used = False
+            self._plate_motion = None
         elif asked.delay_s is not None:
             self.fusion.plates_behind_s += asked.delay_s
             self.say(f"{out_of_step_in_words(asked.delay_s)}; from {time_s:.2f} s on they are brought into step.")
+        if asked.mass is not None and not self._mass_doubted:
+            self._mass_doubted = True
+            self.say(asked.mass)
 
     def say(self, text: str) -> None:
         """Say something to the user."""

@@ -13,6 +13,7 @@ from dynakin.elements import element
 from dynakin.errors import ModelError, RecordingError
 from dynakin.files import LARGEST_TEXT, read_bytes
 from dynakin.filter.estimator import Estimator
+from dynakin.filter.total_wrench import doubtful_mass
 from dynakin.filter.tracker import Tracker
 from dynakin.model.calibration.body import steady_load
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -102,17 +103,27 @@ def stands(recording: Recording) -> bool:
     return window is not None and window.stop - window.start >= 0.8 * recording.n_frames
 
 
-def quietest(recording: Recording) -> tuple[Recording, Recording | None, str]:
-    """What to begin with where nobody stands still for long: the present moment, half a second or more of standing
-    before it where there was any, and words for it."""
+def quietest(recording: Recording, weigh: bool = True) -> tuple[Recording, Recording, str]:
+    """What to begin with where nobody stands still for long: the present moment; what the model is measured on, half a
+    second or more of standing before it where there was any, else all of it; and words for it.
+
+    Args:
+        weigh: whether the mass is to come from it.
+    """
     end = float(recording.time[-1])
     window = standing_window(recording)
     if window is None:
-        present, weighed = _weighed(recording.window(end - _NOW_S, end), recording)
-        return present, None, f"the present posture is taken{weighed}."
+        present, weighed = recording.window(end - _NOW_S, end), ""
+        if weigh:
+            present, weighed = _weighed(present, recording)
+        words = (
+            "Warning: the model is measured on a person who moves, whose joints and zeros of angles it shows less well"
+        )
+        whole = replace(recording, subject=present.subject)
+        return present, whole, f"{words}{weighed}. Stand still at the start, or give a standing trial (--static)."
     still = recording.time[window]
     quiet = recording.window(float(still[0]), float(still[-1]))
-    return recording.window(end - _NOW_S, end), quiet, f"{still[-1] - still[0]:.1f} s of it are taken."
+    return recording.window(end - _NOW_S, end), quiet, f"{still[-1] - still[0]:.1f} s of standing are taken."
 
 
 def _weighed(present: Recording, whole: Recording) -> tuple[Recording, str]:
@@ -180,6 +191,10 @@ def begin(
                 f"Warning: the plates carry {mass:.1f} kg where the person weighs {initial.weighed_kg:.1f} kg; the "
                 "plates are not used."
             )
+        elif mass is not None and initial.feet:
+            ratio = mass / initial.weighed_kg
+            doubt = doubtful_mass(np.zeros((0, 6)), initial.weighed_kg, ratio, initial.unseen_kg)
+            said += [doubt] if doubt else []
     return tracker, said, usable
 
 

@@ -72,7 +72,7 @@ def exchanged(one: Plate, other: Plate) -> Plate:
     return replace(one, moment=moment, cop=other.cop, corners=other.corners)
 
 
-def test_exchanged_plates_are_told_by_name_and_stop_nothing(tmp_path: Path, capsys: Said) -> None:
+def test_exchanged_plates_fail_by_name_and_stop_no_other(tmp_path: Path, capsys: Said) -> None:
     for number, name in enumerate(("good", "exchanged"), start=3):
         trial = simulate("fullbody", "squat", number, 5.0, 12.5)
         if name == "exchanged":
@@ -81,10 +81,9 @@ def test_exchanged_plates_are_told_by_name_and_stop_nothing(tmp_path: Path, caps
         trial.save(tmp_path / "S1" / name)
     keys = 'model = "fullbody"\noutput = "out"\ntrials = "*/markers.trc"\nforces = "forces.mot"\n'
     (tmp_path / "study.toml").write_text(f'{keys}[[subjects]]\nname = "S1"\n{SUBJECT}')
-    assert main(["batch", str(tmp_path / "study.toml"), "--tables-only"]) == 0
-    told = json.loads((tmp_path / "out" / "batch.json").read_text())["trials"]
-    notes = {name: [note for note in row["notes"] if "been exchanged" in note] for name, row in told.items()}
-    assert {name: len(found) for name, found in notes.items()} == {"S1/good": 0, "S1/exchanged": 1}
-    warned = [line for line in capsys.readouterr().out.splitlines() if line.startswith("Warned")]
-    assert any(line.startswith("Warned  S1/exchanged: plate 1 and plate 2 push the feet apart") for line in warned)
-    assert not any("S1/good: plate 1 and plate 2" in line for line in warned)
+    assert main(["batch", str(tmp_path / "study.toml"), "--tables-only"]) == 1
+    worked = json.loads((tmp_path / "out" / "batch.json").read_text())
+    assert set(worked["trials"]) == {"S1/good"} and set(worked["failed"]) == {"S1/exchanged"}
+    (failed,) = [line for line in capsys.readouterr().out.splitlines() if line.startswith("Failed")]
+    assert failed.startswith("Failed  S1/exchanged: ") and "pushes the feet apart" in failed
+    assert "if the two were exchanged" in failed

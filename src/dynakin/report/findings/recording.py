@@ -10,7 +10,7 @@ from dynakin.report.labels import short_marker_names
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.soft_tissue import marker_sites
 from dynakin.results.naming import listed, sentence, words
-from dynakin.results.records import REFUSED, doubts_mass
+from dynakin.results.records import MISPLACED, REFUSED, doubts_mass
 
 # Words of warnings that a finding of their own says, or that are no doubt of the estimate.
 _SAID_ELSEWHERE = (
@@ -36,6 +36,8 @@ ADVICE = {
     "unseen": "Do not use the angles and moments of these segments' joints there, or fill the gap from what you know.",
     "recording": "Correct it in the file, or look at the film at these times, before you use what lies there.",
     "subject": "Give the mass and the height as measured (--mass, --height).",
+    "scaling": "Scale the model to the person again, by a standing trial, or run without --model: fullbody measures "
+    "its own.",
     "left out": "Look at the film at these times: correct labels that are swapped, delete what is no marker.",
 }
 
@@ -73,6 +75,7 @@ def warned(estimate: Estimate, metrics: Metrics) -> list[Insight]:
     found = []
     for title, advice, belongs in (
         ("Subject", "subject", lambda text: text.startswith(_SUBJECT)),
+        ("Model scaling", "scaling", lambda text: text.startswith(MISPLACED)),
         ("Force plates", "plates", lambda text: "plate" in text),
         ("Recording", "recording", lambda text: True),
     ):

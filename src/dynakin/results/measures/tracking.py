@@ -14,7 +14,7 @@ from dynakin.results.estimate import AXES, Estimate
 from dynakin.results.measures.soft_tissue import marker_sites, state_paths
 from dynakin.results.measures.sources import ABSENT
 from dynakin.results.naming import listed, sentence
-from dynakin.results.records import REFUSED, TRACKING, Tracking
+from dynakin.results.records import NO_ESTIMATE, REFUSED, TRACKING, Tracking
 
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
@@ -37,7 +37,6 @@ BRIDGED_S = 0.1
 MOST_LOST = 0.10
 """Part of the measured frames from which on the whole trial is lost: lengths and inertia come from them too."""
 
-_NO_ESTIMATE = ("doubtful", "lost", "restarted")
 _KEPT = ("_measured", "_covariance")
 _RECORD = {"state", "state_sd", "foot_contact", "verdict", "tracking", "constrained", "lost"}
 _RECORD |= {"constraints_met", "step_us"}
@@ -62,7 +61,7 @@ def tracking_of(estimate: Estimate) -> Tracking:
     lost = ((astray & ~refused).sum(axis=1) > np.maximum(USED_ASTRAY * n, 1.0)) | (astray.sum(axis=1) > ANY_ASTRAY * n)
     lost |= _limb_lost(estimate, seen, refused)
     if "tracking" in data:
-        lost |= np.isin(data["tracking"].values, [TRACKING.index(word) for word in _NO_ESTIMATE])
+        lost |= np.isin(data["tracking"].values, [TRACKING.index(word) for word in NO_ESTIMATE])
     return Tracking(_bridged(lost, estimate.time), seen.any(axis=1), np.where(seen, distance, np.nan), refused)
 
 
