@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from dynakin.recordings.companions import companion_forces, companion_static
+from dynakin.recordings.companions import another_person, companion_forces, companion_static
 from dynakin.recordings.read import read
 from dynakin.recordings.recording import Recording
 from dynakin.results.files.markers import write_trc
@@ -86,3 +87,10 @@ def test_a_folder_that_is_not_there(tmp_path: Path) -> None:
     assert companion_forces(tmp_path / "none" / "walk.trc") is None
     still = Recording("a", None, np.arange(3.0), ("x",), np.zeros((3, 1, 3)))
     assert companion_static(tmp_path / "none" / "walk.trc", still) is None
+
+
+def test_of_another_marker_set_nothing_shows_whose_it_is(people: dict[str, Recording]) -> None:
+    trial = people["one"]
+    few = replace(trial, marker_names=tuple(name if k < 20 else f"x{k}" for k, name in enumerate(trial.marker_names)))
+    assert another_person(trial, trial) == ""
+    assert another_person(trial, few).startswith(f"only 20 of the trial's {len(trial.marker_names)} markers are in ")

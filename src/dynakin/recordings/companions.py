@@ -34,6 +34,8 @@ _RIGID_M = 0.006
 _NEAR_M = 0.3
 """How far apart such markers are at most: of those on two segments that hardly move, a posture would be compared."""
 _PAIRS = 6
+_COMMON = 0.5
+"""Part of a trial's markers that its standing one has."""
 _FRAMES = 1000  # spread over a trial, enough for these
 
 
@@ -91,7 +93,12 @@ def _still(recording: Recording) -> float:
 
 def another_person(trial: Recording, other: Recording) -> str:
     """What shows that a recording is of somebody else, or of markers put on anew; "" where nothing does."""
-    apart = _apart_m(trial, other)
+    apart, common = _apart_m(trial, other), _common(trial, other)
+    if len(common) < _COMMON * len(trial.marker_names):
+        return (
+            f"only {len(common)} of the trial's {len(trial.marker_names)} markers are in {other.name}: another marker "
+            "set, so that nothing shows that it is the same person"
+        )
     if apart is None or apart < _SAME_M:
         return ""
     return (
@@ -100,13 +107,17 @@ def another_person(trial: Recording, other: Recording) -> str:
     )
 
 
+def _common(trial: Recording, other: Recording) -> list[tuple[str, str]]:
+    """Names of the markers that are in both."""
+    names = {plain_name(name): name for name in other.marker_names}
+    return [(name, names[plain_name(name)]) for name in trial.marker_names if plain_name(name) in names]
+
+
 def _apart_m(trial: Recording, other: Recording) -> float | None:
     """Median difference of the distances between markers that move as one in the trial; None of too few."""
-    names = {plain_name(name): name for name in other.marker_names}
-    common = [(name, names[plain_name(name)]) for name in trial.marker_names if plain_name(name) in names]
     every = -(-trial.n_frames // _FRAMES)
     apart = []
-    for (a, a_), (b, b_) in combinations(common, 2):
+    for (a, a_), (b, b_) in combinations(_common(trial, other), 2):
         here = np.linalg.norm((trial.marker(a) - trial.marker(b))[::every], axis=1)
         n, here = len(here), here[np.isfinite(here)]
         if len(here) <= 0.5 * n or here.std() >= _RIGID_M or here.mean() >= _NEAR_M:

@@ -30,7 +30,7 @@ class Picture:
 
     Blocks, in this order: time (1); joint centres (S, 3); measured and estimated markers (M, 3) each; arrows (A, 6),
     each a centre of pressure and a force, of the plates and, last, of the estimated total; coordinates, moments and the
-    moments' standard deviations (C); constants (K).
+    moments' standard deviations and the codes of their sources (C); constants (K).
     """
 
     def __init__(self, started: Started, plates: int) -> None:
@@ -40,7 +40,7 @@ class Picture:
         elements = [element(name) for name in self.initial.names]
         self._constants = [k for k, e in enumerate(elements) if e.kind == "length" or e[::2] == ("inertia", "mass")]
         markers, axes = 3 * len(spec.markers), len(spec.coordinates)
-        sizes = (1, 3 * len(segments), markers, markers, 6 * (plates + 1), axes, axes, axes, len(self._constants))
+        sizes = (1, 3 * len(segments), markers, markers, 6 * (plates + 1), axes, axes, axes, axes, len(self._constants))
         self.sizes = dict(zip(BLOCKS, sizes, strict=True))
         self._moment_sd = np.full(len(spec.coordinates), np.nan)
         parents = [segments.index(s.parent) if s.parent in segments else -1 for s in spec.segments]
@@ -78,6 +78,7 @@ class Picture:
             late.coordinates,
             late.moments,
             self._moment_sd,
+            late.moment_sources,
             frame.state[self._constants],
         )
         return np.concatenate([np.ravel(part) for part in parts])
@@ -131,6 +132,7 @@ BLOCKS = (
     "angles",
     "moments",
     "moment_sd",
+    "moment_sources",
     "constants",
 )
 

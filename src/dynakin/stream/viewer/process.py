@@ -14,6 +14,7 @@ import numpy as np
 import viser
 from viser import uplot
 
+from dynakin.results.measures.sources import MEANINGS, MEASURED
 from dynakin.stream.sinks.picture import as_text, in_words, split
 from dynakin.stream.viewer.latest import Latest
 from dynakin.stream.viewer.own_origin import OwnOrigin
@@ -83,8 +84,10 @@ class Page:
         line = uplot.Series(label="angle, deg (m)", stroke="#2166ac", width=2)
         self._add_plot("angle", "Angle, deg (m)", [line])
         line = uplot.Series(label="moment, N m", stroke="#b2182b", width=2)
+        other = uplot.Series(label="derived or prior", stroke="#8c8c8c", width=2, dash=(6, 4))
         band = [uplot.Series(label=f"{sign} 2 sd", stroke="#e3a3a9", width=1) for sign in "-+"]
-        self._add_plot("moment", "Moment, N m (N), with two standard deviations", [line, *band])
+        title = "Moment, N m (N), with two standard deviations; dashed: not measured"
+        self._add_plot("moment", title, [line, *band, other])
         gui.add_markdown(_LEGEND)
         if setup["constants"]:
             lengths = [name for name in setup["constants"] if name.startswith("length/")] or setup["constants"]
@@ -93,8 +96,8 @@ class Page:
             self._add_plot("constant", "Constant, m or kg", [line])
 
     def _add_plot(self, name: str, title: str, lines: list[uplot.Series]) -> None:
-        """A plot over time; with three lines the area between the last two is filled."""
-        bands = (uplot.Band(series=(3, 2), fill="rgba(178,24,43,0.15)"),) if len(lines) == 3 else None
+        """A plot over time; with several lines the area between the second and the third is filled."""
+        bands = (uplot.Band(series=(3, 2), fill="rgba(178,24,43,0.15)"),) if len(lines) > 1 else None
         self.plots[name] = self.server.gui.add_uplot(
             (np.zeros(2), *[np.full(2, np.nan)] * len(lines)),
             (uplot.Series(label="s"), *lines),
@@ -145,20 +148,34 @@ class Page:
         k = self.setup["coordinates"].index(self.chosen.value)
         factor = 180.0 / np.pi if self.setup["rotation"][k] else 1.0
         t = np.array([part["time"][0] for part in self.history])
-        value, moment, sd = (
-            np.array([part[name][k] for part in self.history]) for name in ("angles", "moments", "moment_sd")
+        value, moment, sd, source = (
+            np.array([part[name][k] for part in self.history])
+            for name in ("angles", "moments", "moment_sd", "moment_sources")
         )
+        measured = source == MEASURED
         self.plots["angle"].data = (t, factor * value)
-        self.plots["moment"].data = (t, moment, moment - 2.0 * sd, moment + 2.0 * sd)
+        self.plots["moment"].data = (
+            t,
+            np.where(measured, moment, np.nan),
+            moment - 2.0 * sd,
+            moment + 2.0 * sd,
+            np.where(measured, np.nan, moment),
+        )
         if "constant" in self.plots:
             c = self.setup["constants"].index(self.constant.value)
             self.plots["constant"].data = (t, np.array([part["constants"][c] for part in self.history]))
+
+    def _source(self) -> str:
+        """Where the chosen coordinate's newest moment comes from."""
+        k = self.setup["coordinates"].index(self.chosen.value)
+        return MEANINGS[int(self.history[-1]["moment_sources"][k])]
 
     def _show_status(self, status: dict[str, Any]) -> None:
         rows = [
             ("Rate", f"{status['rate_hz']:.0f} Hz, latency {status['latency_ms']:.1f} ms"),
             ("Fit (NIS, near 1)", f"{status['nis']:.2f}, {status['tracking']}"),
             ("Plates", status["plates"]),
+            ("Moment", f"{self.chosen.value}: {self._source()}"),
             ("Markers", f"{status['missing']['count']} missing, refused: {in_words(status['refused'])}"),
             ("Packets", f"late {status['late']}, lost {status['lost']}, twice {status['duplicate']}"),
             ("At a bound", in_words(status["at_bound"])),
