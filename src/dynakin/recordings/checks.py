@@ -50,7 +50,6 @@ class PlateCheck:
     """What ``check_plates`` found.
 
     Attributes:
-        ok: neither a warning nor a refusal.
         mass_kg_from_plates: standing vertical force over g; None where the person does not stand still on
             plates, or where a sole reaches over a plate's edge.
         mean_mass_kg: the same from the mean over all loaded frames of a movement; right only where it ends as it
@@ -59,7 +58,6 @@ class PlateCheck:
         refusal: why the plates cannot be used, None where they can. The caller decides what follows from it.
     """
 
-    ok: bool
     mass_kg_from_plates: float | None
     mean_mass_kg: float | None
     messages: tuple[str, ...]
@@ -104,16 +102,14 @@ def check_plates(
         loads: the assignment of plates to these feet, where a run has it already.
     """
     if not recording.plates:
-        return PlateCheck(False, None, None, (), "no force plates in this recording, expected at least one")
+        return PlateCheck(None, None, (), "no force plates in this recording, expected at least one")
     findings = _Findings()
     standing = _on_plates(standing_window(recording), recording, ground)
     frames = standing if standing is not None else slice(None)
     feet = _feet(recording, ground, foot_markers or {}, findings)
     if mass_kg is None and _nobody_on(recording, ground, feet):
         findings.say("Nobody steps on the plates: they carry nothing, and no foot is on any.")
-        return PlateCheck(
-            not any("Warning:" in text for text in findings.messages), None, None, tuple(findings.messages), None
-        )
+        return PlateCheck(None, None, tuple(findings.messages), None)
     mass = _check_vertical(recording, ground, mass_kg, standing, findings)
     if loads is None:
         loads = foot_loads(recording, ground, foot_markers or {})
@@ -141,11 +137,10 @@ def check_plates(
     for one, other in combinations(recording.plates, 2):
         _check_together(one, other, recording, ground, findings)
     refusal = "; ".join(findings.refusals) or None
-    ok = refusal is None and not any(text.startswith("Warning:") for text in findings.messages)
     standing_mass, mean_mass = (mass, None) if standing is not None else (None, mass)
     if over_edge:
         standing_mass = None
-    return PlateCheck(ok, standing_mass, mean_mass, tuple(findings.messages), refusal)
+    return PlateCheck(standing_mass, mean_mass, tuple(findings.messages), refusal)
 
 
 def _on_plates(standing: slice | None, recording: Recording, ground: GroundFrame) -> slice | None:
