@@ -92,14 +92,11 @@ class Coverage:
         )
 
 
-def block_coverage(
-    data: xr.Dataset, truth: xr.Dataset, window: npt.NDArray[np.bool_], *, own_model: bool = False
-) -> list[Coverage]:
+def block_coverage(data: xr.Dataset, truth: xr.Dataset, window: npt.NDArray[np.bool_]) -> list[Coverage]:
     """Each block of `BLOCKS` that has a standard deviation, over the frames ``window`` (T,).
 
     Args:
         data: as `Estimate.data`. truth: as `dynakin.simulation.Truth.data`, at the same frames.
-        own_model: as in `coverage`.
     """
     found = []
     for block in BLOCKS:
@@ -113,13 +110,11 @@ def block_coverage(
         free = np.flatnonzero((sd > 0.0).all(axis=0))  # a locked coordinate claims nothing
         if len(free):
             free_names = [names[k] for k in free]
-            found.append(coverage(block, free_names, (given - true)[:, free], sd[:, free], own_model=own_model))
+            found.append(coverage(block, free_names, (given - true)[:, free], sd[:, free]))
     return found
 
 
-def parameter_coverage(
-    parameters: Sequence[Parameter], truth: Mapping[str, float], *, own_model: bool = False
-) -> list[Coverage]:
+def parameter_coverage(parameters: Sequence[Parameter], truth: Mapping[str, float]) -> list[Coverage]:
     """Estimated lengths, and inertial numbers, at the end of the run: one frame.
 
     Args:
@@ -131,7 +126,7 @@ def parameter_coverage(
         if group:
             error = np.array([[p.value - truth[p.name] for p in group]])
             sd = np.array([[p.sd for p in group]])
-            found.append(coverage(title, [p.name for p in group], error, sd, own_model=own_model))
+            found.append(coverage(title, [p.name for p in group], error, sd))
     return found
 
 
