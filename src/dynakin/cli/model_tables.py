@@ -20,7 +20,7 @@ from dynakin.model.markers.marker_set import available_marker_sets, load_marker_
 from dynakin.model.markers.schema import Marker, MarkerSetFile
 from dynakin.model.opensim.definition import OpenSimDefinition
 from dynakin.model.opensim.export import mass_of_run, of_definition, of_initial, read_values
-from dynakin.model.opensim.spec import free_coordinates, placements, used_scales
+from dynakin.model.opensim.spec import independent_coordinates, placements, used_scales
 from dynakin.model.opensim.write import write_osim
 from dynakin.model.schema import ModelFile, kinds_of
 from dynakin.model.schema import Segment as ModelSegment
@@ -254,7 +254,7 @@ def _opensim_tree(definition: OpenSimDefinition) -> Tree:
 
 def _opensim_coordinates(definition: OpenSimDefinition) -> Table:
     rows = table("coordinate", "limits", "unit", "meaning", numbers=(1,), title="Coordinates")
-    free = {c.name for c in free_coordinates(definition.source)}
+    free = {c.name for c in independent_coordinates(definition.source)}
     for joint in definition.source.joints:
         kinds = kinds_of([joint])
         for c in joint.coordinates:
