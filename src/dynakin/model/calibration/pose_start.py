@@ -19,6 +19,7 @@ from dynakin.model.calibration.joint_fit import joint_coordinates
 from dynakin.model.calibration.posture import turned
 from dynakin.model.schema import Interval, kinds_of
 from dynakin.model.spec import free_names
+from dynakin.recordings.rigidity import nearest_rotation
 
 Array = npt.NDArray[np.float64]
 
@@ -247,10 +248,10 @@ def laid(points: Array, targets: Array) -> tuple[Array, Array] | None:
     if len(points) < 3:
         return None
     a, b = points - points.mean(axis=0), targets - targets.mean(axis=0)
-    u, size, vt = np.linalg.svd(b.T @ a)
+    size = np.linalg.svd(b.T @ a, compute_uv=False)
     if size[1] < 1e-6 * size[0]:
         return None
-    turn = u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))]) @ vt
+    turn = nearest_rotation(b.T @ a)
     return turn, targets.mean(axis=0) - turn @ points.mean(axis=0)
 
 
