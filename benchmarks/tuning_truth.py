@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 import dynakin
+from dynakin.files import write_csv
 from dynakin.filter.estimator import Estimator
 from dynakin.model.spec import free_names
 from dynakin.report.paper_figures.figures import save_sensitivity_figures
@@ -24,7 +25,7 @@ from dynakin.report.paper_figures.sensitivity import Sensitivity
 from dynakin.settings import presets
 from dynakin.settings.noise import Noise
 from dynakin.simulation.trial import simulate
-from dynakin.studies.engine.folder import ROWS, open_folder, write_csv
+from dynakin.studies.engine.folder import ROWS, open_folder
 from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import open_pool
 from dynakin.studies.engine.tasks import Task

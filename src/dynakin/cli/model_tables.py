@@ -223,9 +223,7 @@ def export_model(
     """
     if path.suffix.casefold() != ".osim":
         raise typer.BadParameter(f"--export is {path}, expected a file that ends in .osim")
-    values = (
-        {} if parameters is None else {name: constant.value for name, constant in read_constants(parameters).items()}
-    )
+    values = {} if parameters is None else {name: found.value for name, found in read_constants(parameters).items()}
     if isinstance(definition, OpenSimDefinition):
         if trial is not None:
             raise typer.BadParameter("--trial is of no use with --export of an .osim file, which has places of its own")
