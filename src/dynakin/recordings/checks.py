@@ -18,7 +18,7 @@ from dynakin.recordings.plates.limits import beyond_limits
 from dynakin.recordings.plates.pressure import JUDGED_N
 from dynakin.recordings.recording import Array, Plate, Recording
 from dynakin.recordings.standing import standing_window
-from dynakin.units import GRAVITY_M_S2
+from dynakin.units import GRAVITY_M_S2, PERSON_MASS_KG
 
 MASS_WARNING = 0.05
 """Relative difference between declared mass and the plates' from which it is said."""
@@ -27,8 +27,6 @@ MASS_MEAN_RATIO = (0.6, 1.1)
 m g."""
 MASS_RATIO_REFUSED = (0.2, 5.0)
 """Plates' mass over declared mass beyond which the units or plates must be wrong."""
-MASS_REFUSED_KG = (5.0, 400.0)
-"""The plates' mass itself, where none is declared: not a person's beyond these."""
 COP_REFUSED_M = 0.30
 """Centre of pressure outside the outline of the markers of the nearest foot, from which the plate's place or unit must
 be wrong. From `NEAR_M` on it is said."""
@@ -226,7 +224,7 @@ def _check_vertical(
         findings.warn(f"the mean force is {tilt:.0f} deg off the vertical {ground.vertical}, expected a few degrees.")
     if mass_kg is not None:
         _compare_mass(mass, mass_kg, standing is not None, findings)
-    elif standing is not None and not MASS_REFUSED_KG[0] < mass < MASS_REFUSED_KG[1]:
+    elif standing is not None and not PERSON_MASS_KG[0] < mass < PERSON_MASS_KG[1]:
         findings.refuse(
             f"the plates read {mass:.3g} kg standing, expected a person's mass (nobody on the plates, or another unit "
             "of the forces?)"
