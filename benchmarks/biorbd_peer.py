@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from dynakin.bindings import _core
+from dynakin.model.spec import free_names
 
 Array = NDArray[np.float64]
 
@@ -22,7 +23,7 @@ def bio_mod(spec: _core.ModelSpec) -> str:
     Axes that are functions of a coordinate (other than s = q) stay where they are at the start, as biorbd has no such
     joints: a knee is a hinge. So do locked coordinates.
     """
-    free = {c.name for c in spec.coordinates if not c.locked}
+    free = set(free_names(spec))
     start = {c.name: c.value for c in spec.coordinates}
     length = {p.name: p.value for p in spec.parameters}
     lines, last, taken = ["version 4"], {"ground": "root"}, set()

@@ -19,6 +19,7 @@ import numpy as np
 import dynakin
 from dynakin.filter.samples import recording_arrays
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.model.spec import free_names
 from dynakin.settings import presets
 from dynakin.settings.noise import Noise
 from dynakin.simulation.output import SimulatedTrial
@@ -86,7 +87,7 @@ def figures(method: str, given: dict[str, Array], trial: SimulatedTrial, names: 
 
 def blocks(arrays: dict[str, Array], initial: CalibratedModel) -> dict[str, Array]:
     """The core's arrays by the names of the outputs."""
-    n = sum(not c.locked for c in initial.spec.coordinates)
+    n = len(free_names(initial.spec))
     found = {"moments": arrays["moments"], "moments_sd": arrays["moments_sd"]}
     for k, name in enumerate(("coordinates", "speeds", "accelerations")):
         found[name] = arrays["state"][:, k * n : (k + 1) * n]
@@ -103,7 +104,7 @@ def one_trial(model: str, seed: int, duration: float, changes: dict[str, float])
         estimator = dynakin.Estimator(definition, Noise(**values))
         tracker = estimator.start(off_by(estimator.start(trial.recording).calibrated, seed))
         initial = tracker.calibrated
-        names = tuple(c.name for c in initial.spec.coordinates if not c.locked)
+        names = tuple(free_names(initial.spec))
         measured = recording_arrays(trial.recording, initial)
         arrays = tracker.run_arrays(trial.recording.time, *measured)
         found.append(figures(name, blocks(arrays, initial), trial, names))

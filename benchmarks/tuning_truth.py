@@ -17,13 +17,15 @@ from typing import Any
 import numpy as np
 
 import dynakin
+from dynakin.files import write_csv
 from dynakin.filter.estimator import Estimator
+from dynakin.model.spec import free_names
 from dynakin.report.paper_figures.figures import save_sensitivity_figures
 from dynakin.report.paper_figures.sensitivity import Sensitivity
 from dynakin.settings import presets
 from dynakin.settings.noise import Noise
 from dynakin.simulation.trial import simulate
-from dynakin.studies.engine.folder import ROWS, open_folder, write_csv
+from dynakin.studies.engine.folder import ROWS, open_folder
 from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import open_pool
 from dynakin.studies.engine.tasks import Task
@@ -54,7 +56,7 @@ def trial_of(seed: int, duration: float, rate: float = 100.0, noise: Noise | Non
     subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
     definition = dynakin.load_model("sagittal7", subject=subject, markers="opencap")
     trial = prepare(made.recording, Estimator(definition, noise or presets.paper()))
-    names = tuple(c.name for c in trial.initial.spec.coordinates if not c.locked)
+    names = tuple(free_names(trial.initial.spec))
     truth = made.truth.data.sel(coordinate=list(names))
     values = (truth[key].transpose("time", "coordinate").values for key in ("coordinates", "moments"))
     return WithTruth(trial, *values, names)

@@ -33,8 +33,6 @@ PRESSED_N = 100.0
 EMPTY_N = 5.0
 """Vertical force up to which it bears none."""
 NORMAL_95 = 1.96
-NORMAL_MEDIAN = 1.4826
-"""Deviation of a normal error over the median of its size."""
 ALOFT = "aloft"
 """What the program calls a contact of which it says that nothing touches it: its wrench is then zero, for sure."""
 FORCES = ("vertical", "along", "across")
@@ -91,8 +89,7 @@ class Score:
     Attributes:
         frames, of: frames in which it is called so, of those that are judged.
         rms, bias: of the error: N, m, N m; None where nothing is given. given: frames in which it is.
-        inside: part of these within 1.96 standard deviations. sd: RMS of the deviation. median_ratio: median of the
-            deviation over that of a normal error of the same median size. None: without deviations.
+        inside: part of these within 1.96 standard deviations. sd: RMS of the deviation. None: without deviations.
     """
 
     contact: str
@@ -105,7 +102,6 @@ class Score:
     bias: float | None
     inside: float | None
     sd: float | None
-    median_ratio: float | None
 
     @property
     def sd_over_error(self) -> float | None:
@@ -238,7 +234,7 @@ def _scores(
         if not here.any():
             continue
         given = here & np.isfinite(error)
-        rms = bias = inside = spread = middle = None
+        rms = bias = inside = spread = None
         if given.any():
             e = error[given]
             rms, bias = _rms(e), float(e.mean())
@@ -246,11 +242,7 @@ def _scores(
                 s = sd[given]
                 inside = float(np.mean(np.abs(e) <= NORMAL_95 * s))
                 spread = _rms(s)
-                size = NORMAL_MEDIAN * float(np.median(np.abs(e)))
-                middle = float(np.median(s)) / size if size > 0.0 else None
-        yield Score(
-            contact, quantity, meaning, int(here.sum()), of, int(given.sum()), rms, bias, inside, spread, middle
-        )
+        yield Score(contact, quantity, meaning, int(here.sum()), of, int(given.sum()), rms, bias, inside, spread)
 
 
 def pool(scores: Sequence[Score], called: str) -> Score | None:
@@ -264,7 +256,7 @@ def pool(scores: Sequence[Score], called: str) -> Score | None:
         return None
     of = sum(score.frames for score in scores)
     given = sum(score.given for score in own)
-    first = replace(own[0], frames=sum(score.frames for score in own), of=of, given=given, median_ratio=None)
+    first = replace(own[0], frames=sum(score.frames for score in own), of=of, given=given)
     known = [score for score in own if score.given]
     if not known:
         return first

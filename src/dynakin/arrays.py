@@ -3,9 +3,7 @@ no file may have."""
 
 from __future__ import annotations
 
-import math
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -63,14 +61,3 @@ def finite(values: npt.ArrayLike) -> npt.NDArray[np.float64]:
     """The same numbers with infinities as NaN."""
     found = np.asarray(values, dtype=float)
     return np.where(np.isinf(found), np.nan, found) if np.isinf(found).any() else found
-
-
-def with_nulls(value: Any) -> Any:
-    """The same dictionaries and lists with what is not a finite number as None."""
-    if isinstance(value, dict):
-        return {key: with_nulls(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [with_nulls(item) for item in value]
-    if isinstance(value, float | np.floating) and not math.isfinite(value):
-        return None
-    return value

@@ -1,9 +1,15 @@
-"""What is in a file, with errors of one line that name it."""
+"""What is in a file, with errors of one line that name it; tables and plain data written as files."""
 
 from __future__ import annotations
 
+import csv
+import json
+import math
 import stat
+from collections.abc import Mapping, Sequence
+from numbers import Real
 from pathlib import Path
+from typing import Any
 
 from dynakin.errors import DynakinError, RecordingError
 
@@ -58,3 +64,36 @@ def read_bytes(path: Path, raises: type[DynakinError] = RecordingError, largest:
         return path.read_bytes()
     except OSError as error:
         raise raises(f"{path}: cannot be read ({error.strerror or error})") from None
+
+
+def with_nulls(value: Any) -> Any:
+    """The same dictionaries and lists with what is not a finite number as None."""
+    if isinstance(value, dict):
+        return {key: with_nulls(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [with_nulls(item) for item in value]
+    if isinstance(value, int) or not isinstance(value, Real):
+        return value
+    return value if math.isfinite(value) else None  # NumPy's numbers too, without loading it
+
+
+def write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
+    """Rows of the same columns; what is None or no finite number is a blank cell, numbers keep all their digits.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    with path.open("w", encoding="utf-8", newline="") as file:
+        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
+        writer.writeheader()
+        writer.writerows(with_nulls(dict(row)) for row in rows)
+
+
+def write_json(path: Path, content: Any) -> None:
+    """Plain data; a number that is not finite is null.
+
+    Raises:
+        OSError: the file cannot be written.
+    """
+    text = json.dumps(with_nulls(content), indent=2, ensure_ascii=False, allow_nan=False)
+    path.write_text(text + "\n", encoding="utf-8", newline="\n")

@@ -1,5 +1,5 @@
 """Conversion factors to SI at the edges of dynakin: files and reports; inside, everything is SI and
-radians."""
+radians. How large persons are, by which a wrong unit shows."""
 
 from __future__ import annotations
 
@@ -7,6 +7,12 @@ from collections.abc import Mapping
 
 GRAVITY_M_S2 = 9.80665
 """Standard gravity, m/s^2 (CGPM 1901): the value in every model's gravity vector (0, -9.80665, 0)."""
+
+PERSON_MASS_KG = (5.0, 400.0)
+"""Of persons, as plates and files say it: beyond it the unit is another one. A mass that is given may be smaller, as
+models of animals have it."""
+PERSON_HEIGHT_M = (0.3, 2.8)
+"""Of persons: no other unit of length brings one into this range, too."""
 
 COMPONENTS = ("fx", "fy", "fz", "mx", "my", "mz")
 """Of a wrench: N, N m."""

@@ -27,6 +27,7 @@ from dynakin.recordings.rigidity import rigid_motion
 from dynakin.settings.subject import Subject
 from dynakin.simulation.sensors.sizes import SensorNoise
 from support.functional_trials import STANDING, functional_trial
+from support.made_recordings import unseen
 
 PELVIS = ("r.ASIS", "L.ASIS", "r.PSIS", "L.PSIS")
 THIGH = ("r_knee", "r_thigh1", "r_thigh2", "r_thigh3", "r_thigh4")
@@ -48,12 +49,6 @@ def definition(**functional: Recording) -> ModelDefinition:
 
 def renamed(recording: Recording, names: dict[str, str]) -> Recording:
     return replace(recording, marker_names=tuple(names.get(name, name) for name in recording.marker_names))
-
-
-def blank(recording: Recording, *names: str) -> Recording:
-    markers = recording.markers.copy()
-    markers[:, [recording.marker_names.index(name) for name in names]] = np.nan
-    return replace(recording, markers=markers)
 
 
 @pytest.mark.parametrize(("noise", "within_mm", "within_deg"), [
@@ -139,9 +134,9 @@ def test_refusals_say_what_to_do() -> None:
     knee, _, _ = functional_trial(104, "knee", noise)
     small, _, _ = functional_trial(104, "hip", noise, size=0.3)
     stiff, _, _ = functional_trial(104, "knee", noise, size=0.2)
-    few = blank(good, "r_thigh3", "r_thigh4")
+    few = unseen(good, "r_thigh3", "r_thigh4")
     swapped = renamed(few, {"r_thigh1": "r_thigh2", "r_thigh2": "r_knee", "r_knee": "r_thigh1"})
-    bare = blank(good, *(f"r_thigh{k}" for k in (1, 2, 3, 4)))
+    bare = unseen(good, *(f"r_thigh{k}" for k in (1, 2, 3, 4)))
     for joint, trial, words in (
         ("hip_r", small, "about two axes"),
         ("knee_r", stiff, "the knee turns through"),
@@ -153,14 +148,14 @@ def test_refusals_say_what_to_do() -> None:
         with pytest.raises(ModelError, match=words) as caught:
             definition(**{joint: trial}).calibrate(good)
         assert "\n" not in caught.value.message and f"for {joint}" in caught.value.message
-    lame = blank(knee, "r_knee", "r_mknee", "r_ankle", "r_mankle")  # clusters alone, as in a CAST trial
+    lame = unseen(knee, "r_knee", "r_mknee", "r_ankle", "r_mankle")  # clusters alone, as in a CAST trial
     with pytest.raises(ModelError, match=r"right knee centre and lateral epicondyle .*--static") as caught:
         definition(knee_r=lame).calibrate(lame)
     assert "\n" not in caught.value.message and "for knee_r" in caught.value.message
-    few = blank(good, "r_knee", "r_mknee", "r_thigh1", "r_thigh2")
+    few = unseen(good, "r_knee", "r_mknee", "r_thigh1", "r_thigh2")
     with pytest.raises(ModelError, match="2 markers of the right thigh"):
         definition(hip_r=few).calibrate(few)
-    armless = blank(good, "r.ASIS", "L.ASIS")
+    armless = unseen(good, "r.ASIS", "L.ASIS")
     with pytest.raises(ModelError, match="2 markers of the pelvis"):
         definition(hip_r=armless).calibrate(armless)
     with pytest.raises(ModelError, match="planar"):

@@ -19,20 +19,9 @@ from dynakin.recordings.recording import Recording
 from dynakin.settings.model import Bounds, Priors
 from dynakin.settings.subject import Subject
 from support.made_person import FOOT_DIRECTION, LENGTHS, make, stand
+from support.made_recordings import unseen, without
 
 PERSON = Subject(mass_kg=70.0, height_m=1.75, sex="male")
-
-
-def without(recording: Recording, *names: str) -> Recording:
-    keep = [k for k, name in enumerate(recording.marker_names) if name not in names]
-    kept = tuple(recording.marker_names[k] for k in keep)
-    return replace(recording, marker_names=kept, markers=recording.markers[:, keep])
-
-
-def blank(recording: Recording, name: str, frames: slice) -> Recording:
-    markers = recording.markers.copy()
-    markers[frames, recording.marker_names.index(name)] = np.nan
-    return replace(recording, markers=markers)
 
 
 def test_lengths_angles_and_places_of_a_known_person(standing_person: Recording) -> None:
@@ -89,7 +78,7 @@ def test_another_laboratory_frame_changes_nothing(standing_person: Recording) ->
 def test_side_auto_takes_the_side_with_fewer_gaps(standing_person: Recording) -> None:
     definition = load_model("sagittal7", PERSON)
     assert definition.calibrate(standing_person).side == "right"
-    gap = blank(standing_person, "R_knee", slice(40, 60))
+    gap = unseen(standing_person, "R_knee", frames=slice(40, 60))
     found = definition.calibrate(gap)
     plan = found.measured_plan()
     assert found.side == "left"
@@ -106,7 +95,7 @@ def test_both_sides_are_separate_sites(standing_person: Recording) -> None:
 
 
 def test_a_start_without_markers_is_later(standing_person: Recording) -> None:
-    gap = blank(blank(standing_person, "R_knee", slice(0, 25)), "L_knee", slice(0, 30))
+    gap = unseen(unseen(standing_person, "R_knee", frames=slice(0, 25)), "L_knee", frames=slice(0, 30))
     found = load_model("sagittal7", PERSON).calibrate(gap)
     plan = found.measured_plan()
     assert any("Start from frame 25 (0.25 s)" in message for message in found.messages)
@@ -117,7 +106,7 @@ def test_a_marker_seen_only_later_is_placed_there(standing_person: Recording) ->
     moving = [stand(knee=8.0 + k, ankle=5.0 + 0.5 * k) for k in range(60)]
     recording = make(moving)
     for side in "RL":
-        recording = blank(recording, f"{side}_thigh2", slice(0, 40))
+        recording = unseen(recording, f"{side}_thigh2", frames=slice(0, 40))
     found = load_model("sagittal7", PERSON).calibrate(recording)
     plan = found.measured_plan()
     place = next(site.position for site in plan.sites if site.name == "r_thigh2")

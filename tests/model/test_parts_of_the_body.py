@@ -11,20 +11,14 @@ import pytest
 from dynakin.errors import ModelError
 from dynakin.model.calibration.completion import Proportions
 from dynakin.model.definition import load_model
-from dynakin.recordings.recording import Recording
 from dynakin.settings.subject import Subject
 from support.joint_centres import marker_set, seen
 from support.made_in_space import CENTRE, RATE, SIDES, WHO, definition, measured, standing, states
+from support.made_recordings import unseen
 
 UPPER = [*CENTRE, *(side + name for name in ("SHO", "UPA", "ELB", "WRA", "WRB", "FHD", "BHD") for side in "RL")]
 LEFT_LEG = [f"L{name}" for name in ("THI", "KNE", "TIB", "ANK", "HEE", "TOE", "MT5")]
 LEG = ("hip_flexion", "hip_adduction", "hip_rotation", "knee_angle", "ankle_angle", "subtalar_angle")
-
-
-def without(recording: Recording, names: list[str]) -> Recording:
-    markers = recording.markers.copy()
-    markers[:, [recording.marker_names.index(name) for name in names]] = np.nan
-    return replace(recording, markers=markers)
 
 
 def test_proportions_are_those_of_a_person() -> None:
@@ -47,7 +41,7 @@ def test_proportions_are_those_of_a_person() -> None:
 
 
 def test_without_the_upper_body_the_legs_are_the_same_and_the_mass_is_all_there() -> None:
-    full, found = measured(), definition().calibrate(without(standing(), UPPER))
+    full, found = measured(), definition().calibrate(unseen(standing(), *UPPER))
     assert found.plan is not None and full.plan is not None
     for name in LEG:
         for side in "rl":
@@ -67,7 +61,7 @@ def test_without_the_upper_body_the_legs_are_the_same_and_the_mass_is_all_there(
 
 
 def test_the_trunk_stands_where_the_marked_one_does() -> None:
-    full, found = measured(), definition().calibrate(without(standing(), UPPER))
+    full, found = measured(), definition().calibrate(unseen(standing(), *UPPER))
     assert found.plan is not None and full.plan is not None
     apart = found.plan.geometry.lengths["torso"] - full.plan.geometry.lengths["torso"]
     assert abs(apart) < 0.04
@@ -77,7 +71,7 @@ def test_the_trunk_stands_where_the_marked_one_does() -> None:
 
 
 def test_a_leg_without_markers_takes_the_other_ones_lengths_and_hangs_as_it_does() -> None:
-    full, found = measured(), definition().calibrate(without(standing(), LEFT_LEG))
+    full, found = measured(), definition().calibrate(unseen(standing(), *LEFT_LEG))
     assert found.plan is not None and full.plan is not None
     for name in ("thigh", "shank"):
         assert found.plan.geometry.lengths[name] == pytest.approx(full.plan.geometry.lengths[name], abs=2e-3)
@@ -92,7 +86,7 @@ def test_a_leg_without_markers_takes_the_other_ones_lengths_and_hangs_as_it_does
 
 @pytest.mark.parametrize("gone", [["RWRA", "RWRB"], ["RSHO", "LSHO"], ["LPSI", "RPSI"], ["RHEE"], ["RKNE"], ["LASI"]])
 def test_a_few_markers_less_change_what_they_show_and_little_else(gone: list[str]) -> None:
-    full, found = measured(), definition().calibrate(without(standing(), gone))
+    full, found = measured(), definition().calibrate(unseen(standing(), *gone))
     assert found.plan is not None and full.plan is not None
     for name in ("hip_flexion_l", "knee_angle_l", "ankle_angle_l", "pelvis_tilt"):
         apart = found.plan.start[name] - full.plan.start[name]
@@ -104,16 +98,10 @@ def test_a_few_markers_less_change_what_they_show_and_little_else(gone: list[str
 
 def test_a_person_without_height_or_mass_is_measured_by_the_markers() -> None:
     nobody = load_model("fullbody", Subject(), markers="plug-in-gait")
-    found = nobody.calibrate(without(standing(), UPPER))
+    found = nobody.calibrate(unseen(standing(), *UPPER))
     assert found.height_m == pytest.approx(1.75, abs=0.12)
     assert found.mass_kg == pytest.approx(23.0 * found.height_m**2)
     assert any(text.startswith("Warning: mass") and "mean adult" in text for text in found.messages)
-
-
-def blank(recording: Recording, name: str, frames: slice) -> Recording:
-    markers = recording.markers.copy()
-    markers[frames, recording.marker_names.index(name)] = np.nan
-    return replace(recording, markers=markers)
 
 
 def test_a_marker_that_is_seen_only_where_another_is_not() -> None:
@@ -121,7 +109,7 @@ def test_a_marker_that_is_seen_only_where_another_is_not() -> None:
     base, k = standing(), standing().marker_names.index("RKNE")
     medial = np.concatenate([base.markers, base.markers[:, [k]] - [0.0, 0.0, 0.1]], axis=1)
     whole = replace(base, marker_names=(*base.marker_names, "RKNM"), markers=medial)
-    found = definition().calibrate(blank(blank(whole, "RKNM", slice(0, 90)), "LKNE", slice(90, None)))
+    found = definition().calibrate(unseen(unseen(whole, "RKNM", frames=slice(0, 90)), "LKNE", frames=slice(90, None)))
     plain, with_it = measured(), definition().calibrate(whole)
     assert found.plan is not None and plain.plan is not None and with_it.plan is not None
     lengths = [one.plan.geometry.lengths["thigh"] for one in (found, plain, with_it) if one.plan is not None]
@@ -131,16 +119,16 @@ def test_a_marker_that_is_seen_only_where_another_is_not() -> None:
     assert "RKNM" in found.recorded_markers
     assert not any("no frame of" in text for text in with_it.messages)
 
-    knee = definition().calibrate(blank(blank(base, "RKNE", slice(0, 60)), "LANK", slice(60, None)))
+    knee = definition().calibrate(unseen(unseen(base, "RKNE", frames=slice(0, 60)), "LANK", frames=slice(60, None)))
     assert any("measured without RKNE, which is not seen" in text for text in knee.messages)
     assert any(text.startswith("From the proportions") and "knee_r" in text for text in knee.messages)
     assert "RKNE" in knee.recorded_markers
 
     apart = base
     for name in ("RASI", "LASI", "RPSI", "LPSI"):
-        apart = blank(apart, name, slice(50, None))
+        apart = unseen(apart, name, frames=slice(50, None))
     for name in (name for name in base.marker_names if name[1:] not in ("ASI", "PSI")):
-        apart = blank(apart, name, slice(0, 50))
+        apart = unseen(apart, name, frames=slice(0, 50))
     with pytest.raises(ModelError, match=r"nothing on the pelvis.*expected a frame with pelvis and leg"):
         definition().calibrate(apart)
 
@@ -156,7 +144,7 @@ def test_a_static_recording_of_another_person_is_doubted() -> None:
 def test_too_little_of_the_pelvis_is_refused_in_words() -> None:
     pelvis = ["LASI", "RASI", "LPSI", "RPSI"]
     with pytest.raises(ModelError, match=r"segment 'pelvis' .* has 0 of the landmarks .*hip_r.*expected 2 or more"):
-        definition().calibrate(without(standing(), pelvis))
+        definition().calibrate(unseen(standing(), *pelvis))
 
 
 @pytest.mark.parametrize("turn_rad", [0.0, 1.0])

@@ -237,7 +237,7 @@ def test_names_on_other_places_are_no_set() -> None:
 def test_a_wrong_unit_of_length_is_named(factor: float) -> None:
     recording = walking("plug-in-gait")
     for asked in (None, load_marker_set("plug-in-gait")):
-        with pytest.raises(ModelError, match=r"m tall .*expected 0.5 to 2.6 m: the unit of length"):
+        with pytest.raises(ModelError, match=r"m tall .*expected 0.3 to 2.8 m: the unit of length"):
             recognise(replace(recording, markers=factor * recording.markers), asked)
 
 

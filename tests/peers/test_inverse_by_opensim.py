@@ -12,9 +12,10 @@ from dynakin import read
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.prepared import Prepared
 from dynakin.model.definition import load_model
+from dynakin.model.spec import free_names
 from dynakin.settings.model import OpenSimOptions
 from dynakin.validation.reference.inverse_dynamics import RigidMotion, rigid_motions
-from dynakin.validation.reference.inverse_kinematics import free_coordinates, inverse_kinematics
+from dynakin.validation.reference.inverse_kinematics import inverse_kinematics
 
 opensim: Any = pytest.importorskip("opensim", reason="OpenSim is not installed (pip install opensim)")
 pytestmark = pytest.mark.peers
@@ -60,7 +61,7 @@ def posed(folder: Path, ready: Prepared, names: list[str], frames: int) -> np.nd
 
 
 def test_angles_are_opensims(folder: Path, ready: Prepared, motion: RigidMotion) -> None:
-    names = [motion.model.coordinate_names[k] for k in free_coordinates(motion.model)]
+    names = free_names(motion.model.spec)
     ours = inverse_kinematics(ready.calibrated, ready.markers[:25])
     away = np.abs(ours - posed(folder, ready, names, 25)).max(axis=0)
     loose = [k for k, name in enumerate(names) if name.startswith(("arm_rot", "pro_sup", "elbow"))]  # hardly marked

@@ -120,6 +120,12 @@ def test_more_than_255_points_and_late_frames(tmp_path: Path) -> None:
     assert recording.events == (Event(pytest.approx(0.2, abs=1e-4), "Foot Strike", "left"),)
 
 
+def test_a_start_that_is_no_whole_number_is_refused(tmp_path: Path) -> None:
+    path = made_c3d(tmp_path / "a.c3d", BODY, {"TRIAL": {"ACTUAL_START_FIELD": np.array([1.5, 1.0])}})
+    with pytest.raises(RecordingError, match=r"a\.c3d: found 1\.5 in TRIAL:ACTUAL_START_FIELD, expected whole numbers"):
+        read(path)
+
+
 def test_integer_data_and_hidden_points(tmp_path: Path) -> None:
     seen = np.ones((T, len(BODY)), dtype=bool)
     seen[7, 2] = False

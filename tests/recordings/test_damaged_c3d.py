@@ -169,9 +169,12 @@ def test_counts_that_the_files_size_settles(
 @pytest.mark.parametrize(
     ("name", "value", "expected"),
     [
-        ("USED", b"\xff\xff\xff\xff", "no plate read: found -1 in FORCE_PLATFORM:USED"),
-        ("TYPE", struct.pack("<f", np.inf), "plate 1 left out: found type -1, expected a force plate of type 1 to 7."),
-        ("CHANNEL", struct.pack("<f", np.nan), "plate 1 left out: lists channels [-1, 2, 3, 4, 5, 6], expected 6 of 1"),
+        ("USED", b"\xff\xff\xff\xff", "no plate read: found nan in FORCE_PLATFORM:USED"),
+        ("USED", struct.pack("<f", 1.5), "no plate read: found 1.5 in FORCE_PLATFORM:USED, expected a whole number"),
+        ("TYPE", struct.pack("<f", np.inf), "plate 1 left out: found type inf, expected a force plate of type 1 to 7."),
+        ("TYPE", struct.pack("<f", 2.5), "plate 1 left out: found type 2.5, expected a force plate of type 1 to 7."),
+        ("CHANNEL", struct.pack("<f", np.nan), "plate 1 left out: lists channels [nan, 2, 3, 4, 5, 6], expected 6"),
+        ("CHANNEL", struct.pack("<f", 1.5), "plate 1 left out: lists channels [1.5, 2, 3, 4, 5, 6], expected 6"),
         ("CORNERS", struct.pack("<f", np.nan), "plate 1 left out: its corners in the file do not span a surface."),
         ("ORIGIN", struct.pack("<f", 1e30), "plate 1 left out: "),
     ],

@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 from dynakin.errors import ConfigError, RecordingError
 from dynakin.recordings.frame import find_ground_frame
 from dynakin.recordings.landmarks import FacingPairs, find_marker
-from dynakin.recordings.recording import Recording
 from dynakin.recordings.standing import standing_window
-from support.made_recordings import plain, standing
+from support.made_recordings import plain, standing, without
 
 AXES = {"+Y": np.eye(3), "+Z": np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]]),
         "+X": np.array([[0, 1.0, 0], [1.0, 0, 0], [0, 0, -1.0]]), "-Y": np.diag([1.0, -1, -1])}  # fmt: skip
@@ -91,15 +90,6 @@ def test_given_axes_win() -> None:
         find_ground_frame(standing(), vertical="up")
     with pytest.raises(ConfigError, match="across vertical"):
         find_ground_frame(standing(), vertical="+Y", forward="-Y")
-
-
-def without(recording: Recording, *names: str) -> Recording:
-    keep = [k for k, name in enumerate(recording.marker_names) if name not in names]
-    return replace(
-        recording,
-        marker_names=tuple(recording.marker_names[k] for k in keep),
-        markers=recording.markers[:, keep],
-    )
 
 
 def test_forward_without_feet_from_pelvis_and_without_both_from_walking() -> None:

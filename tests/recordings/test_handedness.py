@@ -65,7 +65,11 @@ def test_exchanged_names_are_refused_with_both_possibilities() -> None:
 
 @pytest.mark.parametrize("axes", [(0, 1), (0, 2), (1, 2)])
 def test_two_negated_axes_are_a_rotation(axes: tuple[int, ...]) -> None:
-    find_ground_frame(negated(standing(), *axes))
+    """The person is then found where they were."""
+    made = standing()
+    turned = negated(made, *axes)
+    expected = find_ground_frame(made).points_to_ground(made.markers)
+    np.testing.assert_allclose(find_ground_frame(turned).points_to_ground(turned.markers), expected, atol=1e-9)
 
 
 @settings(max_examples=40, deadline=None)

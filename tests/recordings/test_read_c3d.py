@@ -15,7 +15,6 @@ from support.made_recordings import write, write_c3d
 
 T = 20
 PER_FRAME = 10
-LEVEL = 0.0
 
 # A plate of 0.4 x 0.6 m whose centre is (1, 2, 0.1) m, in a laboratory with Z up. Plate axes: x along the
 # laboratory's X, y along its -Y, z into the floor. Corners 1 to 4 at (+x, +y), (-x, +y), (-x, -y), (+x, -y).

@@ -10,7 +10,7 @@ import pytest
 import xarray as xr
 
 from dynakin.errors import ConfigError
-from dynakin.report.paper_figures.figures import save_sensitivity_figure
+from dynakin.report.paper_figures.figures import save_sensitivity_figures
 from dynakin.report.paper_figures.sensitivity import GAINS, read_sensitivity
 
 HEADER = ",".join([*GAINS, "criterion"])
@@ -46,7 +46,7 @@ def test_csv_and_netcdf_give_the_same_grid(table: Path, tmp_path: Path) -> None:
 
 
 def test_figure_has_three_slices_through_the_optimum_with_units(table: Path, tmp_path: Path) -> None:
-    (path,) = save_sensitivity_figure(table, tmp_path / "figures", ("svg",))
+    (path,) = save_sensitivity_figures({"gains": read_sensitivity(table)}, tmp_path / "figures", ("svg",))
     text = path.read_text(encoding="utf-8")
     words = " | ".join(re.findall(r"<text[^>]*>([^<]*)</text>", text))
     for label in ("gain of coordinates", "gain of speeds", "gain of accelerations"):

@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import xarray as xr
 
-from dynakin.arrays import finite, with_nulls
+from dynakin.arrays import finite
+from dynakin.files import with_nulls, write_csv, write_json
 from dynakin.pipeline.result import Result
 from dynakin.recordings.formats.mot import read_table
 from dynakin.results.estimate import Estimate
 from dynakin.results.files.storage import write_storage
-from dynakin.studies.engine.folder import write_csv, write_json
 
 TABLES = ("coordinates.mot", "speeds.sto", "moments.sto", "powers.sto", "wrench.sto", "uncertainty.sto")
 
@@ -68,3 +68,4 @@ def test_finite_numbers_stay_as_they_are() -> None:
     values = np.array([1.0, -0.0, np.nan])
     assert finite(values) is values
     assert with_nulls({"a": (1, True, "x", None)}) == {"a": [1, True, "x", None]}
+    assert with_nulls([np.float32("nan"), np.int64(2), 10**400]) == [None, 2, 10**400]

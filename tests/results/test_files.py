@@ -18,7 +18,7 @@ from dynakin.recordings.read import read
 from dynakin.results.estimate import Estimate
 from dynakin.results.files.folder import OUTPUT_FILES
 from dynakin.results.files.markers import write_trc
-from dynakin.results.measures.fit import marker_rms_mm, wrench_fit
+from dynakin.results.measures.fit import marker_rms_mm, signal_fit
 from support.estimates.synthetic import make_estimate
 
 DIGITS = 5e-8
@@ -93,7 +93,7 @@ def test_figures_recomputed_from_the_files_equal_metrics_json(folder: Path, esti
     table = read_table(folder / "wrench.sto")
     columns = dict(zip(table.names, table.values.T, strict=True))
     for component, told in metrics["wrench"]["rms"].items():
-        fit = wrench_fit(columns[f"{component}_measured"][window], columns[f"{component}_estimated"][window])
+        fit = signal_fit(columns[f"{component}_measured"][window], columns[f"{component}_estimated"][window])
         assert fit.rms == pytest.approx(told, rel=1e-5)
 
 

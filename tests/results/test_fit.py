@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from dynakin.results.measures.fit import signal_fit, truth_error, wrench_fit
+from dynakin.results.measures.fit import signal_fit, truth_error
 
 TIME = np.arange(1000) / 100.0
 SINE = np.sin(2.0 * np.pi * TIME)
@@ -17,12 +17,6 @@ def test_a_constant_error_is_normalised_by_rms_and_by_range() -> None:
     assert fit.nrms_rms_percent == pytest.approx(100.0 / np.sqrt(8.0), rel=1e-6)
     assert fit.nrms_range_percent == pytest.approx(100.0 / 8.0, rel=1e-3)
     assert fit.correlation == pytest.approx(1.0)
-
-
-def test_the_wrenchs_figures_are_the_same_ones() -> None:
-    fit, wrench = signal_fit(SINE, 0.5 * SINE), wrench_fit(SINE, 0.5 * SINE)
-    assert (wrench.rms, wrench.nrms_percent, wrench.correlation) == (fit.rms, fit.nrms_rms_percent, fit.correlation)
-    assert wrench.nrms_range_percent == fit.nrms_range_percent == pytest.approx(25.0 * np.sqrt(0.5), rel=1e-3)
 
 
 def test_frames_that_either_lacks_do_not_count() -> None:

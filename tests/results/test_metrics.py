@@ -20,7 +20,7 @@ from dynakin.results.measures.consistency import (
     noise_from,
     statistics_of,
 )
-from dynakin.results.measures.fit import marker_rms_mm, wrench_fit
+from dynakin.results.measures.fit import marker_rms_mm
 from dynakin.results.measures.metrics import compute_metrics, evaluation_window
 from support.estimates.synthetic import make_estimate
 
@@ -38,20 +38,6 @@ def test_marker_rms_leaves_out_missing_frames_and_is_undefined_without_any() -> 
     estimated = np.array([[0.001, 0.0, 0.0], [5.0, 5.0, 5.0]])
     assert marker_rms_mm(measured, estimated, PLANE) == pytest.approx(1.0)
     assert marker_rms_mm(measured[1:], estimated[1:], PLANE) is None
-
-
-def test_wrench_fit_is_relative_to_the_rms_of_the_measured_signal() -> None:
-    measured = np.array([3.0, -3.0, 3.0, -3.0])
-    fit = wrench_fit(measured, measured + 0.3)
-    assert fit.rms == pytest.approx(0.3)
-    assert fit.nrms_percent == pytest.approx(10.0)
-    assert fit.nrms_range_percent == pytest.approx(5.0)
-    assert fit.correlation == pytest.approx(1.0)
-
-
-def test_wrench_fit_of_a_constant_has_no_correlation() -> None:
-    assert wrench_fit(np.ones(5), np.arange(5.0)).correlation is None
-    assert wrench_fit(np.full(5, np.nan), np.arange(5.0)) == (None, None, None, None)
 
 
 def test_window_starts_after_two_seconds_of_a_long_trial_only() -> None:

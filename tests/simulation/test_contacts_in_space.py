@@ -14,11 +14,12 @@ import dynakin
 from dynakin.errors import ConfigError
 from dynakin.model.definition import load_model
 from dynakin.simulation.bodies.whole_body import Sole
-from dynakin.simulation.mechanics import Motion, kinematics
+from dynakin.simulation.mechanics import kinematics
 from dynakin.simulation.motions.belt import HALF_BELT_M
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.trial import simulate
+from support.trees import inverse_dynamics, motion_of, wrench_of_momentum
 
 PERFECT = SensorNoise.none()
 WEIGHT = 70.0 * 9.80665
@@ -44,12 +45,6 @@ LEAST_N = 20.0  # below it a centre of pressure is not judged
 def perfect(case: str, seed: int, rate_hz: float = 100.0) -> SimulatedTrial:
     motion, duration_s, rail = CASES[case]
     return simulate("fullbody", motion, seed, duration_s, rate_hz, noise=PERFECT, rail=rail)
-
-
-def motion_of(trial: SimulatedTrial) -> Motion:
-    data = trial.truth.data
-    names = tuple(str(n) for n in data["coordinate"].values)
-    return Motion(names, data["coordinates"].values, data["speeds"].values, data["accelerations"].values)
 
 
 @cache
@@ -81,18 +76,7 @@ def test_contacts_add_up_to_the_whole_and_leave_nothing_at_the_pelvis(case: str,
 def test_contacts_give_what_momentum_takes(case: str) -> None:
     """Momentum from poses alone, by differences at 1000 Hz."""
     trial = perfect(case, 1, 1000.0)
-    step, momentum, weight = 1e-3, 0.0, 0.0
-    for s in trial.truth.tree:
-        body = moving_of(case, 1, 1000.0)[s.name]
-        c, R = body.point(s.com), body.rotation
-        p = s.mass * np.gradient(c, step, axis=0)
-        rate = np.gradient(R, step, axis=0) @ np.swapaxes(R, 1, 2)
-        omega = np.stack([rate[:, 2, 1], rate[:, 0, 2], rate[:, 1, 0]], axis=1)
-        spin = (R @ s.inertia @ np.swapaxes(R, 1, 2) @ omega[:, :, None])[:, :, 0]
-        force = np.tile([0.0, -9.80665 * s.mass, 0.0], (len(c), 1))
-        momentum = momentum + np.hstack([p, np.cross(c, p) + spin])
-        weight = weight + np.hstack([force, np.cross(c, force)])
-    expected = np.gradient(momentum, step, axis=0) - weight
+    expected = wrench_of_momentum(trial.truth.tree, moving_of(case, 1, 1000.0), 1e-3)
     off = np.abs(trial.truth.data["contact_wrench"].sum("contact").values - expected)[3:-3]
     # A landing rises to its peak in 35 ms: differences of 1 ms go over its edges.
     assert off.max() < (0.02 if case == "drop-jump" else 3e-3) * np.abs(expected).max()
@@ -263,16 +247,12 @@ def test_a_rail_takes_from_the_feet_what_the_hands_push(case: str, seed: int) ->
 def test_moments_hold_what_hands_and_seat_carry() -> None:
     """Against Pinocchio with each contact's wrench on its segment."""
     pin = pytest.importorskip("pinocchio", reason="Pinocchio is not installed (it is in the dev extra)")
-    from support.trees import inverse_dynamics
 
     for case in ("sit", "belt with a rail"):
         trial = perfect(case, 1)
-        every = slice(0, None, 25)
-        data = trial.truth.data.isel(time=every)
-        full = motion_of(trial)
-        motion = Motion(full.names, full.q[every], full.qd[every], full.qdd[every])
+        data = trial.truth.data.isel(time=slice(0, None, 25))
         outside = {s: data["contact_wrench"].sel(contact=name).values for name, s in trial.truth.contacts.items()}
-        expected = inverse_dynamics(pin, trial.truth.tree, motion, outside)
+        expected = inverse_dynamics(pin, trial.truth.tree, motion_of(trial, 25), outside)
         assert np.abs(data["moments"].values - expected).max() < 1e-9 * np.abs(expected).max()
 
 

@@ -14,18 +14,12 @@ from dynakin.simulation.motions.registry import MOTIONS
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.trial import simulate
-from support.trees import inverse_dynamics
+from support.trees import inverse_dynamics, motion_of
 
 PERFECT = SensorNoise.none()
 MODELS = ("sagittal7", "squat7")
 SHORTEST = {"squat": 6.0, "sit-to-stand": 12.0, "sway": 6.0}
 HEEL, TOE = {"sagittal7": "r_calc", "squat7": "RHEE"}, {"sagittal7": "r_toe", "squat7": "RTOE"}
-
-
-def motion_of(trial: SimulatedTrial, every: int = 1) -> Motion:
-    data = trial.truth.data.isel(time=slice(0, None, every))
-    names = tuple(str(n) for n in data["coordinate"].values)
-    return Motion(names, data["coordinates"].values, data["speeds"].values, data["accelerations"].values)
 
 
 @pytest.mark.parametrize("motion", MOTIONS)

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from dynakin.errors import ConfigError
-from dynakin.simulation.mechanics import Motion, kinematics
+from dynakin.simulation.mechanics import kinematics
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.trial import simulate
-from support.trees import inverse_dynamics, spatial_body, waving
+from support.trees import inverse_dynamics, motion_of, spatial_body, waving, wrench_of_momentum
 
 RATE_HZ = 200.0
 MIDDLE = {"knee_r": 0.4, "knee_l": 0.4, "elbow_r": 0.5, "elbow_l": 0.5}
@@ -23,12 +23,6 @@ def trial() -> SimulatedTrial:
     return simulate(body, motion, seed=2, duration_s=3.0, rate_hz=RATE_HZ, noise=SensorNoise.none())
 
 
-def motion_of(trial: SimulatedTrial) -> Motion:
-    data = trial.truth.data
-    names = tuple(str(n) for n in data["coordinate"].values)
-    return Motion(names, data["coordinates"].values, data["speeds"].values, data["accelerations"].values)
-
-
 def test_it_is_a_whole_person(trial: SimulatedTrial) -> None:
     assert sum(segment.mass for segment in trial.truth.tree) == pytest.approx(64.0, rel=1e-12)
     assert trial.truth.data.sizes["coordinate"] == 29
@@ -36,19 +30,8 @@ def test_it_is_a_whole_person(trial: SimulatedTrial) -> None:
 
 def test_plates_measure_the_rate_of_momentum(trial: SimulatedTrial) -> None:
     """Linear and angular momentum about the ground origin, from poses and their rates in the truth alone."""
-    tree, moving = trial.truth.tree, kinematics(trial.truth.tree, motion_of(trial))
-    momentum, weight = 0.0, 0.0
-    for s in tree:
-        body = moving.segments[s.name]
-        c, R = body.point(s.com), body.rotation
-        p = s.mass * np.gradient(c, 1.0 / RATE_HZ, axis=0)  # from positions, not from the simulator's velocities
-        rate = np.gradient(R, 1.0 / RATE_HZ, axis=0) @ np.swapaxes(R, 1, 2)
-        omega = np.stack([rate[:, 2, 1], rate[:, 0, 2], rate[:, 1, 0]], axis=1)
-        spin = (R @ s.inertia @ np.swapaxes(R, 1, 2) @ omega[:, :, None])[:, :, 0]
-        force = np.tile([0.0, -9.80665 * s.mass, 0.0], (len(c), 1))
-        momentum = momentum + np.hstack([p, np.cross(c, p) + spin])
-        weight = weight + np.hstack([force, np.cross(c, force)])
-    expected = np.gradient(momentum, 1.0 / RATE_HZ, axis=0) - weight
+    moving = kinematics(trial.truth.tree, motion_of(trial))
+    expected = wrench_of_momentum(trial.truth.tree, moving.segments, 1.0 / RATE_HZ)
     measured = trial.recording.total_wrench(about=trial.truth.origin_L)
     assert np.abs(measured - expected)[3:-3].max() < 2e-4 * np.abs(expected).max()
     np.testing.assert_allclose(measured, trial.truth.data["wrench"].values, atol=1e-9)
@@ -57,12 +40,10 @@ def test_plates_measure_the_rate_of_momentum(trial: SimulatedTrial) -> None:
 def test_moments_equal_pinocchios_with_each_foots_own_wrench(trial: SimulatedTrial) -> None:
     pin = pytest.importorskip("pinocchio", reason="Pinocchio is not installed (it is in the dev extra)")
     data = trial.truth.data.isel(time=slice(0, None, 50))
-    names = tuple(str(n) for n in data["coordinate"].values)
-    motion = Motion(names, data["coordinates"].values, data["speeds"].values, data["accelerations"].values)
     outside = {
         f"foot_{word[0]}": data["contact_wrench"].sel(contact=f"{word} foot").values for word in ("right", "left")
     }
-    expected = inverse_dynamics(pin, trial.truth.tree, motion, outside)
+    expected = inverse_dynamics(pin, trial.truth.tree, motion_of(trial, 50), outside)
     assert np.abs(data["moments"].values - expected).max() < 1e-11 * np.abs(expected).max()
 
 

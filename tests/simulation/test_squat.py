@@ -7,11 +7,12 @@ import pytest
 
 from dynakin.errors import ConfigError
 from dynakin.recordings.standing import standing_window
-from dynakin.simulation.mechanics import Motion, kinematics
+from dynakin.simulation.mechanics import kinematics
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.sensors.soft_tissue import regions
 from dynakin.simulation.trial import simulate_squat
+from support.trees import motion_of
 
 
 @pytest.fixture(scope="module")
@@ -30,15 +31,9 @@ def test_speeds_and_accelerations_are_derivatives() -> None:
 
 def test_force_is_the_rate_of_momentum() -> None:
     """Mass times the second difference of the centre of mass, from the truth's own positions."""
-    truth = simulate_squat(seed=3, duration_s=6.0, rate_hz=1000.0).truth
-    data = truth.data
-    motion = Motion(
-        tuple(data["coordinate"].values),
-        data["coordinates"].values,
-        data["speeds"].values,
-        data["accelerations"].values,
-    )
-    moving = kinematics(truth.tree, motion)
+    trial = simulate_squat(seed=3, duration_s=6.0, rate_hz=1000.0)
+    truth, data = trial.truth, trial.truth.data
+    moving = kinematics(truth.tree, motion_of(trial))
     mc = sum(s.mass * moving.segments[s.name].point(s.com) for s in truth.tree)
     mass = sum(s.mass for s in truth.tree)
     second = (mc[2:] - 2.0 * mc[1:-1] + mc[:-2]) / 1e-6

@@ -13,13 +13,13 @@ from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.bodies.subject import Spread, draw_subject
 from dynakin.simulation.bodies.whole_body import Sole, build_body
 from dynakin.simulation.jets import Jet
-from dynakin.simulation.mechanics import Motion, kinematics
+from dynakin.simulation.mechanics import kinematics
 from dynakin.simulation.motions.posed import close_legs, knee_flexion
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.support import Support, split_between
 from dynakin.simulation.trial import simulate
-from support.trees import inverse_dynamics
+from support.trees import inverse_dynamics, motion_of, wrench_of_momentum
 
 PERFECT = SensorNoise.none()
 MOTIONS = ("squat", "gait")
@@ -80,12 +80,6 @@ def test_stated_lengths_are_distances_of_joints() -> None:
         assert body.lengths[length] == pytest.approx(float(np.linalg.norm(tree[segment].placement)), rel=1e-12)
 
 
-def motion_of(trial: SimulatedTrial, every: int = 1) -> Motion:
-    data = trial.truth.data.isel(time=slice(0, None, every))
-    names = tuple(str(n) for n in data["coordinate"].values)
-    return Motion(names, data["coordinates"].values, data["speeds"].values, data["accelerations"].values)
-
-
 @pytest.mark.parametrize("motion", MOTIONS)
 def test_speeds_and_accelerations_are_derivatives(motion: str) -> None:
     data = perfect(motion, 3, 1000.0).truth.data
@@ -101,20 +95,8 @@ def test_speeds_and_accelerations_are_derivatives(motion: str) -> None:
 def test_the_ground_gives_what_momentum_takes(motion: str) -> None:
     """Momentum from poses alone: neither velocities nor accelerations of the simulator go into it."""
     trial = perfect(motion, 2, 1000.0)
-    tree, step = trial.truth.tree, 1e-3
-    moving = kinematics(tree, motion_of(trial))
-    momentum, weight = 0.0, 0.0
-    for s in tree:
-        body = moving.segments[s.name]
-        c, R = body.point(s.com), body.rotation
-        p = s.mass * np.gradient(c, step, axis=0)
-        rate = np.gradient(R, step, axis=0) @ np.swapaxes(R, 1, 2)
-        omega = np.stack([rate[:, 2, 1], rate[:, 0, 2], rate[:, 1, 0]], axis=1)
-        spin = (R @ s.inertia @ np.swapaxes(R, 1, 2) @ omega[:, :, None])[:, :, 0]
-        force = np.tile([0.0, -9.80665 * s.mass, 0.0], (len(c), 1))
-        momentum = momentum + np.hstack([p, np.cross(c, p) + spin])
-        weight = weight + np.hstack([force, np.cross(c, force)])
-    expected = np.gradient(momentum, step, axis=0) - weight
+    moving = kinematics(trial.truth.tree, motion_of(trial))
+    expected = wrench_of_momentum(trial.truth.tree, moving.segments, 1e-3)
     contacts = trial.truth.data["contact_wrench"].sum("contact").values
     assert np.abs(contacts - expected)[3:-3].max() < 2e-3 * np.abs(expected).max()
 

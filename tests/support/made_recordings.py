@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import ezc3d
@@ -78,6 +79,20 @@ def standing(
         )
     time = np.arange(n_frames) / 100.0
     return Recording("standing", None, time, tuple(places), markers, tuple(plates))
+
+
+def without(recording: Recording, *names: str) -> Recording:
+    """The same without these markers, as if they had not been worn."""
+    keep = [k for k, name in enumerate(recording.marker_names) if name not in names]
+    kept = tuple(recording.marker_names[k] for k in keep)
+    return replace(recording, marker_names=kept, markers=recording.markers[:, keep])
+
+
+def unseen(recording: Recording, *names: str, frames: slice = slice(None)) -> Recording:
+    """The same with these markers seen in no frame, or in none of ``frames``."""
+    markers = recording.markers.copy()
+    markers[frames, [recording.marker_names.index(name) for name in names]] = np.nan
+    return replace(recording, markers=markers)
 
 
 def plain(n_frames: int, rate: float = 100.0, plates: tuple[Plate, ...] = ()) -> Recording:

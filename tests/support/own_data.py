@@ -10,6 +10,7 @@ from dynakin.bindings import _core
 from dynakin.filter.augment import continuous_noise, initial_covariance
 from dynakin.filter.core_filter import core_filter
 from dynakin.filter.noise import wrench_covariance
+from dynakin.model.spec import free_names
 from dynakin.settings import presets
 from dynakin.settings.noise import Noise
 from dynakin.studies.tuning.trial import TuningTrial
@@ -49,7 +50,7 @@ def own_trial(like: TuningTrial, noise: Noise, seed: int) -> TuningTrial:
         like: gives the measured model; its motion's priors are narrowed.
     """
     rng = np.random.default_rng(seed)
-    motion = 3 * sum(not c.locked for c in like.initial.spec.coordinates)
+    motion = 3 * len(free_names(like.initial.spec))
     sd0 = like.initial.sd0.copy()
     sd0[:motion] = 0.05
     sd0[motion:] *= 0.2  # constants that stay possible

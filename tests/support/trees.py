@@ -1,4 +1,4 @@
-"""The simulator's trees in Pinocchio, and a spatial body through the simulator's own classes."""
+"""The simulator's trees in Pinocchio and by their momentum, and a spatial body through the simulator's own classes."""
 
 from __future__ import annotations
 
@@ -19,11 +19,35 @@ from dynakin.simulation.bodies.subject import (
     mass_com_inertia,
     symmetric,
 )
-from dynakin.simulation.mechanics import Axis, Motion, Segment, kinematics
+from dynakin.simulation.mechanics import Axis, Motion, Segment, SegmentMotion, kinematics
+from dynakin.simulation.output import SimulatedTrial
 
 Array = NDArray[np.float64]
 UP = np.array([0.0, 1.0, 0.0])
 X, Y, Z = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+def motion_of(trial: SimulatedTrial, every: int = 1) -> Motion:
+    """The true motion in every so many frames."""
+    data = trial.truth.data.isel(time=slice(0, None, every))
+    names = tuple(str(n) for n in data["coordinate"].values)
+    return Motion(names, data["coordinates"].values, data["speeds"].values, data["accelerations"].values)
+
+
+def wrench_of_momentum(tree: tuple[Segment, ...], poses: Mapping[str, SegmentMotion], step_s: float) -> Array:
+    """What the outside gives, (T, 6) N and N m about the ground origin: the rate of linear and angular momentum less
+    the weight, from poses alone: neither velocities nor accelerations of the simulator go into it."""
+    momentum, weight = 0.0, 0.0
+    for s in tree:
+        c, R = poses[s.name].point(s.com), poses[s.name].rotation
+        p = s.mass * np.gradient(c, step_s, axis=0)
+        rate = np.gradient(R, step_s, axis=0) @ np.swapaxes(R, 1, 2)
+        omega = np.stack([rate[:, 2, 1], rate[:, 0, 2], rate[:, 1, 0]], axis=1)
+        spin = (R @ s.inertia @ np.swapaxes(R, 1, 2) @ omega[:, :, None])[:, :, 0]
+        force = np.tile([0.0, -9.80665 * s.mass, 0.0], (len(c), 1))
+        momentum = momentum + np.hstack([p, np.cross(c, p) + spin])
+        weight = weight + np.hstack([force, np.cross(c, force)])
+    return np.asarray(np.gradient(momentum, step_s, axis=0) - weight)
 
 
 def inverse_dynamics(

@@ -24,7 +24,7 @@ def test_right_standard_deviations_are_consistent() -> None:
     found = coverage("coordinates", NAMES, *draws(), own_model=True)
     assert found.judgement == "consistent" and found.sizes() == "right"
     assert found.inside == pytest.approx([0.95, 0.95], abs=0.012)
-    assert found.normalised_square == pytest.approx([1.0, 1.0], abs=0.07)
+    assert found.mean_square == pytest.approx(1.0, abs=0.07)
     assert found.interval_95[0] < found.mean_square < found.interval_95[1]
     assert found.sd_over_error == pytest.approx([1.0, 1.0], abs=0.04)
 

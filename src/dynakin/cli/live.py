@@ -87,7 +87,6 @@ def live(
     from dynakin.stream.session import Live
     from dynakin.stream.sinks.recorder import Recorder, finish
     from dynakin.stream.sources.replay import Replay
-    from dynakin.stream.start import read_known
 
     if finish_folder is not None:
         if output is None:
@@ -126,7 +125,7 @@ def live(
                 standing_s=standing,
                 standing_wait_s=wait if standing_wait is None else standing_wait,
                 static=None if static is None else read(static),
-                known=None if parameters is None else read_known(parameters),
+                known=None if parameters is None else _estimated(parameters),
                 record=lambda: Recorder(Path(f"live-{datetime.now():%Y%m%d-%H%M%S}"), settings),
                 say=lambda text: out().print(text, soft_wrap=True),
             )
@@ -144,6 +143,12 @@ def live(
         raise typer.Exit(1)
     if record is not None:
         out().print(f"Recorded in {record}; results from it: dynakin live --finish {record} -o OUT", soft_wrap=True)
+
+
+def _estimated(parameters: Path) -> dict[str, tuple[float, float]]:
+    from dynakin.model.identified import read_constants
+
+    return {name: (found.value, found.sd) for name, found in read_constants(parameters).items() if found.estimated}
 
 
 def _for_replay(replay: Replay, address: str, again: bool) -> tuple[float, float]:

@@ -16,11 +16,12 @@ from dynakin.identification.observability.measured import tracker_of
 from dynakin.identification.observability.structure import Structure, structure_of
 from dynakin.identification.observability.trial import Identifiability, identifiability
 from dynakin.model.definition import Definition, ModelDefinition, available_models, load_built_in_or_toml
+from dynakin.model.identified import read_constants
 from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
 from dynakin.model.markers.schema import Marker, MarkerSetFile
 from dynakin.model.opensim.definition import OpenSimDefinition
-from dynakin.model.opensim.export import mass_of_run, of_definition, of_initial, read_values
-from dynakin.model.opensim.spec import free_coordinates, placements, used_scales
+from dynakin.model.opensim.export import mass_of_run, of_definition, of_initial
+from dynakin.model.opensim.spec import independent_coordinates, placements, used_scales
 from dynakin.model.opensim.write import write_osim
 from dynakin.model.schema import ModelFile, kinds_of
 from dynakin.model.schema import Segment as ModelSegment
@@ -222,7 +223,7 @@ def export_model(
     """
     if path.suffix.casefold() != ".osim":
         raise typer.BadParameter(f"--export is {path}, expected a file that ends in .osim")
-    values = {} if parameters is None else read_values(parameters)
+    values = {} if parameters is None else {name: found.value for name, found in read_constants(parameters).items()}
     if isinstance(definition, OpenSimDefinition):
         if trial is not None:
             raise typer.BadParameter("--trial is of no use with --export of an .osim file, which has places of its own")
@@ -254,7 +255,7 @@ def _opensim_tree(definition: OpenSimDefinition) -> Tree:
 
 def _opensim_coordinates(definition: OpenSimDefinition) -> Table:
     rows = table("coordinate", "limits", "unit", "meaning", numbers=(1,), title="Coordinates")
-    free = {c.name for c in free_coordinates(definition.source)}
+    free = {c.name for c in independent_coordinates(definition.source)}
     for joint in definition.source.joints:
         kinds = kinds_of([joint])
         for c in joint.coordinates:

@@ -19,6 +19,7 @@ from dynakin.filter.parameters import parameters_of
 from dynakin.filter.sources import with_sources
 from dynakin.filter.systematic import Systematic
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.model.spec import free_coordinates
 from dynakin.recordings.feet.contact import ON_PLATE, UNMEASURED
 from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
@@ -222,7 +223,7 @@ def _feet(arrays: Mapping[str, Array], feet: ContactLoads) -> dict[str, Any]:
 def _coordinate_blocks(arrays: Mapping[str, Array], model: _core.Model) -> dict[str, Array]:
     """Coordinates, speeds, accelerations and their deviations of all coordinates; locked ones stand still, for sure."""
     spec = model.spec
-    free = [k for k, coordinate in enumerate(spec.coordinates) if not coordinate.locked]
+    free = free_coordinates(spec)
     frames = len(arrays["state"])
     blocks: dict[str, Array] = {}
     for name in ("coordinates", "speeds", "accelerations"):

@@ -9,6 +9,7 @@ import numpy.typing as npt
 
 from dynakin.arrays import runs
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.model.spec import free_names
 from dynakin.results.records import REFUSED, TRACKING, Event, EventKind, Parameter
 
 if TYPE_CHECKING:
@@ -101,9 +102,8 @@ def _held(data: xr.Dataset, unseen_sd: float | None) -> list[Event]:
 
 def _coordinates_at_bounds(data: xr.Dataset, initial: CalibratedModel) -> list[Event]:
     state = data["state"].values
-    free = [coordinate.name for coordinate in initial.spec.coordinates if not coordinate.locked]
     events = []
-    for k, name in enumerate(free):  # the state begins with them
+    for k, name in enumerate(free_names(initial.spec)):  # the state begins with them
         held = (state[:, k] <= initial.lower[k]) | (state[:, k] >= initial.upper[k])
         events += _stretches(data["time"].values, held, "at_bound", name, "held at its joint limit")
     return events

@@ -15,6 +15,7 @@ import numpy.typing as npt
 from dynakin.bindings import _core
 from dynakin.model.calibration.pose_start import bare
 from dynakin.model.inertia import INERTIA_NAMES
+from dynakin.model.spec import free_coordinates, free_names
 
 Array = npt.NDArray[np.float64]
 Kind = Literal["hinge_centre", "ball_centre", "hinge_axes", "pair_axes", "ball_axes", "root"]
@@ -68,7 +69,7 @@ class JointErrors:
         orientations = _orientations(spec, reference)
         larger, added = _with_errors(spec)
         found = _sources(spec, orientations, set(held), less_sure or {})
-        place = {name: k for k, name in enumerate(c.name for c in larger.coordinates if not c.locked)}
+        place = {name: k for k, name in enumerate(free_names(larger))}
         sources = np.array([[column.get(name, 0.0) for _, column in found] for name in added])
         model = _core.Model(larger)
         at = {name: k for k, name in enumerate(model.layout.names)}
@@ -105,14 +106,14 @@ def _orientations(spec: _core.ModelSpec, reference: Array) -> dict[str, Array]:
     """R_GB of each segment in the reference posture."""
     model = _core.Model(spec)
     x = np.zeros(model.layout.size)
-    free = [k for k, coordinate in enumerate(spec.coordinates) if not coordinate.locked]
+    free = free_coordinates(spec)
     x[: len(free)] = reference[free]
     return dict(zip(model.segment_names, _core.segment_poses(model, x)[0], strict=True))
 
 
 def _turning(spec: _core.ModelSpec) -> dict[str, set[str]]:
     """Segment -> free rotations of its joint, without those that follow a joint before it (a patella's)."""
-    free = {c.name for c in spec.coordinates if not c.locked}
+    free = set(free_names(spec))
     seen: set[str] = set()
     found = {}
     for segment in spec.segments:

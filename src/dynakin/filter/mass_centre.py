@@ -12,6 +12,7 @@ from dynakin.arrays import runs
 from dynakin.bindings import _core
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.schema import kinds_of
+from dynakin.model.spec import free_names
 from dynakin.recordings.recording import rate_of
 from dynakin.recordings.resampling import low_pass
 from dynakin.units import GRAVITY_M_S2
@@ -129,11 +130,11 @@ class CentreWeights:
         offset, size = model.layout.blocks["coordinates"]
         states = np.tile(initial.x0, (_POSTURES, 1))
         kinds = kinds_of(initial.spec.segments)
-        turns = np.array([kinds.get(c.name) == "rotation" for c in initial.spec.coordinates if not c.locked])
+        free = free_names(initial.spec)
+        turns = np.array([kinds.get(name) == "rotation" for name in free])
         spread = np.random.default_rng(0).normal(0.0, _SPREAD_RAD, (_POSTURES, size)) * turns
         if initial.unseen_kg:
             root = {a.coordinate for s in initial.spec.segments if s.parent == "ground" for a in s.axes}
-            free = [c.name for c in initial.spec.coordinates if not c.locked]
             spread *= np.where(np.isin(free, list(root)), _UNSEEN_RAD / _SPREAD_RAD, 1.0)
         states[:, offset : offset + size] += spread
         axes = np.array(initial.spec.markers[0].measured)

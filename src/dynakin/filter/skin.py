@@ -19,6 +19,7 @@ from dynakin.filter.noise import soft_tissue_time_s
 from dynakin.filter.systematic import drives, followed
 from dynakin.filter.tracker import Tracker
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.model.spec import free_coordinates
 from dynakin.results.records import FOLLOWING
 from dynakin.settings.noise import Noise
 
@@ -79,7 +80,7 @@ def following_skin(tracker: Tracker, arrays: dict[str, Array], time: Array) -> F
         return None
     names = [segment.name for segment in spec.segments]
     segment = np.array([names.index(marker.segment) for marker in spec.markers])
-    free = np.array([k for k, coordinate in enumerate(spec.coordinates) if not coordinate.locked])
+    free = np.array(free_coordinates(spec))
     followed_by = followed(arrays["state"][:, : len(free)], calibrated)
     followed_by = np.nan_to_num(followed_by - followed_by[used].mean(axis=0))
     # the filter's displacements: independent every two time constants

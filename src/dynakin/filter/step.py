@@ -12,6 +12,7 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
+from dynakin.model.spec import free_coordinates
 from dynakin.results.measures.sources import ABSENT
 from dynakin.settings.strict import nearest
 from dynakin.units import COMPONENTS
@@ -188,7 +189,7 @@ def deviations_of(
         coordinates, speeds, accelerations, moments (C,), 0 where a coordinate is locked (not its moment); wrench (6,).
     """
     variance = np.diagonal(covariance)
-    free = [k for k, coordinate in enumerate(model.spec.coordinates) if not coordinate.locked]
+    free = free_coordinates(model.spec)
     found: dict[str, Array] = {}
     for name in ("coordinates", "speeds", "accelerations"):
         offset, size = model.layout.blocks[name]

@@ -19,6 +19,7 @@ from dynakin.bindings import _core
 from dynakin.filter.joint_errors import JointErrors, Kind, floats
 from dynakin.filter.noise import marker_variance, soft_tissue_sd
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.model.spec import free_coordinates
 from dynakin.recordings.feet.contact import UNMEASURED
 from dynakin.results.measures.sources import MEASURED, PRIOR, moment_sources
 from dynakin.results.records import MISPLACED
@@ -226,7 +227,7 @@ class Systematic:
     def __init__(self, calibrated: CalibratedModel, noise: Noise, sizes: Sizes | None = None) -> None:
         spec = calibrated.spec
         self.sizes = sizes or usual_sizes(calibrated).scaled(noise.systematic_scale)
-        self._free = np.array([k for k, c in enumerate(spec.coordinates) if not c.locked])
+        self._free = np.array(free_coordinates(spec))
         self._count = len(spec.coordinates)
         self._feet = len(calibrated.feet)
         reference = neutral(calibrated)
@@ -492,14 +493,14 @@ def _between(time: Array, known: Array, values: Array) -> Array:
 
 def followed(q: Array, calibrated: CalibratedModel) -> Array:
     """What skin follows of the free coordinates (..., K): it saturates, and is 0 upright."""
-    free = [k for k, c in enumerate(calibrated.spec.coordinates) if not c.locked]
+    free = free_coordinates(calibrated.spec)
     return np.asarray(np.tanh((q - neutral(calibrated)[free]) / SKIN_ANGLE_RAD))
 
 
 def neutral(calibrated: CalibratedModel) -> Array:
     """(C,) upright posture: all free coordinates 0, or as near to it as their bounds allow."""
     q = np.array([c.value for c in calibrated.spec.coordinates], dtype=float)
-    free = [k for k, c in enumerate(calibrated.spec.coordinates) if not c.locked]
+    free = free_coordinates(calibrated.spec)
     K = len(free)
     q[free] = np.clip(0.0, calibrated.lower[:K], calibrated.upper[:K])
     return q

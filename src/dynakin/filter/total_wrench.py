@@ -264,7 +264,7 @@ def _undeclared_in_words(
             continue
         place = np.broadcast_to(found.place(slice(first, end)), (end - first, 2))
         for k, names in enumerate(feet.values()):
-            own = [k for k, name in enumerate(initial.recorded_markers) if name in names]
+            own = [m for m, name in enumerate(initial.recorded_markers) if name in names]
             if not own:
                 continue
             distance = distance_to_hull(place, markers[first:end][:, own][:, :, [0, 2]])
@@ -303,7 +303,6 @@ def _foreign_load(
     """A sentence where the plates' mean load is not the person's weight, for recordings that `closure` cannot judge.
 
     Args:
-        in_step: whether nobody need ask any more if the plates lag behind the markers.
         tolerance: part of the weight by which they may differ; None: nobody asks.
     """
     mass_kg = initial.weighed_kg

@@ -13,6 +13,7 @@ from dynakin.filter.tracker import can_smooth
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.loads import with_loads
 from dynakin.model.schema import kinds_of
+from dynakin.model.spec import free_names
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.standing import standing_window
 from dynakin.results.estimate import Estimate
@@ -76,7 +77,7 @@ def _estimated_anew(estimator: Estimator, estimate: Estimate, standing: Recordin
     wrench = recording_arrays(still, initial, gaps=True)[1] if still.plates else np.full((still.n_frames, 6), np.nan)
     run = tracker.run_smoothed_arrays if can_smooth(estimator.noise) else tracker.run_arrays
     state = run(still.time, markers, wrench)["state"]
-    free = [c.name for c in initial.spec.coordinates if not c.locked]
+    free = free_names(initial.spec)
     kinds = kinds_of(initial.spec.segments)
     turning = np.array([kinds[name] == "rotation" for name in free])
     locked = {c.name: float(c.value) for c in initial.spec.coordinates if c.locked and kinds[c.name] == "rotation"}

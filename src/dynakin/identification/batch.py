@@ -40,7 +40,7 @@ class Posterior:
     Attributes:
         unknowns: what was asked. theta: (U,) deviations from the start. covariance: (U, U), 0 for those held.
         sigma: (N, r) RMS residual by trial and component of `Common.rows`, N and N m. tau_s: (N, r) seconds that a
-            residual lasts. nuisance: (N, r + 1) each trial's slow error of each component, and its delay.
+            residual lasts.
     """
 
     unknowns: Unknowns
@@ -48,7 +48,6 @@ class Posterior:
     covariance: Array
     sigma: Array
     tau_s: Array
-    nuisance: Array
 
     @property
     def phi(self) -> Array:
@@ -67,10 +66,9 @@ class Posterior:
 
 def at_start(unknowns: Unknowns) -> Posterior:
     """The table and the geometry as measured, with the prior."""
-    own = len(unknowns.nuisance_sd)
-    nothing = np.zeros((0, own - 1))
+    nothing = np.zeros((0, len(unknowns.nuisance_sd) - 1))
     covariance = np.diag(np.where(unknowns.free, unknowns.sd, 0.0) ** 2)
-    return Posterior(unknowns, np.zeros(len(unknowns.sd)), covariance, nothing, nothing, np.zeros((0, own)))
+    return Posterior(unknowns, np.zeros(len(unknowns.sd)), covariance, nothing, nothing)
 
 
 def identify_batch(common: Common, trials: Sequence[MeasuredTrial], unknowns: Unknowns) -> Posterior:
@@ -122,7 +120,7 @@ def identify_batch(common: Common, trials: Sequence[MeasuredTrial], unknowns: Un
     spread = cho_solve(factor, np.eye(size)) + through @ through.T
     covariance[np.ix_(free, free)] = spread[:count, :count]
     seconds = tau * np.array(step)[:, None]
-    return Posterior(unknowns, theta, covariance, sigma, seconds, x[count:].reshape(-1, own_count))
+    return Posterior(unknowns, theta, covariance, sigma, seconds)
 
 
 def known_s(trial: MeasuredTrial) -> float:

@@ -14,7 +14,6 @@ from dynakin.filter.estimator import Estimator
 from dynakin.filter.tracker import Tracker
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.progress import Progress
-from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.smoothing import smooth
@@ -142,22 +141,17 @@ class Common:
         offset, size = self.core.layout.blocks[block]
         return slice(offset, offset + size)
 
-    def see(
-        self, recording: Recording, ground: GroundFrame | None = None, progress: Progress | None = None
-    ) -> Movement:
+    def see(self, recording: Recording, progress: Progress | None = None) -> Movement:
         """Smoothed kinematics from the markers alone, lengths and inertia held at the start. Plates are not looked at.
 
         Without plates the smoother's accelerations carry 12 N of noise above 6 Hz, so the coordinates are low-passed.
-
-        Args:
-            ground: directions of the laboratory where the trial is a part of another.
 
         Raises:
             ModelError, RecordingError: the trial does not fit. DivergenceError: from the filter. LostError: the filter
                 lost the person in too many frames.
         """
         recording = replace(recording, plates=())
-        start = self._start(recording, ground)
+        start = self._start(recording)
         markers = marker_paths(recording, self.initial, start.ground)
         coordinates = {c.name: float(c.value) for c in start.spec.coordinates}
         frozen = freeze(self.initial, initial_values(self.initial), coordinates)
@@ -211,7 +205,7 @@ class Common:
         where = recording.path or recording.name
         if not recording.plates:
             raise RecordingError(f"{where}: no force plates, expected at least one; give its ground forces (--forces)")
-        start = self._start(replace(recording, plates=()), None)
+        start = self._start(replace(recording, plates=()))
         push = self._measured_wrench(recording, start)[:, 1]
         load, weighed = float(np.nanmean(push)) / GRAVITY_M_S2, self.initial.weighed_kg
         if abs(load - weighed) > LOAD_APART * weighed:
@@ -224,13 +218,13 @@ class Common:
         """A trial to identify on."""
         return self.with_plates(self.see(recording, progress=progress), recording)
 
-    def _start(self, recording: Recording, ground: GroundFrame | None) -> CalibratedModel:
+    def _start(self, recording: Recording) -> CalibratedModel:
         estimator = self.estimator
         return start_as(
             self.initial,
             estimator.model,
             recording,
-            ground,
+            None,
             self.static,
             forward=estimator.forward,
             priors=estimator.priors,

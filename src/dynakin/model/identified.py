@@ -1,11 +1,13 @@
-"""A subject's identified parameters: the file that `dynakin identify` writes and `dynakin run --parameters` reads."""
+"""A subject's identified parameters: the file that `dynakin identify` writes and `dynakin run --parameters` reads; the
+constants of a run, which `dynakin live` takes too."""
 
 from __future__ import annotations
 
+import json
 import os
 from dataclasses import replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 import tomli_w
@@ -13,6 +15,7 @@ from pydantic import Field, model_validator
 
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
+from dynakin.files import LARGEST_TEXT, read_bytes
 from dynakin.model.calibration.calibrated import CalibratedModel, JointPrior
 from dynakin.model.inertia import INERTIA_NAMES
 from dynakin.settings.strict import Strict, read_toml, validate
@@ -120,6 +123,30 @@ def read_identified(path: Path) -> IdentifiedSubject:
             f"{path}: expected what dynakin identify wrote (.toml); a run's parameters.json is for dynakin live"
         )
     return validate(IdentifiedSubject, read_toml(path), str(path))
+
+
+class Constant(NamedTuple):
+    """What a run found of one constant: SI; ``sd`` is one standard deviation."""
+
+    value: float
+    sd: float
+    estimated: bool
+
+
+def read_constants(path: Path) -> dict[str, Constant]:
+    """The constants of a run's ``parameters.json``, by their names in the state.
+
+    Raises:
+        ModelError: the file cannot be read or is none of that kind.
+    """
+    try:
+        entries = json.loads(read_bytes(path, ModelError, LARGEST_TEXT))["parameters"]
+        found = {str(e["name"]): Constant(float(e["value"]), float(e["sd"]), bool(e["estimated"])) for e in entries}
+        if not np.isfinite([constant[:2] for constant in found.values()]).all():
+            raise ValueError("a number is not finite")
+        return found
+    except (ValueError, KeyError, TypeError, ArithmeticError, RecursionError) as error:
+        raise ModelError(f"{path}: no parameters.json of a run ({error})") from None
 
 
 def with_identified(initial: CalibratedModel, subject: IdentifiedSubject) -> CalibratedModel:

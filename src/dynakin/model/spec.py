@@ -1,4 +1,4 @@
-"""The one place where a plan becomes specification classes of the compiled core."""
+"""The one place where a plan becomes specification classes of the compiled core; which of its coordinates are free."""
 
 from __future__ import annotations
 
@@ -74,6 +74,16 @@ def axes_to_core(segment: Segment) -> list[_core.AxisSpec]:
         )
         for axis in segment.axes
     ]
+
+
+def free_coordinates(spec: _core.ModelSpec) -> list[int]:
+    """(K,) numbers of the coordinates that are not locked, in the order in which a state begins with them."""
+    return [k for k, coordinate in enumerate(spec.coordinates) if not coordinate.locked]
+
+
+def free_names(spec: _core.ModelSpec) -> list[str]:
+    """(K,) names of the coordinates that are not locked, in the same order."""
+    return [coordinate.name for coordinate in spec.coordinates if not coordinate.locked]
 
 
 def in_layout(names: list[str], values: Mapping[str, float], otherwise: float) -> Array:

@@ -88,8 +88,6 @@ class BodyTable:
     name: str
     sex: Sex | None
     parts: dict[str, Part]
-    raw_total: float
-    """Sum of the fractions as printed (1.002, say), before they were normalised."""
 
     def part(self, name: str) -> Part:
         """The part of that name.
@@ -227,4 +225,4 @@ def load_table(name_or_path: str | Path, sex: Sex | None) -> BodyTable:
             raise ModelError(f"{path}: part {part!r} has no row for sex {sex or 'male and female (sex not given)'}")
     total = sum((2 if part in PAIRED else 1) * entry.mass_fraction for part, entry in parts.items())
     normalised = {part: replace(entry, mass_fraction=entry.mass_fraction / total) for part, entry in parts.items()}
-    return BodyTable(path.stem, sex, normalised, total)
+    return BodyTable(path.stem, sex, normalised)

@@ -19,7 +19,7 @@ from dynakin.recordings.plates.limits import beyond_limits
 from dynakin.recordings.plates.pressure import JUDGED_N
 from dynakin.recordings.recording import Array, Plate, Recording
 from dynakin.recordings.standing import standing_window
-from dynakin.units import GRAVITY_M_S2
+from dynakin.units import GRAVITY_M_S2, PERSON_MASS_KG
 
 MASS_WARNING = 0.05
 """Relative difference between declared mass and the plates' from which it is said."""
@@ -28,8 +28,6 @@ MASS_MEAN_RATIO = (0.6, 1.1)
 m g."""
 MASS_RATIO_REFUSED = (0.2, 5.0)
 """Plates' mass over declared mass beyond which the units or plates must be wrong."""
-MASS_REFUSED_KG = (5.0, 400.0)
-"""The plates' mass itself, where none is declared: not a person's beyond these."""
 COP_REFUSED_M = 0.30
 """Centre of pressure outside the outline of the markers of the nearest foot, from which the plate's place or unit must
 be wrong. From `NEAR_M` on it is said."""
@@ -47,7 +45,6 @@ class PlateCheck:
     """What ``check_plates`` found.
 
     Attributes:
-        ok: neither a warning nor a refusal.
         mass_kg_from_plates: standing vertical force over g; None where the person does not stand still on
             plates, or where a sole reaches over a plate's edge.
         mean_mass_kg: the same from the mean over all loaded frames of a movement; right only where it ends as it
@@ -56,7 +53,6 @@ class PlateCheck:
         refusal: why the plates cannot be used, None where they can. The caller decides what follows from it.
     """
 
-    ok: bool
     mass_kg_from_plates: float | None
     mean_mass_kg: float | None
     messages: tuple[str, ...]
@@ -101,16 +97,14 @@ def check_plates(
         loads: the assignment of plates to these feet, where a run has it already.
     """
     if not recording.plates:
-        return PlateCheck(False, None, None, (), "no force plates in this recording, expected at least one")
+        return PlateCheck(None, None, (), "no force plates in this recording, expected at least one")
     findings = _Findings()
     standing = _on_plates(standing_window(recording), recording, ground)
     frames = standing if standing is not None else slice(None)
     feet = _feet(recording, ground, foot_markers or {}, findings)
     if mass_kg is None and _nobody_on(recording, ground, feet):
         findings.say("Nobody steps on the plates: they carry nothing, and no foot is on any.")
-        return PlateCheck(
-            not any("Warning:" in text for text in findings.messages), None, None, tuple(findings.messages), None
-        )
+        return PlateCheck(None, None, tuple(findings.messages), None)
     mass = _check_vertical(recording, ground, mass_kg, standing, findings)
     if loads is None:
         loads = foot_loads(recording, ground, foot_markers or {})
@@ -138,11 +132,10 @@ def check_plates(
     if turned := turned_feet(recording.plates, ground, recording.rate):
         findings.warn(f"{turned}.")
     refusal = "; ".join(findings.refusals) or None
-    ok = refusal is None and not any(text.startswith("Warning:") for text in findings.messages)
     standing_mass, mean_mass = (mass, None) if standing is not None else (None, mass)
     if over_edge:
         standing_mass = None
-    return PlateCheck(ok, standing_mass, mean_mass, tuple(findings.messages), refusal)
+    return PlateCheck(standing_mass, mean_mass, tuple(findings.messages), refusal)
 
 
 def _on_plates(standing: slice | None, recording: Recording, ground: GroundFrame) -> slice | None:
@@ -228,7 +221,7 @@ def _check_vertical(
         findings.warn(f"the mean force is {tilt:.0f} deg off the vertical {ground.vertical}, expected a few degrees.")
     if mass_kg is not None:
         _compare_mass(mass, mass_kg, standing is not None, findings)
-    elif standing is not None and not MASS_REFUSED_KG[0] < mass < MASS_REFUSED_KG[1]:
+    elif standing is not None and not PERSON_MASS_KG[0] < mass < PERSON_MASS_KG[1]:
         findings.refuse(
             f"the plates read {mass:.3g} kg standing, expected a person's mass (nobody on the plates, or another unit "
             "of the forces?)"

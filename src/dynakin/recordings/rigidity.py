@@ -26,18 +26,23 @@ class RigidMotion:
         return RigidMotion(self.rotations[frames], self.translations[frames], self.misfit_m[frames])
 
 
-def rigid_motion(shape: Array, paths: Array) -> RigidMotion:
-    """The rotations and translations by which a shape (K, 3) m fits its markers' paths (T, K, 3) m best, gaps NaN
+def nearest_rotation(covariance: Array) -> Array:
+    """Rotations (..., 3, 3) that turn sources onto targets best, no mirror image, from sum target source^T (..., 3, 3)
     (Soderkvist & Wedin 1993, J Biomech 26:1473-1477)."""
+    u, _, vt = np.linalg.svd(covariance)
+    u[..., 2] *= np.sign(np.linalg.det(u @ vt))[..., None]
+    return np.asarray(u @ vt)
+
+
+def rigid_motion(shape: Array, paths: Array) -> RigidMotion:
+    """The rotations and translations by which a shape (K, 3) m fits its markers' paths (T, K, 3) m best, gaps NaN."""
     seen: npt.NDArray[np.bool_] = np.asarray(np.isfinite(paths + shape).all(axis=2))
     count = np.maximum(seen.sum(axis=1), 1)[:, None]
     weight = seen[..., None]
     where, of = np.where(weight, paths, 0.0), np.where(weight, shape, 0.0)
     centre, middle = where.sum(axis=1) / count, of.sum(axis=1) / count
     a, b = (where - centre[:, None]) * weight, (of - middle[:, None]) * weight
-    u, _, vt = np.linalg.svd(np.swapaxes(a, 1, 2) @ b)
-    u[:, :, 2] *= np.sign(np.linalg.det(u @ vt))[:, None]  # no mirror image
-    rotations = u @ vt
+    rotations = nearest_rotation(np.swapaxes(a, 1, 2) @ b)
     left = a - b @ np.swapaxes(rotations, 1, 2)
     misfit = np.sqrt((left**2).sum(axis=(1, 2)) / count[:, 0])
     translations = centre - (rotations @ middle[:, :, None])[:, :, 0]

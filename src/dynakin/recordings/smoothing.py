@@ -30,7 +30,6 @@ class Smoothed:
     values: Array
     rates: Array
     seconds: Array
-    filled: Mask  # (T, n): interpolated, not measured
     notes: tuple[str, ...]
 
 
@@ -61,13 +60,12 @@ def smooth(
     step = even_step(time)
     labels = list(names) or [f"signal {k + 1}" for k in range(signals.shape[1])]
     values, rates, seconds = (np.full(signals.shape, np.nan) for _ in range(3))
-    filled = np.zeros(signals.shape, dtype=bool)
     notes: list[str] = []
     shortest = max(_DEGREE + 1, round(1.0 / (cutoff_hz * step)) if cutoff_hz else 0)
     for k, label in enumerate(labels):
-        column, filled[:, k] = fill_gaps(signals[:, k], round(max_gap_s / step))
-        if filled[:, k].any():
-            notes.append(f"{label}: {int(filled[:, k].sum())} frames in gaps of at most {max_gap_s:g} s interpolated.")
+        column, filled = fill_gaps(signals[:, k], round(max_gap_s / step))
+        if filled.any():
+            notes.append(f"{label}: {int(filled.sum())} frames in gaps of at most {max_gap_s:g} s interpolated.")
         if np.isnan(column).any():
             notes.append(f"{label}: {int(np.isnan(column).sum())} frames missing, in longer gaps or at the ends.")
         for first, end in runs(np.isfinite(column)):
@@ -81,7 +79,7 @@ def smooth(
             at = step * np.arange(len(part))
             values[first:end, k] = part
             rates[first:end, k], seconds[first:end, k] = spline.derivative(1)(at), spline.derivative(2)(at)
-    return Smoothed(values, rates, seconds, filled, tuple(notes))
+    return Smoothed(values, rates, seconds, tuple(notes))
 
 
 def even_step(time: Array) -> float:

@@ -11,7 +11,7 @@ from dynakin.lazy import loaded_when_asked
 if TYPE_CHECKING:
     from dynakin.report.comparison_page import render_comparison
     from dynakin.report.page import render_report, write_report
-    from dynakin.report.paper_figures.figures import save_figures, save_sensitivity_figure, save_sensitivity_figures
+    from dynakin.report.paper_figures.figures import save_figures, save_sensitivity_figures
     from dynakin.report.paper_figures.sensitivity import Sensitivity, read_sensitivity
 
 __all__ = [
@@ -20,7 +20,6 @@ __all__ = [
     "render_comparison",
     "render_report",
     "save_figures",
-    "save_sensitivity_figure",
     "save_sensitivity_figures",
     "write_report",
 ]
@@ -30,7 +29,7 @@ __getattr__, __dir__ = loaded_when_asked(
     {
         "comparison_page": ("render_comparison",),
         "page": ("render_report", "write_report"),
-        "paper_figures.figures": ("save_figures", "save_sensitivity_figure", "save_sensitivity_figures"),
+        "paper_figures.figures": ("save_figures", "save_sensitivity_figures"),
         "paper_figures.sensitivity": ("Sensitivity", "read_sensitivity"),
     },
 )

@@ -9,6 +9,7 @@ from pydantic import Field
 
 from dynakin.errors import ModelError
 from dynakin.settings.strict import Name, Strict, validate
+from dynakin.units import PERSON_HEIGHT_M, PERSON_MASS_KG
 
 Sex = Literal["male", "female"]
 
@@ -16,8 +17,8 @@ Sex = Literal["male", "female"]
 class _Fields(Strict):
     """The plain fields, so that ``Subject(...)`` can turn pydantic's error into a ModelError."""
 
-    mass_kg: float | None = Field(default=None, gt=0.0, lt=500.0)
-    height_m: float | None = Field(default=None, gt=0.3, lt=2.8)
+    mass_kg: float | None = Field(default=None, gt=0.0, lt=PERSON_MASS_KG[1])
+    height_m: float | None = Field(default=None, gt=PERSON_HEIGHT_M[0], lt=PERSON_HEIGHT_M[1])
     sex: Sex | None = None
 
 
@@ -40,10 +41,11 @@ class Subject(_Fields):
 def _hint(fields: dict[str, Any]) -> str:
     """The option, and what a number in another unit would be in ours."""
     mass, height = (fields.get(key) for key in ("mass_kg", "height_m"))
-    if isinstance(mass, int | float) and not 0.0 < mass < 500.0:
+    if isinstance(mass, int | float) and not 0.0 < mass < PERSON_MASS_KG[1]:
         return "; expected kilograms (--mass)"
-    if isinstance(height, int | float) and not 0.3 < height < 2.8:
-        metres = next((height * unit for unit in (0.01, 0.001) if 0.3 < height * unit < 2.8), None)
+    low, high = PERSON_HEIGHT_M
+    if isinstance(height, int | float) and not low < height < high:
+        metres = next((height * unit for unit in (0.01, 0.001) if low < height * unit < high), None)
         return "; expected metres (--height)" if metres is None else f"; expected metres (--height), {metres:.2f}?"
     return ""
 

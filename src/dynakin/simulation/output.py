@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -11,7 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from dynakin.arrays import cross, with_nulls
+from dynakin.arrays import cross
+from dynakin.files import write_json
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.results.files.config import versions
 from dynakin.results.files.folder import FolderKind, check_output_writable, replacing
@@ -189,8 +189,7 @@ def _write_truth(trial: SimulatedTrial, path: Path) -> None:
         "repetitions": [asdict(r) for r in truth.repetitions],
         "faults": [asdict(f) for f in truth.faults],
     }
-    text = json.dumps(with_nulls(content), indent=2, ensure_ascii=False, allow_nan=False)
-    path.write_text(text + "\n", encoding="utf-8", newline="\n")
+    write_json(path, content)
 
 
 def _write_arrays(trial: SimulatedTrial, path: Path) -> None:

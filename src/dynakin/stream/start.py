@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 
 from dynakin.elements import element
 from dynakin.errors import ModelError, RecordingError
-from dynakin.files import LARGEST_TEXT, read_bytes
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.total_wrench import doubtful_mass
 from dynakin.filter.tracker import Tracker
@@ -215,19 +212,3 @@ def _continued(initial: CalibratedModel, known: Mapping[str, tuple[float, float]
         return replace(initial, x0=x0, sd0=sd0)
     text = f"Of the saved parameters {listed(beyond)} lie beyond their bounds as measured here: measured anew."
     return replace(initial, x0=x0, sd0=sd0, messages=(*initial.messages, text))
-
-
-def read_known(path: Path) -> dict[str, tuple[float, float]]:
-    """Constants and their standard deviations from a run's ``parameters.json``.
-
-    Raises:
-        ModelError: the file cannot be read or is none of that kind.
-    """
-    try:
-        entries = json.loads(read_bytes(path, ModelError, LARGEST_TEXT))["parameters"]
-        found = {str(e["name"]): (float(e["value"]), float(e["sd"])) for e in entries if e["estimated"]}
-        if not np.isfinite(list(found.values())).all():
-            raise ValueError("a number is not finite")
-        return found
-    except (ValueError, KeyError, TypeError, ArithmeticError, RecursionError) as error:
-        raise ModelError(f"{path}: no parameters.json of a run ({error})") from None

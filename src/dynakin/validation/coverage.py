@@ -36,8 +36,7 @@ class Coverage:
     Attributes:
         block: which.
         names: its C elements.
-        normalised_square: (C,) mean squared z over the frames, z = error over standard deviation: 1 is right.
-        mean_square: the same over all elements, a degree of freedom.
+        mean_square: mean squared z over frames and elements, z = error over standard deviation: 1 is right.
         dof: independent values of z in it: frames next to each other have nearly the same error (see `independent`).
         interval_95: where ``mean_square`` lies in 95 % of runs if the standard deviations are right and elements are
             independent of each other.
@@ -50,7 +49,6 @@ class Coverage:
 
     block: str
     names: tuple[str, ...]
-    normalised_square: Array
     mean_square: float
     dof: float
     interval_95: tuple[float, float]
@@ -92,14 +90,11 @@ class Coverage:
         )
 
 
-def block_coverage(
-    data: xr.Dataset, truth: xr.Dataset, window: npt.NDArray[np.bool_], *, own_model: bool = False
-) -> list[Coverage]:
+def block_coverage(data: xr.Dataset, truth: xr.Dataset, window: npt.NDArray[np.bool_]) -> list[Coverage]:
     """Each block of `BLOCKS` that has a standard deviation, over the frames ``window`` (T,).
 
     Args:
         data: as `Estimate.data`. truth: as `dynakin.simulation.Truth.data`, at the same frames.
-        own_model: as in `coverage`.
     """
     found = []
     for block in BLOCKS:
@@ -113,13 +108,11 @@ def block_coverage(
         free = np.flatnonzero((sd > 0.0).all(axis=0))  # a locked coordinate claims nothing
         if len(free):
             free_names = [names[k] for k in free]
-            found.append(coverage(block, free_names, (given - true)[:, free], sd[:, free], own_model=own_model))
+            found.append(coverage(block, free_names, (given - true)[:, free], sd[:, free]))
     return found
 
 
-def parameter_coverage(
-    parameters: Sequence[Parameter], truth: Mapping[str, float], *, own_model: bool = False
-) -> list[Coverage]:
+def parameter_coverage(parameters: Sequence[Parameter], truth: Mapping[str, float]) -> list[Coverage]:
     """Estimated lengths, and inertial numbers, at the end of the run: one frame.
 
     Args:
@@ -131,7 +124,7 @@ def parameter_coverage(
         if group:
             error = np.array([[p.value - truth[p.name] for p in group]])
             sd = np.array([[p.sd for p in group]])
-            found.append(coverage(title, [p.name for p in group], error, sd, own_model=own_model))
+            found.append(coverage(title, [p.name for p in group], error, sd))
     return found
 
 
@@ -146,8 +139,7 @@ def coverage(block: str, names: Sequence[str], error: Array, sd: Array, *, own_m
     """
     z = error / sd
     about_mean = (error - error.mean(axis=0)) / sd
-    square = np.mean(z**2, axis=0)
-    mean_square, dof = float(square.mean()), float(sum(independent(z[:, k]) for k in range(z.shape[1])))
+    mean_square, dof = float(np.mean(z**2)), float(sum(independent(z[:, k]) for k in range(z.shape[1])))
     low, high = mean_interval_95(dof)
     band = (low, high) if own_model else (min(low, CONSISTENT[0]), max(high, CONSISTENT[1]))
     inside = np.mean(np.abs(z) <= Z_95, axis=0)
@@ -160,7 +152,6 @@ def coverage(block: str, names: Sequence[str], error: Array, sd: Array, *, own_m
     return Coverage(
         block,
         tuple(names),
-        square,
         mean_square,
         dof,
         (low, high),

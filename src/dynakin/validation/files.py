@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from dynakin.arrays import with_nulls
+from dynakin.files import write_csv
 from dynakin.results.files.config import versions, write_metrics
 from dynakin.results.files.folder import FolderKind, check_output_writable, replacing
 from dynakin.validation.table2 import Spread
@@ -75,15 +74,8 @@ def save_comparison(
     summary |= {name: rows for name, rows in plain.items() if name != "repetitions"}  # curves are long: CSV only
     with replacing(folder, kind=COMPARISON) as made:
         for name, rows in plain.items():
-            _write_csv(made / f"{name}.csv", rows)
+            write_csv(made / f"{name}.csv", rows)
         write_metrics(summary, made / _SUMMARY)
         if page is not None:
             (made / "report.html").write_text(page, encoding="utf-8", newline="\n")
     return folder
-
-
-def _write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    with path.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-        writer.writeheader()
-        writer.writerows(with_nulls(dict(row)) for row in rows)

@@ -225,7 +225,10 @@ def test_the_command_line_exports(tmp_path: Path) -> None:
     path, out = small_model(tmp_path, "PinJoint", 4), tmp_path / "out.osim"
     found = {
         "schema_version": 1,
-        "parameters": [{"name": "marker/m/x", "value": 0.4}, {"name": "length/scale_base", "value": 1.1}],
+        "parameters": [
+            {"name": name, "value": value, "sd": 0.01, "estimated": True}
+            for name, value in (("marker/m/x", 0.4), ("length/scale_base", 1.1))
+        ],
     }
     parameters = tmp_path / "parameters.json"
     parameters.write_text(json.dumps(found))
@@ -239,8 +242,9 @@ def test_the_command_line_exports(tmp_path: Path) -> None:
 
 
 def test_parameters_of_another_model_are_refused(tmp_path: Path) -> None:
+    from dynakin.model.identified import read_constants
     from dynakin.model.opensim.definition import load_opensim
-    from dynakin.model.opensim.export import of_definition, read_values
+    from dynakin.model.opensim.export import of_definition
 
     definition = load_opensim(small_model(tmp_path, "PinJoint", 4))
     with pytest.raises(ModelError, match="has no length/scale_femur"):
@@ -248,4 +252,4 @@ def test_parameters_of_another_model_are_refused(tmp_path: Path) -> None:
     wrong = tmp_path / "parameters.json"
     wrong.write_text("[]")
     with pytest.raises(ModelError, match=r"no parameters\.json of a run"):
-        read_values(wrong)
+        read_constants(wrong)

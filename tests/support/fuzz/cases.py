@@ -13,10 +13,9 @@ from pydantic import BaseModel
 
 from dynakin.errors import DynakinError
 from dynakin.model.definition import load_model
-from dynakin.model.identified import read_identified
+from dynakin.model.identified import read_constants, read_identified
 from dynakin.model.markers.marker_set import load_marker_set
 from dynakin.model.markers.recognise import foot_markers_of
-from dynakin.model.opensim.export import read_values
 from dynakin.model.table import load_table
 from dynakin.recordings.checks import check_plates
 from dynakin.recordings.formats.c3d import read_c3d_results
@@ -25,7 +24,6 @@ from dynakin.recordings.read import read
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.settings import presets
 from dynakin.settings.settings import Settings, read_keys
-from dynakin.stream.start import read_known
 from dynakin.studies.batch.dataset import read_dataset
 from support.fuzz.mutate import mutated_c3d, mutated_text
 
@@ -109,7 +107,7 @@ READERS: Mapping[str, Callable[[Path, Path], Any]] = {
     "config": lambda path, _: Settings.of(read_keys(path), str(path)),
     "study": _study,
     "subject": lambda path, _: read_identified(path),
-    "known": lambda path, _: (read_known(path), read_values(path)),
+    "known": lambda path, _: read_constants(path),
 }
 
 

@@ -6,12 +6,10 @@ Rates of our coordinates are turned into its speeds (angular velocities in ball 
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import opensim
 from numpy.typing import NDArray
-from scipy.spatial.transform import Rotation
 
 from support.oracle.mechanics import axis_angle
 
@@ -100,11 +98,3 @@ class Peer:
         for three in self.balls:
             forces[three] = angular_velocity_map(self._array(q)[three]).T @ forces[three]
         return dict(zip(self.names, forces, strict=True))
-
-
-def rotation_between(a: NDArray, b: NDArray) -> float:
-    """Largest angle (rad) between two lists of rotations."""
-    return float(np.abs(Rotation.from_matrix(a @ np.swapaxes(b, -1, -2)).magnitude()).max())
-
-
-__all__: list[Any] = ["Peer", "angular_velocity_map", "rotation_between"]

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from dynakin.bindings import _core
 from dynakin.model.opensim.description import Coupler, OpenSimModel
-from dynakin.model.opensim.spec import free_coordinates
+from dynakin.model.opensim.spec import independent_coordinates
 from support.oracle.functions import axis_function
 from support.oracle.spec import Axis, Function
 
@@ -17,7 +17,7 @@ Motion = tuple[dict[str, float], dict[str, float], dict[str, float]]
 
 def random_motion(source: OpenSimModel, rng: Generator) -> Motion:
     """Values within the ranges (and +-1), speeds and accelerations of the free coordinates."""
-    free = free_coordinates(source)
+    free = independent_coordinates(source)
     q = {c.name: rng.uniform(max(c.limits[0], -1.0), min(c.limits[1], 1.0)) for c in free}
     return q, {name: 2.0 * rng.normal() for name in q}, {name: 10.0 * rng.normal() for name in q}
 

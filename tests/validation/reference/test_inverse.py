@@ -11,12 +11,13 @@ import pytest
 import dynakin
 from dynakin.bindings import _core
 from dynakin.filter.prepared import Prepared
+from dynakin.model.spec import free_names
 from dynakin.simulation.output import SimulatedTrial
 from dynakin.simulation.sensors.sizes import SensorNoise
 from dynakin.simulation.trial import simulate
 from dynakin.validation.methods import Trial, compare_trial
 from dynakin.validation.reference.inverse_dynamics import INVERSE, RigidMotion, inverse_name, rigid_motions
-from dynakin.validation.reference.inverse_kinematics import fixed_model, free_coordinates, inverse_kinematics
+from dynakin.validation.reference.inverse_kinematics import fixed_model, inverse_kinematics
 from dynakin.validation.setup import Setup
 
 FLEXION = [f"{joint}_{side}" for joint in ("hip_flexion", "knee_angle", "ankle_angle") for side in "rl"]
@@ -40,7 +41,7 @@ def ready(simulated: SimulatedTrial, setup: Setup) -> Prepared:
 def moved(ready: Prepared, frames: int = 40) -> tuple[np.ndarray, np.ndarray]:
     """Free coordinates (T, F) that wander from the start posture within their ranges, and the markers (T, M, 3)."""
     calibrated, model = ready.calibrated, fixed_model(ready.calibrated)
-    at = [calibrated.names.index(model.coordinate_names[k]) for k in free_coordinates(model)]
+    at = [calibrated.names.index(name) for name in free_names(model.spec)]
     phase = np.random.default_rng(1).uniform(0.0, 6.0, len(at))
     wander = 0.2 * (np.sin(np.linspace(0.0, 3.0, frames)[:, None] + phase) - np.sin(phase))
     q = np.clip(calibrated.x0[at] + wander, calibrated.lower[at] + 0.01, calibrated.upper[at] - 0.01)
@@ -62,7 +63,7 @@ def test_a_posture_is_found_again_from_its_markers(ready: Prepared) -> None:
 def test_a_joint_stays_within_its_range(ready: Prepared) -> None:
     q, markers = moved(ready)
     calibrated, model = ready.calibrated, fixed_model(ready.calibrated)
-    free = [model.coordinate_names[k] for k in free_coordinates(model)]
+    free = free_names(model.spec)
     knee = free.index("knee_angle_r")
     upper = calibrated.upper.copy()
     limit = upper[calibrated.names.index("knee_angle_r")] = float(np.median(q[:, knee]))

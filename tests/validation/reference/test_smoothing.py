@@ -45,7 +45,6 @@ def test_a_short_gap_is_filled_and_said() -> None:
     signal = wave(0.5)
     signal[400:408] = np.nan
     found = smooth(TIME, signal, 6.0, names=["knee"])
-    assert found.filled[:, 0].nonzero()[0].tolist() == list(range(400, 408))
     assert np.abs(found.values - wave(0.5)).max() < 1e-3
     assert found.notes == ("knee: 8 frames in gaps of at most 0.1 s interpolated.",)
 
@@ -57,7 +56,6 @@ def test_a_long_gap_and_the_ends_stay_open_and_are_said() -> None:
     for array in (found.values, found.rates, found.seconds):
         assert np.isnan(array[:, 0]).nonzero()[0].tolist() == [*range(5), *range(400, 430)]
     assert found.notes == ("knee: 35 frames missing, in longer gaps or at the ends.",)
-    assert not found.filled.any()
 
 
 def test_each_side_of_a_gap_is_filtered_on_its_own() -> None:

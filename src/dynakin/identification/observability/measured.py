@@ -15,6 +15,7 @@ from dynakin.filter.noise import marker_variance, wrench_covariance
 from dynakin.filter.tracker import Tracker
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition
+from dynakin.model.spec import free_coordinates
 from dynakin.simulation.bodies.registry import BODIES
 from dynakin.simulation.bodies.subject import Spread
 from dynakin.simulation.sensors.sizes import SensorNoise
@@ -132,4 +133,4 @@ def tracker_of(definition: Definition) -> Tracker:
 
 
 def _free(tracker: Tracker) -> int:
-    return sum(not coordinate.locked for coordinate in tracker.calibrated.spec.coordinates)
+    return len(free_coordinates(tracker.calibrated.spec))

@@ -23,6 +23,7 @@ from dynakin.model.markers.anatomy import standing_at
 from dynakin.model.mirroring import SUFFIXES
 from dynakin.model.schema import Frame, ModelFile, Segment
 from dynakin.model.table import BodyTable
+from dynakin.recordings.rigidity import nearest_rotation
 
 Array = npt.NDArray[np.float64]
 
@@ -265,8 +266,7 @@ def laid(source: Array, target: Array, weights: Array, hold: Array, height_m: fl
     a, b = weights @ source, weights @ target
     covariance = (target - b).T @ (weights[:, None] * (source - a))
     covariance += _HOLD_WEIGHT * 2.0 * (_HOLD * height_m) ** 2 * hold
-    u, _, vt = np.linalg.svd(covariance)
-    turn = u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))]) @ vt
+    turn = nearest_rotation(covariance)
     return turn, b - turn @ a
 
 

@@ -11,7 +11,7 @@ import scipy.linalg
 from dynakin.bindings import _core
 from dynakin.model.plan import Geometry, ModelPlan
 from dynakin.model.schema import kinds_of
-from dynakin.model.spec import to_core
+from dynakin.model.spec import free_names, to_core
 
 Array = npt.NDArray[np.float64]
 
@@ -38,7 +38,7 @@ def hold_unseen(plan: ModelPlan, postures: list[tuple[Array, Array]]) -> tuple[M
     depth = _depths(plan)
     kinds = kinds_of(plan.model.segments)
     model = _core.Model(to_core(plan))
-    free = [c.name for c in model.spec.coordinates if not c.locked]
+    free = free_names(model.spec)
     loose = np.array([site.soft_tissue_m >= LOOSE_FROM_M for site in plan.sites])
     sd_m = np.repeat(np.where(loose, LOOSE_SD_M, MARKER_SD_M), 3)
     jacobians = [

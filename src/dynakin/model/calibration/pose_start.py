@@ -18,6 +18,8 @@ from dynakin.errors import ModelError
 from dynakin.model.calibration.joint_fit import joint_coordinates
 from dynakin.model.calibration.posture import turned
 from dynakin.model.schema import Interval, kinds_of
+from dynakin.model.spec import free_names
+from dynakin.recordings.rigidity import nearest_rotation
 
 Array = npt.NDArray[np.float64]
 
@@ -137,15 +139,15 @@ class _Body:
             raise ModelError(f"{where}: {np.count_nonzero(self.seen)} markers are seen, expected at least 3")
         self.names = [marker.name for marker in spec.markers]
         self.rows = np.array([marker.measured for marker in spec.markers]) & self.seen[:, None]
-        free = [c for c in spec.coordinates if not c.locked]
-        self.n_free = len(free)
+        self.free = free_names(spec)
+        self.n_free = len(self.free)
         self.x0 = np.array(self.model.initial_state(), dtype=float)
-        bounds = np.array([limits.get(c.name, (-np.inf, np.inf)) for c in free]).reshape(-1, 2)
+        bounds = np.array([limits.get(name, (-np.inf, np.inf)) for name in self.free]).reshape(-1, 2)
         self.lower, self.upper = bounds.T
         self.rest = np.clip(self.x0[: self.n_free], self.lower, self.upper)
-        order = {c.name: k for k, c in enumerate(free)}
+        order = {name: k for k, name in enumerate(self.free)}
         kinds = kinds_of(spec.segments)
-        self.turns = np.array([kinds[c.name] == "rotation" for c in free])
+        self.turns = np.array([kinds[name] == "rotation" for name in self.free])
         self.paths, self.base = _paths(spec, order)
         self.roots = [k for k, s in enumerate(spec.segments) if s.parent == "ground"]
         self.segment_of = [[s.name for s in spec.segments].index(m.segment) for m in spec.markers]
@@ -214,11 +216,11 @@ class _Body:
     def moved(self, turn: Array, shift: Array) -> Array:
         """The rest posture carried along by a rigid motion: the root's coordinates for p -> turn p + shift."""
         R, p = (part[self.roots[0]] for part in _core.segment_poses(self.model, self.state(self.rest)))
-        spec, free = self.model.spec, _free(self)
+        spec = self.model.spec
         target = (turn @ R, turn @ p + shift)
-        found = joint_coordinates(spec.segments[self.roots[0]], free, target, spec.parameters)
+        found = joint_coordinates(spec.segments[self.roots[0]], spec.coordinates, target, spec.parameters)
         q: Array = self.rest.copy()
-        q[self.base] = [found[free[k].name] for k in self.base]
+        q[self.base] = [found[self.free[k]] for k in self.base]
         return q
 
     def mended(self, fit: _Fit) -> _Fit:
@@ -246,10 +248,10 @@ def laid(points: Array, targets: Array) -> tuple[Array, Array] | None:
     if len(points) < 3:
         return None
     a, b = points - points.mean(axis=0), targets - targets.mean(axis=0)
-    u, size, vt = np.linalg.svd(b.T @ a)
+    size = np.linalg.svd(b.T @ a, compute_uv=False)
     if size[1] < 1e-6 * size[0]:
         return None
-    turn = u @ np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))]) @ vt
+    turn = nearest_rotation(b.T @ a)
     return turn, targets.mean(axis=0) - turn @ points.mean(axis=0)
 
 
@@ -306,9 +308,5 @@ def _refuse(body: _Body, fit: _Fit, bad_m: float, where: str) -> None:
 
 def _mirror(body: _Body) -> _Body:
     """The same body with its markers seen in a mirror (upright, across the ground's z)."""
-    limits = {c.name: (low, high) for c, low, high in zip(_free(body), body.lower, body.upper, strict=True)}
+    limits = {name: (low, high) for name, low, high in zip(body.free, body.lower, body.upper, strict=True)}
     return _Body(body.model, body.measured * np.array([1.0, 1.0, -1.0]), limits, "mirror")
-
-
-def _free(body: _Body) -> list[_core.CoordinateSpec]:
-    return [c for c in body.model.spec.coordinates if not c.locked]

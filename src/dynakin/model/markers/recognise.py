@@ -29,6 +29,7 @@ from dynakin.model.markers.match import (
 from dynakin.model.markers.schema import MarkerSetFile
 from dynakin.model.markers.swaps import Swap, distance_words, find_swaps
 from dynakin.recordings.recording import Recording
+from dynakin.units import PERSON_HEIGHT_M
 
 _LISTED = 8  # names in a sentence
 _LEG = ("thigh", "shank", "foot")
@@ -36,7 +37,6 @@ _ON_LEG_AT_LEAST = 2  # segments of one leg
 _ROOT = "pelvis"
 _ABOUT_AS_MANY = 0.9  # of the markers that the first set explains
 _IMPOSSIBLE = 4.5  # deviations of a distance beyond which it is none of a body (2.9 at most in shared/data)
-_HEIGHTS_M = (0.5, 2.6)  # of persons
 _FEW_WRONG, _MANY_WRONG = 2, 0.25
 _HALF, _START_S = 0.5, 0.2
 _SHORT = 0.05  # of a trial: exchanged labels that the filter's own outlier rules are for
@@ -251,7 +251,7 @@ def _refuse_wrong_size(found: Found, expected: Expected, where: str) -> None:
     if not np.isfinite(found.distance).any():
         return
     height_m, largest_m = body_height_m(found, expected), float(np.nanmax(found.distance))
-    low, high = _HEIGHTS_M
+    low, high = PERSON_HEIGHT_M
     if min(height_m, largest_m) > high or max(height_m, largest_m) < low:
         raise ModelError(
             f"{where}: a person {height_m:.3g} m tall by the distances of the markers (the largest is {largest_m:.3g} "

@@ -12,8 +12,9 @@ from dynakin.errors import ModelError
 from dynakin.model.calibration.body import find_mass
 from dynakin.model.opensim.description import Marker, OpenSimModel
 from dynakin.model.opensim.sites import with_mass
-from dynakin.model.opensim.spec import free_coordinates
+from dynakin.model.opensim.spec import independent_coordinates
 from dynakin.model.schema import Interval, kinds_of
+from dynakin.model.spec import free_coordinates
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.landmarks import DEFAULT_PAIRS, FacingPairs
 from dynakin.recordings.recording import Recording
@@ -32,7 +33,7 @@ def limits_of(source: OpenSimModel) -> dict[str, Interval]:
     root of a body that is fixed nowhere: its ranges are those of the laboratory that the file was made in."""
     kinds = kinds_of(source.joints)
     found = {}
-    for c in free_coordinates(source):
+    for c in independent_coordinates(source):
         low, high = (-np.inf, np.inf) if c.name in source.floating else c.limits
         whole = kinds.get(c.name) == "rotation" and high - low > 2.0 * np.pi - _A_TURN
         found[c.name] = (-np.inf, np.inf) if whole else (low, high)
@@ -41,7 +42,7 @@ def limits_of(source: OpenSimModel) -> dict[str, Interval]:
 
 def beyond_range(source: OpenSimModel, start: dict[str, float]) -> list[str]:
     """Says where the root starts beyond what the file clamps it to: OpenSim would draw it at the end of that range."""
-    clamped = [c for c in free_coordinates(source) if c.name in source.floating]
+    clamped = [c for c in independent_coordinates(source) if c.name in source.floating]
     names = [c.name for c in clamped if not c.limits[0] <= start[c.name] <= c.limits[1]]
     if not names:
         return []
@@ -104,7 +105,7 @@ def refuse_too_few(source: OpenSimModel, spec: _core.ModelSpec, names: list[str]
     Raises:
         ModelError: so few are they.
     """
-    free = sum(not coordinate.locked for coordinate in spec.coordinates)
+    free = len(free_coordinates(spec))
     if 3 * len(names) < free:
         raise ModelError(
             f"{recording.path or recording.name}: {len(names)} of the {len(source.markers)} markers of "

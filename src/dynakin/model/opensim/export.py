@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
-
-import numpy as np
 
 from dynakin.elements import element
 from dynakin.errors import ModelError
-from dynakin.files import LARGEST_TEXT, is_file, read_bytes
+from dynakin.files import is_file
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.opensim.definition import OpenSimDefinition
 from dynakin.model.opensim.description import OpenSimModel
@@ -17,22 +14,6 @@ from dynakin.model.opensim.from_core import from_core
 from dynakin.model.opensim.identified import identified
 from dynakin.model.opensim.sites import with_mass
 from dynakin.settings.strict import read_toml
-
-
-def read_values(path: Path) -> dict[str, float]:
-    """Values by the core's names from a run's ``parameters.json``.
-
-    Raises:
-        ModelError: the file cannot be read or is none of that kind.
-    """
-    try:
-        entries = json.loads(read_bytes(path, ModelError, LARGEST_TEXT))["parameters"]
-        found = {str(entry["name"]): float(entry["value"]) for entry in entries}
-        if not np.isfinite(list(found.values())).all():
-            raise ValueError("a number is not finite")
-        return found
-    except (ValueError, KeyError, TypeError, ArithmeticError, RecursionError) as error:
-        raise ModelError(f"{path}: no parameters.json of a run ({error})") from None
 
 
 def mass_of_run(parameters: Path) -> float | None:

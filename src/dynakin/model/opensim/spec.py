@@ -13,7 +13,7 @@ from dynakin.model.opensim.description import GROUND, Coordinate, Marker, OpenSi
 AXES = [True, True, True]
 
 
-def free_coordinates(model: OpenSimModel) -> list[Coordinate]:
+def independent_coordinates(model: OpenSimModel) -> list[Coordinate]:
     """Coordinates that no coupler drives, in the order of the joints."""
     driven = {coupler.dependent for coupler in model.couplers}
     return [c for joint in model.joints for c in joint.coordinates if c.name not in driven]
@@ -26,7 +26,7 @@ def placements(model: OpenSimModel, scales: Mapping[str, str]) -> dict[str, Plac
 
 
 def unseen(model: OpenSimModel, bodies: Collection[str]) -> list[str]:
-    """Free coordinates that move none of these bodies and are not locked by the file."""
+    """Independent coordinates that move none of these bodies and are not locked by the file."""
     placed = placements(model, {})
     parents = {joint.child: joint.parent for joint in model.joints}
     seen: set[str] = set()
@@ -35,7 +35,7 @@ def unseen(model: OpenSimModel, bodies: Collection[str]) -> list[str]:
         while at != GROUND:
             seen |= {axis.coordinate for axis in placed[at].axes}
             at = parents[at]
-    return [c.name for c in free_coordinates(model) if c.name not in seen and not c.locked]
+    return [c.name for c in independent_coordinates(model) if c.name not in seen and not c.locked]
 
 
 def moved_by(model: OpenSimModel, coordinates: Collection[str]) -> set[str]:
@@ -87,7 +87,7 @@ def to_spec(
         name=model.name,
         coordinates=[
             _core.CoordinateSpec(c.name, start.get(c.name, c.value), c.locked or c.name in lock)
-            for c in free_coordinates(model)
+            for c in independent_coordinates(model)
             if c.name in moving
         ],
         parameters=[_core.ParameterSpec(name, 1.0, True) for name in used_scales(placed)],

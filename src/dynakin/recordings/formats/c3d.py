@@ -100,7 +100,7 @@ def _recording(data: Any, path: Path, options: ReadOptions, notes: list[str]) ->
     names, markers, doubled_notes = distinct_names(found.names, raw * factor)
     check_unique(names, "marker", path)
     markers, missing_notes = clean_markers(names, markers, np.arange(frames) / rate, path)
-    first = first_frame(parameters, int(data["header"]["points"]["first_frame"]))
+    first = first_frame(parameters, int(data["header"]["points"]["first_frame"]), path)
     start_notes = []
     if first:
         start_notes.append(f"Time 0 is frame {first + 1} of the capture ({first / rate:.4g} s after its start).")

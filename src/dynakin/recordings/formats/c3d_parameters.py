@@ -35,10 +35,6 @@ class Parameters:
         except (TypeError, ValueError):
             return np.empty(0)
 
-    def integers(self, group: str, name: str) -> npt.NDArray[np.int64]:
-        """As ``array``, cut to whole numbers; -1 where a value is not finite (counts and types are never negative)."""
-        return np.clip(np.nan_to_num(self.array(group, name), nan=-1, posinf=-1, neginf=-1), -1e9, 1e9).astype(np.int64)
-
     def number(self, group: str, name: str) -> float | None:
         """First value as a number, None where there is none."""
         values = self.array(group, name).ravel()

@@ -58,11 +58,14 @@ def read_plates(
         markers: (T, M, 3) m, on whose side of a plate the person is.
         unit_m: metres per unit of length of the file.
     """
-    count = int(next(iter(parameters.integers("FORCE_PLATFORM", "USED").ravel()), 0))
-    if count == 0:
+    used = parameters.number("FORCE_PLATFORM", "USED") or 0.0
+    if used == 0.0:
         return (), ["The file has no force plates."]
-    if not 0 < count <= _MOST_PLATES:
-        return (), [f"Warning: no plate read: found {count} in FORCE_PLATFORM:USED, expected 0 to {_MOST_PLATES}."]
+    if used not in range(_MOST_PLATES + 1):
+        return (), [
+            f"Warning: no plate read: found {used:g} in FORCE_PLATFORM:USED, expected a whole number from 0 to "
+            f"{_MOST_PLATES}."
+        ]
     per_frame, odd = divmod(analog.shape[1], len(time))
     if per_frame == 0 or odd:
         return (), [
@@ -72,7 +75,7 @@ def read_plates(
     step = (time[1] - time[0]) / per_frame if len(time) > 1 else 1.0
     analog_time = np.arange(analog.shape[1]) * step + time[0]
     raws, notes = [], []
-    for k in range(count):
+    for k in range(int(used)):
         name = f"plate {k + 1}"
         try:
             raw, said = _raw(name, parameters, k, analog, markers, unit_m)
@@ -108,14 +111,15 @@ def _raw(
     Raises:
         RecordingError: why it cannot be read.
     """
-    types = parameters.integers("FORCE_PLATFORM", "TYPE").ravel()
-    kind = int(types[k]) if k < len(types) else 0
-    if kind not in TYPES:
-        raise RecordingError(f"found type {kind}, expected a force plate of type 1 to {max(TYPES)}")
+    types = parameters.array("FORCE_PLATFORM", "TYPE").ravel()
+    found = float(types[k]) if k < len(types) else 0.0
+    if found not in TYPES:
+        raise RecordingError(f"found type {found:g}, expected a force plate of type 1 to {max(TYPES)}")
     corners = _slice(parameters.array("FORCE_PLATFORM", "CORNERS"), k, 12, "CORNERS").reshape(4, 3) * unit_m
     axis_x, axis_y = corners[0] - corners[1], corners[0] - corners[3]
     if not np.linalg.norm(np.cross(axis_x, axis_y)) > _LEAST_SURFACE_M2:
         raise RecordingError("its corners in the file do not span a surface")
+    kind = int(found)
     channels = _channels(parameters, k, TYPES[kind].channels, len(analog))
     calibration = _calibration(parameters, k, kind) if TYPES[kind].calibrated else None
     notes = []
@@ -156,13 +160,13 @@ def _raw(
 
 def _channels(parameters: Parameters, k: int, wanted: int, count: int) -> list[int]:
     """Indices of the ``wanted`` channels of plate k, of ``count`` in the file."""
-    listed = parameters.integers("FORCE_PLATFORM", "CHANNEL")
+    listed = parameters.array("FORCE_PLATFORM", "CHANNEL")
     per_plate = listed.reshape(listed.shape[0], -1) if listed.size else listed.reshape(0, 0)
-    channels = [int(number) - 1 for number in per_plate[:wanted, k]] if k < per_plate.shape[1] else []
-    if len(channels) < wanted or min(channels) < 0 or max(channels) >= count:
-        numbers = [channel + 1 for channel in channels]
-        raise RecordingError(f"lists channels {numbers}, expected {wanted} of 1 to {count}")
-    return channels
+    numbers = per_plate[:wanted, k] if k < per_plate.shape[1] else np.empty(0)
+    if len(numbers) < wanted or any(number not in range(1, count + 1) for number in numbers):
+        said = ", ".join(f"{number:g}" for number in numbers)
+        raise RecordingError(f"lists channels [{said}], expected {wanted} of 1 to {count}")
+    return [int(number) - 1 for number in numbers]
 
 
 def _slice(values: Array, k: int, size: int, key: str) -> Array:

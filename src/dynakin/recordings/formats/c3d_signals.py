@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
+from dynakin.errors import RecordingError
 from dynakin.recordings.formats.c3d_parameters import Parameters
 from dynakin.recordings.recording import Array
 from dynakin.recordings.signals import AnalogChannel, Event
@@ -13,13 +15,19 @@ from dynakin.recordings.signals import AnalogChannel, Event
 _SIDES: dict[str, Literal["left", "right"]] = {"left": "left", "l": "left", "right": "right", "r": "right"}
 
 
-def first_frame(parameters: Parameters, in_header: int) -> int:
+def first_frame(parameters: Parameters, in_header: int, path: Path) -> int:
     """Number of the first frame in the capture, from 0; the header's word ends at 65535, TRIAL:ACTUAL_START_FIELD (low
-    and high word, from 1) does not."""
-    words = parameters.integers("TRIAL", "ACTUAL_START_FIELD").ravel()
+    and high word, from 1) does not.
+
+    Raises:
+        RecordingError: a word is no whole number.
+    """
+    words = [float(word) for word in parameters.array("TRIAL", "ACTUAL_START_FIELD").ravel()[:2]]
     if len(words) < 2:
         return in_header
-    low, high = (int(word) & 0xFFFF for word in words[:2])
+    if strange := [word for word in words if not word.is_integer()]:
+        raise RecordingError(f"{path}: found {strange[0]:g} in TRIAL:ACTUAL_START_FIELD, expected whole numbers")
+    low, high = (int(word) & 0xFFFF for word in words)
     return (high << 16) + low - 1 if high else in_header
 
 

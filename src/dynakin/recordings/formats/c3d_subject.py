@@ -6,12 +6,11 @@ import re
 from collections.abc import Iterator
 
 from dynakin.recordings.formats.c3d_parameters import Parameters
+from dynakin.units import PERSON_HEIGHT_M, PERSON_MASS_KG
 
 _GROUPS = ("PROCESSING", "SUBJECTS", "SUBJECT", "SUBJECT_PARAMETERS", "ANTHROPOMETRY", "ANALYSIS")
 _MASS = ("bodymass", "mass", "bodyweight", "weight")
-_MASS_KG = (5.0, 400.0)
 _HEIGHT = ("height", "bodyheight", "stature")
-_HEIGHT_M = (0.3, 2.6)
 # Of each leg, with what it can measure in m: ranges that no other unit of length brings a person into, too
 _OF_A_LEG = {
     "leg_length": (("leglength",), (0.2, 1.4)),
@@ -26,10 +25,10 @@ def read_subject(parameters: Parameters) -> dict[str, float]:
     """``Recording.subject``: the first plausible value of each; lengths from m, cm or mm by their size."""
     found: dict[str, float] = {}
     for word, value in _entries(parameters):
-        if word in _MASS and _MASS_KG[0] < value < _MASS_KG[1]:
+        if word in _MASS and PERSON_MASS_KG[0] < value < PERSON_MASS_KG[1]:
             found.setdefault("mass_kg", value)
         elif word in _HEIGHT:
-            _put(found, "height_m", value, _HEIGHT_M)
+            _put(found, "height_m", value, PERSON_HEIGHT_M)
         else:
             for key, (stems, limits) in _OF_A_LEG.items():
                 for side, spelled in _SIDES.items():

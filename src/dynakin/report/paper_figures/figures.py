@@ -22,7 +22,7 @@ from dynakin.report.paper_figures.movement import (
 )
 from dynakin.report.paper_figures.parameters import inertias_figure, lengths_and_masses_figure
 from dynakin.report.paper_figures.saving import FORMATS, save_each
-from dynakin.report.paper_figures.sensitivity import Sensitivity, read_sensitivity, sensitivity_figure
+from dynakin.report.paper_figures.sensitivity import Sensitivity, sensitivity_figure
 from dynakin.results.estimate import Estimate
 from dynakin.results.failures import Failures
 from dynakin.results.measures.facing import facing
@@ -82,15 +82,6 @@ def save_figures(
     if sensitivity is not None:
         draws = {SENSITIVITY_FIGURE: lambda: sensitivity_figure(sensitivity), **draws}
     return _write(draws, Path(folder), formats, failures)
-
-
-def save_sensitivity_figure(path: str | Path, folder: str | Path, formats: Sequence[str] = FORMATS) -> list[Path]:
-    """Write Figure 3 of the paper from a file of a criterion over the gains (see `read_sensitivity`).
-
-    Raises:
-        ConfigError: an unknown format, or no such file. OutputError: the folder cannot be written.
-    """
-    return save_sensitivity_figures({SENSITIVITY_FIGURE: read_sensitivity(path)}, folder, formats)
 
 
 def save_sensitivity_figures(

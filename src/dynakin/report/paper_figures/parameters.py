@@ -17,6 +17,7 @@ from dynakin.results.records import Parameter
 from dynakin.validation.methods import Trial
 
 _PANEL_IN = 2.35
+_LABEL_PT = 7.5
 _INERTIAS = {f"i{a}{b}": f"{a}{b}" for a, b in ("xx", "yy", "zz")}
 
 
@@ -103,7 +104,7 @@ def _changes(axes: Axes, estimate: Estimate, parameters: list[Parameter]) -> Non
             fontsize=7,
         )
     axes.axhline(0.0, color=QUIET, linewidth=0.6)
-    _label_ends(axes, labels, height_in=_PANEL_IN)
+    _label_ends(axes, labels)
 
 
 def _label(p: Parameter) -> str:
@@ -113,16 +114,10 @@ def _label(p: Parameter) -> str:
     return f"{words(p.segment)} {number(factor * p.value)} ± {band} ({change})"
 
 
-def _label_ends(
-    axes: Axes, labels: Sequence[tuple[str, float, str]], *, size: float = 7.5, height_in: float = 2.5
-) -> None:
-    """Write (text, y in data, colour) to the right of the axes, pushed apart; call it after the limits are set.
-
-    Args:
-        height_in: of the axes, inches: how much a line of text takes.
-    """
+def _label_ends(axes: Axes, labels: Sequence[tuple[str, float, str]]) -> None:
+    """Write (text, y in data, colour) to the right of the axes, pushed apart; call it after the limits are set."""
     low, high = axes.get_ylim()
-    gap = 1.25 * size / 72.0 / height_in
+    gap = 1.25 * _LABEL_PT / 72.0 / _PANEL_IN  # of the axes' height
     wanted = np.array([(y - low) / (high - low) for _, y, _ in labels])
     for (text, _, colour), y, start in zip(labels, spread(wanted, gap), wanted, strict=True):
         axes.annotate(
@@ -133,7 +128,7 @@ def _label_ends(
             textcoords="axes fraction",
             va="center",
             color=colour,
-            fontsize=size,
+            fontsize=_LABEL_PT,
             annotation_clip=False,
             arrowprops={
                 "arrowstyle": "-",

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import platform
 from dataclasses import asdict
 from importlib import metadata
@@ -11,7 +10,7 @@ from typing import Any
 
 import tomli_w
 
-from dynakin.arrays import with_nulls
+from dynakin.files import write_json
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.metrics import SCHEMA_VERSION
 
@@ -41,7 +40,7 @@ def plain(value: Any) -> Any:
 
 def write_parameters(estimate: Estimate, path: Path) -> None:
     """Every length, marker position and inertial parameter with its standard deviation, start, table and bounds."""
-    _write(
+    write_json(
         path,
         {
             "schema_version": SCHEMA_VERSION,
@@ -54,12 +53,7 @@ def write_parameters(estimate: Estimate, path: Path) -> None:
 
 def write_metrics(metrics: dict[str, Any], path: Path) -> None:
     """The figures of `dynakin.results.measures.metrics.compute_metrics`."""
-    _write(path, metrics)
-
-
-def _write(path: Path, content: dict[str, Any]) -> None:
-    text = json.dumps(with_nulls(content), indent=2, ensure_ascii=False, allow_nan=False)
-    path.write_text(text + "\n", encoding="utf-8", newline="\n")
+    write_json(path, metrics)
 
 
 _PACKAGES = ("dynakin", "numpy", "scipy", "xarray", "ezc3d")

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from dynakin.arrays import finite, with_nulls
+from dynakin.arrays import finite
+from dynakin.files import with_nulls
 from dynakin.results.estimate import Estimate
 from dynakin.results.files.config import versions
 from dynakin.results.measures.metrics import SCHEMA_VERSION

@@ -8,17 +8,6 @@ from typing import NamedTuple
 import numpy as np
 
 
-class WrenchFit(NamedTuple):
-    """Agreement of one wrench component; None where a figure is not defined (a constant signal, no frame)."""
-
-    rms: float | None
-    nrms_percent: float | None
-    """Of the measured component's RMS."""
-    nrms_range_percent: float | None
-    """Of its range (largest less smallest)."""
-    correlation: float | None
-
-
 def marker_rms_mm(measured: np.ndarray, estimated: np.ndarray, axes: np.ndarray) -> float | None:
     """Root mean square distance of one marker, mm, over the frames where it is measured and estimated.
 
@@ -90,13 +79,3 @@ def truth_error(truth: np.ndarray, estimated: np.ndarray) -> TruthError:
     if not len(error):
         return TruthError(None, None, None)
     return TruthError(float(np.sqrt(np.mean(error**2))), float(np.mean(error)), float(np.std(error)))
-
-
-def wrench_fit(measured: np.ndarray, estimated: np.ndarray) -> WrenchFit:
-    """RMS difference, the same in percent of the measured component's RMS and of its range, correlation.
-
-    Args:
-        measured, estimated: (T,) in N or N m.
-    """
-    fit = signal_fit(measured, estimated)
-    return WrenchFit(*fit)

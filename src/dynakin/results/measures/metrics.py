@@ -24,7 +24,7 @@ from dynakin.results.measures.consistency import (
 )
 from dynakin.results.measures.facing import facing
 from dynakin.results.measures.feet import contact_figures, foot_figures
-from dynakin.results.measures.fit import WrenchFit, marker_rms_mm, wrench_fit
+from dynakin.results.measures.fit import SignalFit, marker_rms_mm, signal_fit
 from dynakin.results.measures.posterior import posterior_figures
 from dynakin.results.measures.power import work
 from dynakin.results.measures.soft_tissue import soft_tissue
@@ -149,9 +149,10 @@ def _markers(estimate: Estimate, kind: str, window: np.ndarray) -> dict[str, Any
 def _wrench(estimate: Estimate, kind: str, window: np.ndarray) -> dict[str, dict[str, float | None]]:
     measured = _array(estimate, "wrench_measured")[window]
     compared = _array(estimate, f"wrench_{kind}")[window]
-    fits = {name: wrench_fit(measured[:, k], compared[:, k]) for k, name in enumerate(COMPONENTS)}
+    fits = {name: signal_fit(measured[:, k], compared[:, k]) for k, name in enumerate(COMPONENTS)}
     fits = {name: fit for name, fit in fits.items() if fit.rms is not None}
-    return {key: {name: getattr(fit, key) for name, fit in fits.items()} for key in WrenchFit._fields}
+    renamed = {"nrms_rms_percent": "nrms_percent"}  # its name in the file from before there were two
+    return {renamed.get(key, key): {name: getattr(fit, key) for name, fit in fits.items()} for key in SignalFit._fields}
 
 
 def window_consistency(estimate: Estimate, window: np.ndarray) -> Consistency:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable
 
 import numpy as np
 
 from dynakin.errors import ConfigError
+from dynakin.settings.strict import nearest
 from dynakin.simulation.bodies import sagittal, squat_chain, whole_body
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.bodies.subject import SimulatedSubject, Spread, draw_subject
@@ -48,8 +48,7 @@ def choose_body(
         _check(model)
         return model
     if model not in BODIES:
-        near = difflib.get_close_matches(str(model), BODIES, n=1)
-        hint = f" (did you mean {near[0]!r}?)" if near else ""
+        hint = nearest(str(model), BODIES)
         raise ConfigError(f"simulation: model is {str(model)!r}{hint}, expected {' or '.join(BODIES)}")
     subject = draw_subject(streams["subject"], mass_kg, height_m, sex, spread)
     if markers is not None:

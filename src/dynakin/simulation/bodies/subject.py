@@ -143,9 +143,8 @@ def draw_subject(
     height_m: float,
     sex: str | None,
     spread: Spread | None = None,
-    table: str = "dumas",
 ) -> SimulatedSubject:
-    """A subject around the table; the parts' masses add up to ``mass_kg`` exactly.
+    """A subject around the table of Dumas; the parts' masses add up to ``mass_kg`` exactly.
 
     Raises:
         ConfigError: mass or height not positive, or an unknown sex.
@@ -157,7 +156,7 @@ def draw_subject(
         raise ConfigError(f"simulated subject: sex is {sex!r}, expected male, female or None")
     spread = spread or Spread()
     lengths = {k: f * height_m * float(np.exp(spread.length * rng.standard_normal())) for k, f in FRACTIONS.items()}
-    parts = _draw_parts(rng, load_table(table, sex), lengths, spread)  # type: ignore[arg-type]
+    parts = _draw_parts(rng, load_table("dumas", sex), lengths, spread)  # type: ignore[arg-type]
     total = sum(J[3, 3] * (2.0 if name in PAIRED else 1.0) for name, J in parts.items())
     parts = {name: J * (mass_kg / total) for name, J in parts.items()}
     centres = {name: spread.joint * height_m * rng.standard_normal(3) for name in JOINTS}

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -11,6 +10,7 @@ from numpy.typing import NDArray
 
 from dynakin.errors import ConfigError
 from dynakin.files import is_file
+from dynakin.settings.strict import nearest
 from dynakin.simulation.bodies.body import SimulatedBody
 from dynakin.simulation.mechanics import Motion
 from dynakin.simulation.motions.belt import belt_movement
@@ -73,10 +73,9 @@ def choose_movement(
     if path.suffix.casefold() in (".mot", ".sto") and is_file(path):
         return file_movement(path, body, cutoff_hz)
     every = tuple(MOTIONS_IN_SPACE if body.in_space else MOTIONS)
-    near = difflib.get_close_matches(str(motion), every, n=1)
-    hint = f" (did you mean {near[0]!r}?)" if near else ""
     raise ConfigError(
-        f"simulation: motion is {str(motion)!r}{hint}, expected {', '.join(every)} or a .mot or .sto file that exists"
+        f"simulation: motion is {str(motion)!r}{nearest(str(motion), every)}, expected {', '.join(every)} or a .mot or "
+        ".sto file that exists"
     )
 
 

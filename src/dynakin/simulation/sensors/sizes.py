@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
 import tomllib
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields, replace
@@ -10,6 +9,7 @@ from pathlib import Path
 
 from dynakin.errors import ConfigError
 from dynakin.files import LARGEST_TEXT, is_file, read_bytes
+from dynakin.settings.strict import nearest
 
 _HIGHEST = {"soft_tissue_random": 1.0, "plate_gain_sd": 0.5}
 _SIGNED = {"plate_lag_s": 0.5}
@@ -110,9 +110,9 @@ class SensorNoise:
         known = [entry.name for entry in fields(self)]
         for key in values:
             if key not in known:
-                near = difflib.get_close_matches(key, known, n=1)
-                hint = f" (did you mean {near[0]!r}?)" if near else ""
-                raise ConfigError(f"sensor noise: unknown key {key!r}{hint}, expected one of {', '.join(known)}")
+                raise ConfigError(
+                    f"sensor noise: unknown key {key!r}{nearest(key, known)}, expected one of {', '.join(known)}"
+                )
         return replace(self, **values)  # type: ignore[arg-type]
 
     def as_dict(self) -> dict[str, float]:

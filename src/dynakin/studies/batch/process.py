@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from dynakin.errors import DynakinError
+from dynakin.files import write_csv, write_json
 from dynakin.pipeline.stages import judged
 from dynakin.progress import Progress
 from dynakin.results.failures import Failures
@@ -17,7 +18,7 @@ from dynakin.results.measures.metrics import compute_metrics
 from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.settings.settings import Settings
 from dynakin.studies.batch.dataset import Dataset, Session
-from dynakin.studies.engine.folder import write_csv, write_json
+from dynakin.studies.engine.folder import writing
 from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import Pool
 from dynakin.studies.engine.tasks import Failure, Task
@@ -155,25 +156,28 @@ def write_batch(folder: Path, batch: Batch, identified: Mapping[str, Mapping[str
     Raises:
         OutputError: a file cannot be written.
     """
-    for name, rows in (("table2", batch.table2()), ("table2_subjects", batch.table2_of_subjects())):
-        if rows:
-            write_csv(folder / f"{name}.csv", [flat(row) for row in rows])
-    single = [
+    tables = {
+        "table2": [flat(row) for row in batch.table2()],
+        "table2_subjects": [flat(row) for row in batch.table2_of_subjects()],
+    }
+    tables["trials"] = [
         {"trial": name, "quantity": quantity, "method": method, **dict(zip(SignalFit._fields, fit, strict=True))}
         for name, fits in batch.fits().items()
         for (quantity, method), fit in fits.items()
     ]
-    if single:
-        write_csv(folder / "trials.csv", single)
-    write_json(
-        folder / "batch.json",
-        {
-            "versions": versions(),
-            "subjects": dict(identified or {}),
-            "trials": {name: {k: v for k, v in row.items() if k != "fits"} for name, row in batch.rows.items()},
-            "failed": {
-                name: {"message": failure.message, "unexpected": failure.unexpected, "details": failure.details}
-                for name, failure in batch.failures.items()
+    with writing(folder):
+        for name, rows in tables.items():
+            if rows:
+                write_csv(folder / f"{name}.csv", rows)
+        write_json(
+            folder / "batch.json",
+            {
+                "versions": versions(),
+                "subjects": dict(identified or {}),
+                "trials": {name: {k: v for k, v in row.items() if k != "fits"} for name, row in batch.rows.items()},
+                "failed": {
+                    name: {"message": failure.message, "unexpected": failure.unexpected, "details": failure.details}
+                    for name, failure in batch.failures.items()
+                },
             },
-        },
-    )
+        )

@@ -2,13 +2,10 @@
 
 from __future__ import annotations
 
-import csv
-import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
-from dynakin.arrays import with_nulls
 from dynakin.errors import OutputError
 
 ROWS = "rows.jsonl"
@@ -35,28 +32,14 @@ def open_folder(folder: Path, own: Sequence[str]) -> Path:
     return folder
 
 
-def write_csv(path: Path, rows: Sequence[Mapping[str, Any]]) -> None:
-    """Rows of the same columns; what is None or no finite number is a blank cell, numbers keep all their digits.
+@contextmanager
+def writing(folder: Path) -> Iterator[None]:
+    """Says in one line why something could not be written into ``folder``.
 
     Raises:
-        OutputError: the file cannot be written.
+        OutputError: a file cannot be written.
     """
     try:
-        with path.open("w", encoding="utf-8", newline="") as file:
-            writer = csv.DictWriter(file, list(rows[0]), lineterminator="\n")
-            writer.writeheader()
-            writer.writerows(with_nulls(dict(row)) for row in rows)
+        yield
     except OSError as error:
-        raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from None
-
-
-def write_json(path: Path, content: Any) -> None:
-    """
-    Raises:
-        OutputError: the file cannot be written.
-    """
-    try:
-        text = json.dumps(with_nulls(content), indent=2, ensure_ascii=False, allow_nan=False)
-        path.write_text(text + "\n", encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise OutputError(f"{path}: cannot be written ({error.strerror or error})") from None
+        raise OutputError(f"{error.filename or folder}: cannot be written ({error.strerror or error})") from None

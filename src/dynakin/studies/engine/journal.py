@@ -7,8 +7,8 @@ import json
 from pathlib import Path
 from typing import Any
 
-from dynakin.arrays import with_nulls
 from dynakin.errors import OutputError
+from dynakin.files import with_nulls
 from dynakin.studies.engine.tasks import Row
 
 VERSION = 1

@@ -27,6 +27,8 @@ PATIENCE = 8
 SETTLED = 0.5
 """Change of the cost in an iteration at which the search ends; in nats, half of what matters to anyone."""
 
+MOST_ITERATIONS = 60
+
 
 @dataclass(frozen=True, eq=False)
 class Optimum:
@@ -43,9 +45,7 @@ class _Settled(Exception):
     """Nothing is gained any more."""
 
 
-def minimise(
-    costs: Costs, start: Array, reach: float, *, settled: float = SETTLED, most_iterations: int = 60
-) -> Optimum:
+def minimise(costs: Costs, start: Array, reach: float, *, settled: float = SETTLED) -> Optimum:
     """Search from ``start`` (k,), each element within ``reach`` of 0, until little is gained.
 
     Args:
@@ -81,7 +81,7 @@ def minimise(
         return float(values[0]) * scale, slopes * scale
 
     bounds = [(-reach, reach)] * len(start)
-    options = {"maxiter": most_iterations, "ftol": 1e-15, "gtol": 1e-12}
+    options = {"maxiter": MOST_ITERATIONS, "ftol": 1e-15, "gtol": 1e-12}
     try:
         converged = bool(
             minimize(with_gradient, start, jac=True, method="L-BFGS-B", bounds=bounds, options=options).success

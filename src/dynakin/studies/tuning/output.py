@@ -8,10 +8,11 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from dynakin.files import write_csv, write_json
 from dynakin.results.files.config import versions
 from dynakin.settings.noise import SCALES
 from dynakin.settings.presets import write_preset
-from dynakin.studies.engine.folder import write_csv, write_json
+from dynakin.studies.engine.folder import writing
 from dynakin.studies.tuning.fit import Fit
 from dynakin.studies.tuning.grid import Grid
 from dynakin.studies.tuning.score import CRITERIA
@@ -28,7 +29,8 @@ def write_grid(folder: Path, grid: Grid, base: str) -> None:
     Raises:
         OutputError: a file cannot be written.
     """
-    write_csv(folder / "grid.csv", [_line(grid, cell) for cell in grid.cells])
+    with writing(folder):
+        write_csv(folder / "grid.csv", [_line(grid, cell) for cell in grid.cells])
     summary: dict[str, Any] = {
         "versions": versions(),
         "trials": list(grid.trials),
@@ -47,7 +49,8 @@ def write_grid(folder: Path, grid: Grid, base: str) -> None:
         ]
         write_preset(folder / f"preset_{name}.toml", grid.base.changed(**grid.settings(best)), base, remarks)
         summary["optimum"][name] = {**best, "at_edge": grid.at_edge(best)}
-    write_json(folder / "grid.json", summary)
+    with writing(folder):
+        write_json(folder / "grid.json", summary)
 
 
 def write_fit(folder: Path, fit: Fit, base: str, advice: Sequence[str]) -> None:
@@ -60,24 +63,25 @@ def write_fit(folder: Path, fit: Fit, base: str, advice: Sequence[str]) -> None:
         OutputError: a file cannot be written.
     """
     rows = [asdict(s) | {"unit": SCALES[s.name].unit, "known": s.known} for s in fit.settings]
-    write_csv(folder / "fit.csv", rows)
     names = [trial.name for trial in fit.shared.trials]
-    write_json(
-        folder / "fit.json",
-        {
-            "versions": versions(),
-            "trials": names,
-            "base": base,
-            "criterion": fit.criterion,
-            "settings": rows,
-            "figures": fit.figures,
-            "held_out": [asdict(fold) for fold in fit.folds],
-            "hessian": None if fit.hessian is None else fit.hessian.tolist(),
-            "evaluations": fit.optimum.evaluations,
-            "converged": fit.optimum.converged,
-            "recommendation": list(advice),
-        },
-    )
+    with writing(folder):
+        write_csv(folder / "fit.csv", rows)
+        write_json(
+            folder / "fit.json",
+            {
+                "versions": versions(),
+                "trials": names,
+                "base": base,
+                "criterion": fit.criterion,
+                "settings": rows,
+                "figures": fit.figures,
+                "held_out": [asdict(fold) for fold in fit.folds],
+                "hessian": None if fit.hessian is None else fit.hessian.tolist(),
+                "evaluations": fit.optimum.evaluations,
+                "converged": fit.optimum.converged,
+                "recommendation": list(advice),
+            },
+        )
     remarks = [f"Written by `dynakin tune fit` on {', '.join(names)}.", *advice]
     write_preset(folder / "preset_fit.toml", fit.noise, base, remarks)
 

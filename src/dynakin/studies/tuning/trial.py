@@ -32,7 +32,6 @@ class TuningTrial:
         time: (T,) s. markers: (T, M, 3) m, wrench: (T, 6), ground frame; NaN missing, or taken out.
         first, end: the frames that count; those before are filtered too.
         ahead: frames of the horizon of "100 ms ahead".
-        taken_out: sensors that the starting settings refused, summed over frames.
         estimate: kinds of parameters that are estimated.
     """
 
@@ -44,7 +43,6 @@ class TuningTrial:
     first: int
     end: int
     ahead: int
-    taken_out: int = 0
     estimate: tuple[Quantity, ...] = QUANTITIES
 
     def counted(self, first: int, end: int) -> TuningTrial:
@@ -92,13 +90,11 @@ def prepare(
     initial = estimator.calibrate(recording, static=static)
     tracker = estimator.start(initial)
     markers, wrench = estimator.measured(recording, tracker.calibrated)
-    taken_out = 0
     if _doubts(estimator.noise):
         _, arrays, shift, _ = run_in_step(tracker, recording.time, markers, wrench)
         wrench = in_step(recording.time, wrench, shift) if shift else wrench
         refused = arrays["verdicts"] == REFUSED
         refused[arrays["tracking"] != FOLLOWING] = True
-        taken_out = int(refused.sum())
         markers, wrench = markers.copy(), wrench.copy()
         markers[refused[:, :-1]] = np.nan
         wrench[refused[:, -1]] = np.nan
@@ -113,7 +109,6 @@ def prepare(
         int(window[0]),
         len(recording.time),
         max(1, round(horizon_s / step)),
-        taken_out,
         estimator.estimate,
     )
 

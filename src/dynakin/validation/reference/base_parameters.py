@@ -11,6 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import numpy.typing as npt
+import scipy.linalg
 
 from dynakin.validation.reference.condensed import Condensed
 
@@ -76,7 +77,8 @@ def base_parameters(problem: Condensed) -> BaseParameters:
     K[:, rest] = np.linalg.lstsq(problem.A[:, kept], problem.A[:, rest], rcond=None)[0]
     A, b = problem.with_mass()
     x, *_ = np.linalg.lstsq(A[:, kept], b, rcond=None)
-    covariance = np.linalg.pinv(A[:, kept].T @ A[:, kept], rcond=0.0, hermitian=True)
+    R = np.linalg.qr(A[:, kept], mode="r")  # A'A = R'R, whose condition is the square of R's
+    sd = np.linalg.norm(scipy.linalg.solve_triangular(R, np.eye(rank)), axis=1)  # of (R'R)^-1 the diagonal's roots
     names = [name for name, wanted in zip(problem.names, problem.estimated, strict=True) if wanted]
     scale = problem.scale[problem.estimated]
     return BaseParameters(
@@ -84,7 +86,7 @@ def base_parameters(problem: Condensed) -> BaseParameters:
         tuple(names),
         scale[kept, None] * K / scale,
         scale[kept] * x,
-        scale[kept] * np.sqrt(np.diag(covariance)),
+        scale[kept] * sd,
         singular,
     )
 

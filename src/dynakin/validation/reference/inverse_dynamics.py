@@ -82,9 +82,9 @@ class RigidMotion:
         return found
 
 
-def filled(time: Array, markers: Array, max_gap_s: float = MAX_GAP_S) -> Array:
-    """Markers (T, M, 3) with gaps of at most ``max_gap_s`` closed by splines."""
-    frames = round(max_gap_s / even_step(time))
+def filled(time: Array, markers: Array) -> Array:
+    """Markers (T, M, 3) with gaps of at most `MAX_GAP_S` closed by splines."""
+    frames = round(MAX_GAP_S / even_step(time))
     columns = [fill_gaps(column, frames)[0] for column in markers.reshape(len(markers), -1).T]
     return np.stack(columns, axis=1).reshape(markers.shape)
 

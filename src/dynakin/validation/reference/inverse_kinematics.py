@@ -13,6 +13,7 @@ import numpy.typing as npt
 from dynakin.bindings import _core
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.calibration.pose_start import bare
+from dynakin.model.spec import free_coordinates
 
 Array = npt.NDArray[np.float64]
 
@@ -45,17 +46,12 @@ def inverse_kinematics(calibrated: CalibratedModel, markers: Array) -> Array:
     return found
 
 
-def free_coordinates(model: _core.Model) -> list[int]:
-    """Numbers of the coordinates that are not locked: the first elements of a rigid model's state."""
-    return [k for k, coordinate in enumerate(model.spec.coordinates) if not coordinate.locked]
-
-
 class _FrameFit:
     """Least squares of one frame's markers, within the joints' ranges."""
 
     def __init__(self, calibrated: CalibratedModel) -> None:
         self.model = fixed_model(calibrated)
-        coordinates = [self.model.spec.coordinates[k] for k in free_coordinates(self.model)]
+        coordinates = [self.model.spec.coordinates[k] for k in free_coordinates(self.model.spec)]
         at = [calibrated.names.index(coordinate.name) for coordinate in coordinates]
         self.lower, self.upper, self.start = calibrated.lower[at], calibrated.upper[at], calibrated.x0[at]
         turns = {a.coordinate for s in self.model.spec.segments for a in s.axes if a.kind == "rotation"}

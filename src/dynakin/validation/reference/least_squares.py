@@ -33,7 +33,6 @@ class LeastSquares:
     Attributes:
         names, table: (p,) kg, kg m, kg m, kg m^2 a segment. free, bounded: (p,) the two estimates.
         at_bound: names that end on a bound of (9) in ``bounded``.
-        impossible: segments whose ``free`` parameters belong to no real body (m > 0, m izz > mx^2 + my^2 fails).
         base: base parameters, without bounds.
         frames: number of frames used.
     """
@@ -43,7 +42,6 @@ class LeastSquares:
     free: Array
     bounded: Array
     at_bound: tuple[str, ...]
-    impossible: tuple[str, ...]
     base: BaseParameters
     frames: int
 
@@ -74,11 +72,7 @@ def identify(
     base = base_parameters(problem)
     free = free_parameters(problem, base.rank)
     bounded, at_bound = _bounded(problem, plan, bounds or Bounds())
-    fitted = inertia_of(chain, free)
-    impossible = tuple(name for name, body in fitted.items() if body.mass != 0.0 and not body.possible_in_plane())
-    return LeastSquares(
-        problem.names, problem.table, free, bounded, at_bound, impossible, base, problem.frames
-    )  # fmt: skip
+    return LeastSquares(problem.names, problem.table, free, bounded, at_bound, base, problem.frames)
 
 
 def free_parameters(problem: Condensed, rank: int) -> Array:

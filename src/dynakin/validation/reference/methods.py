@@ -12,7 +12,7 @@ from dynakin.errors import ConfigError
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.definition import Definition, ModelDefinition
 from dynakin.recordings.recording import Recording
-from dynakin.recordings.smoothing import MAX_GAP_S, smooth
+from dynakin.recordings.smoothing import smooth
 from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.units import COMPONENTS
 from dynakin.validation.reference.chain import Kinematics, PlanarChain
@@ -54,7 +54,6 @@ def reference_methods(
     cutoff_hz: float | None = CUTOFF_HZ,
     *,
     lengths: Lengths = "constant",
-    max_gap_s: float = MAX_GAP_S,
 ) -> Reference:
     """Classical joint angles, low-passed and differentiated, then the table's wrench and joint moments.
 
@@ -65,7 +64,6 @@ def reference_methods(
             the paper. "frame": each hinge follows its landmarks, so that angles and lengths err together and partly
             cancel in the wrench; the stronger opponent on real trials, where thigh and shank leave the sagittal plane
             and look shorter.
-        max_gap_s: longest gap of an angle that is filled.
 
     Raises:
         ModelError: the model is not planar or no tree of hinges, or the markers do not fit.
@@ -81,11 +79,11 @@ def reference_methods(
     chain = PlanarChain.of(plan)
     landmarks = landmark_paths(recording, initial, definition)
     angles = classical_angles(chain, plan, landmarks)
-    smoothed = smooth(recording.time, angles, cutoff_hz, max_gap_s=max_gap_s, names=chain.coordinates)
+    smoothed = smooth(recording.time, angles, cutoff_hz, names=chain.coordinates)
     hinges = None
     if lengths == "frame":
         paths = hinge_paths(chain, plan, landmarks, angles)
-        flat = smooth(recording.time, paths.reshape(len(paths), -1), cutoff_hz, max_gap_s=max_gap_s)
+        flat = smooth(recording.time, paths.reshape(len(paths), -1), cutoff_hz)
         hinges = np.stack([flat.values, flat.rates, flat.seconds]).reshape(3, *paths.shape)
     kinematics = Kinematics(smoothed.values, smoothed.rates, smoothed.seconds, hinges)
     forces = table_dynamics(chain, kinematics)
