@@ -19,7 +19,7 @@ from dynakin.model.definition import Definition, ModelDefinition, available_mode
 from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
 from dynakin.model.markers.schema import Marker, MarkerSetFile
 from dynakin.model.opensim.definition import OpenSimDefinition
-from dynakin.model.opensim.export import mass_of_run, of_definition, of_initial, read_values
+from dynakin.model.opensim.export import of_definition, of_initial, read_values
 from dynakin.model.opensim.spec import free_coordinates, placements, used_scales
 from dynakin.model.opensim.write import write_osim
 from dynakin.model.schema import ModelFile, kinds_of
@@ -222,19 +222,16 @@ def export_model(
     """
     if path.suffix.casefold() != ".osim":
         raise typer.BadParameter(f"--export is {path}, expected a file that ends in .osim")
-    values = {} if parameters is None else read_values(parameters)
+    found = None if parameters is None else read_values(parameters)
     if isinstance(definition, OpenSimDefinition):
         if trial is not None:
             raise typer.BadParameter("--trial is of no use with --export of an .osim file, which has places of its own")
-        mass = settings.mass_kg
-        if mass is None and parameters is not None:
-            mass = mass_of_run(parameters)
-        write_osim(of_definition(definition, values, mass), path)
+        write_osim(of_definition(definition, found, settings.mass_kg), path)
         return
     if trial is None:
         raise typer.BadParameter("--export of a model that is no .osim file: expected --trial to measure it on")
     recording, static = _read(trial, settings)
-    write_osim(of_initial(definition.calibrate(recording, static=static), values), path)
+    write_osim(of_initial(definition.calibrate(recording, static=static), found), path)
 
 
 def _read(trial: Path, settings: Settings) -> tuple[Recording, Recording | None]:
