@@ -66,13 +66,16 @@ def batch(
         title = (
             f"{plural(len(result.rows), 'trial')} of {plural(people, 'subject')}, mean ± standard deviation over trials"
         )
-        console.print(as_table(table2_text(result.table2(), title)))
+        console.print(as_table(table2_text(result.table2(), title, of=len(result.rows), doubted=result.doubted)))
     with stage("writing tables"):
         write_batch(folder, result, identified)
     console.print(f"Tables  {folder}/table2.csv, table2_subjects.csv, trials.csv, batch.json", soft_wrap=True)
     for subject, row in identified.items():
         console.print(f"Subject {subject}: {row['said'][-1]}", soft_wrap=True)
     for name, row in result.rows.items():
+        for preset_name, verdict in row["verdict"].items():
+            which = f", EKF ({preset_name})" if len(row["verdict"]) > 1 else ""
+            console.print(f"Verdict {name}{which}: {verdict}", soft_wrap=True)
         for note in row["notes"]:
             if note.startswith("Warning:"):
                 console.print(f"Warned  {name}: {note.removeprefix('Warning: ')}", soft_wrap=True)

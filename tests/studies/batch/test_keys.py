@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import tomllib
 from dataclasses import replace
@@ -85,6 +86,15 @@ def test_exchanged_plates_are_told_by_name_and_stop_nothing(tmp_path: Path, caps
     told = json.loads((tmp_path / "out" / "batch.json").read_text())["trials"]
     notes = {name: [note for note in row["notes"] if "been exchanged" in note] for name, row in told.items()}
     assert {name: len(found) for name, found in notes.items()} == {"S1/good": 0, "S1/exchanged": 1}
-    warned = [line for line in capsys.readouterr().out.splitlines() if line.startswith("Warned")]
+    assert not told["S1/good"]["findings"] and "Force plates" in told["S1/exchanged"]["findings"]
+    assert "force plates" in told["S1/exchanged"]["verdict"]["default"]
+    with (tmp_path / "out" / "trials.csv").open(encoding="utf-8", newline="") as file:
+        findings = {row["trial"]: row["findings"] for row in csv.DictReader(file)}
+    assert findings["S1/good"] == "" and "Force plates" in findings["S1/exchanged"]
+    said = capsys.readouterr().out
+    verdicts = [line for line in said.splitlines() if line.startswith("Verdict")]
+    assert "Verdict S1/good: Nothing in this run speaks against using it." in verdicts and len(verdicts) == 2
+    assert "FY *" in said and "are doubted: S1/exchanged" in " ".join(said.split())
+    warned = [line for line in said.splitlines() if line.startswith("Warned")]
     assert any(line.startswith("Warned  S1/exchanged: plate 1 and plate 2 push the feet apart") for line in warned)
     assert not any("S1/good: plate 1 and plate 2" in line for line in warned)
