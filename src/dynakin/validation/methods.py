@@ -3,7 +3,7 @@ table ("AT") and "classical" of a planar chain, inverse kinematics and dynamics 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
@@ -46,6 +46,7 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
+WARNING = "Warning: "
 AT = "AT"
 CLASSICAL = "classical"
 
@@ -83,7 +84,7 @@ class Trial:
         measured_markers: (T, M, 3) m; measured_wrench: (T, 6).
         axes: (3,) bool, ground axes that the model explains. rotation: (C,) bool.
         repetitions: squats or gait cycles after the adaptation.
-        notes: what was left out and why.
+        notes: what was warned of, what was left out and why.
         estimates: of each preset, for whoever wants more. lost: presets that lost the person, and why.
     """
 
@@ -142,8 +143,14 @@ def compare_trial(
     initial = list(trackers.values())[-1].calibrated
     with stage(f"{recording.name}: the reference methods"):
         trial = trial_of(estimates, initial, setup.definition, setup.cutoff_hz, inverse=True)
-    mass = [text for text in initial.messages if text.startswith(("Mass ", "Warning: mass "))]
-    return with_lost(replace(trial, notes=(*mass, *trial.notes)), lost)
+    mass = [text for text in initial.messages if text.startswith("Mass ")]
+    said = [text for each in (initial, *estimates.values()) for text in warnings_of(each.messages)]
+    return with_lost(replace(trial, notes=tuple(dict.fromkeys((*said, *mass, *trial.notes)))), lost)
+
+
+def warnings_of(messages: Iterable[str]) -> list[str]:
+    """Those that say that a trial may not be what it is taken for."""
+    return [text for text in messages if text.startswith(WARNING)]
 
 
 def with_lost(trial: Trial, lost: Mapping[str, str]) -> Trial:
