@@ -14,10 +14,11 @@ from dynakin.identification.held_out import with_subject
 from dynakin.progress import stage
 from dynakin.report.text_tables import angle_text, moment_text, table2_text, truth_text, unseen_texts
 from dynakin.results.measures.mean_curves import curve_points
+from dynakin.results.records import WARNING, warnings_of
 from dynakin.validation.case import Case
 from dynakin.validation.differences import angle_differences, moment_differences
 from dynakin.validation.held_out import identify_on, judge, predict_blind
-from dynakin.validation.methods import WARNING, Trial, compare_trial, warnings_of
+from dynakin.validation.methods import Trial, compare_trial
 from dynakin.validation.table2 import merged, table2
 from dynakin.validation.truth import truth_rows
 from dynakin.validation.unseen import unseen, unseen_figures

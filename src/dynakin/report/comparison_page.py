@@ -16,8 +16,9 @@ from dynakin.report.sections.section import Section
 from dynakin.report.text_tables import angle_text, moment_text, name_of, table2_text, truth_text, unseen_text
 from dynakin.results.files.config import plain, versions
 from dynakin.results.naming import listed, number, plural, sentence
+from dynakin.results.records import WARNING
 from dynakin.units import COMPONENTS
-from dynakin.validation.methods import WARNING, Trial
+from dynakin.validation.methods import Trial
 from dynakin.validation.table2 import MARKERS, Row
 from dynakin.validation.unseen import UnseenRow
 

@@ -3,7 +3,7 @@ table ("AT") and "classical" of a planar chain, inverse kinematics and dynamics 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
@@ -27,6 +27,7 @@ from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.measures.repetitions import Found, repetitions_of
 from dynakin.results.measures.sources import measured_only, moment_sources, wrench_sources
 from dynakin.results.measures.tracking import why_lost
+from dynakin.results.records import warnings_of
 from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.settings.lag import in_words
 from dynakin.units import COMPONENTS
@@ -46,7 +47,6 @@ if TYPE_CHECKING:
 Array = npt.NDArray[np.float64]
 Mask = npt.NDArray[np.bool_]
 
-WARNING = "Warning: "
 AT = "AT"
 CLASSICAL = "classical"
 
@@ -146,11 +146,6 @@ def compare_trial(
     mass = [text for text in initial.messages if text.startswith("Mass ")]
     said = [text for each in (initial, *estimates.values()) for text in warnings_of(each.messages)]
     return with_lost(replace(trial, notes=tuple(dict.fromkeys((*said, *mass, *trial.notes)))), lost)
-
-
-def warnings_of(messages: Iterable[str]) -> list[str]:
-    """Those that say that a trial may not be what it is taken for."""
-    return [text for text in messages if text.startswith(WARNING)]
 
 
 def with_lost(trial: Trial, lost: Mapping[str, str]) -> Trial:
