@@ -20,7 +20,7 @@ from dynakin.validation.differences import angle_differences, moment_differences
 from dynakin.validation.held_out import identify_on, judge, predict_blind
 from dynakin.validation.methods import Trial, compare_trial
 from dynakin.validation.table2 import merged, table2
-from dynakin.validation.truth import truth_rows
+from dynakin.validation.truth import truth_rows, with_truth_noted
 from dynakin.validation.unseen import unseen, unseen_figures
 
 
@@ -29,7 +29,8 @@ def compare_cases(cases: Sequence[Case]) -> list[Trial]:
     compared = []
     for case in cases:
         with stage(case.recording.name) as progress:
-            compared.append(compare_trial(case.recording, case.setup, static=case.static, progress=progress))
+            trial = compare_trial(case.recording, case.setup, static=case.static, progress=progress)
+            compared.append(with_truth_noted(trial))
     return compared
 
 
