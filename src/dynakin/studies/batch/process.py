@@ -124,18 +124,23 @@ def belongs_to(dataset: Dataset, options: Options, *, identify: bool = False) ->
     """
     return {
         "what": "batch",
-        "dynakin": versions()["dynakin"],
-        "options": [*options.presets, options.cutoff_hz, options.files, identify],
-        "sessions": [[s.name, s.content, *_stamps(s.content)] for s in dataset.sessions],
+        "version of dynakin": versions()["dynakin"],
+        "presets": list(options.presets),
+        "--cutoff-hz": options.cutoff_hz,
+        "results of single trials": options.files,
+        "--identify": identify,
+        "trials": {s.name: s.content | {"files": _stamps(s.content)} for s in dataset.sessions},
     }
 
 
-def _stamps(content: Mapping[str, Any]) -> list[Any]:
-    found = []
+def _stamps(content: Mapping[str, Any]) -> dict[str, str]:
+    """Size and time of each file, by its name: a file that was changed has others."""
+    found = {}
     for key in ("trial", "forces", "static", "parameters"):
         file = Path(str(content.get(key, "")))
         if file.is_file():
-            found.append([key, file.stat().st_size, file.stat().st_mtime_ns])
+            changed = file.stat()
+            found[str(file)] = f"{changed.st_size} bytes of {changed.st_mtime_ns / 1e9:.6f}"
     return found
 
 

@@ -121,9 +121,9 @@ def belongs_to_fit(shared: Shared) -> dict[str, Any]:
     """All that the rows of a fit depend on in addition to their settings, for its journal."""
     return {
         "what": "fit",
-        "dynakin": versions()["dynakin"],
+        "version of dynakin": versions()["dynakin"],
         "trials": [trial.identity() for trial in shared.trials],
-        "base": shared.base.model_dump(mode="json"),
+        "settings": shared.base.model_dump(mode="json"),
     }
 
 

@@ -124,11 +124,11 @@ def belongs_to(shared: Shared, axes: Sequence[Axis]) -> dict[str, Any]:
     """All that the rows of a grid depend on, for its journal."""
     return {
         "what": "grid",
-        "dynakin": versions()["dynakin"],
+        "version of dynakin": versions()["dynakin"],
         "trials": [trial.identity() for trial in shared.trials],
-        "base": shared.base.model_dump(mode="json"),
-        "left_out": shared.left_out,
-        "axes": [[axis.name, *axis.values] for axis in axes],
+        "settings": shared.base.model_dump(mode="json"),
+        "--left-out": shared.left_out,
+        "--vary": {axis.name: list(axis.values) for axis in axes},
     }
 
 
