@@ -11,6 +11,7 @@ from rich.table import Table
 from rich.tree import Tree
 
 from dynakin.cli.console import out, table
+from dynakin.errors import ConfigError
 from dynakin.filter.estimator import Estimator
 from dynakin.identification.observability.measured import tracker_of
 from dynakin.identification.observability.structure import Structure, structure_of
@@ -222,6 +223,8 @@ def export_model(
     """
     if path.suffix.casefold() != ".osim":
         raise typer.BadParameter(f"--export is {path}, expected a file that ends in .osim")
+    if path.exists():
+        raise ConfigError(f"--export: {path} exists already, expected another name (a model, perhaps the only one)")
     found = None if parameters is None else read_values(parameters)
     if isinstance(definition, OpenSimDefinition):
         if trial is not None:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dynakin.errors import ConfigError, OutputError
+from dynakin.files import expanded
 from dynakin.identification.observability.trial import Identifiability
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.progress import stage
@@ -129,7 +130,7 @@ class Result:
             folder = None if self.settings is None or self.settings.output == Path() else self.settings.output
         if folder is None:
             raise OutputError("save: no folder was given, expected save(FOLDER) or run(..., output=FOLDER)")
-        folder = Path(folder)
+        folder = expanded(folder)
         if not keep_lost:
             refuse_lost(self.estimate, "keep_lost=True")
         self._write(folder, overwrite)

@@ -321,3 +321,10 @@ def test_an_export_is_measured_with_the_height_and_sex_of_the_run(
     for wrong, reason in (({"height_m": 1.6}, "--height is 1.6"), ({"sex": "male"}, "--sex is male")):
         with pytest.raises(ConfigError, match=reason):
             settings_of_run(given.changed(**wrong), parameters)
+
+
+def test_an_export_overwrites_nothing(tmp_path: Path) -> None:
+    path = small_model(tmp_path, "PinJoint", 4)
+    before = path.read_bytes()
+    result = CliRunner().invoke(app, ["model", str(path), "--export", str(path), "--mass", "10"])
+    assert "exists already" in str(result.exception) and path.read_bytes() == before
