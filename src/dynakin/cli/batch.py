@@ -39,7 +39,7 @@ def batch(
     with stage("loading"):
         from dynakin.report.text_tables import table2_text
         from dynakin.results.naming import plural
-        from dynakin.studies.batch.dataset import read_dataset
+        from dynakin.studies.batch.dataset import check_presets, read_dataset
         from dynakin.studies.batch.process import Options, belongs_to, run_batch, write_batch
         from dynakin.studies.batch.subjects import identify_subjects, with_parameters
         from dynakin.studies.engine.folder import ROWS, open_folder
@@ -49,6 +49,7 @@ def batch(
     if backend == "threads":
         raise ConfigError("batch: --backend threads, expected processes or dask: a crash would take all trials with it")
     found = read_dataset(dataset, output)
+    check_presets(preset or [], "batch: --preset")
     options = Options(tuple(preset or found.presets), cutoff, not tables_only)
     subjects = sorted({session.subject for session in found.sessions})
     folder = open_folder(found.output, ("table2", "batch.", "trials.", *subjects))

@@ -144,7 +144,8 @@ def compare_trial(
     with stage(f"{recording.name}: the reference methods"):
         trial = trial_of(estimates, initial, setup.definition, setup.cutoff_hz, inverse=True)
     mass = [text for text in initial.messages if text.startswith("Mass ")]
-    said = [text for each in (initial, *estimates.values()) for text in warnings_of(each.messages)]
+    said = warnings_of(initial.messages)
+    said += [text for estimate in estimates.values() for text in warnings_of(estimate.messages)]
     return with_lost(replace(trial, notes=tuple(dict.fromkeys((*said, *mass, *trial.notes)))), lost)
 
 
