@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -72,7 +73,8 @@ def batch(
         write_batch(folder, result, identified)
     console.print(f"Tables  {folder}/table2.csv, table2_subjects.csv, trials.csv, batch.json", soft_wrap=True)
     for subject, row in identified.items():
-        console.print(f"Subject {subject}: {row['said'][-1]}", soft_wrap=True)
+        for text in to_say(row["said"]):
+            console.print(f"Subject {subject}: {text}", soft_wrap=True)
     for name, row in result.rows.items():
         for preset_name, verdict in row["verdict"].items():
             which = f", EKF ({preset_name})" if len(row["verdict"]) > 1 else ""
@@ -89,3 +91,8 @@ def batch(
         raise DynakinError(f"{dataset}: none of {len(found.sessions)} trials could be worked on")
     if result.failures or lost:
         raise typer.Exit(1)
+
+
+def to_say(said: Sequence[str]) -> list[str]:
+    """Of what the identification of a subject says, trials that are left out, warnings, and the verdict."""
+    return [*(text for text in said[:-1] if text.startswith(("Left out: ", "Warning: "))), said[-1]]
