@@ -26,6 +26,14 @@ def is_text(name: str) -> bool:
     return True
 
 
+def expanded(path: str | Path) -> Path:
+    """The path, its ``~`` the home folder, as a shell has it; unchanged where there is no such user."""
+    try:
+        return Path(path).expanduser()
+    except RuntimeError:
+        return Path(path)
+
+
 def is_file(path: Path) -> bool:
     """Whether there is such a file; a name that no file can have (5,000 characters, a NUL) is none."""
     try:

@@ -127,3 +127,11 @@ def test_run_names_what_lies_next_to_a_recording(data_dir: Path, tmp_path: Path,
     assert main(["check", walk]) == 0
     found, _ = told(capsys)
     assert "--forces walking1_grf.mot lies next to the recording" in found
+
+
+def test_what_is_no_recording_or_no_option_is_wrong_input(tmp_path: Path, capsys: Said) -> None:
+    """As README has it: 1 is a refusal of a recording that is there."""
+    there = tmp_path / "x.trc"
+    there.write_text("no recording\n")
+    assert [main(["check", str(tmp_path / "nowhere.trc")]), main(["check", str(there), "--mass", "-3"])] == [2, 2]
+    assert main(["check", str(there)]) == 1

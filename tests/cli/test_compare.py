@@ -122,3 +122,14 @@ def test_a_folder_of_somebody_else_is_left_alone(trial: list[str], tmp_path: Pat
     assert main(["compare", *trial, *SUBJECT, "-o", str(tmp_path)]) == 2
     assert "thesis.txt" in capsys.readouterr().err
     assert [entry.name for entry in tmp_path.iterdir()] == ["thesis.txt"]
+
+
+def test_what_makes_a_trial_doubtful_is_said_everywhere(trial: list[str], tmp_path: Path, capsys: Said) -> None:
+    out = tmp_path / "comparison"
+    subject = ["--model", "sagittal7", "--markers", "opencap", "--mass", "40"]  # of 70 kg
+    assert main(["compare", *trial, *subject, "--height", "1.75", "-o", str(out)]) == 0
+    said = " ".join(capsys.readouterr().out.split())
+    (compared,) = json.loads((out / "comparison.json").read_text())["trials"]
+    assert any("the person weighs 40.0 kg" in warning for warning in compared["warnings"])
+    for text in (said, (out / "report.html").read_text()):
+        assert "the person weighs 40.0 kg" in text

@@ -117,8 +117,14 @@ def test_a_result_as_a_researcher_takes_it(from_python: dynakin.Result) -> None:
     estimate = from_python.estimate
     assert list(table.columns) == estimate.coordinate_names and table.index.name == "time"
     np.testing.assert_array_equal(table.to_numpy(), estimate.data["moments"].transpose("time", "coordinate"))
-    with pytest.raises(ValueError, match=r"markers_estimated has the dimensions time, marker, axis"):
-        from_python.to_dataframe("markers_estimated")
+    for quantity, dimensions in (
+        ("markers_estimated", "time, marker, axis"),
+        ("final_covariance", "element, element_"),
+    ):
+        with pytest.raises(
+            ConfigError, match=f"{quantity} has the dimensions {dimensions}, .* as coordinates, .*speeds"
+        ):
+            from_python.to_dataframe(quantity)
     assert from_python.events == estimate.events and from_python.failures.found == []
     assert from_python.metrics()["identifiability"]["advice"] == list(from_python.observability.advice)
     assert from_python.model.mass_kg == 70.0

@@ -9,14 +9,15 @@ import numpy as np
 import pytest
 
 from dynakin.cli.app import main
-from dynakin.errors import LostError, ModelError
+from dynakin.errors import LostError, ModelError, RecordingError
 from dynakin.filter.augment import initial_covariance
 from dynakin.identification.change import change_between, change_in_words
 from dynakin.identification.decision import Decision, decide, parts_of
-from dynakin.identification.subject import Identification, identify_subject
+from dynakin.identification.subject import Identification, identify_subject, warned
 from dynakin.identification.trials import measure_all
-from dynakin.model.identified import read_identified, with_identified
+from dynakin.model.identified import IdentifiedSubject, read_identified, with_identified
 from dynakin.recordings.recording import Recording
+from dynakin.simulation.trial import simulate
 from support.identification import Case, estimator
 
 
@@ -96,11 +97,21 @@ def test_few_trials_are_halved_and_many_are_not(case: Case) -> None:
     assert decided.folds == tuple(trial.movement.recording.name for trial in brief)
 
 
+def none(subject: IdentifiedSubject) -> tuple[tuple[float, ...], ...]:
+    """A covariance of 0."""
+    return tuple((0.0,) * len(subject.batch.names) for _ in subject.batch.names)
+
+
 def test_change_between_two_sessions(identified: Identification) -> None:
     before = identified.subject
     assert not any(change.clear for change in change_between(before, before))
     values = np.array(before.batch.values)
     values[before.batch.names.index("inertia/trunk/my")] += 5.0
+    rounded = before.batch.model_copy(
+        update={"values": tuple(np.array(before.batch.values) * (1.0 + 1e-15)), "covariance": none(before)}
+    )
+    exact = before.model_copy(update={"batch": before.batch.model_copy(update={"covariance": none(before)})})
+    assert not any(change.clear for change in change_between(exact, exact.model_copy(update={"batch": rounded})))
     batch = before.batch.model_copy(update={"values": tuple(values.tolist())})
     changes = change_between(before, before.model_copy(update={"batch": batch}))
     assert changes[0].clear and changes[0].difference == pytest.approx(5.0, rel=1e-6)
@@ -150,10 +161,15 @@ def test_what_is_wrong_with_the_input_is_one_line_and_nothing_is_written(
     file = tmp_path / "subject.toml"
     alone = tmp_path / "alone.trc"
     alone.write_bytes(Path(files[1]).read_bytes())
+    copy = tmp_path / "copy" / "markers.trc"
+    copy.parent.mkdir()
+    for name in ("markers.trc", "forces.mot"):
+        copy.with_name(name).write_bytes(Path(files[1]).with_name(name).read_bytes())
     heavier = [*OPTIONS[:4], "--mass", "75", *OPTIONS[6:]]
     no_mass = [*OPTIONS[:4], *OPTIONS[6:]]
     cases = {
         "expected at least two of the same subject": [files[0], *OPTIONS],
+        f"{files[1]} and {copy}: the markers are the same": [*files, str(copy), *OPTIONS],
         "is given twice": [files[0], files[0], *OPTIONS],
         "no force plates": [files[0], str(alone), *OPTIONS],
         "the subject weighs 75.0 kg (expected within 4 %)": [*files, *heavier],
@@ -168,6 +184,24 @@ def test_what_is_wrong_with_the_input_is_one_line_and_nothing_is_written(
         assert not captured.out and not file.exists()
     assert main(["identify", *files, *OPTIONS, "-o", str(tmp_path / "no" / "subject.toml")]) == 2
     assert "in a folder that exists" in capsys.readouterr().err
+
+
+def test_another_person_and_other_markers_are_named(case: Case) -> None:
+    first = case.sims[0].recording
+    child = simulate("sagittal7", "squat", 3, 5.0, height_m=1.4, mass_kg=70.0).recording
+    with pytest.raises(RecordingError, match=r"differ by \d+ mm .* another person.* expected trials of one person"):
+        case.common.check(child)
+    renamed = replace(first, marker_names=tuple(f"M{k}" for k in range(len(first.marker_names))))
+    with pytest.raises(RecordingError, match=r"has 0 of the \d+ markers .* share no marker set"):
+        case.common.check(renamed)
+
+
+def test_warnings_of_the_calibration_are_part_of_what_is_found(case: Case, identified: Identification) -> None:
+    assert identified.warned == ()
+    doubtful = replace(case.common.initial, messages=("Warning: another person.", "Mass 70 kg: given."))
+    trial = replace(case.trials[0].movement, start=replace(doubtful, messages=("Warning: a leg is short.",)))
+    said = warned(replace(case.common, initial=doubtful), [replace(case.trials[0], movement=trial)])
+    assert said == ("Warning: another person.", f"Warning: {case.sims[0].recording.name}: a leg is short.")
 
 
 def mislabelled(recording: Recording) -> Recording:

@@ -13,6 +13,7 @@ from dynakin import read
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.tracker import Tracker
 from dynakin.model.definition import Definition, load_model
+from dynakin.model.identified import read_constants
 from dynakin.model.opensim.definition import OpenSimDefinition
 from dynakin.model.opensim.export import of_definition, of_initial
 from dynakin.model.opensim.write import write_osim
@@ -49,11 +50,11 @@ def estimated(folder: Path, name: str, model: str, mass: float, out: Path) -> tu
 
 def exported(definition: Definition, estimate: Estimate, tracker: Tracker, path: Path) -> Any:
     """The model that the run ended with, as OpenSim loads it."""
-    values = {parameter.name: parameter.value for parameter in estimate.parameters}
+    found = read_constants(path.with_name("parameters.json"))
     if isinstance(definition, OpenSimDefinition):
-        write_osim(of_definition(definition, values, estimate.mass_kg), path)
+        write_osim(of_definition(definition, found, estimate.mass_kg), path)
     else:
-        write_osim(of_initial(tracker.calibrated, values), path)
+        write_osim(of_initial(tracker.calibrated, found), path)
     return opensim.Model(str(path))
 
 

@@ -57,6 +57,16 @@ def test_a_foreign_file_in_our_own_output_stops_the_replacement(small: Estimate,
     assert check_output_writable(out) == out
 
 
+def test_the_home_folder_is_where_a_shell_has_it(
+    small: Estimate, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    monkeypatch.chdir(tmp_path)
+    assert Result(small).save("~/out") == tmp_path / "out"
+    assert check_output_writable("~/other") == tmp_path / "other"
+    assert [entry.name for entry in tmp_path.iterdir()] == ["out"]
+
+
 def test_a_file_in_the_way_is_named(tmp_path: Path) -> None:
     (tmp_path / "out").write_text("")
     with pytest.raises(OutputError, match="is a file"):

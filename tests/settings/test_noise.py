@@ -10,12 +10,15 @@ import tomli_w
 
 import dynakin
 from dynakin.errors import ConfigError
+from dynakin.filter.build import estimator_of
 from dynakin.settings import presets
+from dynakin.settings.effect import check_effect, check_noise
 from dynakin.settings.model import Priors
 from dynakin.settings.noise import Noise
 from dynakin.settings.settings import Settings
 from dynakin.settings.strict import Strict
 from dynakin.studies.tuning.settings import check_setting
+from dynakin.validation.case import case_of
 
 # Every number that a preset had before it became, or ceased to be, the default.
 DEFAULT: dict[str, Any] = {
@@ -193,3 +196,38 @@ def test_scales_that_are_given_are_not_calibrated_again() -> None:
     assert Noise().calibrates(True) and not Noise().calibrates(False)
     assert not Noise(variance_scale=0.2).calibrates(True) and not Noise(jerk_scale={"knees": 2.0}).calibrates(True)
     assert Noise(variance_scale=0.2, adapt=True).calibrates(False)
+
+
+@pytest.mark.parametrize(
+    ("floating", "noise", "said"),
+    [
+        (True, {"force_variance_n2": 1.0}, "'force_variance_n2' has no effect on a model that is fixed nowhere"),
+        (True, {"jerk_density_rad2_s5": 5.0}, "expected 'floating_jerk_density_rad2_s5'"),
+        (True, {"jerk_density_rad2_s5": 60.0, "plate_force_sd_n": 3.0}, ""),  # the preset's own; one that has an effect
+        (True, {"jerk_density_rad2_s5": 5.0, "floating_jerk_density_rad2_s5": None}, ""),
+        (False, {"floating_jerk_density_rad2_s5": 5.0}, "expected 'jerk_density_rad2_s5'"),
+        (False, {"residual_force_sd_n": 5.0}, "fixed in the ground, expected 'force_variance_n2'"),
+        (False, {"jerk_scale": {"hips": 2.0}}, "'jerk_scale' has no effect on a model that is fixed in the ground"),
+        (False, {"force_variance_n2": 1.0}, ""),
+    ],
+)
+def test_a_key_that_does_nothing_with_the_model_is_refused(floating: bool, noise: dict[str, Any], said: str) -> None:
+    settings = Settings(trial=Path("x.trc"), output=Path("o"), noise=noise)
+    if not said:
+        check_noise(settings, floating)
+        return
+    with pytest.raises(ConfigError) as error:
+        check_noise(settings, floating)
+    assert said in error.value.message
+
+
+def test_all_commands_refuse_it() -> None:
+    settings = Settings(model="fullbody", mass_kg=70.0, noise={"force_variance_n2": 1.0})
+    for make in (estimator_of, case_of):
+        with pytest.raises(ConfigError, match="has no effect on a model that is fixed nowhere"):
+            make(settings)
+
+
+def test_the_grid_refuses_it_too() -> None:
+    with pytest.raises(ConfigError, match="'force_variance_n2' has no effect on a model that is fixed nowhere"):
+        check_effect(["force_variance_n2"], presets.default(), [True])

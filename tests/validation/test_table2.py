@@ -12,12 +12,14 @@ import pytest
 
 import dynakin
 from dynakin.errors import ConfigError, OutputError
+from dynakin.report.text_tables import table2_text
+from dynakin.results.measures.fit import SignalFit
 from dynakin.results.measures.metrics import compute_metrics
 from dynakin.validation.differences import angle_differences, moment_differences
 from dynakin.validation.files import save_comparison
 from dynakin.validation.methods import Trial, compare_trial
 from dynakin.validation.setup import Setup
-from dynakin.validation.table2 import Spread, marker_fit, spread, table2
+from dynakin.validation.table2 import Spread, marker_fit, spread, table2, table2_of
 
 IN_PLANE = np.array([True, True, False])
 
@@ -105,6 +107,14 @@ def test_files_hold_the_rows_and_replace_only_an_earlier_comparison(compared: Tr
     (folder / "mine.txt").write_text("kept")
     with pytest.raises(OutputError, match=r"mine\.txt"):
         save_comparison(folder, {"table2": rows})
+
+
+def test_a_row_over_fewer_trials_says_so_and_forces_that_are_doubted_are_marked() -> None:
+    one, none = SignalFit(1.0, 2.0, 3.0, 0.9), SignalFit(None, None, None, None)
+    rows = table2_of([{("markers", "EKF"): one, ("fy", "EKF"): one}, {("markers", "EKF"): one, ("fy", "EKF"): none}])
+    text = table2_text(rows, "2 trials", of=2, doubted=["A/walk"])
+    assert [row[:2] for row in text.rows] == [("markers", "EKF"), ("FY *", "EKF (n = 1)")]
+    assert text.title.endswith("whose mass or forces are doubted: A/walk")
 
 
 def test_settings_that_make_no_sense_are_refused() -> None:

@@ -15,7 +15,7 @@ from dynakin.results.measures.sources import ABSENT, DERIVED, MEASURED
 from dynakin.simulation.trial import simulate_squat
 from dynakin.validation.methods import Method, Trial, compare_trial
 from dynakin.validation.setup import Setup
-from dynakin.validation.truth import FIGURES, LEG, TRUTH, truth_errors, truth_rows
+from dynakin.validation.truth import FIGURES, LEG, TRUTH, truth_errors, truth_rows, with_truth_noted
 
 
 @pytest.fixture(scope="module")
@@ -86,6 +86,22 @@ def test_every_method_of_a_simulated_trial_has_every_figure(compared: Trial) -> 
     assert all(row.rms.n == 1 and row.rms.mean is not None for row in rows)
     elsewhere = {name: replace(e, recording=replace(e.recording, path=None)) for name, e in compared.estimates.items()}
     assert truth_rows([replace(compared, estimates=elsewhere)]) == []
+
+
+def test_a_truth_of_another_model_is_left_out_and_that_is_said(compared: Trial) -> None:
+    assert with_truth_noted(compared) is compared
+    in_space = {"ankle": "ankle_angle_r", "knee": "knee_angle_r", "hip": "hip_flexion_r"}
+    path = Path(str(next(iter(compared.estimates.values())).recording.path)).with_name(TRUTH)
+    with xr.open_dataset(path) as stored:
+        kept = stored.load()
+    names = [in_space.get(str(name), str(name)) for name in kept["coordinate"].values]
+    kept.assign_coords(coordinate=names).to_netcdf(path)  # as a simulation of fullbody has it
+    try:
+        assert truth_rows([compared]) == []
+        (note,) = (note for note in with_truth_noted(compared).notes if "another model" in note)
+        assert note.endswith("which has no ankle, hip and knee.") and str(path) in note
+    finally:
+        kept.to_netcdf(path)
 
 
 def test_methods_are_judged_over_the_moments_that_all_have_measured(compared: Trial) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Annotated
 
@@ -39,7 +40,7 @@ def batch(
     with stage("loading"):
         from dynakin.report.text_tables import table2_text
         from dynakin.results.naming import plural
-        from dynakin.studies.batch.dataset import read_dataset
+        from dynakin.studies.batch.dataset import check_presets, read_dataset
         from dynakin.studies.batch.process import Options, belongs_to, run_batch, write_batch
         from dynakin.studies.batch.subjects import identify_subjects, with_parameters
         from dynakin.studies.engine.folder import ROWS, open_folder
@@ -49,6 +50,7 @@ def batch(
     if backend == "threads":
         raise ConfigError("batch: --backend threads, expected processes or dask: a crash would take all trials with it")
     found = read_dataset(dataset, output)
+    check_presets(preset or [], "batch: --preset")
     options = Options(tuple(preset or found.presets), cutoff, not tables_only)
     subjects = sorted({session.subject for session in found.sessions})
     folder = open_folder(found.output, ("table2", "batch.", "trials.", *subjects))
@@ -66,13 +68,17 @@ def batch(
         title = (
             f"{plural(len(result.rows), 'trial')} of {plural(people, 'subject')}, mean ± standard deviation over trials"
         )
-        console.print(as_table(table2_text(result.table2(), title)))
+        console.print(as_table(table2_text(result.table2(), title, of=len(result.rows), doubted=result.doubted)))
     with stage("writing tables"):
         write_batch(folder, result, identified)
     console.print(f"Tables  {folder}/table2.csv, table2_subjects.csv, trials.csv, batch.json", soft_wrap=True)
     for subject, row in identified.items():
-        console.print(f"Subject {subject}: {row['said'][-1]}", soft_wrap=True)
+        for text in to_say(row["said"]):
+            console.print(f"Subject {subject}: {text}", soft_wrap=True)
     for name, row in result.rows.items():
+        for preset_name, verdict in row["verdict"].items():
+            which = f", EKF ({preset_name})" if len(row["verdict"]) > 1 else ""
+            console.print(f"Verdict {name}{which}: {verdict}", soft_wrap=True)
         for note in row["notes"]:
             if note.startswith("Warning:"):
                 console.print(f"Warned  {name}: {note.removeprefix('Warning: ')}", soft_wrap=True)
@@ -85,3 +91,8 @@ def batch(
         raise DynakinError(f"{dataset}: none of {len(found.sessions)} trials could be worked on")
     if result.failures or lost:
         raise typer.Exit(1)
+
+
+def to_say(said: Sequence[str]) -> list[str]:
+    """Of what the identification of a subject says, trials that are left out, warnings, and the verdict."""
+    return [*(text for text in said[:-1] if text.startswith(("Left out: ", "Warning: "))), said[-1]]

@@ -22,7 +22,8 @@ def check(
 ) -> None:
     """Say what `run` would make of a recording, what would be absent and why, and what to add for more.
 
-    Exit code 0 where `run` would run; 1 where it would refuse, with the line that it would refuse with.
+    Exit code 0 where `run` would run; 1 where it would refuse the recording, with the line that it would refuse with; 2
+    where there is no such file, or an option or key is wrong.
     """
     with stage("loading"):
         from dynakin.cli.check_rows import model_rows, nearest_sets, recording_rows, rehearsed, to_add

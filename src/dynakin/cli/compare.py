@@ -79,6 +79,8 @@ def compare(
             failed = error
         tables |= print_repetitions(console, compared)
         more["trials"] = [described(trial) for trial in compared]
+    if notes:
+        more["notes"] = notes
     if output is not None:
         with stage("writing tables and report"):
             names = [case.recording.name for case in cases]

@@ -14,12 +14,13 @@ from dynakin.identification.held_out import with_subject
 from dynakin.progress import stage
 from dynakin.report.text_tables import angle_text, moment_text, table2_text, truth_text, unseen_texts
 from dynakin.results.measures.mean_curves import curve_points
+from dynakin.results.records import WARNING, warnings_of
 from dynakin.validation.case import Case
 from dynakin.validation.differences import angle_differences, moment_differences
 from dynakin.validation.held_out import identify_on, judge, predict_blind
 from dynakin.validation.methods import Trial, compare_trial
 from dynakin.validation.table2 import merged, table2
-from dynakin.validation.truth import truth_rows
+from dynakin.validation.truth import truth_rows, with_truth_noted
 from dynakin.validation.unseen import unseen, unseen_figures
 
 
@@ -28,7 +29,8 @@ def compare_cases(cases: Sequence[Case]) -> list[Trial]:
     compared = []
     for case in cases:
         with stage(case.recording.name) as progress:
-            compared.append(compare_trial(case.recording, case.setup, static=case.static, progress=progress))
+            trial = compare_trial(case.recording, case.setup, static=case.static, progress=progress)
+            compared.append(with_truth_noted(trial))
     return compared
 
 
@@ -41,7 +43,7 @@ def print_comparison(console: Console, compared: Sequence[Trial]) -> dict[str, S
         title = f"{first.name}: {seconds[0]:g} to {seconds[-1]:g} s"
     else:
         title = f"{len(compared)} trials, mean ± standard deviation, each after its adaptation"
-    console.print(as_table(table2_text(rows, title)))
+    console.print(as_table(table2_text(rows, title, of=len(compared))))
     if angles:
         console.print(as_table(angle_text(angles)))
     if moments:
@@ -51,8 +53,7 @@ def print_comparison(console: Console, compared: Sequence[Trial]) -> dict[str, S
         console.print(as_table(truth_text(truth)))
     for trial in compared:
         for note in trial.notes:
-            text = note if len(compared) == 1 else f"{trial.name}: {note}"
-            console.print(Padding(text, (0, 0, 0, 2)), style="dim")
+            _print_note(console, note if len(compared) == 1 else f"{trial.name}: {note}")
     return {"table2": rows, "angles": angles, "moments": moments, "truth": truth}
 
 
@@ -67,15 +68,21 @@ def print_held_out(
             identified, decided = with_subject(identified)
             blind = predict_blind(identified, judging.recording)
             tables.append(judge(blind, judging.recording))
-            notes += [f"{fitted.recording.name}: {said}" for said in decided]
-            notes += [f"{judging.recording.name}: {note}" for note in blind.notes]
+            fits = [text for each in identified.estimates.values() for text in warnings_of(each.messages)]
+            notes += [f"{fitted.recording.name}: {said}" for said in dict.fromkeys([*fits, *decided])]
+            judged = [*warnings_of(blind.start.messages), *blind.notes]
+            notes += [f"{judging.recording.name}: {note}" for note in judged]
     names = f"{pairs[0][0].recording.name} -> {pairs[0][1].recording.name}"
     title = f"Identified -> judged from markers alone: {names if len(pairs) == 1 else f'{len(pairs)} trials'}"
     rows = merged(tables)
     console.print(as_table(table2_text(rows, title)))
     for note in notes:
-        console.print(Padding(note, (0, 0, 0, 2)), style="dim")
+        _print_note(console, note)
     return {"held_out": rows}
+
+
+def _print_note(console: Console, note: str) -> None:
+    console.print(Padding(note, (0, 0, 0, 2)), style="yellow" if WARNING in note else "dim")
 
 
 def print_unseen(console: Console, cases: Sequence[Case], horizon_ms: float) -> dict[str, Sequence[Any]]:
@@ -126,5 +133,6 @@ def described(trial: Trial) -> dict[str, Any]:
         "mass_kg": trial.mass_kg,
         "methods": [method.name for method in trial.methods],
         "repetitions": [asdict(repetition) for repetition in trial.repetitions.items],
+        "warnings": warnings_of(trial.notes),
         "notes": list(trial.notes),
     }

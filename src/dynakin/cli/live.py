@@ -148,7 +148,9 @@ def live(
 def _estimated(parameters: Path) -> dict[str, tuple[float, float]]:
     from dynakin.model.identified import read_constants
 
-    return {name: (found.value, found.sd) for name, found in read_constants(parameters).items() if found.estimated}
+    return {
+        name: (found.value, found.sd) for name, found in read_constants(parameters).constants.items() if found.estimated
+    }
 
 
 def _for_replay(replay: Replay, address: str, again: bool) -> tuple[float, float]:

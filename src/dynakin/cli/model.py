@@ -40,6 +40,7 @@ def model(
     from dynakin.cli.model_tables import export_model, list_models, print_identifiability, print_model, print_opensim
     from dynakin.filter.build import definition_of
     from dynakin.model.opensim.definition import OpenSimDefinition
+    from dynakin.model.opensim.export import settings_of_run
 
     console = out()
     needless = ["--trial"] if trial is not None else []
@@ -59,6 +60,8 @@ def model(
         console.print(list_models())
         return
     settings = Settings.of({"model": name}, "model", ("model",), given)
+    if parameters is not None:
+        settings = settings_of_run(settings, parameters)
     definition = definition_of(settings)
     if export is not None:
         export_model(definition, export, parameters, trial, settings)

@@ -11,6 +11,7 @@ from rich.table import Table
 from rich.tree import Tree
 
 from dynakin.cli.console import out, table
+from dynakin.errors import ConfigError
 from dynakin.filter.estimator import Estimator
 from dynakin.identification.observability.measured import tracker_of
 from dynakin.identification.observability.structure import Structure, structure_of
@@ -20,7 +21,7 @@ from dynakin.model.identified import read_constants
 from dynakin.model.markers.marker_set import available_marker_sets, load_marker_set
 from dynakin.model.markers.schema import Marker, MarkerSetFile
 from dynakin.model.opensim.definition import OpenSimDefinition
-from dynakin.model.opensim.export import mass_of_run, of_definition, of_initial
+from dynakin.model.opensim.export import of_definition, of_initial
 from dynakin.model.opensim.spec import independent_coordinates, placements, used_scales
 from dynakin.model.opensim.write import write_osim
 from dynakin.model.schema import ModelFile, kinds_of
@@ -223,19 +224,18 @@ def export_model(
     """
     if path.suffix.casefold() != ".osim":
         raise typer.BadParameter(f"--export is {path}, expected a file that ends in .osim")
-    values = {} if parameters is None else {name: found.value for name, found in read_constants(parameters).items()}
+    if path.exists():
+        raise ConfigError(f"--export: {path} exists already, expected another name (a model, perhaps the only one)")
+    found = None if parameters is None else read_constants(parameters)
     if isinstance(definition, OpenSimDefinition):
         if trial is not None:
             raise typer.BadParameter("--trial is of no use with --export of an .osim file, which has places of its own")
-        mass = settings.mass_kg
-        if mass is None and parameters is not None:
-            mass = mass_of_run(parameters)
-        write_osim(of_definition(definition, values, mass), path)
+        write_osim(of_definition(definition, found, settings.mass_kg), path)
         return
     if trial is None:
         raise typer.BadParameter("--export of a model that is no .osim file: expected --trial to measure it on")
     recording, static = _read(trial, settings)
-    write_osim(of_initial(definition.calibrate(recording, static=static), values), path)
+    write_osim(of_initial(definition.calibrate(recording, static=static), found), path)
 
 
 def _read(trial: Path, settings: Settings) -> tuple[Recording, Recording | None]:

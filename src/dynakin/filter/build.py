@@ -6,6 +6,7 @@ from dynakin.filter.estimator import Estimator
 from dynakin.model.definition import ModelDefinition, load_model
 from dynakin.model.identified import IdentifiedSubject, read_identified
 from dynakin.model.opensim.definition import OpenSimDefinition
+from dynakin.settings.effect import check_noise
 from dynakin.settings.settings import Settings
 
 
@@ -38,10 +39,12 @@ def estimator_of(settings: Settings) -> Estimator:
     """An estimator of the model with these settings.
 
     Raises:
-        ModelError, ConfigError: the model or a setting is wrong.
+        ModelError, ConfigError: the model or a setting is wrong, or has no effect on this model.
     """
+    definition = definition_of(settings)
+    check_noise(settings, definition.floating)
     return Estimator(
-        definition_of(settings),
+        definition,
         settings.noise_settings(),
         priors=settings.priors,
         bounds=settings.bounds,

@@ -11,6 +11,9 @@ from dynakin.identification.observability.base import base_spread
 from dynakin.model.identified import IdentifiedSubject
 from dynakin.results.naming import number
 
+ROUNDING = 1e-9
+"""Of a number (SI), what no session can show: a total mass that is given has no deviation, and differs by 1e-14."""
+
 
 @dataclass(frozen=True)
 class Change:
@@ -29,8 +32,8 @@ class Change:
 
     @property
     def clear(self) -> bool:
-        """Whether the difference is beyond two of its standard deviations."""
-        return abs(self.difference) > 2.0 * self.sd
+        """Whether the difference is beyond two of its standard deviations, and more than rounding."""
+        return abs(self.difference) > 2.0 * self.sd + ROUNDING * max(1.0, abs(self.before), abs(self.after))
 
 
 def change_between(before: IdentifiedSubject, after: IdentifiedSubject) -> list[Change]:

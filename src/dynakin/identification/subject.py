@@ -20,6 +20,7 @@ from dynakin.identification.trials import Common, MeasuredTrial, measure_all
 from dynakin.model.identified import Batch, HeldOut, IdentifiedSubject
 from dynakin.progress import Progress
 from dynakin.recordings.recording import Recording
+from dynakin.results.records import WARNING, warnings_of
 
 Array = npt.NDArray[np.float64]
 
@@ -34,6 +35,7 @@ class Identification:
         subject: what is written to the file. common, trials: what it was made of.
         posterior: the batch estimate of the segments' inertia, used or not.
         decision: of cross-validation. lost: sentences on the trials that are left out, the person being lost in them.
+        warned: what makes the model as measured, or a trial, doubtful.
     """
 
     subject: IdentifiedSubject
@@ -42,6 +44,7 @@ class Identification:
     posterior: Posterior
     decision: Decision
     lost: tuple[str, ...] = ()
+    warned: tuple[str, ...] = ()
 
 
 def identify_subject(
@@ -69,12 +72,13 @@ def identify_subject(
     decision = decide(common, trials, lambda done, of: report(round(_SEEING + (_WORK - _SEEING) * done / of), _WORK))
     posterior = estimate(common, trials, "bodies")
     batch = _batch(common, posterior)
+    said = warned(common, trials)
     subject = IdentifiedSubject(
         model=common.initial.spec.name,
         mass_kg=common.initial.mass_kg,
         use=decision.use,
         trials=tuple(trial.movement.recording.name for trial in trials),
-        report=(*lost, *in_words(decision, posterior, batch)),
+        report=(*lost, *said, *in_words(decision, posterior, batch)),
         held_out=HeldOut(
             parts=decision.folds,
             components=decision.components,
@@ -83,7 +87,16 @@ def identify_subject(
         ),
         batch=batch,
     )
-    return Identification(subject, common, tuple(trials), posterior, decision, tuple(lost))
+    return Identification(subject, common, tuple(trials), posterior, decision, tuple(lost), said)
+
+
+def warned(common: Common, trials: Sequence[MeasuredTrial]) -> tuple[str, ...]:
+    """Warnings of the calibrations: first of the subject, then of trials what was not said before."""
+    said = warnings_of(common.initial.messages)
+    for movement in (trial.movement for trial in trials):
+        mine = [text for text in warnings_of(movement.start.messages) if text not in said]
+        said += [f"{WARNING}{movement.recording.name}: {text.removeprefix(WARNING)}" for text in mine]
+    return tuple(said)
 
 
 def _followed(

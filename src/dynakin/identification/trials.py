@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 import numpy.typing as npt
@@ -14,6 +15,7 @@ from dynakin.filter.estimator import Estimator
 from dynakin.filter.tracker import Tracker
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.progress import Progress
+from dynakin.recordings.companions import another_person
 from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.recordings.recording import Recording
 from dynakin.recordings.smoothing import smooth
@@ -31,6 +33,13 @@ RATE_HZ = 25.0
 LOAD_APART = 0.04
 """Part by which the mean load of a trial's plates may miss the body mass: a second of walking ends as fast as it began
 within 0.2 m/s, 2 % of gravity; other plates or another person miss by more."""
+
+
+LEAST_SHARED = 0.25
+"""Part of the first trial's markers that another one has at least: two marker sets share a few names by chance."""
+
+SAME_PLACE_M = 1e-5
+"""How far apart the markers of a trial and of its copy lie at most: files round to 1e-5 m or less."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,12 +103,14 @@ class Common:
     """The model as measured on the subject's first trial, which all trials share.
 
     Attributes:
-        estimator: how trials are filtered. initial: as measured. static: the standing trial, or the first one.
+        estimator: how trials are filtered. initial: as measured. first: on whose markers. static: the standing trial,
+            or the first one.
         core: with lengths and inertia among its states.
     """
 
     estimator: Estimator
     initial: CalibratedModel
+    first: Recording
     static: Recording
     core: _core.Model
 
@@ -120,7 +131,7 @@ class Common:
                 "(--static): it must not come from the plates of a held-out trial"
             )
         initial = estimator.start(replace(first, plates=()), static=static).calibrated
-        return cls(estimator, initial, static or first, _core.Model(initial.spec))
+        return cls(estimator, initial, first, static or first, _core.Model(initial.spec))
 
     def tracker(self) -> Tracker:
         """A filter that starts from the model as it was measured."""
@@ -199,10 +210,19 @@ class Common:
         """Whether a trial can be identified on: before anything that takes long.
 
         Raises:
-            ModelError, RecordingError: its markers do not fit, it has no plates, they are refused, or they carry
-                somebody of another mass.
+            ModelError, RecordingError: its markers are others than the first trial's, or another person's; it has no
+                plates, they are refused, or they carry somebody of another mass.
         """
         where = recording.path or recording.name
+        names = self.initial.recorded_markers
+        shared = sum(name in recording.marker_names for name in names)
+        if shared < LEAST_SHARED * len(names):
+            raise RecordingError(
+                f"{where}: has {shared} of the {len(names)} markers that were measured in {self.first.name}: the "
+                "recordings share no marker set; expected the same markers in all trials of a subject"
+            )
+        if other := another_person(recording, self.first):
+            raise RecordingError(f"{where}: {other}; expected trials of one person with the same markers")
         if not recording.plates:
             raise RecordingError(f"{where}: no force plates, expected at least one; give its ground forces (--forces)")
         start = self._start(replace(recording, plates=()))
@@ -258,6 +278,21 @@ def _low_passed(time: Array, wrench: Array, middle: int) -> Array:
     return np.where(np.isfinite(wrench), np.concatenate(halves), np.nan)
 
 
+def refuse_copies(recordings: Sequence[Recording]) -> None:
+    """A copy would predict the trial that is held out because it is that trial.
+
+    Raises:
+        RecordingError: the markers of two recordings are the same; both are named.
+    """
+    for one, other in combinations(recordings, 2):
+        alike = one.marker_names == other.marker_names and one.markers.shape == other.markers.shape
+        if alike and np.allclose(one.markers, other.markers, rtol=0.0, atol=SAME_PLACE_M, equal_nan=True):
+            raise RecordingError(
+                f"{one.path or one.name} and {other.path or other.name}: the markers are the same, one is a copy; "
+                "expected different trials: each is held out in turn"
+            )
+
+
 def measure_all(
     common: Common,
     recordings: Sequence[Recording],
@@ -270,9 +305,10 @@ def measure_all(
         lost: takes why the filter lost the person, by the trial's place among the recordings; these are left out.
 
     Raises:
-        ModelError, RecordingError: as `Common.check`, before anything that takes long.
+        ModelError, RecordingError: as `Common.check`, or a copy of another trial; before anything that takes long.
         DivergenceError: from the filter. LostError: from the filter, where ``lost`` is not given.
     """
+    refuse_copies(recordings)
     for recording in recordings:
         common.check(recording)
     found, total, before = [], sum(recording.n_frames for recording in recordings), 0

@@ -5,15 +5,17 @@ from __future__ import annotations
 
 import json
 import os
-from dataclasses import replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 import tomli_w
 from pydantic import Field, model_validator
 
 from dynakin.bindings import _core
+from dynakin.elements import element
 from dynakin.errors import ModelError
 from dynakin.files import LARGEST_TEXT, read_bytes
 from dynakin.model.calibration.calibrated import CalibratedModel, JointPrior
@@ -126,27 +128,93 @@ def read_identified(path: Path) -> IdentifiedSubject:
 
 
 class Constant(NamedTuple):
-    """What a run found of one constant: SI; ``sd`` is one standard deviation."""
+    """What a run found of one constant: SI; ``sd`` is one standard deviation; its bounds, where the file states them."""
 
     value: float
     sd: float
     estimated: bool
+    bounds: tuple[float, float] | None = None
 
 
-def read_constants(path: Path) -> dict[str, Constant]:
-    """The constants of a run's ``parameters.json``, by their names in the state.
+@dataclass(frozen=True)
+class RunConstants:
+    """What a run's ``parameters.json`` holds.
+
+    Attributes:
+        path: the file. model: of which model; None: it does not say.
+        constants: by their names in the state.
+    """
+
+    path: Path
+    model: str | None
+    constants: dict[str, Constant]
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Name -> value."""
+        return {name: constant.value for name, constant in self.constants.items()}
+
+    def check(self, model: str, known: Iterable[str], bounds: Mapping[str, tuple[float, float]]) -> None:
+        """That the values are of this model.
+
+        Args:
+            model: its name. known: all that it has, ``length/thigh``, ``marker/RKNE``, ``inertia/pelvis``.
+            bounds: of values of which the file states none.
+
+        Raises:
+            ModelError: another model's, or a value outside its bounds.
+        """
+        if self.model not in (None, model):
+            raise ModelError(f"{self.path}: found parameters of model {self.model}, another model's; expected {model}")
+        names = set(known)
+        for name, constant in self.constants.items():
+            kind, owner, _ = element(name)
+            if kind != "plates" and f"{kind}/{owner}" not in names:
+                raise ModelError(
+                    f"{self.path}: model {model} has no {name} as measured here: the parameters are another model's, "
+                    "or of other markers"
+                )
+            low, high = constant.bounds or bounds.get(name, (-np.inf, np.inf))
+            slack = 1e-6 * (high - low) if np.isfinite(high - low) else 0.0
+            if not low - slack <= constant.value <= high + slack:
+                raise ModelError(f"{self.path}: {name} is {constant.value:g}, expected {low:.4g} to {high:.4g}")
+
+    def check_mass(self, found_kg: float, expected_kg: float) -> None:
+        """That the segments with these values weigh what they weigh without them: the total mass is a prior of the run.
+
+        Raises:
+            ModelError: they are more than 5 % apart.
+        """
+        if abs(found_kg - expected_kg) > _MASS_APART * expected_kg:
+            raise ModelError(
+                f"{self.path}: the segments hold {found_kg:.1f} kg together, expected {expected_kg:.1f} kg within "
+                f"{100.0 * _MASS_APART:.0f} %: the parameters are another person's, or --mass is not that of the run"
+            )
+
+
+def read_constants(path: Path) -> RunConstants:
+    """A run's ``parameters.json``.
 
     Raises:
-        ModelError: the file cannot be read or is none of that kind.
+        ModelError: the file cannot be read, is none of that kind, or holds no parameters.
     """
     try:
-        entries = json.loads(read_bytes(path, ModelError, LARGEST_TEXT))["parameters"]
-        found = {str(e["name"]): Constant(float(e["value"]), float(e["sd"]), bool(e["estimated"])) for e in entries}
+        content = json.loads(read_bytes(path, ModelError, LARGEST_TEXT))
+        found = {str(entry["name"]): _constant(entry) for entry in content["parameters"]}
         if not np.isfinite([constant[:2] for constant in found.values()]).all():
             raise ValueError("a number is not finite")
-        return found
-    except (ValueError, KeyError, TypeError, ArithmeticError, RecursionError) as error:
+        model = content.get("model")
+    except (ValueError, KeyError, TypeError, AttributeError, ArithmeticError, RecursionError) as error:
         raise ModelError(f"{path}: no parameters.json of a run ({error})") from None
+    if not found:
+        raise ModelError(f"{path}: holds no parameters, expected those of a run")
+    return RunConstants(path, None if model is None else str(model), found)
+
+
+def _constant(entry: Mapping[str, Any]) -> Constant:
+    low, high = entry.get("lower"), entry.get("upper")
+    bounds = None if low is None or high is None else (float(low), float(high))
+    return Constant(float(entry["value"]), float(entry["sd"]), bool(entry["estimated"]), bounds)
 
 
 def with_identified(initial: CalibratedModel, subject: IdentifiedSubject) -> CalibratedModel:

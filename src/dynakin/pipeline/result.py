@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from dynakin.errors import ConfigError, OutputError
+from dynakin.files import expanded
 from dynakin.identification.observability.trial import Identifiability
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.progress import stage
@@ -31,6 +32,7 @@ from dynakin.validation.methods import Trial
 
 if TYPE_CHECKING:
     import pandas as pd
+    import xarray as xr
 
     from dynakin.report.paper_figures.sensitivity import Sensitivity
 
@@ -69,7 +71,7 @@ class Result:
         each with ``_sd``, ``state``, ``wrench_estimated``, ...
 
         Raises:
-            ConfigError: no such quantity. ValueError: it has more dimensions than a table.
+            ConfigError: no such quantity, or it is no table over time.
         """
         known = [str(name) for name in self.estimate.data]
         if quantity not in known:
@@ -77,9 +79,11 @@ class Result:
                 f"to_dataframe: no quantity {quantity!r}{nearest(quantity, known)}, expected one of {', '.join(known)}"
             )
         data = self.estimate.data[quantity]
-        if len(data.dims) != 2:
-            raise ValueError(
-                f"{quantity} has the dimensions {', '.join(map(str, data.dims))}, expected time and another"
+        if not _is_table(data):
+            tables = [name for name in known if _is_table(self.estimate.data[name])]
+            raise ConfigError(
+                f"to_dataframe: {quantity} has the dimensions {', '.join(map(str, data.dims))}, expected time and one "
+                f"other, as {', '.join(tables)} have; estimate.data has it as it is"
             )
         return data.transpose("time", ...).to_pandas()
 
@@ -126,7 +130,7 @@ class Result:
             folder = None if self.settings is None or self.settings.output == Path() else self.settings.output
         if folder is None:
             raise OutputError("save: no folder was given, expected save(FOLDER) or run(..., output=FOLDER)")
-        folder = Path(folder)
+        folder = expanded(folder)
         if not keep_lost:
             refuse_lost(self.estimate, "keep_lost=True")
         self._write(folder, overwrite)
@@ -217,6 +221,10 @@ class Result:
     def _write_repetitions(self, path: Path) -> None:
         curves = estimate_curves(self.estimate) if self.comparison is None else self.comparison.curves()
         write_curves(path, curve_points(self.estimate.recording.name, curves))
+
+
+def _is_table(data: xr.DataArray) -> bool:
+    return len(data.dims) == 2 and "time" in data.dims
 
 
 def _written(path: Path, failed: Failures, write: Callable[[Path], None]) -> None:

@@ -16,6 +16,7 @@ from dynakin.report.sections.section import Section
 from dynakin.report.text_tables import angle_text, moment_text, name_of, table2_text, truth_text, unseen_text
 from dynakin.results.files.config import plain, versions
 from dynakin.results.naming import listed, number, plural, sentence
+from dynakin.results.records import WARNING
 from dynakin.units import COMPONENTS
 from dynakin.validation.methods import Trial
 from dynakin.validation.table2 import MARKERS, Row
@@ -66,7 +67,7 @@ def render_comparison(
             *(f"preset {name}" for name in presets),
             f"dynakin {versions()['dynakin']}",
         ],
-        insights=_findings(tables),
+        insights=[*_warned([*messages, *notes]), *_findings(tables)],
         sections=_sections(trials, tables),
         messages=[*messages, *notes],
         configuration="\n".join(
@@ -91,7 +92,7 @@ def _sections(trials: Sequence[Trial], tables: Mapping[str, Sequence[Any]]) -> l
     over = "" if len(trials) == 1 else f", mean ± standard deviation over {len(trials)} trials"
     if rows := tables.get("table2"):
         shown = [
-            table2_text(rows, f"Difference to what was measured{over}"),
+            table2_text(rows, f"Difference to what was measured{over}", of=len(trials)),
             table2_text(rows, "Every marker", single_markers=True),
         ]
         parts = [part for part in (wrench_part(trials[0], "table2"),) if part.panels] if len(trials) == 1 else []
@@ -130,6 +131,14 @@ def _sections(trials: Sequence[Trial], tables: Mapping[str, Sequence[Any]]) -> l
         key = f"repetitions-{k + 1}"
         found.append(method_repetitions(estimate, trial.repetitions, trial.curves(), key=key, title=title))
     return [section for section in found if not section.empty]
+
+
+def _warned(notes: Sequence[str]) -> list[Insight]:
+    """What makes all figures of a trial doubtful, before them."""
+    text = " ".join(sentence(note.replace(WARNING, "", 1)) for note in notes if WARNING in note)
+    if not text:
+        return []
+    return [Insight("warning", "Recordings", text, "Look at these trials with dynakin check or run first.")]
 
 
 def _findings(tables: Mapping[str, Sequence[Any]]) -> list[Insight]:

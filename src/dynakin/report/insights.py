@@ -18,6 +18,10 @@ def in_short(found: list[Insight]) -> str:
     return f"{sentence(plural(len(titles), 'finding'))} to look at before using this run: {listed(titles, 8)}."
 
 
+DOUBTS_FORCES = frozenset({"Mass", "Subject", "Force plates", "Left at the pelvis"})
+"""Titles of warnings after which a trial's forces, or the mass that they are compared with, may be wrong."""
+
+
 def insights(estimate: Estimate, metrics: Metrics) -> list[Insight]:
     """All findings, in the order of the report; one whose blocks of ``metrics`` are None, because the stage that makes
     them failed (`dynakin.results.failures`), is left out."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from dynakin.results.naming import listed
 from dynakin.units import COMPONENTS
 from dynakin.validation.differences import AngleDifference, MomentDifference
 from dynakin.validation.table2 import MARKERS, Row, Spread
@@ -31,13 +32,24 @@ def shown(value: Spread, digits: int, unit: str = "") -> str:
     return f"{text} {unit}".rstrip().replace("-", "−")
 
 
-def table2_text(rows: Sequence[Row], title: str, *, single_markers: bool = False) -> TextTable:
-    """Rows of Table II or of a held-out trial: the markers' mean and the wrench, or each single marker."""
+def table2_text(
+    rows: Sequence[Row], title: str, *, single_markers: bool = False, of: int = 1, doubted: Sequence[str] = ()
+) -> TextTable:
+    """Rows of Table II or of a held-out trial: the markers' mean and the wrench, or each single marker.
+
+    Args:
+        of: trials in all: a row over fewer says over how many. doubted: trials whose mass or forces are doubted: rows
+            of the wrench are marked, and the title names them.
+    """
     found = []
     for row in rows:
         if (row.quantity in (MARKERS, *COMPONENTS)) == single_markers:
             continue
-        found.append((name_of(row.quantity), row.method, *_fit(row)))
+        mark = " *" if doubted and row.quantity in COMPONENTS else ""
+        over = f" (n = {row.rms.n})" if row.rms.n < of else ""
+        found.append((name_of(row.quantity) + mark, row.method + over, *_fit(row)))
+    if doubted:
+        title += f"; * with trials whose mass or forces are doubted: {listed(list(doubted), 4)}"
     headings = ("", "method", "RMS", "of range, %", "of RMS, %", "r")
     return TextTable(title, headings, _once(found), (2, 3, 4, 5), folded=single_markers)
 

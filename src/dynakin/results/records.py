@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -22,9 +23,16 @@ MISPLACED = "markers lie"
 """How the warning begins of a model that does not fit the person."""
 NOT_SMOOTHED = "Not smoothed:"
 """How the message begins of a run whose settings have no smoother."""
+WARNING = "Warning: "
+"""How the message begins that says that a trial may not be what it is taken for."""
 _MASS_DOUBTED = ("check the mass", "the mass is wrong")
 
 EventKind = Literal["missing", "gated", "at_bound", "reset", "note"]
+
+
+def warnings_of(messages: Iterable[str]) -> list[str]:
+    """The warnings among the messages of a calibration or an estimate."""
+    return [text for text in messages if text.startswith(WARNING)]
 
 
 def doubts_mass(message: str) -> bool:

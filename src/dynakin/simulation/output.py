@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from dynakin.arrays import cross
-from dynakin.files import write_json
+from dynakin.files import expanded, write_json
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.results.files.config import versions
 from dynakin.results.files.folder import FolderKind, check_output_writable, replacing
@@ -51,7 +51,7 @@ def save_trial(trial: SimulatedTrial, folder: str | Path) -> Path:
     Raises:
         OutputError: the folder cannot be written, or holds something that the simulator did not write.
     """
-    folder = Path(folder).absolute()
+    folder = expanded(folder).absolute()
     with replacing(folder, kind=TRIAL) as made:
         for name, write in _WRITERS.items():
             if name != "forces.mot" or trial.recording.plates:

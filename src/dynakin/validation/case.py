@@ -14,6 +14,7 @@ from dynakin.recordings.recording import Recording
 from dynakin.results.estimate import Estimate
 from dynakin.settings import presets as known_presets
 from dynakin.settings.defaults import CUTOFF_HZ
+from dynakin.settings.effect import check_noise
 from dynakin.settings.settings import Settings
 from dynakin.validation.setup import Setup
 
@@ -55,9 +56,11 @@ def case_of(
     Raises:
         DynakinError: anything wrong with the input, in one line.
     """
+    definition = definition_of(config)
+    check_noise(config, definition.floating)
     configs = {known_presets.title(name): config.changed(preset=name) for name in (presets or [config.preset])}
     setup = Setup(
-        definition_of(config),
+        definition,
         {title: one.noise_settings() for title, one in configs.items()},
         cutoff_hz,
         config.priors,

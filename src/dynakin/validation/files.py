@@ -7,7 +7,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from dynakin.files import write_csv
+from dynakin.files import expanded, write_csv
 from dynakin.results.files.config import versions, write_metrics
 from dynakin.results.files.folder import FolderKind, check_output_writable, replacing
 from dynakin.validation.table2 import Spread
@@ -68,7 +68,7 @@ def save_comparison(
     Raises:
         OutputError: as `check_comparison_folder`.
     """
-    folder = Path(folder)
+    folder = expanded(folder)
     plain = {name: [flat(row) for row in rows] for name, rows in tables.items() if rows}
     summary = {"schema_version": SCHEMA_VERSION, "versions": versions(), **(more or {})}
     summary |= {name: rows for name, rows in plain.items() if name != "repetitions"}  # curves are long: CSV only

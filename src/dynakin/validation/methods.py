@@ -27,6 +27,7 @@ from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.measures.repetitions import Found, repetitions_of
 from dynakin.results.measures.sources import measured_only, moment_sources, wrench_sources
 from dynakin.results.measures.tracking import why_lost
+from dynakin.results.records import warnings_of
 from dynakin.settings.defaults import CUTOFF_HZ
 from dynakin.settings.lag import in_words
 from dynakin.units import COMPONENTS
@@ -83,7 +84,7 @@ class Trial:
         measured_markers: (T, M, 3) m; measured_wrench: (T, 6).
         axes: (3,) bool, ground axes that the model explains. rotation: (C,) bool.
         repetitions: squats or gait cycles after the adaptation.
-        notes: what was left out and why.
+        notes: what was warned of, what was left out and why.
         estimates: of each preset, for whoever wants more. lost: presets that lost the person, and why.
     """
 
@@ -142,8 +143,10 @@ def compare_trial(
     initial = list(trackers.values())[-1].calibrated
     with stage(f"{recording.name}: the reference methods"):
         trial = trial_of(estimates, initial, setup.definition, setup.cutoff_hz, inverse=True)
-    mass = [text for text in initial.messages if text.startswith(("Mass ", "Warning: mass "))]
-    return with_lost(replace(trial, notes=(*mass, *trial.notes)), lost)
+    mass = [text for text in initial.messages if text.startswith("Mass ")]
+    said = warnings_of(initial.messages)
+    said += [text for estimate in estimates.values() for text in warnings_of(estimate.messages)]
+    return with_lost(replace(trial, notes=tuple(dict.fromkeys((*said, *mass, *trial.notes)))), lost)
 
 
 def with_lost(trial: Trial, lost: Mapping[str, str]) -> Trial:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -12,6 +12,7 @@ import numpy.typing as npt
 
 from dynakin.results.measures.adaptation import constant_groups
 from dynakin.results.measures.sources import legs_of
+from dynakin.results.naming import listed
 from dynakin.results.records import Parameter
 from dynakin.units import COMPONENTS
 from dynakin.validation.methods import Trial
@@ -62,15 +63,13 @@ def truth_rows(trials: Sequence[Trial]) -> list[TruthRow]:
 
     found: dict[tuple[str, str, str], list[float]] = {}
     for trial in trials:
-        estimate = next(iter(trial.estimates.values()))
-        path = estimate.recording.path
-        if path is None or not (Path(path).parent / TRUTH).exists():
+        path = _truth_file(trial)
+        if path is None:
             continue
-        with xr.open_dataset(Path(path).parent / TRUTH) as truth:
-            if truth.sizes["time"] != len(trial.time) or not np.allclose(truth["time"].values, trial.time):
-                continue  # another recording's
-            legs = legs_of(estimate.data)
-            joints = [name for name, leg in zip(trial.coordinate_names, legs, strict=True) if leg]
+        with xr.open_dataset(path) as truth:
+            joints = _leg_joints(trial)
+            if not _is_of(truth, trial) or set(joints) - {str(name) for name in truth["coordinate"].values}:
+                continue  # another recording's, or another model's (`with_truth_noted`)
             turning = {str(name) for name in truth["coordinate"].values}
             turning &= {n for n, turns in zip(trial.coordinate_names, trial.rotation, strict=True) if turns}
             paths = truth["coordinates"].transpose("time", "coordinate")
@@ -78,10 +77,42 @@ def truth_rows(trials: Sequence[Trial]) -> list[TruthRow]:
                 n for n in trial.coordinate_names if n in turning and np.ptp(paths.sel(coordinate=n).values) > 0.0
             ]
             for method, data in zip(trial.methods, _where_all_say(trial), strict=True):
-                values = truth_errors(method.name, data, truth, trial.window, joints or LEG, moving).values
+                values = truth_errors(method.name, data, truth, trial.window, joints, moving).values
                 for (quantity, unit), value in zip(FIGURES, values, strict=True):
                     found.setdefault((quantity, unit, method.name), []).append(value)
     return [TruthRow(*key, spread([v for v in values if np.isfinite(v)])) for key, values in found.items()]
+
+
+def with_truth_noted(trial: Trial) -> Trial:
+    """The trial with a note where it was simulated with a model of other coordinates, so that no error can be had."""
+    import xarray as xr
+
+    path = _truth_file(trial)
+    if path is None:
+        return trial
+    with xr.open_dataset(path) as truth:
+        lacking = set(_leg_joints(trial)) - {str(name) for name in truth["coordinate"].values}
+        if not lacking or not _is_of(truth, trial):
+            return trial
+    note = f"The truth in {path} is left out: it is of another model, which has no {listed(sorted(lacking))}."
+    return replace(trial, notes=(*trial.notes, note))
+
+
+def _truth_file(trial: Trial) -> Path | None:
+    path = next(iter(trial.estimates.values())).recording.path
+    found = None if path is None else Path(path).parent / TRUTH
+    return found if found is not None and found.exists() else None
+
+
+def _is_of(truth: xr.Dataset, trial: Trial) -> bool:
+    """Whether the truth is that of this recording, by its times."""
+    return truth.sizes["time"] == len(trial.time) and np.allclose(truth["time"].values, trial.time)
+
+
+def _leg_joints(trial: Trial) -> Sequence[str]:
+    """Coordinates of the legs, whose moments count."""
+    legs = legs_of(next(iter(trial.estimates.values())).data)
+    return [name for name, leg in zip(trial.coordinate_names, legs, strict=True) if leg] or LEG
 
 
 def _where_all_say(trial: Trial) -> list[xr.Dataset]:

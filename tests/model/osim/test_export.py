@@ -13,6 +13,7 @@ from dynakin.bindings import _core
 from dynakin.cli.app import app
 from dynakin.errors import ModelError, OutputError
 from dynakin.filter.build import definition_of
+from dynakin.model.identified import read_constants
 from dynakin.model.opensim.description import OpenSimModel
 from dynakin.model.opensim.from_core import from_core
 from dynakin.model.opensim.identified import identified
@@ -241,15 +242,97 @@ def test_the_command_line_exports(tmp_path: Path) -> None:
     np.testing.assert_allclose(model.joints[1].parent_offset.translation, np.array([0.1, -0.3, 0.05]) * 1.1)
 
 
+def written(path: Path, values: dict[str, float], **more: object) -> Path:
+    """A parameters.json."""
+    path.write_text(
+        json.dumps(
+            {"parameters": [{"name": n, "value": v, "sd": 0.0, "estimated": True} for n, v in values.items()], **more}
+        )
+    )
+    return path
+
+
 def test_parameters_of_another_model_are_refused(tmp_path: Path) -> None:
-    from dynakin.model.identified import read_constants
     from dynakin.model.opensim.definition import load_opensim
     from dynakin.model.opensim.export import of_definition
 
-    definition = load_opensim(small_model(tmp_path, "PinJoint", 4))
-    with pytest.raises(ModelError, match="has no length/scale_femur"):
-        of_definition(definition, {"length/scale_femur": 1.0}, None)
-    wrong = tmp_path / "parameters.json"
-    wrong.write_text("[]")
+    definition, path = load_opensim(small_model(tmp_path, "PinJoint", 4)), tmp_path / "parameters.json"
+    for values, reason in (
+        ({"length/scale_femur": 1.0}, "has no length/scale_femur"),
+        ({"length/scale_base": 9.0}, r"length/scale_base is 9, expected 0\.8 to 1\.2"),
+    ):
+        with pytest.raises(ModelError, match=reason):
+            of_definition(definition, read_constants(written(path, values)), None)
+    path.write_text("[]")
     with pytest.raises(ModelError, match=r"no parameters\.json of a run"):
-        read_constants(wrong)
+        read_constants(path)
+    with pytest.raises(ModelError, match="holds no parameters"):
+        read_constants(written(path, {}))
+
+
+@pytest.fixture(scope="module")
+def squat(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, dict[str, float]]:
+    """A trial of somebody of 70 kg, and the parameters of the model that is measured on it."""
+    from dynakin.simulation.trial import simulate
+
+    folder = simulate("sagittal7", "sway", 1, 3.0, 50.0).save(tmp_path_factory.mktemp("trial") / "person")
+    trial = folder / "markers.trc"
+    initial = definition_of(Settings(model="sagittal7", mass_kg=70.0, height_m=1.75)).calibrate(read(trial))
+    return str(trial), {n: float(v) for n, v in zip(initial.names, initial.x0, strict=True) if n.count("/") and v}
+
+
+@pytest.mark.parametrize(
+    ("changed", "more", "mass", "reason"),
+    [
+        ({}, {}, "70", ""),
+        ({"length/thigh": 9.0}, {}, "70", "length/thigh is 9, expected"),
+        ({"length/tail": 0.4}, {}, "70", "has no length/tail"),
+        ({}, {"model": "squat7"}, "70", "parameters of model squat7"),
+        ({}, {}, "90", "expected 90.0 kg within 5 %"),
+    ],
+)
+def test_a_built_in_model_takes_its_own_parameters_alone(
+    squat: tuple[str, dict[str, float]],
+    changed: dict[str, float],
+    more: dict[str, str],
+    mass: str,
+    reason: str,
+    tmp_path: Path,
+) -> None:
+    trial, values = squat
+    values = {n: v for n, v in values.items() if n.startswith(("length", "marker", "inertia")) and "soft" not in n}
+    parameters = written(tmp_path / "parameters.json", values | changed, **more)
+    if mass == "90":  # stated by the run, so that the mass alone speaks
+        entries = json.loads(parameters.read_text())["parameters"]
+        entries = [e | ({"lower": e["value"], "upper": e["value"]} if "inertia" in e["name"] else {}) for e in entries]
+        parameters.write_text(json.dumps({"parameters": entries}))
+    out = tmp_path / "out.osim"
+    command = ["model", "sagittal7", "--trial", trial, "--mass", mass, "--height", "1.75"]
+    result = CliRunner().invoke(app, [*command, "--export", str(out), "--parameters", str(parameters)])
+    assert out.exists() is (reason == ""), result.output
+    if reason:
+        assert reason in str(result.exception)
+
+
+def test_an_export_is_measured_with_the_height_and_sex_of_the_run(
+    squat: tuple[str, dict[str, float]], tmp_path: Path
+) -> None:
+    from dynakin.errors import ConfigError
+    from dynakin.model.opensim.export import settings_of_run
+
+    parameters = written(tmp_path / "parameters.json", squat[1])
+    given = Settings(model="sagittal7")
+    assert settings_of_run(given, parameters) is given
+    (tmp_path / "config.toml").write_text('mass_kg = 70.0\nheight_m = 1.75\nsex = "female"\n')
+    found = settings_of_run(given, parameters)
+    assert (found.mass_kg, found.height_m, found.sex) == (70.0, 1.75, "female")
+    for wrong, reason in (({"height_m": 1.6}, "--height is 1.6"), ({"sex": "male"}, "--sex is male")):
+        with pytest.raises(ConfigError, match=reason):
+            settings_of_run(given.changed(**wrong), parameters)
+
+
+def test_an_export_overwrites_nothing(tmp_path: Path) -> None:
+    path = small_model(tmp_path, "PinJoint", 4)
+    before = path.read_bytes()
+    result = CliRunner().invoke(app, ["model", str(path), "--export", str(path), "--mass", "10"])
+    assert "exists already" in str(result.exception) and path.read_bytes() == before

@@ -15,6 +15,7 @@ from dynakin.errors import ConfigError
 from dynakin.simulation.trial import simulate
 from dynakin.studies.batch.dataset import read_dataset
 
+TRIAL = "output = 'o'\ntrials = '*.trc'\n[[subjects]]\nname = 'a'\n"
 SUBJECTS, TRIALS, SECONDS, RATE_HZ = 6, 2, 5.0, 50.0
 CORRUPT, SWAPPED = "S3/squat_2", "S6/squat_1"
 
@@ -113,6 +114,10 @@ def test_results_of_each_trial_are_written(study: Path, tmp_path: Path) -> None:
         ("output = 'o'\n[[subjects]]\nmass_kg = 70\n", "subject 1 has no name"),
         ("output = 'o'\n[[subjects]]\nname = 'a'\nmas_kg = 70\n", "subject 'a': unknown key 'mas_kg'"),
         ("output = 'o'\n[[subjects]]\nname = 'a'\n", "no file *.c3d in"),
+        (f"{TRIAL}mass_kg = '81 kg'\n", "a/x: mass_kg: Input should be a valid number"),
+        (f"{TRIAL}mass_kg = -3\n", "a/x: subject: mass_kg: Input should be greater than 0"),
+        (f"presets = ['nope']\n{TRIAL}", "presets: preset 'nope' is unknown"),
+        (f"preset = 'nope'\n{TRIAL}", "a/x: preset 'nope' is unknown"),
         ("output = 'o'\n[[subjects]]\nname = 'a'\ntrials = [{file = 'x'}]\n", "expected a pattern"),
         ("output = 'o'\n[[subjects]]\nname = 'a'\ntrials = [{trial = 'x.c3d'}, {trial = 'x.trc'}]\n", "two trials"),
         ("output = 'o'\n[[subjects]]\nname = '..'\n", "subject 1: name is '..', expected the name of a folder"),
@@ -134,6 +139,8 @@ def test_results_of_each_trial_are_written(study: Path, tmp_path: Path) -> None:
 def test_a_bad_dataset_is_said_in_one_line(tmp_path: Path, text: str, expected: str) -> None:
     path = tmp_path / "study.toml"
     path.write_text(text)
+    (tmp_path / "a").mkdir()
+    (tmp_path / "a" / "x.trc").write_text("")
     with pytest.raises(ConfigError) as error:
         read_dataset(path)
     assert str(path) in error.value.message and expected in error.value.message and "\n" not in error.value.message

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import tomllib
 from dataclasses import replace
@@ -72,6 +73,12 @@ def exchanged(one: Plate, other: Plate) -> Plate:
     return replace(one, moment=moment, cop=other.cop, corners=other.corners)
 
 
+def twisted(plate: Plate) -> Plate:
+    """With a free moment that feet do not make."""
+    more = 0.08 * plate.force
+    return replace(plate, moment=plate.moment + more, free_moment=plate.free_moment + more)
+
+
 def test_exchanged_plates_fail_by_name_and_stop_no_other(tmp_path: Path, capsys: Said) -> None:
     for number, name in enumerate(("good", "exchanged"), start=3):
         trial = simulate("fullbody", "squat", number, 5.0, 12.5)
@@ -87,3 +94,28 @@ def test_exchanged_plates_fail_by_name_and_stop_no_other(tmp_path: Path, capsys:
     (failed,) = [line for line in capsys.readouterr().out.splitlines() if line.startswith("Failed")]
     assert failed.startswith("Failed  S1/exchanged: ") and "pushes the feet apart" in failed
     assert "if the two were exchanged" in failed
+
+
+def test_what_rests_on_doubted_forces_is_marked(tmp_path: Path, capsys: Said) -> None:
+    """A free moment too large for feet is warned of, and stops nothing."""
+    for number, name in enumerate(("good", "doubted"), start=3):
+        trial = simulate("fullbody", "squat", number, 5.0, 12.5)
+        if name == "doubted":
+            trial = replace(trial, recording=trial.recording.with_plates(tuple(map(twisted, trial.recording.plates))))
+        trial.save(tmp_path / "S1" / name)
+    keys = 'model = "fullbody"\noutput = "out"\ntrials = "*/markers.trc"\nforces = "forces.mot"\n'
+    (tmp_path / "study.toml").write_text(f'{keys}[[subjects]]\nname = "S1"\n{SUBJECT}')
+    assert main(["batch", str(tmp_path / "study.toml"), "--tables-only"]) == 0
+    rows = json.loads((tmp_path / "out" / "batch.json").read_text())["trials"]
+    assert not rows["S1/good"]["findings"] and "Force plates" in rows["S1/doubted"]["findings"]
+    assert "force plates" in rows["S1/doubted"]["verdict"]["default"]
+    with (tmp_path / "out" / "trials.csv").open(encoding="utf-8", newline="") as file:
+        findings = {row["trial"]: row["findings"] for row in csv.DictReader(file)}
+    assert findings["S1/good"] == "" and "Force plates" in findings["S1/doubted"]
+    said = capsys.readouterr().out
+    verdicts = [line for line in said.splitlines() if line.startswith("Verdict")]
+    assert "Verdict S1/good: Nothing in this run speaks against using it." in verdicts and len(verdicts) == 2
+    assert "FY *" in said and "are doubted: S1/doubted" in " ".join(said.split())
+    warned = [line for line in said.splitlines() if line.startswith("Warned")]
+    assert any(line.startswith("Warned  S1/doubted: plate 1: free moment") for line in warned)
+    assert not any("S1/good: plate 1" in line for line in warned)

@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from dynakin.cli.app import main
+from dynakin.cli.batch import to_say
 from dynakin.model.identified import read_identified
 from dynakin.simulation.trial import simulate
 from dynakin.studies.batch.dataset import Dataset, read_dataset
@@ -69,6 +70,17 @@ def test_without_enough_plates_the_table_is_kept_and_it_says_why(dataset: Datase
     other = replace(others[0], content=others[0].content | {"mass_kg": 80.0})
     said = identify_on_trials(IdentifyOptions(tmp_path), [one, other])
     assert "has other settings than" in said["said"][0]
+
+
+def test_a_copy_is_no_second_trial(dataset: Dataset, tmp_path: Path) -> None:
+    one = dataset.sessions[0]
+    said = identify_on_trials(IdentifyOptions(tmp_path), [one, replace(one, trial="copy")])
+    assert said["use"] == "table" and "the markers are the same" in said["said"][-1]
+
+
+def test_of_a_subject_warnings_and_trials_that_are_left_out_are_printed() -> None:
+    said = ["Left out: S1/a: another person.", "Table: FX 3 N.", "Warning: a doubt.", "The table is kept."]
+    assert to_say(said) == [said[0], *said[2:]] and to_say(said[-1:]) == said[-1:]
 
 
 @pytest.mark.parametrize("option", ["--identify", "--no-identify"])

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from dynakin.errors import ConfigError, OutputError
-from dynakin.studies.engine.journal import Journal
+from dynakin.studies.engine.journal import Journal, difference
 from dynakin.studies.engine.pools import open_pool
 from dynakin.studies.engine.tasks import Task
 from dynakin.studies.engine.work import work
@@ -81,11 +81,33 @@ def test_a_run_that_was_killed_goes_on_where_it_stopped(tmp_path: Path):
 def test_rows_of_something_else_are_not_taken(tmp_path: Path):
     path = tmp_path / "rows.jsonl"
     table("threads", journal=Journal(path, SHARED))
-    with pytest.raises(OutputError, match="belongs to other settings"):
+    with pytest.raises(OutputError, match=r"belongs to other settings.*\(base: 1\.1, now 1\.2\); name another folder"):
         Journal(path, {"base": 1.2})
+    path.write_text('{"dynakin_journal": 1, "belongs_to": "ab"}\n')
+    with pytest.raises(OutputError, match="belongs to another version of dynakin"):
+        Journal(path, SHARED)
     path.write_text("time,x\n0,1\n")
     with pytest.raises(OutputError, match="is no journal"):
         Journal(path, SHARED)
+
+
+@pytest.mark.parametrize(
+    ("now", "said"),
+    [
+        ({"trials": {"A/walk": {"mass_kg": 70.0, "lag_s": float("inf")}}, "presets": ["default"]}, ""),
+        ({"trials": {"A/walk": {"mass_kg": 71.0, "lag_s": float("inf")}}, "presets": ["default"]},
+         "trials, A/walk, mass_kg: 70.0, now 71.0"),
+        ({"trials": {"A/walk": {"mass_kg": 70.0}}, "presets": ["default"]},
+         "trials, A/walk, lag_s: Infinity, now none"),
+        ({"trials": {"A/walk": {"mass_kg": 70.0, "lag_s": float("inf")}}, "presets": ["paper"]},
+         "presets, 1: default, now paper"),
+        ({"trials": {"A/walk": {"mass_kg": 70.0, "lag_s": float("inf")}}, "presets": []},
+         'presets: ["default"], now []'),
+    ],
+)  # fmt: skip
+def test_what_changed_is_named(now: dict, said: str):
+    before = {"trials": {"A/walk": {"mass_kg": 70.0, "lag_s": float("inf")}}, "presets": ["default"]}
+    assert difference(before, now) == said
 
 
 @pytest.mark.parametrize(

@@ -4,54 +4,82 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from dynakin.elements import element
-from dynakin.errors import ModelError
+from dynakin.errors import ConfigError
 from dynakin.files import is_file
 from dynakin.model.calibration.calibrated import CalibratedModel
+from dynakin.model.identified import RunConstants
 from dynakin.model.opensim.definition import OpenSimDefinition
 from dynakin.model.opensim.description import OpenSimModel
 from dynakin.model.opensim.from_core import from_core
 from dynakin.model.opensim.identified import identified
 from dynakin.model.opensim.sites import with_mass
+from dynakin.settings.model import Bounds
+from dynakin.settings.settings import Settings, option_names
 from dynakin.settings.strict import read_toml
+from dynakin.settings.subject import Subject
 
 
-def mass_of_run(parameters: Path) -> float | None:
-    """The mass (kg) in the run's ``config.toml`` next to its parameters, None where there is none.
+def settings_of_run(settings: Settings, parameters: Path) -> Settings:
+    """The settings with mass, height and sex of the run's ``config.toml`` next to its parameters, where there is one.
 
     Raises:
-        ModelError: that file is damaged.
+        ModelError: that file is damaged. ConfigError: height or sex are given, and that run had others.
     """
     path = parameters.with_name("config.toml")
     if not is_file(path):
-        return None
-    mass = read_toml(path).get("mass_kg")
-    if mass is not None and not (isinstance(mass, int | float) and 0.0 < mass < float("inf")):
-        raise ModelError(f"{path}: mass_kg is {mass!r}, expected a number above 0")
-    return None if mass is None else float(mass)
+        return settings
+    content = read_toml(path)
+    run = Subject(**{key: content.get(key) for key in ("mass_kg", "height_m", "sex")})
+    for key in ("height_m", "sex"):
+        here, there = getattr(settings, key), getattr(run, key)
+        if here is not None and here != there:
+            had = f"had {there}" if there is not None else "had none given"
+            raise ConfigError(
+                f"{option_names(key)[0]} is {here}, but the run of {parameters} {had} ({path}); expected the same, or "
+                "nothing"
+            )
+    known = run.model_dump(exclude_none=True)
+    return settings.changed(**(known | settings.subject().model_dump(exclude_none=True)))
 
 
-def of_definition(definition: OpenSimDefinition, values: dict[str, float], mass_kg: float | None) -> OpenSimModel:
+def of_definition(definition: OpenSimDefinition, found: RunConstants | None, mass_kg: float | None) -> OpenSimModel:
     """The OpenSim model with masses that sum to ``mass_kg`` first, where given, and then these values.
 
     Raises:
-        ModelError: a value of something that the model does not have: it was found with another model.
+        ModelError: the values are another model's or another person's.
     """
-    source = definition.source
+    source = definition.source if mass_kg is None else with_mass(definition.source, mass_kg)
+    if found is None:
+        return source
     known = {f"length/{name}" for name in definition.scales.values()}
+    scale = Bounds().length_fraction
+    bounds = dict.fromkeys(known, (1.0 - scale, 1.0 + scale))
     known |= {f"marker/{marker.name}" for marker in source.markers}
     known |= {f"inertia/{body.name}" for body in source.bodies}
-    for name in values:
-        kind, owner, _ = element(name)
-        if kind in ("length", "marker", "inertia") and f"{kind}/{owner}" not in known:
-            raise ModelError(f"{source.path}: has no {name}, which the parameters hold: they are another model's")
-    if mass_kg is not None:
-        source = with_mass(source, mass_kg)
-    return identified(source, definition.scales, values)
+    found.check(definition.name, known, bounds)
+    model = identified(source, definition.scales, found.values)
+    found.check_mass(model.mass, source.mass)
+    return model
 
 
-def of_initial(initial: CalibratedModel, values: dict[str, float]) -> OpenSimModel:
-    """A model that was measured on a recording."""
-    bounds = zip(initial.names, initial.lower, initial.upper, strict=True)
-    limits = {name: (float(low), float(high)) for name, low, high in bounds if "/" not in name}
-    return from_core(initial.spec, values, limits)
+def of_initial(initial: CalibratedModel, found: RunConstants | None) -> OpenSimModel:
+    """A model that was measured on a recording, with these values.
+
+    Raises:
+        ModelError: the values are another model's or another person's.
+    """
+    spec = initial.spec
+    bounds = {
+        name: (float(low), float(high))
+        for name, low, high in zip(initial.names, initial.lower, initial.upper, strict=True)
+    }
+    limits = {name: pair for name, pair in bounds.items() if "/" not in name}
+    if found is None:
+        return from_core(spec, None, limits)
+    known = {f"length/{parameter.name}" for parameter in spec.parameters}
+    known |= {f"marker/{marker.name}" for marker in spec.markers}
+    known |= {f"inertia/{segment.name}" for segment in spec.segments}
+    found.check(spec.name, known, bounds)
+    model = from_core(spec, found.values, limits)
+    found.check_mass(model.mass, sum(float(segment.inertia[0]) for segment in spec.segments))
+    return model

@@ -11,6 +11,7 @@ import matplotlib as mpl
 from matplotlib.figure import Figure
 
 from dynakin.errors import ConfigError, OutputError
+from dynakin.files import expanded
 from dynakin.progress import stage
 from dynakin.report.figure import FILE_STYLE
 from dynakin.report.paper_figures.movement import (
@@ -81,7 +82,7 @@ def save_figures(
     }
     if sensitivity is not None:
         draws = {SENSITIVITY_FIGURE: lambda: sensitivity_figure(sensitivity), **draws}
-    return _write(draws, Path(folder), formats, failures)
+    return _write(draws, expanded(folder), formats, failures)
 
 
 def save_sensitivity_figures(
@@ -92,7 +93,7 @@ def save_sensitivity_figures(
     Raises:
         ConfigError: an unknown format. OutputError: the folder cannot be written.
     """
-    return _write({name: partial(sensitivity_figure, grid) for name, grid in grids.items()}, Path(folder), formats)
+    return _write({name: partial(sensitivity_figure, grid) for name, grid in grids.items()}, expanded(folder), formats)
 
 
 def _write(

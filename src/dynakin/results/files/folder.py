@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from dynakin.errors import OutputError
-from dynakin.files import is_text
+from dynakin.files import expanded, is_text
 
 OUTPUT_FILES = (
     "coordinates.mot",
@@ -89,7 +89,7 @@ def check_folder_writable(folder: str | Path) -> Path:
 def _named(folder: str | Path) -> Path:
     if "\0" in str(folder) or not is_text(str(folder)):
         raise OutputError(f"{folder}: cannot write results there, its name is no text")
-    return Path(folder)
+    return expanded(folder)
 
 
 def _check_takes_files(folder: Path, place: Path) -> None:
@@ -107,8 +107,7 @@ def _check_takes_files(folder: Path, place: Path) -> None:
 @contextmanager
 def replacing(folder: Path, *, kind: FolderKind = RESULTS, overwrite: bool = True) -> Iterator[Path]:
     """Give a temporary sibling folder to fill; on success it takes the place of ``folder``, on failure it goes."""
-    check_output_writable(folder, kind=kind, overwrite=overwrite)
-    folder = folder.absolute()
+    folder = check_output_writable(folder, kind=kind, overwrite=overwrite).absolute()
     made: Path | None = None
     try:
         folder.parent.mkdir(parents=True, exist_ok=True)

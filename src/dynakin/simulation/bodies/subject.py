@@ -15,8 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from dynakin.errors import ConfigError
+from dynakin.errors import ConfigError, ModelError
 from dynakin.model.table import PAIRED, BodyTable, load_table
+from dynakin.settings.subject import Subject
 
 Array = NDArray[np.float64]
 
@@ -147,13 +148,12 @@ def draw_subject(
     """A subject around the table of Dumas; the parts' masses add up to ``mass_kg`` exactly.
 
     Raises:
-        ConfigError: mass or height not positive, or an unknown sex.
+        ConfigError: mass, height or sex that nobody has (`Subject`).
     """
-    for key, value in (("mass_kg", mass_kg), ("height_m", height_m)):
-        if not 0.0 < value < np.inf:
-            raise ConfigError(f"simulated subject: {key} is {value:g}, expected a positive number")
-    if sex not in ("male", "female", None):
-        raise ConfigError(f"simulated subject: sex is {sex!r}, expected male, female or None")
+    try:
+        Subject(mass_kg=mass_kg, height_m=height_m, sex=sex)
+    except ModelError as error:
+        raise ConfigError(f"simulated {error.message}") from None
     spread = spread or Spread()
     lengths = {k: f * height_m * float(np.exp(spread.length * rng.standard_normal())) for k, f in FRACTIONS.items()}
     parts = _draw_parts(rng, load_table("dumas", sex), lengths, spread)  # type: ignore[arg-type]

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from dynakin.errors import ConfigError
 from dynakin.files import is_file
+from dynakin.settings.presets import preset
 from dynakin.settings.settings import RECORDED, Settings, read_keys
 from dynakin.settings.strict import nearest
 
@@ -47,14 +49,14 @@ class Dataset:
 
 
 def read_dataset(path: Path, output: Path | None = None) -> Dataset:
-    """Read a dataset's file; what its trials hold is looked at when they are worked on.
+    """Read a dataset's file: every key is checked; the files that it names are looked at when they are worked on.
 
     Args:
         output: folder of the results, instead of the one that the file names.
 
     Raises:
-        ConfigError: the file cannot be read, a key is unknown or missing, no trial is found for a subject, or two
-            trials of a subject have one name.
+        ConfigError: the file cannot be read, a key is unknown, missing or wrong, no trial is found for a subject, or
+            two trials of a subject have one name.
     """
     content = read_keys(path, paths=("output",))  # the others lie with subjects and trials
     entries = content.get("subjects")
@@ -76,7 +78,22 @@ def read_dataset(path: Path, output: Path | None = None) -> Dataset:
     presets = content.get("presets", [])
     if not isinstance(presets, list) or not all(isinstance(name, str) for name in presets):
         raise ConfigError(f"{path}: presets is {presets!r}, expected a list of names")
+    check_presets(presets, f"{path}: presets")
+    for session in sessions:
+        Settings.of(session.content, f"{path}: {session.name}")
     return Dataset(path, into, tuple(presets), tuple(sessions))
+
+
+def check_presets(names: Sequence[str], where: str) -> None:
+    """
+    Raises:
+        ConfigError: there is no such preset; ``where`` opens the message.
+    """
+    for name in names:
+        try:
+            preset(name)
+        except ConfigError as error:
+            raise ConfigError(f"{where}: {error.message}") from None
 
 
 def _run_keys(content: dict[str, Any], own: tuple[str, ...], where: str) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from dynakin.errors import DynakinError
 from dynakin.files import write_csv, write_json
 from dynakin.pipeline.stages import judged
 from dynakin.progress import Progress
+from dynakin.report.insights import DOUBTS_FORCES, in_short, insights
 from dynakin.results.failures import Failures
 from dynakin.results.files.config import versions
 from dynakin.results.measures.fit import SignalFit
@@ -47,7 +48,8 @@ class Batch:
     """What came of a dataset.
 
     Attributes:
-        rows: by session: ``fits`` (quantity, method, figures of `SignalFit`), ``notes``, ``events``, ``nis_per_dof``.
+        rows: by session: ``fits`` (quantity, method, figures of `SignalFit`), ``verdict`` by preset, ``findings`` (the
+            titles of what it warns of), ``notes``, ``events``, ``nis_per_dof``.
         failures: by session, why it gave nothing.
     """
 
@@ -58,6 +60,11 @@ class Batch:
     def fits(self) -> dict[str, Fits]:
         """Fit of each (quantity, method), by session."""
         return {name: {(q, m): SignalFit(*values) for q, m, *values in row["fits"]} for name, row in self.rows.items()}
+
+    @property
+    def doubted(self) -> list[str]:
+        """Sessions with findings that doubt their mass or forces."""
+        return [name for name, row in self.rows.items() if DOUBTS_FORCES & set(row["findings"])]
 
     def table2(self) -> list[Row]:
         """The paper's Table II, mean and standard deviation over trials."""
@@ -95,8 +102,11 @@ def work_on(options: Options, payload: Session) -> dict[str, Any]:
         saved = "the results are saved. " if options.files else ""
         raise DynakinError(f"{saved}{' '.join(failures.messages())}")
     metrics = {name: compute_metrics(estimate) for name, estimate in estimates.items()}
+    found = {name: insights(estimate, metrics[name]) for name, estimate in estimates.items()}
     return {
         "fits": [[*key, *fit] for key, fit in trial_fits(trial).items()],
+        "verdict": {name: in_short(each) for name, each in found.items()},
+        "findings": list(dict.fromkeys(i.title for each in found.values() for i in each if i.level == "warning")),
         "notes": [*trial.notes, *result.estimate.messages],
         "lost": lost,
         "nis_per_dof": {name: m["consistency"]["mean_nis_per_dof"] for name, m in metrics.items()},
@@ -115,18 +125,23 @@ def belongs_to(dataset: Dataset, options: Options, *, identify: bool = False) ->
     """
     return {
         "what": "batch",
-        "dynakin": versions()["dynakin"],
-        "options": [*options.presets, options.cutoff_hz, options.files, identify],
-        "sessions": [[s.name, s.content, *_stamps(s.content)] for s in dataset.sessions],
+        "version of dynakin": versions()["dynakin"],
+        "presets": list(options.presets),
+        "--cutoff-hz": options.cutoff_hz,
+        "results of single trials": options.files,
+        "--identify": identify,
+        "trials": {s.name: s.content | {"files": _stamps(s.content)} for s in dataset.sessions},
     }
 
 
-def _stamps(content: Mapping[str, Any]) -> list[Any]:
-    found = []
+def _stamps(content: Mapping[str, Any]) -> dict[str, str]:
+    """Size and time of each file, by its name: a file that was changed has others."""
+    found = {}
     for key in ("trial", "forces", "static", "parameters"):
         file = Path(str(content.get(key, "")))
         if file.is_file():
-            found.append([key, file.stat().st_size, file.stat().st_mtime_ns])
+            changed = file.stat()
+            found[str(file)] = f"{changed.st_size} bytes of {changed.st_mtime_ns / 1e9:.6f}"
     return found
 
 
@@ -148,7 +163,7 @@ def run_batch(
 
 def write_batch(folder: Path, batch: Batch, identified: Mapping[str, Mapping[str, Any]] | None = None) -> None:
     """``table2.csv`` (over trials), ``table2_subjects.csv`` (over subjects), ``trials.csv`` (a row a trial, quantity
-    and method) and ``batch.json`` (what failed and why, notes, events, subjects).
+    and method, with the trial's findings) and ``batch.json`` (what failed and why, verdicts, notes, events, subjects).
 
     Args:
         identified: what came of `identify_subjects`.
@@ -161,7 +176,9 @@ def write_batch(folder: Path, batch: Batch, identified: Mapping[str, Mapping[str
         "table2_subjects": [flat(row) for row in batch.table2_of_subjects()],
     }
     tables["trials"] = [
-        {"trial": name, "quantity": quantity, "method": method, **dict(zip(SignalFit._fields, fit, strict=True))}
+        {"trial": name, "quantity": quantity, "method": method}
+        | dict(zip(SignalFit._fields, fit, strict=True))
+        | {"findings": "; ".join(batch.rows[name]["findings"])}
         for name, fits in batch.fits().items()
         for (quantity, method), fit in fits.items()
     ]

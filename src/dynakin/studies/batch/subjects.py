@@ -76,7 +76,7 @@ def identify_on_trials(options: IdentifyOptions, payload: Sequence[Session]) -> 
     found.subject.write(file)
     return {
         "use": found.subject.use,
-        "said": [*(f"Left out: {text}." for text in left_out), *found.lost, *found.decision.in_words()],
+        "said": [*(f"Left out: {text}." for text in left_out), *found.lost, *found.warned, *found.decision.in_words()],
         "file": str(file),
     }
 

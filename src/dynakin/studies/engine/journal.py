@@ -11,7 +11,8 @@ from dynakin.errors import OutputError
 from dynakin.files import with_nulls
 from dynakin.studies.engine.tasks import Row
 
-VERSION = 1
+VERSION = 2
+_SHOWN = 60  # characters of a value in a message
 
 
 class Journal:
@@ -21,15 +22,15 @@ class Journal:
 
     Args:
         path: the file; made when the first row comes, in a folder that exists.
-        belongs_to: plain data: everything on which the rows depend. Its digest stands in the heading.
+        belongs_to: plain data: everything on which the rows depend. It stands in the heading.
 
     Raises:
-        OutputError: the file cannot be read, is none of ours, or belongs to something else.
+        OutputError: the file cannot be read, is none of ours, or belongs to something else; what changed is named.
     """
 
     def __init__(self, path: Path, belongs_to: Any) -> None:
         self.path = path
-        self._heading = {"dynakin_journal": VERSION, "belongs_to": digest(belongs_to)}
+        self._heading = {"dynakin_journal": VERSION, "belongs_to": json.loads(json.dumps(belongs_to))}
         self.rows = self._read()
 
     def _read(self) -> dict[str, Row]:
@@ -48,10 +49,12 @@ class Journal:
         if heading is None:  # killed before its heading was whole
             self.path.unlink()
             return {}
-        if heading != self._heading:
+        if not isinstance(heading, dict) or heading.get("dynakin_journal") != VERSION:
+            raise OutputError(f"{self.path}: belongs to another version of dynakin; name another folder, or remove it")
+        if changed := difference(heading.get("belongs_to"), self._heading["belongs_to"]):
             raise OutputError(
-                f"{self.path}: belongs to other settings, recordings or another version; name another folder, or "
-                "remove it"
+                f"{self.path}: belongs to other settings, recordings or another version ({changed}); name another "
+                "folder, or remove it, and all is worked out again"
             )
         kept = sum(len(line.encode()) for line in whole)
         with self.path.open("r+b") as file:
@@ -73,6 +76,27 @@ class Journal:
                 file.write(json.dumps(with_nulls({"key": key, "row": row}), allow_nan=False) + "\n")
         except OSError as error:
             raise OutputError(f"{self.path}: cannot be written ({error.strerror or error})") from None
+
+
+def difference(before: Any, now: Any, where: str = "") -> str:
+    """The first thing in which plain data differ, "trials, walk, mass_kg: 70, now 71"; "" where nothing does."""
+    if digest(before) == digest(now):
+        return ""
+    if isinstance(before, dict) and isinstance(now, dict):
+        pairs = [(str(key), before.get(key, _MISSING), now.get(key, _MISSING)) for key in {**before, **now}]
+    elif isinstance(before, list) and isinstance(now, list) and len(before) == len(now):
+        pairs = [(str(k + 1), *both) for k, both in enumerate(zip(before, now, strict=True))]
+    else:
+        return f"{where or 'what it is of'}: {_shown(before)}, now {_shown(now)}"
+    return next(found for key, a, b in pairs if (found := difference(a, b, f"{where}, {key}" if where else key)))
+
+
+_MISSING = "none"
+
+
+def _shown(value: Any) -> str:
+    text = value if isinstance(value, str) else json.dumps(value)
+    return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 3]}..."
 
 
 def digest(content: Any) -> str:

@@ -12,13 +12,14 @@ import numpy.typing as npt
 from dynakin.errors import ConfigError
 from dynakin.progress import Progress
 from dynakin.results.files.config import versions
+from dynakin.settings.effect import check_effect, without_effect
 from dynakin.settings.noise import Noise
 from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import Pool
 from dynakin.studies.tuning.likelihood import REACH, Likelihood
 from dynakin.studies.tuning.optimise import SETTLED, Optimum, curvature, deviations, minimise
 from dynakin.studies.tuning.score import CRITERIA, Shared
-from dynakin.studies.tuning.settings import check_effect, check_setting, together, value_of, without_effect
+from dynakin.studies.tuning.settings import check_setting, together, value_of
 
 Array = npt.NDArray[np.float64]
 
@@ -120,9 +121,9 @@ def belongs_to_fit(shared: Shared) -> dict[str, Any]:
     """All that the rows of a fit depend on in addition to their settings, for its journal."""
     return {
         "what": "fit",
-        "dynakin": versions()["dynakin"],
+        "version of dynakin": versions()["dynakin"],
         "trials": [trial.identity() for trial in shared.trials],
-        "base": shared.base.model_dump(mode="json"),
+        "settings": shared.base.model_dump(mode="json"),
     }
 
 

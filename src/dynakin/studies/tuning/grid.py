@@ -13,13 +13,14 @@ import numpy.typing as npt
 from dynakin.errors import ConfigError, DynakinError
 from dynakin.progress import Progress
 from dynakin.results.files.config import versions
+from dynakin.settings.effect import check_effect
 from dynakin.settings.noise import Noise
 from dynakin.studies.engine.journal import Journal
 from dynakin.studies.engine.pools import Pool
 from dynakin.studies.engine.tasks import Task
 from dynakin.studies.engine.work import work
 from dynakin.studies.tuning.score import CRITERIA, Shared, score_task
-from dynakin.studies.tuning.settings import check_effect, check_setting
+from dynakin.studies.tuning.settings import check_setting
 from dynakin.units import COMPONENTS
 
 Array = npt.NDArray[np.float64]
@@ -123,11 +124,11 @@ def belongs_to(shared: Shared, axes: Sequence[Axis]) -> dict[str, Any]:
     """All that the rows of a grid depend on, for its journal."""
     return {
         "what": "grid",
-        "dynakin": versions()["dynakin"],
+        "version of dynakin": versions()["dynakin"],
         "trials": [trial.identity() for trial in shared.trials],
-        "base": shared.base.model_dump(mode="json"),
-        "left_out": shared.left_out,
-        "axes": [[axis.name, *axis.values] for axis in axes],
+        "settings": shared.base.model_dump(mode="json"),
+        "--left-out": shared.left_out,
+        "--vary": {axis.name: list(axis.values) for axis in axes},
     }
 
 

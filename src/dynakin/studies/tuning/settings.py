@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping
 
 from dynakin.errors import ConfigError
 from dynakin.settings.noise import SCALES, Noise
@@ -22,37 +22,6 @@ def check_setting(name: str) -> str:
             f"setting {name!r} cannot be varied{nearest(name, SCALES)}; expected one of {', '.join(SCALES)}"
         )
     return name
-
-
-def of_floating(name: str) -> str | None:
-    """The setting that stands in for this one on a model that is fixed nowhere; None: there is none."""
-    return f"floating_{name}" if f"floating_{name}" in SCALES else None
-
-
-def without_effect(names: Sequence[str], noise: Noise, floating: Collection[bool]) -> dict[str, str]:
-    """Those of the settings that no trial depends on, and why.
-
-    Args:
-        noise: all other settings. floating: whether the model is fixed nowhere, of each trial.
-    """
-    found = {}
-    for name in names:
-        other = of_floating(name)
-        if name.startswith("floating_") and not any(floating):
-            found[name] = f"a model that is fixed in the ground, expected {name.removeprefix('floating_')!r}"
-        elif other and all(floating) and (other in names or getattr(noise, other) is not None):
-            found[name] = f"a model that is fixed nowhere, expected {other!r}"
-    return found
-
-
-def check_effect(names: Sequence[str], noise: Noise, floating: Collection[bool]) -> None:
-    """Refuse settings that have no effect.
-
-    Raises:
-        ConfigError: there is one; the message names it and the one that has.
-    """
-    for name, why in without_effect(names, noise, floating).items():
-        raise ConfigError(f"setting {name!r} has no effect on {why}")
 
 
 def value_of(noise: Noise, name: str) -> float:

@@ -67,10 +67,16 @@ class TuningTrial:
 
     def identity(self) -> dict[str, object]:
         """Plain data that stands for this trial where rows are kept."""
-        arrays = (self.time, self.markers, self.wrench, self.initial.x0, self.initial.sd0)
+        arrays = {
+            "times": self.time,
+            "markers": self.markers,
+            "forces": self.wrench,
+            "model as measured": self.initial.x0,
+            "its deviations": self.initial.sd0,
+        }
         return {
             "name": self.name,
-            "arrays": [digest([float(x).hex() for x in values.ravel()]) for values in arrays],
+            "arrays": {what: digest([float(x).hex() for x in values.ravel()]) for what, values in arrays.items()},
             "estimate": list(self.estimate),
             "counted": [self.first, self.end, self.ahead],
         }
