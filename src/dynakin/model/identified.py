@@ -128,7 +128,7 @@ def read_identified(path: Path) -> IdentifiedSubject:
 
 
 class Constant(NamedTuple):
-    """What a run found of one constant: SI; ``sd`` is one standard deviation; its bounds, where the file states them."""
+    """What a run found of one constant, SI; ``sd``: one standard deviation; ``bounds`` where the file states them."""
 
     value: float
     sd: float
