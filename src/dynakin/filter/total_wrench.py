@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -101,25 +102,8 @@ def known_ground(
         RecordingError: the plates are refused.
     """
     n = recording.n_frames
-    loads = None
-    if initial.feet:
-        loads = foot_loads(
-            recording, initial.ground, foot_markers(initial), assigned=assigned, others=list(initial.contacts)
-        )
-        if initial.unmarked_feet:
-            loads = loads.without(np.tile(np.isin(loads.feet, list(initial.unmarked_feet)), (n, 1)))
-            sides = " and the ".join(initial.unmarked_feet)
-            text = (
-                f"No markers of the {sides} foot: what it carries is not known. Moments are those of a leg whose own "
-                "foot is on a plate, or in the air."
-            )
-            loads = replace(loads, reasons=(*loads.reasons, text))
-    names = list(initial.contacts)
-    by_plate = [loads is not None and name in loads.others for name in names]
-    may = np.zeros((n, 0), dtype=bool)
-    if names:
-        paths, floor = ContactPaths.of(initial).at(markers), float(np.nanmin(markers[..., 1]))
-        may = may_bear(initial, paths, floor, float(paths[:, 0, 1].max()) - floor) & ~np.array(by_plate)
+    loads = _loads_of_feet(recording, initial, assigned)
+    may, by_plate = _declared_contacts(initial, markers, loads)
     if not recording.plates:
         text = (
             "No force plates: the ground reaction follows from the motion where one foot may stand, and where both may "
@@ -139,7 +123,77 @@ def known_ground(
         delay = None if in_step else plates_delay(needed, np.where(loads.total_known[:, None], wrench[:, :3], np.nan))
         if delay is not None:
             return _brought_into_step(recording, initial, markers, delay, assigned, tolerance)
-    notes, reasons = list(check.messages), list[str]()
+    judged = _judged(recording, initial, markers, wrench, loads, check, may, by_plate, tolerance)
+    notes, reasons = [*check.messages, *judged.notes], [*judged.reasons]
+    undeclared = judged.undeclared
+    if loads is not None:
+        before = loads
+        loads = loads.with_borne(np.asarray(judged.bears.any(axis=1))).with_undeclared(undeclared)
+        loads = loads.without(judged.beyond)
+        reasons += _light_feet(before, loads, judged.beyond)
+    partly = undeclared if loads is None else ~loads.total_known
+    wrench = np.where(partly[:, None], np.nan, wrench)
+    used = int(np.count_nonzero(np.isfinite(wrench).all(axis=1)))
+    if loads is not None or used < n:
+        notes.append(f"The total wrench is measured in {used} of {n} frames.")
+    notes += reasons
+    return Ground(loads, undeclared, judged.bears, used > 0, judged.load_ratio, tuple(notes), tuple(reasons)), wrench
+
+
+def _loads_of_feet(
+    recording: Recording, initial: CalibratedModel, assigned: Mapping[str, str] | None
+) -> FootLoads | None:
+    """What each foot carries by feet and plates; None of a model that stands on its root."""
+    if not initial.feet:
+        return None
+    loads = foot_loads(
+        recording, initial.ground, foot_markers(initial), assigned=assigned, others=list(initial.contacts)
+    )
+    if not initial.unmarked_feet:
+        return loads
+    hidden = np.isin(loads.feet, list(initial.unmarked_feet))
+    loads = loads.without(np.tile(hidden, (recording.n_frames, 1)))
+    text = (
+        f"No markers of the {' and the '.join(initial.unmarked_feet)} foot: what it carries is not known. Moments are "
+        "those of a leg whose own foot is on a plate, or in the air."
+    )
+    return replace(loads, reasons=(*loads.reasons, text))
+
+
+def _declared_contacts(initial: CalibratedModel, markers: Array, loads: FootLoads | None) -> tuple[Flags, list[bool]]:
+    """(T, C) frames in which each declared contact may bear where no plate measures it, and which ones a plate does."""
+    names = list(initial.contacts)
+    by_plate = [loads is not None and name in loads.others for name in names]
+    if not names:
+        return np.zeros((len(markers), 0), dtype=bool), by_plate
+    paths, floor = ContactPaths.of(initial).at(markers), float(np.nanmin(markers[..., 1]))
+    return may_bear(initial, paths, floor, float(paths[:, 0, 1].max()) - floor) & ~np.array(by_plate), by_plate
+
+
+class _Judged(NamedTuple):
+    """As in `Ground`, by the motion of the centre of mass; beyond (T, F): feet whose plate is not to be believed."""
+
+    bears: Flags
+    undeclared: Flags
+    beyond: Flags
+    load_ratio: float | None
+    notes: list[str]
+    reasons: list[str]
+
+
+def _judged(
+    recording: Recording,
+    initial: CalibratedModel,
+    markers: Array,
+    wrench: Array,
+    loads: FootLoads | None,
+    check: PlateCheck,
+    may: Flags,
+    by_plate: list[bool],
+    tolerance: float | None,
+) -> _Judged:
+    """Whether the plates carry what the motion needs, where feet and plates say that they carry the person."""
+    n, names, notes, reasons = recording.n_frames, list(initial.contacts), list[str](), list[str]()
     measured: Flags = np.asarray(np.isfinite(wrench).all(axis=1))
     claimed = measured if loads is None else loads.total_known
     undeclared = np.zeros(n, dtype=bool) if loads is None else loads.elsewhere.copy()
@@ -151,52 +205,44 @@ def known_ground(
         reasons += loads.reasons
     found = closure(initial, recording.time, markers, wrench, claimed)
     if found is None:
-        bears = may
         flies = loads is not None and bool(loads.aloft.all(axis=1).any())  # which weighs nobody
         foreign = None if flies or names else _foreign_load(check, wrench, claimed, initial, tolerance)
-        undeclared |= foreign is not None
         reasons += [foreign] if foreign else []
-        notes.append(UNJUDGED)
-    else:
-        bears = bearing(found, may, names, by_plate, claimed, recording.rate)
-        if bears.any():
-            reasons.append(_declared_in_words(found, bears, names, recording.time))
-            found = replace(found, undeclared=found.undeclared & ~bears.any(axis=1))
-        undeclared |= found.undeclared | _nearly_all(found)
-        if found.undeclared.any():
-            text, beyond = _undeclared_in_words(found, recording, initial, markers, wrench)
-            reasons.append(text)
-        if found.too_much is not None and loads is not None:
-            undeclared |= claimed
-            beyond = beyond | claimed[:, None]
-            reasons.append(
-                f"Warning: the plates carry {found.too_much:.2f} times what the motion needs of "
-                f"{initial.weighed_kg:.1f} kg, all the time: their scale or the mass is wrong, or a load is not "
-                "declared. No moment of the legs is given there. Check the plates' units, --mass, and [[loads]]."
-            )
-        if found.unjudged > MANY * n:
-            notes.append(
-                f"In {found.unjudged} of {n} frames too few markers are seen to check that the plates carry the person."
-            )
-    if loads is not None:
-        before, loads = (
-            loads,
-            loads.with_borne(np.asarray(bears.any(axis=1))).with_undeclared(undeclared).without(beyond),
+        return _Judged(may, undeclared | (foreign is not None), beyond, None, [*notes, UNJUDGED], reasons)
+    bears = bearing(found, may, names, by_plate, claimed, recording.rate)
+    if bears.any():
+        reasons.append(_declared_in_words(found, bears, names, recording.time))
+        found = replace(found, undeclared=found.undeclared & ~bears.any(axis=1))
+    undeclared |= found.undeclared | _nearly_all(found)
+    if found.undeclared.any():
+        text, beyond = _undeclared_in_words(found, recording, initial, markers, wrench)
+        reasons.append(text)
+    if found.too_much is not None and loads is not None:
+        undeclared |= claimed
+        beyond = beyond | claimed[:, None]
+        reasons.append(
+            f"Warning: the plates carry {found.too_much:.2f} times what the motion needs of "
+            f"{initial.weighed_kg:.1f} kg, all the time: their scale or the mass is wrong, or a load is not "
+            "declared. No moment of the legs is given there. Check the plates' units, --mass, and [[loads]]."
         )
-        for k, foot in enumerate(loads.feet):
-            light = (loads.reason[:, k] != before.reason[:, k]) & (before.reason[:, k] == on_plates.MEASURED)
-            if (light & ~beyond[:, k]).any():
-                reasons.append(
-                    f"In {np.count_nonzero(light & ~beyond[:, k])} of these frames the {foot} foot's plate reads less "
-                    f"than {LOADED_N:g} N: what the foot carries there is not known."
-                )
-    partly = undeclared if loads is None else ~loads.total_known
-    wrench = np.where(partly[:, None], np.nan, wrench)
-    used = int(np.count_nonzero(np.isfinite(wrench).all(axis=1)))
-    if loads is not None or used < n:
-        notes.append(f"The total wrench is measured in {used} of {n} frames.")
-    ratio = None if found is None else found.load_ratio
-    return Ground(loads, undeclared, bears, used > 0, ratio, (*notes, *reasons), tuple(reasons)), wrench
+    if found.unjudged > MANY * n:
+        notes.append(
+            f"In {found.unjudged} of {n} frames too few markers are seen to check that the plates carry the person."
+        )
+    return _Judged(bears, undeclared, beyond, found.load_ratio, notes, reasons)
+
+
+def _light_feet(before: FootLoads, loads: FootLoads, beyond: Flags) -> list[str]:
+    """Sentences on feet whose plate was measured and reads next to nothing where something undeclared bears."""
+    found = []
+    for k, foot in enumerate(loads.feet):
+        light = (loads.reason[:, k] != before.reason[:, k]) & (before.reason[:, k] == on_plates.MEASURED)
+        if (light & ~beyond[:, k]).any():
+            found.append(
+                f"In {np.count_nonzero(light & ~beyond[:, k])} of these frames the {foot} foot's plate reads less "
+                f"than {LOADED_N:g} N: what the foot carries there is not known."
+            )
+    return found
 
 
 def _brought_into_step(
