@@ -14,6 +14,7 @@ import pytest
 import dynakin
 from dynakin import Estimator, Subject, load_model
 from dynakin.errors import RecordingError
+from dynakin.filter.parameters import DELAY_UNSEEN_S, parameters_of
 from dynakin.filter.plate_motion import Needed, brought_into_step, plates_delay
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.simulation.trial import simulate as simulate_anew
@@ -139,3 +140,12 @@ def test_where_plates_end_before_they_are_not_known() -> None:
     whole = simulate("fullbody", "gait", 7, 4.0).recording
     there = brought_into_step(whole, 0.05)
     assert np.isnan(there.plates[0].force[-5:]).all() and np.isfinite(there.plates[0].force[:-5]).all()
+
+
+def test_a_delay_that_the_filter_finds_is_said_to_be_less_sure_than_it_sees() -> None:
+    """Of a body that is fixed nowhere: jerk and inertia take it up."""
+    tracker = person().start(simulate("fullbody", "squat", 7, 8.0).recording)
+    calibrated, sd = tracker.calibrated, np.sqrt(np.diagonal(tracker.covariance))
+    delay = next(p for p in parameters_of(calibrated, tracker.state, sd, sd) if p.name == "plates/delay")
+    seen = sd[calibrated.names.index("plates/delay")]
+    assert delay.posterior_sd == pytest.approx(seen) and delay.sd == pytest.approx(np.hypot(seen, DELAY_UNSEEN_S))

@@ -47,9 +47,9 @@ class Parameter:
 
     ``value`` and ``sd`` (one standard deviation) are those of the last frame; ``initial`` and ``prior_sd`` those
     before the first, with the declared total mass in them where it is a prior (None: not estimated); ``skin_sd`` is
-    the part of ``sd`` that the filter cannot see: skin that follows an angle looks like a length; ``table`` is what
-    the anthropometric table says, None where it says nothing; ``lower`` and ``upper`` are the bounds of equation (9),
-    None where there is none. All in ``unit`` (m, m/rad, rad, kg, kg m, kg m2, N, N m, s).
+    the part of ``sd`` that the filter cannot see: skin that follows an angle looks like a length, jerk like a delay;
+    ``table`` is what the anthropometric table says, None where it says nothing; ``lower`` and ``upper`` are the bounds
+    of equation (9), None where there is none. All in ``unit`` (m, m/rad, rad, kg, kg m, kg m2, N, N m, s).
     """
 
     name: str
