@@ -17,8 +17,11 @@ from dynakin.stream.start import floor_plate
 
 Array = npt.NDArray[np.float64]
 
-WINDOW_S, EVERY_S = 8.0, 4.0
-"""The last seconds are asked, and how often: some 40 ms of computing."""
+WINDOW_S, FIRST_S, RARELY_S = 8.0, 4.0, 60.0
+"""The last seconds are asked, after the first, then half as often each time that a movement shows nothing, at least so
+often: it takes some 40 ms, and neither clocks nor axes change."""
+MOVES = 0.02
+"""Of the weight, standard deviation of the force that a movement needs: standing shows no clock."""
 LEAST_S = 1.0
 """So much of them must be judged: by half of it a walk in step was 10 ms late."""
 _STEP_S = 0.0095
@@ -38,6 +41,7 @@ class LivePlateMotion:
         self._initial, self._plates = initial, tuple(plates)
         self._kept: deque[tuple[float, Array, Array, bool]] = deque()
         self._asked_s: float | None = None
+        self._every_s = FIRST_S
         self.delay_s: float | None = None
         self.turned: str | None = None
         self.mass: str | None = None
@@ -58,12 +62,13 @@ class LivePlateMotion:
             self._kept.popleft()
         if self._asked_s is None or time_s < self._asked_s:
             self._asked_s = time_s
-        if time_s - self._asked_s < EVERY_S:
+        if time_s - self._asked_s < self._every_s:
             return False
         self._asked_s = time_s
         self._ask()
         if self.delay_s is not None:
             self._kept.clear()  # of plates as they came until now
+            self._every_s = FIRST_S
         return any(found is not None for found in (self.delay_s, self.turned, self.mass))
 
     def _ask(self) -> None:
@@ -76,10 +81,12 @@ class LivePlateMotion:
         total = np.where(known[:, None], total, np.nan)
         if not needed.judged_s(total) >= LEAST_S:
             return
+        judged = needed.judged(total)
+        if needed.force[judged].std(axis=0).max() > MOVES * needed.weight:
+            self._every_s = min(2.0 * self._every_s, RARELY_S)
         up = axis_vector(self._initial.ground.vertical)
         plates = [floor_plate(name, wrenches[:, p], up) for p, name in enumerate(self._plates)]
         self.turned = turned_axes(needed, plates, self._initial, known, _REMEDY)
         self.delay_s = None if self.turned else plates_delay(needed, total)
-        judged = needed.judged(total)
         ratio = float(total[judged, 1].mean() / needed.force[judged, 1].mean())
         self.mass = doubtful_mass(total, self._initial.weighed_kg, ratio, self._initial.unseen_kg)
