@@ -115,9 +115,9 @@ def test_what_is_wrong_is_said_in_one_line(arguments: list[str], words: str, tmp
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (["--delay", "-1"], "--delay is -1, expected seconds, more than 0"),
+        (["--delay", "-1"], "--delay is -1, expected seconds, 0 or more"),
         (["--standing-wait", "nan"], "--standing-wait is nan"),
-        (["--port", "99999"], "--port is 99999, expected 1 to 65535"),
+        (["--port", "99999"], "--port is 99999, expected 0 (any that is free) to 65535"),
     ],
 )
 def test_numbers_that_cannot_be_are_refused(words: list[str], said: str, capsys: Said) -> None:

@@ -231,3 +231,9 @@ def test_all_commands_refuse_it() -> None:
 def test_the_grid_refuses_it_too() -> None:
     with pytest.raises(ConfigError, match="'force_variance_n2' has no effect on a model that is fixed nowhere"):
         check_effect(["force_variance_n2"], presets.default(), [True])
+
+
+def test_an_outputs_configuration_lists_keys_without_effect() -> None:
+    """It repeats its run after a default has changed as well."""
+    settings = Settings(trial=Path("x.trc"), output=Path("o"), noise={"force_variance_n2": 30.0}, versions={"x": "1"})
+    check_noise(settings, True)

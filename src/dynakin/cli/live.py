@@ -101,10 +101,10 @@ def live(
             "--source is missing, expected simulate:squat, replay:FILE, lsl:NAME, qtm:HOST or a plug-in's KIND:..."
         )
     for option, seconds in (("--delay", delay), ("--standing-wait", standing_wait)):
-        if seconds is not None and not 0.0 < seconds < inf:
-            raise typer.BadParameter(f"{option} is {seconds:g}, expected seconds, more than 0")
-    if not 0 < port < 65536:
-        raise typer.BadParameter(f"--port is {port}, expected 1 to 65535")
+        if seconds is not None and not 0.0 <= seconds < inf:
+            raise typer.BadParameter(f"{option} is {seconds:g}, expected seconds, 0 or more")
+    if not 0 <= port < 65536:
+        raise typer.BadParameter(f"--port is {port}, expected 0 (any that is free) to 65535")
     static = given.pop("static", None)
     if parameters is not None and parameters.suffix.casefold() == ".toml":
         given["parameters"], parameters = str(parameters.absolute()), None

@@ -290,7 +290,8 @@ class Estimator:
         except ValueError as error:  # a frame that the core refuses, named by it
             raise RecordingError(f"{recording.path or recording.name}: {error}") from None
         config = self.settings() | {"lag_s": lag_s, "ground_reasons": list(ground.reasons)}
-        doubt = [ready.doubt] if ready.doubt else clock if ground.usable else []
+        unsought = " No further delay of the plates is sought, because a wrong mass looks like one."
+        doubt = [ready.doubt + unsought] if ready.doubt else clock if ground.usable else []
         config["noise_used"] = tracker.noise.scales()
         notes += [*doubt, *ready.unsmoothed]
         if tracker.systematic is not None:

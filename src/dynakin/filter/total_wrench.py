@@ -22,6 +22,7 @@ from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import NEAR_M
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.hull import distance_to_hull
+from dynakin.recordings.plates.axes import turned_feet
 from dynakin.recordings.plates.pressure import LOADED_N
 from dynakin.recordings.recording import Recording
 from dynakin.units import GRAVITY_M_S2
@@ -123,8 +124,10 @@ def known_ground(
         delay = None if in_step else plates_delay(needed, np.where(loads.total_known[:, None], wrench[:, :3], np.nan))
         if delay is not None:
             return _brought_into_step(recording, initial, markers, delay, assigned, tolerance)
+    turned = None if loads is not None else turned_feet(recording.plates, initial.ground, recording.rate)
     judged = _judged(recording, initial, markers, wrench, loads, check, may, by_plate, tolerance)
-    notes, reasons = [*check.messages, *judged.notes], [*judged.reasons]
+    notes = [*check.messages, *([f"Warning: {turned}."] if turned else []), *judged.notes]
+    reasons = [*judged.reasons]
     undeclared = judged.undeclared
     if loads is not None:
         before = loads
@@ -329,7 +332,7 @@ def _undeclared_in_words(
 
 
 def doubtful_mass(wrench: Array, mass_kg: float, load_ratio: float | None, unseen_kg: float = 0.0) -> str | None:
-    """A sentence where the plates contradict the mass: by `Ground.load_ratio`, or, where that is not known, by the mean
+    """Sentences where the plates contradict the mass: by `Ground.load_ratio`, or, where that is not known, by the mean
     vertical force of the known frames of the wrench (T, 6)."""
     load = _mean_load_kg(wrench, least=50) if load_ratio is None else load_ratio * mass_kg
     within = MASS_APART + UNSEEN_APART * unseen_kg / mass_kg
@@ -338,8 +341,7 @@ def doubtful_mass(wrench: Array, mass_kg: float, load_ratio: float | None, unsee
     return (
         f"Warning: the plates carry {load:.1f} kg on average where the person weighs {mass_kg:.1f} kg "
         f"({100.0 * abs(load - mass_kg) / mass_kg:.1f} % apart, expected within {100.0 * within:.0f} %): check the "
-        "mass. Forces, moments and inertia take the error on, and no further delay of the plates is sought, because a "
-        "wrong mass looks like one."
+        "mass. Forces, moments and inertia take the error on."
     )
 
 

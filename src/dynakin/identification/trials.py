@@ -35,9 +35,6 @@ LOAD_APART = 0.04
 within 0.2 m/s, 2 % of gravity; other plates or another person miss by more."""
 
 
-LEAST_SHARED = 0.25
-"""Part of the first trial's markers that another one has at least: two marker sets share a few names by chance."""
-
 SAME_PLACE_M = 1e-5
 """How far apart the markers of a trial and of its copy lie at most: files round to 1e-5 m or less."""
 
@@ -214,13 +211,6 @@ class Common:
                 plates, they are refused, or they carry somebody of another mass.
         """
         where = recording.path or recording.name
-        names = self.initial.recorded_markers
-        shared = sum(name in recording.marker_names for name in names)
-        if shared < LEAST_SHARED * len(names):
-            raise RecordingError(
-                f"{where}: has {shared} of the {len(names)} markers that were measured in {self.first.name}: the "
-                "recordings share no marker set; expected the same markers in all trials of a subject"
-            )
         if other := another_person(recording, self.first):
             raise RecordingError(f"{where}: {other}; expected trials of one person with the same markers")
         if not recording.plates:

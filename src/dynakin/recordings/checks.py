@@ -14,7 +14,6 @@ from dynakin.recordings.feet.contact import NEAR_M, foot_places
 from dynakin.recordings.feet.loads import FootLoads
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
-from dynakin.recordings.plates.axes import turned_feet
 from dynakin.recordings.plates.limits import beyond_limits
 from dynakin.recordings.plates.pressure import JUDGED_N
 from dynakin.recordings.recording import Array, Plate, Recording
@@ -129,8 +128,6 @@ def check_plates(
             findings.warn(f"{under[foot]} and {plate.name} both have their centre of pressure under the {foot} foot.")
         if foot:
             under[foot] = plate.name
-    if turned := turned_feet(recording.plates, ground, recording.rate):
-        findings.warn(f"{turned}.")
     refusal = "; ".join(findings.refusals) or None
     standing_mass, mean_mass = (mass, None) if standing is not None else (None, mass)
     if over_edge:

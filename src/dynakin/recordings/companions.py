@@ -35,7 +35,7 @@ _NEAR_M = 0.3
 """How far apart such markers are at most: of those on two segments that hardly move, a posture would be compared."""
 _PAIRS = 6
 _COMMON = 0.5
-"""Part of a trial's markers that its standing one has."""
+"""Part of the markers of the one with fewer that the other has."""
 _FRAMES = 1000  # spread over a trial, enough for these
 
 
@@ -94,10 +94,11 @@ def _still(recording: Recording) -> float:
 def another_person(trial: Recording, other: Recording) -> str:
     """What shows that a recording is of somebody else, or of markers put on anew; "" where nothing does."""
     apart, common = _apart_m(trial, other), _common(trial, other)
-    if len(common) < _COMMON * len(trial.marker_names):
+    fewer = min(len(trial.marker_names), len(other.marker_names))
+    if len(common) < _COMMON * fewer:
         return (
-            f"only {len(common)} of the trial's {len(trial.marker_names)} markers are in {other.name}: another marker "
-            "set, so that nothing shows that it is the same person"
+            f"only {len(common)} markers are in both {trial.name} ({len(trial.marker_names)}) and {other.name} "
+            f"({len(other.marker_names)}): they share no marker set, and nothing shows that it is the same person"
         )
     if apart is None or apart < _SAME_M:
         return ""

@@ -51,13 +51,15 @@ def check_effect(names: Sequence[str], noise: Noise, floating: Collection[bool])
 
 
 def check_noise(settings: Settings, floating: bool) -> None:
-    """Refuse keys of [noise] that have no effect on the model. A value that the preset, or a built-in one, has anyway
-    (as an output's config.toml lists them all) was not set by hand.
+    """Refuse keys of [noise] that have no effect on the model. A value that the preset has anyway was not set by hand,
+    nor was any of an output's config.toml, which lists them all.
 
     Raises:
         ConfigError: as `check_effect`.
     """
     noise = settings.noise_settings()
-    usual = [presets.preset(settings.preset), *(make() for make in presets.PRESETS.values())]
-    by_hand = [n for n in settings.noise if all(getattr(noise, n) != getattr(preset, n) for preset in usual)]
+    if settings.versions:
+        return
+    usual = presets.preset(settings.preset)
+    by_hand = [n for n in settings.noise if getattr(noise, n) not in (None, getattr(usual, n))]
     check_effect(by_hand, noise, [floating])

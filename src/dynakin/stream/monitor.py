@@ -46,7 +46,7 @@ class Monitor:
         self._silent = {"markers": False, "plates": False}
         self._restarts = 0
         self.left_out = self._said_left_out = 0
-        self.steps = self.lost_frames = 0
+        self.steps = self.lost_frames = self.without_plates = 0
         self._said_s = -np.inf
         self.stepped_s = -np.inf  # time of the last step
         self._followed_s = np.nan  # time of the last step with markers that fitted
@@ -71,6 +71,7 @@ class Monitor:
         names, report = self.initial.recorded_markers, estimate.report
         on_plates = "none"
         if self._plates:
+            self.without_plates += fused.wrenches is None
             others = "left out" if whole else "incomplete"
             plates = {"accepted": "used" if whole else "incomplete", "refused": "refused"}.get(verdicts[-1], others)
             on_plates = "silent" if fused.wrenches is None else plates if self.used else "left out"
@@ -152,16 +153,24 @@ class Monitor:
     def summary(self, fusion: Fusion) -> str:
         """A sentence at the end, on what was left out, lost or not measured; "" where nothing was."""
         markers, blocks = fusion.marker_counts, fusion.plate_counts
-        counts = {
-            "of too slow a computer left out": self.left_out,
-            "without the plates": fusion.without_plates,
+        frames = {
+            "left out because the computer was too slow": self.left_out,
+            "without the plates": self.without_plates,
             "with the motion lost": self.lost_frames,
-            "come late": markers.late + blocks.late,
-            "lost on the way": markers.lost + blocks.lost,
+        }
+        packets = {
+            "late": markers.late + blocks.late,
+            "lost": markers.lost + blocks.lost,
             "not as declared": markers.invalid + blocks.invalid,
         }
-        found = [f"{count} {how}" for how, count in counts.items() if count]
-        return f"Of {self.steps + self.left_out} frames: {listed(found)}." if found else ""
+        kinds = ((f"Of {self.steps + self.left_out} frames", frames), ("Packets", packets))
+        found = [(of, [f"{count} {how}" for how, count in counts.items() if count]) for of, counts in kinds]
+        return " ".join(f"{of}: {listed(counts)}." for of, counts in found if counts)
+
+    def go_on_from(self, before: Monitor) -> None:
+        """Takes over what was counted of the session, after a restart."""
+        self.steps, self.lost_frames, self.without_plates = before.steps, before.lost_frames, before.without_plates
+        self.left_out, self._said_left_out = before.left_out, before._said_left_out
 
     def changes(self, fusion: Fusion, now_s: float) -> list[str]:
         """Sentences on frames left out, streams that fell silent or came back, and clocks that were set back."""

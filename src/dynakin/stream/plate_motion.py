@@ -24,6 +24,9 @@ MOVES = 0.02
 """Of the weight, standard deviation of the force that a movement needs: standing shows no clock."""
 LEAST_S = 1.0
 """So much of them must be judged: by half of it a walk in step was 10 ms late."""
+NEARLY_ALL = 0.95
+"""Part of the frames with a load that no plate measures, from which it may be none: what the plates carry is said, too.
+In fewer of them a seat is left, and what they carry is no mass."""
 _STEP_S = 0.0095
 """No more than some 100 frames a second are kept: forces of the body's mass are below 6 Hz."""
 _REMEDY = "Correct the plates' axes in the capture system"
@@ -39,25 +42,25 @@ class LivePlateMotion:
 
     def __init__(self, initial: CalibratedModel, plates: Sequence[str]) -> None:
         self._initial, self._plates = initial, tuple(plates)
-        self._kept: deque[tuple[float, Array, Array, bool]] = deque()
+        self._kept: deque[tuple[float, Array, Array, bool, bool]] = deque()
         self._asked_s: float | None = None
         self._every_s = FIRST_S
         self.delay_s: float | None = None
         self.turned: str | None = None
         self.mass: str | None = None
 
-    def look(self, time_s: float, markers: Array, wrenches: Array, whole: bool) -> bool:
+    def look(self, time_s: float, markers: Array, wrenches: Array, claimed: bool, whole: bool) -> bool:
         """The next frame; whether something was found.
 
         Args:
             markers: (M, 3) m, of the model, ground frame, NaN missing. wrenches: (P, 6) N and N m, laboratory frame.
-            whole: whether their sum is all that bears the person.
+            claimed: whether their sum is all that bears the person, by feet and plates. whole: by the motion as well.
         """
         if self._kept and 0.0 <= time_s - self._kept[-1][0] < _STEP_S:
             return False
         if self._kept and time_s < self._kept[-1][0]:
             self._kept.clear()
-        self._kept.append((time_s, markers, wrenches, whole))
+        self._kept.append((time_s, markers, wrenches, claimed, whole))
         while time_s - self._kept[0][0] > WINDOW_S:
             self._kept.popleft()
         if self._asked_s is None or time_s < self._asked_s:
@@ -74,9 +77,9 @@ class LivePlateMotion:
     def _ask(self) -> None:
         self.delay_s = self.turned = self.mass = None
         time = np.array([at for at, *_ in self._kept])
-        known = np.array([whole for *_, whole in self._kept])
-        needed = Needed(self._initial, time, np.stack([markers for _, markers, _, _ in self._kept]))
-        wrenches = np.stack([wrenches for _, _, wrenches, _ in self._kept])  # (T, P, 6)
+        known, whole = (np.array([one[k] for one in self._kept], dtype=bool) for k in (3, 4))
+        needed = Needed(self._initial, time, np.stack([one[1] for one in self._kept]))
+        wrenches = np.stack([one[2] for one in self._kept])  # (T, P, 6)
         total = self._initial.ground.vectors_to_ground(wrenches[:, :, :3].sum(axis=1))
         total = np.where(known[:, None], total, np.nan)
         if not needed.judged_s(total) >= LEAST_S:
@@ -89,4 +92,12 @@ class LivePlateMotion:
         self.turned = turned_axes(needed, plates, self._initial, known, _REMEDY)
         self.delay_s = None if self.turned else plates_delay(needed, total)
         ratio = float(total[judged, 1].mean() / needed.force[judged, 1].mean())
-        self.mass = doubtful_mass(total, self._initial.weighed_kg, ratio, self._initial.unseen_kg)
+        foreign = float(np.mean(~whole[known]))
+        if not foreign:
+            self.mass = doubtful_mass(total, self._initial.weighed_kg, ratio, self._initial.unseen_kg)
+        elif foreign > NEARLY_ALL:
+            self.mass = (
+                f"Warning: the plates carry {ratio * self._initial.weighed_kg:.1f} kg where the person weighs "
+                f"{self._initial.weighed_kg:.1f} kg, all the time: the mass or the unit of the forces is wrong, a "
+                "plate is missing, or something that no plate measures bears or pulls the person (a seat, a cable)."
+            )

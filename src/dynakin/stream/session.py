@@ -15,6 +15,7 @@ from dynakin.filter.plate_motion import out_of_step_in_words
 from dynakin.filter.samples import Sample, sample_arrays
 from dynakin.filter.tracker import Tracker, live_lag
 from dynakin.recordings.recording import Recording
+from dynakin.results.records import doubts_mass
 from dynakin.settings.defaults import DELAY_S
 from dynakin.stream.feet import LiveFeet
 from dynakin.stream.fusion import Fused, Fusion
@@ -305,7 +306,7 @@ class Live:
             recording, quiet, text = quietest(whole, weigh=not self.estimator.model.has_mass)
             static = static or quiet
             self.say(f"Nobody stood still for {self.standing_s:g} s.")
-            self.say(text)
+            self.say(text if self.static is None else "Lengths and marker places are those of the standing trial.")
         try:
             self._tracker, said, self._use_plates = begin(
                 self.estimator,
@@ -323,14 +324,18 @@ class Live:
             return
         for text in said:
             self.say(text)
+        self._mass_doubted = any(map(doubts_mass, said))
         self._begin_running("Ready: move.")
 
     def _begin_running(self, text: str) -> None:
         initial = self.tracker.calibrated
         plates = self.fusion.plates is not None
         rate, holds = self.fusion.markers.rate_hz, self.estimator.noise.recover
-        self._monitor = Monitor(initial, rate, plates, plates and self._use_plates, holds)
-        self._feet, self._plate_motion, self._mass_doubted = None, None, False
+        monitor = Monitor(initial, rate, plates, plates and self._use_plates, holds)
+        if self._monitor is not None:
+            monitor.go_on_from(self._monitor)
+        self._monitor = monitor
+        self._feet = self._plate_motion = None
         if initial.feet:  # without plates too: what depends on the ground is then a prior
             names = () if self.fusion.plates is None else self.fusion.plates.names
             self._plate_motion = LivePlateMotion(initial, names) if plates and self._use_plates else None
@@ -353,7 +358,7 @@ class Live:
             markers[np.array(tracker.verdicts[: len(markers)]) == "refused"] = np.nan
             feet, whole = self._feet.look(tracker.core_model, tracker.state, sample.time_s, wrenches, markers)
             if self._plate_motion is not None and wrenches is not None:
-                self._ask_plates(self._plate_motion, sample.time_s, markers, wrenches)
+                self._ask_plates(self._plate_motion, sample.time_s, markers, wrenches, whole)
         if not (whole and self._use_plates):
             sample = Sample(sample.time_s, sample.markers)
         try:
@@ -381,11 +386,11 @@ class Live:
         for text in [*news, *motion, *monitor.settling(sample.time_s, state, tracker)]:
             self.say(text)
 
-    def _ask_plates(self, asked: LivePlateMotion, time_s: float, markers: Array, wrenches: Array) -> None:
+    def _ask_plates(self, asked: LivePlateMotion, time_s: float, markers: Array, wrenches: Array, whole: bool) -> None:
         """Plates out of step are brought into it; of plates with other axes nothing is taken any more; that they carry
         another mass is said."""
         assert self._feet is not None and self._monitor is not None
-        if not asked.look(time_s, markers, wrenches, self._feet.claimed):
+        if not asked.look(time_s, markers, wrenches, self._feet.claimed, whole):
             return
         if asked.turned is not None:
             self.say(f"Warning: {asked.turned}. The plates are not used any more.")

@@ -326,6 +326,7 @@ def test_an_export_is_measured_with_the_height_and_sex_of_the_run(
     (tmp_path / "config.toml").write_text('mass_kg = 70.0\nheight_m = 1.75\nsex = "female"\n')
     found = settings_of_run(given, parameters)
     assert (found.mass_kg, found.height_m, found.sex) == (70.0, 1.75, "female")
+    assert settings_of_run(given.changed(height_m=1.754), parameters).height_m == 1.754  # as a run prints it
     for wrong, reason in (({"height_m": 1.6}, "--height is 1.6"), ({"sex": "male"}, "--sex is male")):
         with pytest.raises(ConfigError, match=reason):
             settings_of_run(given.changed(**wrong), parameters)

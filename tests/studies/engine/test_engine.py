@@ -98,7 +98,7 @@ def test_rows_of_something_else_are_not_taken(tmp_path: Path):
         ({"trials": {"A/walk": {"mass_kg": 71.0, "lag_s": float("inf")}}, "presets": ["default"]},
          "trials, A/walk, mass_kg: 70.0, now 71.0"),
         ({"trials": {"A/walk": {"mass_kg": 70.0}}, "presets": ["default"]},
-         "trials, A/walk, lag_s: Infinity, now none"),
+         "trials, A/walk, lag_s: Infinity, now not set"),
         ({"trials": {"A/walk": {"mass_kg": 70.0, "lag_s": float("inf")}}, "presets": ["paper"]},
          "presets, 1: default, now paper"),
         ({"trials": {"A/walk": {"mass_kg": 70.0, "lag_s": float("inf")}}, "presets": []},
@@ -122,3 +122,9 @@ def test_what_changed_is_named(now: dict, said: str):
 def test_options_that_do_not_go_together_are_refused(options: dict, expected: str):
     with pytest.raises(ConfigError, match=expected):
         open_pool(**options)
+
+
+def test_a_difference_is_named_whatever_the_values_are() -> None:
+    assert difference({"constraint": "none"}, {}) == "constraint: none, now not set"
+    assert difference({"trials": {"a": [1, 2]}}, {"trials": {"a": [1, 3]}}) == "trials, a, 2: 2, now 3"
+    assert difference({"a": 1}, {"a": 1, "b": "none"}) == "b: not set, now none"

@@ -18,6 +18,9 @@ from dynakin.settings.settings import Settings, option_names
 from dynakin.settings.strict import read_toml
 from dynakin.settings.subject import Subject
 
+_HEIGHT_M = 0.006
+"""A height that a run measured is shown in centimetres."""
+
 
 def settings_of_run(settings: Settings, parameters: Path) -> Settings:
     """The settings with mass, height and sex of the run's ``config.toml`` next to its parameters, where there is one.
@@ -32,8 +35,10 @@ def settings_of_run(settings: Settings, parameters: Path) -> Settings:
     run = Subject(**{key: content.get(key) for key in ("mass_kg", "height_m", "sex")})
     for key in ("height_m", "sex"):
         here, there = getattr(settings, key), getattr(run, key)
-        if here is not None and here != there:
-            had = f"had {there}" if there is not None else "had none given"
+        same = here == there or (key == "height_m" and None not in (here, there) and abs(here - there) < _HEIGHT_M)
+        if here is not None and not same:
+            words = f"{there:.3f}" if isinstance(there, float) else there
+            had = f"had {words}" if there is not None else "had none given"
             raise ConfigError(
                 f"{option_names(key)[0]} is {here}, but the run of {parameters} {had} ({path}); expected the same, or "
                 "nothing"

@@ -126,7 +126,7 @@ def belongs_to(dataset: Dataset, options: Options, *, identify: bool = False) ->
     return {
         "what": "batch",
         "version of dynakin": versions()["dynakin"],
-        "presets": list(options.presets),
+        "presets": {name: _stamp(Path(name)) for name in options.presets},
         "--cutoff-hz": options.cutoff_hz,
         "results of single trials": options.files,
         "--identify": identify,
@@ -134,15 +134,24 @@ def belongs_to(dataset: Dataset, options: Options, *, identify: bool = False) ->
     }
 
 
+FILES = ("trial", "forces", "static", "parameters", "model", "markers", "table", "preset")
+"""Keys that name files, or may."""
+
+
 def _stamps(content: Mapping[str, Any]) -> dict[str, str]:
     """Size and time of each file, by its name: a file that was changed has others."""
-    found = {}
-    for key in ("trial", "forces", "static", "parameters"):
-        file = Path(str(content.get(key, "")))
-        if file.is_file():
-            changed = file.stat()
-            found[str(file)] = f"{changed.st_size} bytes of {changed.st_mtime_ns / 1e9:.6f}"
-    return found
+    named = [content.get(key, "") for key in FILES]
+    functional = content.get("functional")
+    named += functional.values() if isinstance(functional, Mapping) else []
+    return {str(name): stamp for name in named if (stamp := _stamp(Path(str(name))))}
+
+
+def _stamp(file: Path) -> str:
+    """Size and time of a file; "" of what is none, as a preset's name."""
+    if not file.is_file():
+        return ""
+    changed = file.stat()
+    return f"{changed.st_size} bytes of {changed.st_mtime_ns / 1e9:.6f}"
 
 
 def run_batch(

@@ -88,13 +88,17 @@ def difference(before: Any, now: Any, where: str = "") -> str:
         pairs = [(str(k + 1), *both) for k, both in enumerate(zip(before, now, strict=True))]
     else:
         return f"{where or 'what it is of'}: {_shown(before)}, now {_shown(now)}"
-    return next(found for key, a, b in pairs if (found := difference(a, b, f"{where}, {key}" if where else key)))
+    found = (difference(a, b, f"{where}, {key}" if where else key) for key, a, b in pairs)
+    return next(text for text in found if text)
 
 
-_MISSING = "none"
+_MISSING = ["missing"]
+"""What no setting is."""
 
 
 def _shown(value: Any) -> str:
+    if value is _MISSING:
+        return "not set"
     text = value if isinstance(value, str) else json.dumps(value)
     return text if len(text) <= _SHOWN else f"{text[: _SHOWN - 3]}..."
 
