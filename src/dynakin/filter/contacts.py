@@ -174,7 +174,10 @@ def carry(point: Array) -> Array:
     """(..., 6, 6) that takes a wrench about a point (..., 3) m to the ground's origin: n += point x f."""
     found = np.zeros((*point.shape[:-1], 6, 6))
     found[..., :, :] = np.eye(6)
-    found[..., 3:, :3] = np.cross(point[..., None, :], np.eye(3)).swapaxes(-1, -2)
+    x, y, z = np.moveaxis(point, -1, 0)
+    found[..., 3, 1], found[..., 3, 2] = -z, y
+    found[..., 4, 0], found[..., 4, 2] = z, -x
+    found[..., 5, 0], found[..., 5, 1] = -y, x
     return found
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -92,17 +92,28 @@ def sample_arrays(sample: Sample, initial: CalibratedModel) -> tuple[Array, Arra
     if not np.isfinite(_numbers(sample.time_s, (), "sample: time", np.inf)):
         raise RecordingError(f"sample: time is {sample.time_s} s, expected a number")
     where = f"sample at {sample.time_s} s"
-    missing = np.full(3, np.nan)
-    measured = [
-        _numbers(sample.markers.get(name, missing), (3,), f"{where}: marker {name!r}", FARTHEST_M)
-        for name in initial.recorded_markers
-    ]
-    markers = initial.ground.points_to_ground(np.stack(measured))
+    markers = initial.ground.points_to_ground(_positions(sample, initial.recorded_markers, where))
     if not sample.plates:
         return np.ascontiguousarray(markers), np.full(6, np.nan)
     plates = [_numbers(plate, (6,), f"{where}: {name}", LARGEST_MOMENT_NM) for name, plate in sample.plates.items()]
     total = np.sum(plates, axis=0)
     return np.ascontiguousarray(markers), initial.ground.wrench_to_ground(total)
+
+
+def _positions(sample: Sample, names: Sequence[str], where: str) -> Array:
+    """(M, 3) m, laboratory frame: all at once, and one by one only to name what is wrong."""
+    given = [sample.markers.get(name, _MISSING) for name in names]
+    try:
+        found = np.array(given, dtype=float)
+    except (TypeError, ValueError):
+        found = np.zeros(0)
+    if found.shape == (len(names), 3) and not (np.abs(found) > FARTHEST_M).any():
+        return found
+    whats = [f"{where}: marker {name!r}" for name in names]
+    return np.stack([_numbers(each, (3,), what, FARTHEST_M) for each, what in zip(given, whats, strict=True)])
+
+
+_MISSING = np.full(3, np.nan)
 
 
 def _numbers(given: npt.ArrayLike, shape: tuple[int, ...], what: str, most: float) -> Array:

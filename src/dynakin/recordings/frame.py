@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import cross
 from dynakin.errors import ConfigError
 from dynakin.recordings.landmarks import DEFAULT_PAIRS, FacingPairs
 from dynakin.recordings.orientation import axis_vector, find_forward, find_vertical, horizontal, refuse_mirrored
@@ -92,13 +93,13 @@ class GroundFrame:
         """Wrenches (..., 6) [N, N m] about the laboratory origin, there, to those about the ground's origin,
         in ground."""
         force, moment = wrench[..., :3], wrench[..., 3:]
-        moved = moment - np.cross(self.origin_L, force)
+        moved = moment - cross(self.origin_L, force)
         return np.concatenate([self.vectors_to_ground(force), self.vectors_to_ground(moved)], axis=-1)
 
     def wrench_to_laboratory(self, wrench: Array) -> Array:
         """The way back of ``wrench_to_ground``."""
         force = self.vectors_to_laboratory(wrench[..., :3])
-        moment = self.vectors_to_laboratory(wrench[..., 3:]) + np.cross(self.origin_L, force)
+        moment = self.vectors_to_laboratory(wrench[..., 3:]) + cross(self.origin_L, force)
         return np.concatenate([force, moment], axis=-1)
 
 

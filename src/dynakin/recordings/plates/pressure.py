@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from dynakin.arrays import cross
 from dynakin.recordings.recording import Array, Plate
 
 UNLOADED_N = 10.0
@@ -36,13 +37,13 @@ def centre_of_pressure(force: Array, moment: Array, surface: Surface, threshold_
     r = (n x M_c) / (n . F). NaN (and no free moment) where the push |n . F| stays below ``threshold_n``.
     """
     n, c = surface.normal, surface.point
-    moment_c = moment - np.cross(c, force)
+    moment_c = moment - cross(c, force)
     push = force @ n  # (T,)
     loaded = np.abs(push) >= max(threshold_n, 1e-9)
     r = np.full_like(force, np.nan)
-    r[loaded] = np.cross(n, moment_c[loaded]) / push[loaded, None]
+    r[loaded] = cross(n, moment_c[loaded]) / push[loaded, None]
     free = np.zeros_like(force)
-    free[loaded] = np.outer((moment_c[loaded] - np.cross(r[loaded], force[loaded])) @ n, n)
+    free[loaded] = np.outer((moment_c[loaded] - cross(r[loaded], force[loaded])) @ n, n)
     return c + r, free
 
 
