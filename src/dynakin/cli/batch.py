@@ -40,6 +40,7 @@ def batch(
     with stage("loading"):
         from dynakin.report.text_tables import table2_text
         from dynakin.results.naming import plural
+        from dynakin.results.records import WARNING, warnings_of
         from dynakin.studies.batch.dataset import check_presets, read_dataset
         from dynakin.studies.batch.process import Options, belongs_to, run_batch, write_batch
         from dynakin.studies.batch.subjects import identify_subjects, with_parameters
@@ -79,9 +80,8 @@ def batch(
         for preset_name, verdict in row["verdict"].items():
             which = f", EKF ({preset_name})" if len(row["verdict"]) > 1 else ""
             console.print(f"Verdict {name}{which}: {verdict}", soft_wrap=True)
-        for note in row["notes"]:
-            if note.startswith("Warning:"):
-                console.print(f"Warned  {name}: {note.removeprefix('Warning: ')}", soft_wrap=True)
+        for note in warnings_of(row["notes"]):
+            console.print(f"Warned  {name}: {note.removeprefix(WARNING)}", soft_wrap=True)
     for name, failure in result.failures.items():
         console.print(f"Failed  {name}: {failure.message}", soft_wrap=True)
     lost = [(name, *entry) for name, row in result.rows.items() for entry in row["lost"].items()]

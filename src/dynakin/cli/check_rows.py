@@ -14,6 +14,7 @@ from dynakin.pipeline.stages import prepare_case
 from dynakin.recordings.companions import companion_forces, companion_static
 from dynakin.recordings.recording import Recording
 from dynakin.results.naming import sentence, words
+from dynakin.results.records import WARNING, warnings_of
 from dynakin.settings.settings import Settings
 from dynakin.validation.case import Case
 
@@ -110,9 +111,9 @@ def model_rows(ready: Prepared, settings: Settings, refusal: DynakinError | None
         return rows
     figures = ready.moment_figures()
     rows += [("Results", text) for text in (figures["verdict"], *figures["reasons"])]
-    known = {*figures["reasons"], *used, *(sentence(text.removeprefix("Warning: ")) for text in sentences)}
-    warnings = [text for text in ready.messages if text.startswith("Warning: ")]
-    return rows + [("Doubts", text) for text in warnings if sentence(text.removeprefix("Warning: ")) not in known]
+    known = {*figures["reasons"], *used, *(sentence(text.removeprefix(WARNING)) for text in sentences)}
+    warnings = warnings_of(ready.messages)
+    return rows + [("Doubts", text) for text in warnings if sentence(text.removeprefix(WARNING)) not in known]
 
 
 def _held(ready: Prepared) -> list[str]:

@@ -93,13 +93,14 @@ def _still(recording: Recording) -> float:
 
 def another_person(trial: Recording, other: Recording) -> str:
     """What shows that a recording is of somebody else, or of markers put on anew; "" where nothing does."""
-    apart, common = _apart_m(trial, other), _common(trial, other)
+    common = _common(trial, other)
     fewer = min(len(trial.marker_names), len(other.marker_names))
     if len(common) < _COMMON * fewer:
         return (
             f"only {len(common)} markers are in both {trial.name} ({len(trial.marker_names)}) and {other.name} "
             f"({len(other.marker_names)}): they share no marker set, and nothing shows that it is the same person"
         )
+    apart = _apart_m(trial, other)
     if apart is None or apart < _SAME_M:
         return ""
     return (

@@ -57,9 +57,8 @@ def check_noise(settings: Settings, floating: bool) -> None:
     Raises:
         ConfigError: as `check_effect`.
     """
-    noise = settings.noise_settings()
     if settings.versions:
         return
-    usual = presets.preset(settings.preset)
+    noise, usual = settings.noise_settings(), presets.preset(settings.preset)
     by_hand = [n for n in settings.noise if getattr(noise, n) not in (None, getattr(usual, n))]
     check_effect(by_hand, noise, [floating])

@@ -73,7 +73,6 @@ class Fusion:
         self._last_s: float | None = None
         self.plates_behind_s = 0.0
         """By how much the plates lag behind the markers: what they say so much later is of a frame."""
-        self.without_plates = 0  # frames that went without the wrench though plates were declared
 
     @property
     def marker_counts(self) -> Counts:
@@ -222,7 +221,6 @@ class Fusion:
                     if self.plates.rate_hz > 1.01 * self.markers.rate_hz
                     else wrenches
                 )
-            self.without_plates += wrenches is None
         self._last_s = time_s
         markers = dict(zip(self.markers.names, positions, strict=True))
         plates = {} if wrenches is None or self.plates is None else dict(zip(self.plates.names, wrenches, strict=True))

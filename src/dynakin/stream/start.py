@@ -25,6 +25,7 @@ from dynakin.recordings.plates.pressure import JUDGED_N, UNLOADED_N, Surface, pl
 from dynakin.recordings.recording import Plate, Recording
 from dynakin.recordings.standing import standing_window
 from dynakin.results.naming import listed
+from dynakin.results.records import warnings_of
 from dynakin.stream.fusion import Fused
 
 _NOW_S = 0.1  # the present posture, from a few frames
@@ -163,7 +164,7 @@ def begin(
     rate_hz = rate_hz or standing.rate
     tracker = estimator.start(standing, static=static, lag_s=lag_s, rate_hz=rate_hz)
     initial = tracker.calibrated
-    said = [message for message in initial.messages if message.startswith("Warning")]
+    said = warnings_of(initial.messages)
     if known:
         tracker = estimator.start(_continued(initial, known), lag_s=lag_s, rate_hz=rate_hz)
         said.append(f"Lengths, marker places and masses go on from {len(known)} saved values.")

@@ -82,16 +82,14 @@ def turned_feet(plates: Sequence[Plate], ground: GroundFrame, rate_hz: float) ->
     if off.min() < AWAY_DEG or min(sizes) < LEAST_PART:
         return None
 
-    def left_deg(turn: Array) -> float:
-        return abs(float(np.angle(along(turn).sum(), deg=True)))
-
-    how, turn = min(TURNS, key=lambda named: left_deg(named[1]))
-    if left_deg(turn) > ALONG_DEG:
+    left_deg = [abs(float(np.angle(along(turn).sum(), deg=True))) for _, turn in TURNS]
+    best = int(np.argmin(left_deg))
+    if left_deg[best] > ALONG_DEG:
         return None
     exchanged = ", or if the two were exchanged" if len(judged) == 2 and off.min() > 180.0 - AWAY_DEG else ""
     names = " and ".join(plates[k].name for k in judged)
     return (
         f"the horizontal force of {names} pushes the feet apart or across: it lies "
         f"{off.min():.0f} to {off.max():.0f} deg off the direction from each foot to the other, seen from above, and "
-        f"{left_deg(turn):.0f} deg if {axes[judged[0]].in_words(how)}{exchanged}"
+        f"{left_deg[best]:.0f} deg if {axes[judged[0]].in_words(TURNS[best][0])}{exchanged}"
     )

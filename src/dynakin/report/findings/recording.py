@@ -10,7 +10,7 @@ from dynakin.report.labels import short_marker_names
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures.soft_tissue import marker_sites
 from dynakin.results.naming import listed, sentence, words
-from dynakin.results.records import MISPLACED, REFUSED, doubts_mass
+from dynakin.results.records import MISPLACED, REFUSED, WARNING, doubts_mass, warnings_of
 
 # Words of warnings that a finding of their own says, or that are no doubt of the estimate.
 _SAID_ELSEWHERE = (
@@ -70,7 +70,7 @@ def unmarked(estimate: Estimate, metrics: Metrics) -> Insight | None:
 
 def warned(estimate: Estimate, metrics: Metrics) -> list[Insight]:
     """What the reading, the calibration and the plates warned of, and no other finding says."""
-    warnings = [text.removeprefix("Warning: ") for text in estimate.messages if text.startswith("Warning: ")]
+    warnings = [text.removeprefix(WARNING) for text in warnings_of(estimate.messages)]
     warnings = [text for text in dict.fromkeys(warnings) if not (doubts_mass(text) or _said_elsewhere(text))]
     found = []
     for title, advice, belongs in (

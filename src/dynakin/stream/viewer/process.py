@@ -15,6 +15,7 @@ import viser
 from viser import uplot
 
 from dynakin.results.measures.sources import MEANINGS, MEASURED
+from dynakin.results.records import NO_ESTIMATE
 from dynakin.stream.sinks.picture import as_text, in_words, split
 from dynakin.stream.viewer.latest import Latest
 from dynakin.stream.viewer.own_origin import OwnOrigin
@@ -112,7 +113,7 @@ class Page:
         """Shows a sentence."""
         self.said.append(as_text(text))
         lines = [*list(self.said)[:-1], f"**{self.said[-1]}**"]
-        motion = f", motion {tracking}" if tracking in ("doubtful", "lost", "restarted") else ""
+        motion = f", motion {tracking}" if tracking in NO_ESTIMATE else ""
         self.words.content = f"### dynakin live: {as_text(phase + motion)}\n" + "  \n".join(lines)
 
     def draw(self) -> None:
