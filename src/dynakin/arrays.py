@@ -1,5 +1,5 @@
 """What all share of arrays: runs of true values, peaks, angles within a turn, vectors' products; no infinities, which
-no file may have."""
+no file may have; no gaps."""
 
 from __future__ import annotations
 
@@ -55,6 +55,11 @@ def cross(a: npt.NDArray[np.float64], b: npt.NDArray[np.float64]) -> npt.NDArray
     hundred vectors of a movement."""
     turned = a * b.take(_NEXT, -1) - a.take(_NEXT, -1) * b
     return np.asarray(turned.take(_NEXT, -1))
+
+
+def filled(values: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """The same numbers with 0 where one is missing (NaN): `np.nan_to_num` takes ten times as long for a frame."""
+    return np.where(np.isnan(values), 0.0, values)
 
 
 def finite(values: npt.ArrayLike) -> npt.NDArray[np.float64]:

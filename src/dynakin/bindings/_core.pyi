@@ -439,9 +439,9 @@ class ContactLoads:
         segments: a name a contact. wrench (T, C, 6) N and N m, on the person, about the ground origin; covariance (T, 6 C, 6 C), that of the sum positive definite; contact (T, C) uint8: 0 nothing touches, 1 on a plate, 2 not measured, 3 on a plate with another contact; effects (T, 6, 6 K): what the six states of each of the first K contacts add to its wrench, where the model has them. Raises ValueError for other shapes or codes.
         """
 
-def contact_moments(model: Model, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)], loads: ContactLoads, frame: int = 0, covariance: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='F')] | None = None) -> dict:
+def contact_moments(model: Model, x: Annotated[NDArray[numpy.float64], dict(shape=(None,), writable=False)], loads: ContactLoads, frame: int = 0, covariance: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='F')] | None = None, jacobian: bool = False) -> dict:
     """
-    Joint moments with the contacts' wrenches of one frame, changed as little as their covariance allows to give the wrench that x needs. A dict: moments (J,), N m or N; jacobian, d moments / dx (J, n); foot_wrench (C, 6) as used; foot_adjustment (C, 6), its change; remainder (6,) that no contact gives; moment_source (J,): 0 measured, 1 derived from the motion, 2 divided by a prior; with the covariance (n, n) of x also moments_sd, foot_wrench_sd.
+    Joint moments with the contacts' wrenches of one frame, changed as little as their covariance allows to give the wrench that x needs. A dict: moments (J,), N m or N; where asked jacobian, d moments / dx (J, n); foot_wrench (C, 6) as used; foot_adjustment (C, 6), its change; remainder (6,) that no contact gives; moment_source (J,): 0 measured, 1 derived from the motion, 2 divided by a prior; with the covariance (n, n) of x also moments_sd, foot_wrench_sd.
     """
 
 def whole_body(model: Model, states: Annotated[NDArray[numpy.float64], dict(shape=(None, None), order='C', device='cpu', writable=False)], segments: Sequence[str] = [], foot_wrench: Annotated[NDArray[numpy.float64], dict(shape=(None, None, None), order='C', device='cpu', writable=False)] | None = None) -> dict:

@@ -74,7 +74,7 @@ void check_frame(const PyContactLoads& loads, std::size_t frame) {
 }
 
 nb::dict contact_moments(const Model& model, const StateRef& x, const PyContactLoads& loads, std::size_t frame,
-                         const std::optional<Eigen::MatrixXd>& P) {
+                         const std::optional<Eigen::MatrixXd>& P, bool jacobian) {
   const AtFrames at(model, x);
   check_frame(loads, frame);
   if (P && (P->rows() != x.size() || P->cols() != x.size()))
@@ -93,11 +93,13 @@ nb::dict contact_moments(const Model& model, const StateRef& x, const PyContactL
   ContactRecord record(model, one);
   std::vector<double> moments(nc), moments_sd(P ? nc : 0);
   record.report(0, x, at.kinematics, at.dynamics, P ? &*P : nullptr, moments.data(), moments_sd.data());
-  Eigen::MatrixXd J(nc, model.state_size());
-  record.moments.jacobian(x, at.kinematics, at.dynamics, J);
   nb::dict out;
   out["moments"] = owned(std::move(moments), {nc});
-  out["jacobian"] = RowMatrix(J);
+  if (jacobian) {
+    Eigen::MatrixXd J(nc, model.state_size());
+    record.moments.jacobian(x, at.kinematics, at.dynamics, J);
+    out["jacobian"] = RowMatrix(J);
+  }
   out["foot_wrench"] = owned(std::move(record.wrench), {feet, 6});
   out["foot_adjustment"] = owned(std::move(record.adjustment), {feet, 6});
   out["remainder"] = owned(std::move(record.remainder), {6});
@@ -188,9 +190,10 @@ void bind_contacts(nb::module_& m) {
           "first K "
           "contacts add to its wrench, where the model has them. Raises ValueError for other shapes or codes.");
   m.def("contact_moments", &contact_moments, nb::arg("model"), nb::arg("x"), nb::arg("loads"), nb::arg("frame") = 0,
-        nb::arg("covariance") = nb::none(),
+        nb::arg("covariance") = nb::none(), nb::arg("jacobian") = false,
         "Joint moments with the contacts' wrenches of one frame, changed as little as their covariance allows to give "
-        "the wrench that x needs. A dict: moments (J,), N m or N; jacobian, d moments / dx (J, n); foot_wrench (C, 6) "
+        "the wrench that x needs. A dict: moments (J,), N m or N; where asked jacobian, d moments / dx (J, n); "
+        "foot_wrench (C, 6) "
         "as used; foot_adjustment (C, 6), its change; remainder (6,) that no contact gives; moment_source (J,): 0 "
         "measured, 1 derived from the motion, 2 divided by a prior; with the covariance (n, n) of x also moments_sd, "
         "foot_wrench_sd.");

@@ -15,6 +15,7 @@ import numpy as np
 import numpy.typing as npt
 import scipy.linalg
 
+from dynakin.arrays import filled
 from dynakin.filter.contacts import RESIDUAL, ContactLoads, carry
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.feet import loads as on_plates
@@ -64,13 +65,9 @@ UNMARKED_M_S2, UNMARKED_M2_S2 = 0.5, 0.5
 _WHITE_N, _WHITE_NM = 5.0, 2.0  # of a wrench that is a state
 _LEAST_HEIGHT_M = 0.3  # of the pelvis over the sole, for the direction
 
-_CONTACT = {
-    on_plates.SWING: NO_CONTACT,
-    on_plates.MEASURED: ON_PLATE,
-    on_plates.SHARED: SHARED_PLATE,
-    on_plates.OFF_PLATE: UNMEASURED,
-    on_plates.UNKNOWN: UNMEASURED,
-}
+_CONTACT = np.zeros(len(on_plates.REASONS), dtype=np.uint8)  # of a foot, by the number of its reason
+_CONTACT[[on_plates.SWING, on_plates.MEASURED, on_plates.SHARED]] = NO_CONTACT, ON_PLATE, SHARED_PLATE
+_CONTACT[[on_plates.OFF_PLATE, on_plates.UNKNOWN]] = UNMEASURED
 
 
 class Prior(NamedTuple):
@@ -93,24 +90,25 @@ def expected_loads(
         bears: (T, C) frames in which a declared contact may bear; where plates measure it, these say.
     """
     weight, root, C = initial.weighed_kg * GRAVITY_M_S2, paths[:, 0], len(initial.contacts)
-    feet = np.vectorize(_CONTACT.get, otypes=[np.uint8])(loads.reason)
+    feet = _CONTACT[loads.reason]
     frames, F = feet.shape
     K = F + C
     contact = np.concatenate([feet, np.where(bears, UNMEASURED, NO_CONTACT).astype(np.uint8)], axis=1)
     wrench = np.zeros((frames, K + 1, 6))
-    wrench[:, :F] = np.where((feet == ON_PLATE)[..., None], loads.wrench, np.nan_to_num(loads.wrench))
+    wrench[:, :F] = np.where((feet == ON_PLATE)[..., None], loads.wrench, filled(loads.wrench))
     for k, name in enumerate(initial.contacts, start=F):
         if (measured := loads.others.get(name)) is not None:
             contact[:, k] = np.where(measured.any(axis=1), ON_PLATE, NO_CONTACT)
             contact[np.isnan(measured).any(axis=1), k] = UNMEASURED
-            wrench[:, k] = np.nan_to_num(measured)
+            wrench[:, k] = filled(measured)
     wrench[:, :K][contact == NO_CONTACT] = 0.0
     errors, effects = np.zeros((frames, K + 1, 6, K + 1, 6)), np.zeros((frames, 6, K, 6))
     unmeasured = contact == UNMEASURED
     alone = unmeasured.sum(axis=1) == 1
     priors: dict[int, Prior] = {}
+    each = np.arange(K)
+    errors[:, each, :, each] = plate_errors(wrench[:, :K].reshape(-1, 6)).reshape(frames, K, 6, 6).swapaxes(0, 1)
     for k in range(K):
-        errors[:, k, :, k] = plate_errors(wrench[:, k])
         off = unmeasured[:, k]
         if not (off | (contact[:, k] == SHARED_PLATE)).any():
             continue  # nobody asks for its prior

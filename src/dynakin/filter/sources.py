@@ -118,9 +118,9 @@ class ContactSources:
 
 def _contacts(feet: ContactLoads, undeclared: Flags, unmarked: Collection[str]) -> Codes:
     """(T, C) codes of the contacts; absent of a foot that no marker shows."""
-    return np.where(np.isin(feet.segments, list(unmarked)), ABSENT, contact_sources(feet.contact, undeclared)).astype(
-        np.uint8
-    )
+    codes = contact_sources(feet.contact, undeclared)
+    codes[:, [segment in unmarked for segment in feet.segments]] = ABSENT
+    return codes
 
 
 def moved_segments(spec: _core.ModelSpec) -> list[str]:

@@ -8,6 +8,8 @@ import numpy as np
 
 from dynakin.recordings.recording import Array
 
+_FRAMES = 4096  # at once: all pairs of corners of an hour take much memory
+
 
 def distance_to_hull(points: Array, outline: Array) -> Array:
     """Distance (T,) m of points (T, 2) from the convex hull of the corners (T, K, 2), 0 inside, NaN corners
@@ -16,25 +18,30 @@ def distance_to_hull(points: Array, outline: Array) -> Array:
     A point outside is as far from the hull as from the nearest of all lines between two corners; it is inside
     if it lies in some triangle of corners. NaN where the point or all corners are missing.
     """
-    n_corners = outline.shape[1]
-    distance = np.full(len(points), np.inf)
-    for i in range(n_corners):  # alone: where the only other corners are missing
-        distance = np.fmin(distance, np.linalg.norm(points - outline[:, i], axis=1))
-    for i, j in combinations(range(n_corners), 2):
-        distance = np.fmin(distance, _to_segment(points, outline[:, i], outline[:, j]))
-    for i, j, k in combinations(range(n_corners), 3):
-        sides = np.stack([_side(points, outline[:, a], outline[:, b]) for a, b in ((i, j), (j, k), (k, i))], axis=1)
-        distance[(sides > 0).all(axis=1) | (sides < 0).all(axis=1)] = 0.0
+    blocks = [slice(first, first + _FRAMES) for first in range(0, max(len(points), 1), _FRAMES)]
+    return np.concatenate([_distance(points[block], outline[block]) for block in blocks])
+
+
+def _distance(points: Array, outline: Array) -> Array:
+    numbers = range(outline.shape[1])
+    pairs, triangles = list(combinations(numbers, 2)), list(combinations(numbers, 3))
+    to_point = points[:, None] - outline  # (T, K, 2)
+    distance = np.fmin.reduce(_length(to_point), axis=1, initial=np.inf)  # alone: the only other corners are missing
+    if pairs:
+        first, second = np.array(pairs).T
+        along, to_point = outline[:, second] - outline[:, first], to_point[:, first]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            share = np.clip((to_point * along).sum(axis=2) / (along**2).sum(axis=2), 0.0, 1.0)
+            distance = np.fmin(distance, np.fmin.reduce(_length(to_point - share[..., None] * along), axis=1))
+    if triangles:
+        side = along[..., 0] * to_point[..., 1] - along[..., 1] * to_point[..., 0]  # of each pair
+        pair = {own: k for k, own in enumerate(pairs)}
+        ij, jk, ik = np.array([(pair[i, j], pair[j, k], pair[i, k]) for i, j, k in triangles]).T
+        around = side[:, ij], side[:, jk], -side[:, ik]
+        within = np.logical_and.reduce([one > 0 for one in around]) | np.logical_and.reduce([one < 0 for one in around])
+        distance[within.any(axis=1)] = 0.0
     return np.where(np.isfinite(distance) & np.isfinite(points).all(axis=1), distance, np.nan)
 
 
-def _to_segment(points: Array, a: Array, b: Array) -> Array:
-    along = b - a
-    with np.errstate(invalid="ignore", divide="ignore"):
-        share = np.clip(((points - a) * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
-        return np.asarray(np.linalg.norm(points - a - share[:, None] * along, axis=1))
-
-
-def _side(points: Array, a: Array, b: Array) -> Array:
-    along, to_point = b - a, points - a
-    return np.asarray(along[:, 0] * to_point[:, 1] - along[:, 1] * to_point[:, 0])
+def _length(vectors: Array) -> Array:
+    return np.asarray(np.sqrt(vectors[..., 0] ** 2 + vectors[..., 1] ** 2))

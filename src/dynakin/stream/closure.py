@@ -21,6 +21,7 @@ DELAY_S = 0.5 * WINDOW_S
 KEPT_S = 0.5
 """How long something undeclared is remembered while nobody can judge: a person who leaves a chair walks off."""
 _LEAST_FRAMES = 6
+_EVERY_S = 0.018  # between questions: 50 a second, where frames come more often
 
 
 class LiveClosure:
@@ -55,9 +56,10 @@ class LiveClosure:
         self._kept.append((time_s, self._weights @ markers, force))
         while self._kept[0][0] < time_s - WINDOW_S - 1e-9:
             self._kept.popleft()
-        time = np.array([at for at, _, _ in self._kept])
-        if len(time) < _LEAST_FRAMES or time[-1] - time[0] < 0.9 * WINDOW_S:
+        short = len(self._kept) < _LEAST_FRAMES or time_s - self._kept[0][0] < 0.9 * WINDOW_S
+        if short or 0.0 <= time_s - self._judged_s < _EVERY_S:
             return self.bears
+        time = np.array([at for at, _, _ in self._kept])
         excess = np.where(self._axes, self._excess(time), 0.0)
         size = float(np.abs(excess).max()) / (self._mass * GRAVITY_M_S2)
         self.bears, self._judged_s = size > (EDGE if self.bears else EXCESS), time_s

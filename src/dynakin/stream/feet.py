@@ -284,7 +284,7 @@ class LiveFeet:
         cops = np.concatenate([plate.cop for plate in plates])
         F, P = len(self.feet), len(plates)
         away = distance_to_hull(np.tile(cops, (F, 1)), np.repeat(outlines, P, axis=0)).reshape(F, P)
-        away = np.nan_to_num(away, nan=np.inf)  # of a plate that is not loaded
+        away = np.where(np.isnan(away), np.inf, away)  # of a plate that is not loaded
         near = away < NEAR_M
         self._under = near.copy()
         apart = np.isfinite(away).any(axis=0) & (away.min(axis=0) > BETWEEN_M)

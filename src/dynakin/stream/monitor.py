@@ -37,10 +37,12 @@ class Monitor:
         self.initial, self.rate_hz = initial, rate_hz
         self.last = Status(phase="running")
         self._plates, self.used, self._holds = plates, used, holds
-        self._recent: deque[tuple[float, float]] = deque()
+        self._recent: deque[float] = deque()  # times of the last second's estimates
+        self._late: deque[float] = deque()  # and by how much they were late, s
         kinds = [element(name).kind for name in initial.names]
         self._constants = np.flatnonzero([kind in ("length", "inertia") for kind in kinds])
         self._bounded = np.flatnonzero(np.isfinite(initial.lower) & [k in ("length", "inertia") for k in kinds])
+        self._lower, self._upper = initial.lower[self._bounded], initial.upper[self._bounded]
         self._since: tuple[float, Array] | None = None
         self._begun: float | None = None
         self._silent = {"markers": False, "plates": False}
@@ -75,20 +77,20 @@ class Monitor:
             others = "left out" if whole else "incomplete"
             plates = {"accepted": "used" if whole else "incomplete", "refused": "refused"}.get(verdicts[-1], others)
             on_plates = "silent" if fused.wrenches is None else plates if self.used else "left out"
-        at = [k for k in self._bounded if not self.initial.lower[k] < state[k] < self.initial.upper[k]]
-        recent = self._recent
+        bounded, recent = self._bounded, self._recent
+        within = (self._lower < state[bounded]) & (state[bounded] < self._upper)
         rows = 0 if report is None else report.n_rows
-        span = recent[-1][0] - recent[0][0] if len(recent) > 1 else np.nan
+        span = recent[-1] - recent[0] if len(recent) > 1 else np.nan
         markers, blocks = fusion.marker_counts, fusion.plate_counts
         self.last = Status(
             phase="running",
             rate_hz=(len(recent) - 1) / span if span > 0.0 else float("nan"),
-            latency_ms=1e3 * max((late for _, late in recent), default=float("nan")),
+            latency_ms=1e3 * max(self._late, default=float("nan")),
             nis=report.nis / rows if report is not None and rows else float("nan"),
             refused=tuple(name for name, word in zip(names, verdicts, strict=False) if word == "refused"),
             missing=tuple(name for name, word in zip(names, verdicts, strict=False) if word == "missing"),
             plates=on_plates,
-            at_bound=tuple(self.initial.names[k] for k in at),
+            at_bound=tuple(self.initial.names[k] for k in bounded[~within]),
             tracking="" if report is None else report.tracking,
             left_out=self.left_out,
             late=markers.late + blocks.late,
@@ -128,9 +130,11 @@ class Monitor:
     def published(self, time_s: float, latency_s: float) -> None:
         """An estimate went out, so long after its sample had arrived."""
         self.stepped_s = time_s
-        self._recent.append((time_s, latency_s))
-        while time_s - self._recent[0][0] > _SOON_S:
+        self._recent.append(time_s)
+        self._late.append(latency_s)
+        while time_s - self._recent[0] > _SOON_S:
             self._recent.popleft()
+            self._late.popleft()
 
     def settling(self, time_s: float, state: Array, tracker: Tracker) -> list[str]:
         """A sentence once lengths and masses have come to rest."""

@@ -12,7 +12,7 @@ import numpy.typing as npt
 from dynakin.errors import DivergenceError, DynakinError, ModelError, StreamError
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.plate_motion import out_of_step_in_words
-from dynakin.filter.samples import Sample, sample_arrays
+from dynakin.filter.samples import Sample
 from dynakin.filter.tracker import Tracker, live_lag
 from dynakin.recordings.recording import Recording
 from dynakin.results.records import doubts_mass
@@ -33,6 +33,7 @@ _ASK_S = 0.1  # how often sinks are asked for wishes, and the standing person is
 _DEVIATIONS_S, _DELAYED_DEVIATIONS_S = 0.2, 1.0  # those of a lag take 0.6 steps for each of its frames
 _SPARSE_S = 0.05  # steps are never further apart than this because the computer is slow
 _CATCH_UP_S = 1.0  # with what came while the model was measured: that is left out too, but is no sign of slowness
+_MISSING = np.full(3, np.nan)
 _MASS_KG = 70.0  # of a person of whom nothing is known, so that at least the movement is seen
 
 
@@ -88,6 +89,7 @@ class Live:
         self._monitor: Monitor | None = None
         self._use_plates = True
         self._feet: LiveFeet | None = None
+        self._own = np.zeros(0, dtype=int)  # places of the model's markers among the stream's, after the last: missing
         self._plate_motion: LivePlateMotion | None = None
         self._mass_doubted = False
         self._running = False
@@ -336,6 +338,8 @@ class Live:
             monitor.go_on_from(self._monitor)
         self._monitor = monitor
         self._feet = self._plate_motion = None
+        streamed = {name: k for k, name in enumerate(self.fusion.markers.names)}
+        self._own = np.array([streamed.get(name, len(streamed)) for name in initial.recorded_markers])
         if initial.feet:  # without plates too: what depends on the ground is then a prior
             names = () if self.fusion.plates is None else self.fusion.plates.names
             self._plate_motion = LivePlateMotion(initial, names) if plates and self._use_plates else None
@@ -354,7 +358,7 @@ class Live:
         sample, feet, whole = fused.sample, None, True
         if self._feet is not None:
             wrenches = fused.wrenches if self._use_plates else None
-            markers, _ = sample_arrays(sample, tracker.calibrated)
+            markers = tracker.calibrated.ground.points_to_ground(np.vstack([fused.positions, _MISSING])[self._own])
             markers[np.array(tracker.verdicts[: len(markers)]) == "refused"] = np.nan
             feet, whole = self._feet.look(tracker.core_model, tracker.state, sample.time_s, wrenches, markers)
             if self._plate_motion is not None and wrenches is not None:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import filled
 from dynakin.recordings.feet.soles import Soles
 from dynakin.recordings.plates.ground_plate import GroundPlate
 from dynakin.recordings.plates.pressure import JUDGED_N, LOADED_N, UNLOADED_N
@@ -62,7 +63,7 @@ class FootLoads:
         known there, and a foot that is on no plate, or on one that reads nothing, may be what it bears, unless it is
         surely in the air."""
         reason = self.reason.copy()
-        light = (reason == SWING) | (np.nan_to_num(self.wrench[..., 1]) < LOADED_N)
+        light = (reason == SWING) | (filled(self.wrench[..., 1]) < LOADED_N)
         reason[frames[:, None] & light & (reason <= SHARED) & ~self.aloft] = UNKNOWN
         wrench = np.where((reason == UNKNOWN)[..., None], np.nan, self.wrench)
         return replace(
@@ -118,37 +119,33 @@ def divided(
             stand anywhere: nobody sees it. aloft: (T, F) it is surely in the air.
         given: number of a plate -> the declared contact that bears on it, where it is no foot's.
     """
+    given = dict(given or {})
     n, F = off.shape
-    elsewhere = np.full(n, not plates)
+    of_feet = [p for p in range(len(plates)) if p not in given]  # plates that only feet stand on
+    owners = on[:, :, of_feet]  # (T, F, P)
+    count = owners.sum(axis=1)
+    known = np.stack([plate.known for plate in plates], axis=1) if plates else np.zeros((n, 0), dtype=bool)
+    alone, both = owners & (count == 1)[:, None], owners & (count > 1)[:, None]
     wrench, reason = np.zeros((n, F, 6)), np.full((n, F), SWING, dtype=np.int8)
-    total_known = np.full(n, bool(plates))
+    nobodys = np.zeros(n, dtype=bool)
+    for k, p in enumerate(of_feet):
+        wrench += np.where(alone[:, :, k, None], plates[p].wrench[:, None], 0.0)
+        if both[:, :, k].any():
+            shared = np.flatnonzero(count[:, k] > 1)
+            wrench[shared] += _shares(plates[p], shared, owners[:, :, k], soles.middle)
+        nobodys |= (count[:, k] == 0) & (plates[p].push > JUDGED_N)
     others: dict[str, Array] = {}
-    for p, plate in enumerate(plates):
-        if given and p in given:
-            total_known &= plate.known
-            bears = np.linalg.norm(np.nan_to_num(plate.wrench[:, :3]), axis=1) > UNLOADED_N
-            share = np.where(bears[:, None], plate.wrench, 0.0)
-            others[given[p]] = others.get(given[p], 0.0) + np.where(plate.known[:, None], share, np.nan)
-            continue
-        owners = on[:, :, p]
-        count = owners.sum(axis=1)
-        for k in range(F):
-            alone = owners[:, k] & (count == 1)
-            wrench[alone, k] += plate.wrench[alone]
-            reason[alone, k] = np.maximum(reason[alone, k], MEASURED)
-        both = np.flatnonzero(count > 1)
-        share = _shares(plate, both, owners, soles.middle)
-        for k in range(F):
-            wrench[both, k] += share[:, k]
-            of = both[owners[both, k]]
-            reason[of, k] = np.maximum(reason[of, k], SHARED)
-        total_known &= plate.known
-        reason[~plate.known[:, None] & owners] = UNKNOWN
-        nobodys = (count == 0) & (plate.push > JUDGED_N)
-        elsewhere |= nobodys & marked.all() & ~hidden.any(axis=1)
-        may: Flags = hidden | ~marked
-        reason[nobodys[:, None] & may & (reason == SWING)] = UNKNOWN  # a foot that nobody sees may be on it
-    total_known &= ~elsewhere
+    for p, name in given.items() if plates else ():
+        bears = np.linalg.norm(filled(plates[p].wrench[:, :3]), axis=1) > UNLOADED_N
+        share = np.where(bears[:, None], plates[p].wrench, 0.0)
+        others[name] = others.get(name, 0.0) + np.where(known[:, p, None], share, np.nan)
+    reason[alone.any(axis=2)] = MEASURED
+    reason[both.any(axis=2)] = SHARED
+    reason[(owners & ~known[:, None, of_feet]).any(axis=2)] = UNKNOWN
+    may: Flags = hidden | ~marked
+    reason[nobodys[:, None] & may & (reason == SWING)] = UNKNOWN  # a foot that nobody sees may be on it
+    elsewhere: Flags = nobodys & marked.all() & ~hidden.any(axis=1) if plates else np.ones(n, dtype=bool)
+    total_known = known.all(axis=1) & ~elsewhere
     reason[off] = OFF_PLATE
     reason[hidden & (reason == SWING)] = UNKNOWN
     _alone_is_unknown(reason)
@@ -165,10 +162,10 @@ def divided(
         aloft,
         soles,
         on,
-        dict(given or {}),
+        given,
         others,
     )
-    return loads.with_undeclared(elsewhere)
+    return loads.with_undeclared(elsewhere) if elsewhere.any() else loads
 
 
 def _shares(plate: GroundPlate, frames: npt.NDArray[np.intp], owners: Flags, middle: Array) -> Array:

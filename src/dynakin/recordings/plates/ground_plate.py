@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import runs
+from dynakin.arrays import filled, runs
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.hull import distance_to_hull
 from dynakin.recordings.plates.pressure import JUDGED_N, LOADED_N, UNLOADED_N, Surface, centre_of_pressure
@@ -52,7 +52,7 @@ class GroundPlate:
     @cached_property
     def push(self) -> Array:
         """(T,) N, vertical; 0 where it is not measured."""
-        return np.asarray(np.nan_to_num(self.wrench[:, 1]))
+        return filled(self.wrench[:, 1])
 
     @cached_property
     def loaded(self) -> Flags:
@@ -79,9 +79,9 @@ class GroundPlate:
 def level_pressure(wrench: Array, height_m: float) -> Array:
     """Centres of pressure (T, 2) m [X, Z] of wrenches (T, 6) on a level plane; NaN where they are not loaded."""
     surface = Surface(np.array([0.0, height_m, 0.0]), np.array([0.0, 1.0, 0.0]))
-    filled = np.nan_to_num(wrench)
-    cop = centre_of_pressure(filled[:, :3], filled[:, 3:], surface, LOADED_N)[0][:, [0, 2]]
-    cop[filled[:, 1] < LOADED_N] = np.nan
+    known = filled(wrench)
+    cop = centre_of_pressure(known[:, :3], known[:, 3:], surface, LOADED_N)[0][:, [0, 2]]
+    cop[known[:, 1] < LOADED_N] = np.nan
     return cop
 
 
