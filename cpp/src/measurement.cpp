@@ -7,11 +7,17 @@
 namespace dynakin {
 namespace {
 
-// Covariance of a wrench declared at r, carried to the ground origin: m_O = m_r + r x f, so force noise becomes moment
-// noise. An infinite variance there makes every component that depends on it infinite too; infinity times zero is zero.
-Matrix6 carried(const Matrix6& R, const Vector3& r, std::array<bool, 6>& used) {
+// A wrench at r, about the ground origin: m_O = m_r + r x f.
+Matrix6 carry(const Vector3& r) {
   Matrix6 X = Matrix6::Identity();
   X.bottomLeftCorner<3, 3>() = skew(r);
+  return X;
+}
+
+// Covariance of a wrench declared at r, carried to the ground origin: force noise becomes moment
+// noise. An infinite variance there makes every component that depends on it infinite too; infinity times zero is zero.
+Matrix6 carried(const Matrix6& R, const Vector3& r, std::array<bool, 6>& used) {
+  const Matrix6 X = carry(r);
   Matrix6 finite = R;
   for (int k = 0; k < 6; ++k) {
     if (std::isfinite(R(k, k))) continue;
@@ -28,6 +34,7 @@ Matrix6 carried(const Matrix6& R, const Vector3& r, std::array<bool, 6>& used) {
 Measurement::Measurement(const Model& model, const FilterSettings& settings)
     : model_(model),
       settings_(settings),
+      offset_carry_(carry(model.spec().wrench_offset_point)),
       wrench_used_(model.spec().wrench_measured),
       slot_(marker_column_slots(model)),
       wrench_scratch_(6, model.state_size()),
@@ -83,7 +90,7 @@ void Measurement::evaluate(const Eigen::VectorXd& x) {
     wrench = late_dynamics_.wrench.vector();
   }
   for (int k = 0; k < 6; ++k)
-    if (const int c = model_.offset_columns()[k]; c != k_none) wrench(k) += x(c);
+    if (const int c = model_.offset_columns()[k]; c != k_none) wrench += x(c) * offset_carry_.col(k);
   if (model_.contacts() > 0)
     wrench.noalias() -= wrench_model_.effects * x.segment(model_.contact_column(0), 6 * model_.contacts());
   predicted_(3 * n_markers + 6) = dynamics_.mass;
@@ -151,7 +158,7 @@ void Measurement::wrench_rows(const Vector6& measured) {
   else
     delayed_jacobian();
   for (int k = 0; k < 6; ++k)
-    if (const int c = model_.offset_columns()[k]; c != k_none) wrench_scratch_.col(c) = Vector6::Unit(k);
+    if (const int c = model_.offset_columns()[k]; c != k_none) wrench_scratch_.col(c) = offset_carry_.col(k);
   if (model_.contacts() > 0)
     wrench_scratch_.middleCols(model_.contact_column(0), 6 * model_.contacts()) = -wrench_model_.effects;
   const std::vector<int>& columns = *block.columns;

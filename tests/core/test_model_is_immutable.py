@@ -50,6 +50,7 @@ def as_data(thing):
         "gravity": _plain(thing.gravity),
         "wrench_measured": _plain(thing.wrench_measured),
         "wrench_offset": _plain(thing.wrench_offset),
+        "wrench_offset_point": _plain(thing.wrench_offset_point),
         "wrench_delay": thing.wrench_delay,
     }
 

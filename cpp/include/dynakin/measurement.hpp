@@ -72,6 +72,7 @@ class Measurement {
   const Model& model_;
   const FilterSettings& settings_;
   Matrix6 declared_covariance_;  // of the settings, about the ground origin
+  Matrix6 offset_carry_;         // takes the plates' slow error there
   WrenchModel wrench_model_;
   std::array<bool, 6> wrench_used_{};
   std::vector<std::vector<int>> slot_;  // a marker: state column -> place in its list

@@ -86,7 +86,8 @@ struct ModelSpec {
   std::vector<MarkerSpec> markers;
   Vector3 gravity{0.0, -9.80665, 0.0};  // m/s^2, ground frame
   std::array<bool, 6> wrench_measured = {true, true, true, true, true, true};
-  std::array<bool, 6> wrench_offset{};  // components whose slow error, about the ground origin, is estimated
+  std::array<bool, 6> wrench_offset{};  // components whose slow error, about wrench_offset_point, is estimated
+  Vector3 wrench_offset_point = Vector3::Zero();  // m, ground frame
   bool wrench_delay = false;            // whether the plates' delay behind the markers is estimated
   // Contacts whose wrench on the person is a state where no plate measures it: six numbers each, of unit variance, that
   // a WrenchModel turns into newtons.

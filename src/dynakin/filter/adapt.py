@@ -34,9 +34,10 @@ SETTLING_S = 0.3
 """Left out of it: the first frames' covariances are the priors'."""
 LEAST_FRAMES = 25
 """Fewer say nothing: a quarter of a second."""
-JERK_SHARE = 0.5
+JERK_SHARE: dict[JointGroup, float] = {"feet": 1.0}
+OTHER_JERK_SHARE = 0.5
 """Part of a jerk scale's logarithm that is believed: jerk is not white, and what fits the next frame best is too little
-for a step."""
+for a step. Of feet all of it: what is kept back there turns up as ankles that are off by a constant (`truth3d`)."""
 LATE_SHARE = 0.8
 """Part of the factor's logarithm that is believed of estimates without any lag: they are late where accelerations
 change, which the next frame hardly shows."""
@@ -138,7 +139,7 @@ def _scaled(noise: Noise, ratio: float, jerk: dict[JointGroup, float] | None = N
     """The noise with this factor on all of it, and the jerk's scales moved towards what groups ask for in addition."""
     scales = dict(noise.jerk_scale)
     for group, wanted in (jerk or {}).items():
-        scales[group] = scales.get(group, 1.0) * (wanted / ratio) ** JERK_SHARE
+        scales[group] = scales.get(group, 1.0) * (wanted / ratio) ** JERK_SHARE.get(group, OTHER_JERK_SHARE)
     return noise.changed(variance_scale=ratio * noise.variance_scale, jerk_scale=scales)
 
 

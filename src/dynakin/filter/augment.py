@@ -44,6 +44,7 @@ def extended(initial: CalibratedModel, noise: Noise, estimate: Collection[Quanti
     spec.wrench_offset = [
         bool(seen and value > 0.0) for seen, value in zip(spec.wrench_measured, plate_sd(noise), strict=True)
     ]
+    spec.wrench_offset_point = initial.plate_centre
     spec.wrench_delay = noise.plate_delay_sd_s > 0.0
     spec.contacts = [*initial.feet, *initial.contacts]
     names = list(_core.Model(spec).layout.names)
@@ -107,8 +108,10 @@ def variance_scales(names: Collection[str], noise: Noise) -> Array:
 
 
 def initial_covariance(initial: CalibratedModel, noise: Noise) -> Array:
-    """P0 (n, n): the priors, and with `total_mass_use` "prior" the total mass as one piece of information on it."""
+    """P0 (n, n): the priors, and with `total_mass_use` "prior" the total mass as one piece of information on it. That of
+    the motion is not scaled: it is how fast people move when a recording begins, however well the sensors measure."""
     root = np.sqrt(variance_scales(initial.names, noise))
+    root[[name.endswith(("/speed", "/acceleration")) for name in initial.names]] = 1.0
     scales: Array = np.outer(root, root)
     covariance: Array = np.diag(initial.sd0**2)
     if initial.joint_prior is not None:

@@ -233,6 +233,7 @@ class Estimator:
             ModelError, RecordingError, ConfigError: as in `run`.
         """
         lag_s, unsmoothed = known_lag(lag_s, self.noise)
+        recording = recording.without_empty_ends()
         if problem := rate_problem(recording.time):
             raise RecordingError(f"{recording.path or recording.name}: {problem}")
         calibrated = self.calibrate(recording, static=static)

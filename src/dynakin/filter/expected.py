@@ -107,7 +107,10 @@ def expected_loads(
     alone = unmeasured.sum(axis=1) == 1
     priors: dict[int, Prior] = {}
     each = np.arange(K)
-    errors[:, each, :, each] = plate_errors(wrench[:, :K].reshape(-1, 6)).reshape(frames, K, 6, 6).swapaxes(0, 1)
+    height = np.column_stack([filled(loads.soles.middle[:, :, 1]), np.zeros((frames, C))])
+    errors[:, each, :, each] = (
+        plate_errors(wrench[:, :K].reshape(-1, 6), height.reshape(-1)).reshape(frames, K, 6, 6).swapaxes(0, 1)
+    )
     for k in range(K):
         off = unmeasured[:, k]
         if not (off | (contact[:, k] == SHARED_PLATE)).any():
@@ -120,7 +123,7 @@ def expected_loads(
         wrench[off, k], effects[off, :, k] = prior.mean[off], prior.spread[off]
         errors[off, k, :, k] = _about(root[off], np.array([_WHITE_N] * 3 + [_WHITE_NM] * 3))
     for t in np.flatnonzero((contact == SHARED_PLATE).any(axis=1)):
-        _divide(int(t), np.flatnonzero(contact[t] == SHARED_PLATE), priors, wrench, errors)
+        _divide(int(t), np.flatnonzero(contact[t] == SHARED_PLATE), priors, wrench, errors, height)
     size = residual_sd(noise, initial)
     errors[:, K, :, K] = _about(root, np.where(undeclared[:, None], UNDECLARED_SD * weight, size))
     residual = np.where(undeclared, UNMEASURED, ON_PLATE if all(size) else NO_CONTACT)
@@ -144,11 +147,12 @@ def residual_sd(noise: Noise, initial: CalibratedModel) -> Array:
     return np.where(size.all(), np.hypot(size, more), size)
 
 
-def plate_errors(wrench: Array) -> Array:
+def plate_errors(wrench: Array, height_m: Array) -> Array:
     """Covariances (T, 6, 6) about the ground's origin of what a plate says, (T, 6) about it too: at its centre of
-    pressure on the level of that origin."""
-    push = np.maximum(np.abs(wrench[:, 1]), LOADED_N)
-    pressure = np.stack([wrench[:, 5] / push, np.zeros_like(push), -wrench[:, 3] / push], axis=1)
+    pressure at a height (T,), of what the foot stands on."""
+    push, over = np.maximum(np.abs(wrench[:, 1]), LOADED_N), wrench[:, [2, 0]] * height_m[:, None]
+    z, x = ((over - wrench[:, [3, 5]] * [1.0, -1.0]) / push[:, None]).T
+    pressure = np.stack([x, height_m, z], axis=1)
     shear, lift = np.hypot(PLATE_NOISE_N, PLATE_TURN_RAD * push), np.hypot(PLATE_NOISE_N, PLATE_GAIN * push)
     moment = np.hypot(PLATE_NOISE_NM, PLATE_PLACE_M * push)
     return _about(pressure, np.stack([shear, lift, shear, moment, moment, moment], axis=1))
@@ -199,10 +203,12 @@ def _about(point: Array, sd: Array) -> Array:
     return np.asarray(spread @ np.swapaxes(spread, 1, 2))
 
 
-def _divide(t: int, feet: npt.NDArray[np.intp], priors: dict[int, Prior], wrench: Array, errors: Array) -> None:
+def _divide(
+    t: int, feet: npt.NDArray[np.intp], priors: dict[int, Prior], wrench: Array, errors: Array, height: Array
+) -> None:
     """A frame's plate among the feet on it, in place: their priors, given the sum that it measures."""
     each = {k: priors[k].spread[t] @ priors[k].spread[t].T for k in feet}
-    plate = plate_errors(wrench[t, feet].sum(axis=0)[None])[0]
+    plate = plate_errors(wrench[t, feet].sum(axis=0)[None], height[t, feet[:1]])[0]
     S = np.sum(list(each.values()), axis=0) + plate
     lacks = np.sum([wrench[t, k] - priors[k].mean[t] for k in feet], axis=0)
     root = np.linalg.cholesky(S)

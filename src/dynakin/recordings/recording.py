@@ -17,6 +17,8 @@ from dynakin.recordings.signals import AnalogChannel, Event
 
 Array = npt.NDArray[np.float64]
 
+_PERSON = 0.25  # of the markers that are usually seen: fewer are what a person leaves behind, or reflections
+
 
 @dataclass(frozen=True, eq=False)
 class Plate:
@@ -183,7 +185,29 @@ class Recording:
                 f"{self.path or self.name}: no frame between {start_s:g} s and {end_s:g} s; "
                 f"it runs from {self.time[0]:g} s to {self.time[-1]:g} s"
             )
-        keep = slice(int(index[0]), int(index[-1]) + 1)
+        return self._part(slice(int(index[0]), int(index[-1]) + 1))
+
+    def without_empty_ends(self) -> Recording:
+        """Without the frames before the person is seen and after: those in which less than a quarter of the markers are
+        that the others show. Nothing could be estimated there; that they are left out is a note."""
+        seen = np.count_nonzero(np.isfinite(self.markers).all(axis=2), axis=1)
+        somebody = np.flatnonzero(seen >= np.maximum(_PERSON * np.median(seen[seen > 0]), 1.0)) if seen.any() else seen
+        if not len(somebody) or len(somebody) == self.n_frames:
+            return self
+        keep = slice(int(somebody[0]), int(somebody[-1]) + 1)
+        left_out = [
+            f"the {'first' if where == 0 else 'last'} {count} frames"
+            for where, count in enumerate((keep.start, self.n_frames - keep.stop))
+            if count
+        ]
+        if not left_out:
+            return self
+        part = self._part(keep)
+        note = f"Nobody is seen in {' and '.join(left_out)}: they are left out."
+        return replace(part, notes=(*self.notes, note.replace(" 1 frames", " frame")))
+
+    def _part(self, keep: slice) -> Recording:
+        """These frames; the times stay as they are."""
         first, last = self.time[keep][[0, -1]]
         step = 1.0 / self.rate if self.n_frames > 1 else np.inf
         return replace(

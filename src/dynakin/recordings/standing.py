@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import numpy.typing as npt
 
 from dynakin.arrays import runs
 from dynakin.recordings.recording import Array, Recording
@@ -18,14 +19,25 @@ _SPAN_S = 0.1  # speeds are taken over this span, so that 1 mm of marker noise c
 
 
 def marker_velocities(recording: Recording) -> Array:
-    """Velocity of each marker (T, M, 3) m/s, laboratory frame, over 0.1 s around each frame; NaN where either end is
-    missing."""
+    """Velocity of each marker (T, M, 3) m/s, laboratory frame, over 0.1 s around each frame, less where a gap is nearer
+    than that or the recording ends; NaN where it is not seen, or for one frame only."""
     half = max(1, round(0.5 * _SPAN_S * recording.rate)) if recording.n_frames > 1 else 0
-    frames = np.arange(recording.n_frames)
-    before, after = np.maximum(frames - half, 0), np.minimum(frames + half, recording.n_frames - 1)
+    frames, last = np.arange(recording.n_frames)[:, None], recording.n_frames - 1
+    first_seen, last_seen = _seen_without_break(np.asarray(np.isfinite(recording.markers).all(axis=2)))
+    before, after = np.maximum(frames - half, first_seen), np.minimum(np.minimum(frames + half, last), last_seen)
+    along = np.arange(recording.markers.shape[1])
     with np.errstate(invalid="ignore", divide="ignore"):
-        travelled = recording.markers[after] - recording.markers[before]
-        return np.asarray(travelled / (recording.time[after] - recording.time[before])[:, None, None])
+        travelled = recording.markers[after, along] - recording.markers[before, along]
+        return np.asarray(travelled / (recording.time[after] - recording.time[before])[..., None])
+
+
+def _seen_without_break(seen: npt.NDArray[np.bool_]) -> tuple[npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+    """First and last frame (T, M) of the stretch in which a marker is seen (T, M) about each frame; the frame itself
+    where it is not."""
+    frames = np.arange(len(seen))[:, None]
+    first = np.maximum.accumulate(np.where(seen, 0, frames + 1), axis=0)
+    last = np.minimum.accumulate(np.where(seen, len(seen) - 1, frames - 1)[::-1], axis=0)[::-1]
+    return np.where(seen, first, frames), np.where(seen, last, frames)
 
 
 def marker_speeds(recording: Recording) -> Array:

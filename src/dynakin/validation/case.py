@@ -90,7 +90,7 @@ def case_of(
         for key in ("forces", "plate_filter_hz", "force_threshold_n"):
             if getattr(config, key) is not None:
                 raise ConfigError(f"{recording.name}: {key} takes effect while a file is read, expected its path")
-    recording = without_plate_loads(recording, config.plate_loads, config.vertical)
+    recording = without_plate_loads(recording.without_empty_ends(), config.plate_loads, config.vertical)
     if static is None and config.static is not None:
         static = read(config.static)
     return Case(recording, static, setup, config, configs)

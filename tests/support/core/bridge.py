@@ -45,6 +45,7 @@ def to_core(spec: Spec) -> _core.ModelSpec:
         wrench_offset=spec.wrench_offset,
         wrench_delay=spec.wrench_delay,
         contacts=spec.contacts,
+        wrench_offset_point=spec.wrench_offset_point,
     )
 
 

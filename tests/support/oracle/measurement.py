@@ -39,7 +39,9 @@ def plates(layout: Layout, x: NDArray, effects: NDArray | None = None) -> NDArra
     """(..., 6) N, N m: what the plates should say, the body's wrench of a delay ago and their slow error, less what the
     contacts' states add to what was expected of them: effects (6, 6 C), without them nothing."""
     values, kin = _kinematics(layout, x, late=True)
-    said = mechanics.total_wrench(layout.spec, kin, values.inertia) + values.offset
+    moved = np.cross(layout.spec.wrench_offset_point, values.offset[..., :3])
+    slow = values.offset + np.concatenate([np.zeros_like(moved), moved], axis=-1)
+    said = mechanics.total_wrench(layout.spec, kin, values.inertia) + slow
     if effects is None:
         return said
     return said - values.contacts.reshape(*x.shape[:-1], -1) @ np.swapaxes(effects, -1, -2)

@@ -84,5 +84,6 @@ class Spec:
     gravity: NDArray = field(default_factory=lambda: np.array([0.0, -9.80665, 0.0]))
     wrench_measured: list[bool] = field(default_factory=lambda: [True] * 6)
     wrench_offset: list[bool] = field(default_factory=lambda: [False] * 6)
+    wrench_offset_point: NDArray = field(default_factory=lambda: np.zeros(3))
     wrench_delay: bool = False
     contacts: list[str] = field(default_factory=list)

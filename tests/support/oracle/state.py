@@ -24,7 +24,7 @@ class Values:
     markers: NDArray  # (..., M, 3) m, in the segments' frames
     soft_tissue: NDArray  # (..., M, 3) m, displacement from there
     inertia: NDArray  # (..., S, 10)
-    offset: NDArray  # (..., 6) N and N m, the plates' slow error about the ground's origin
+    offset: NDArray  # (..., 6) N and N m, the plates' slow error about the spec's point
     delay: NDArray  # (...) s, of the plates behind the markers
     contacts: NDArray  # (..., C, 6), what is not known of the contacts' wrenches
 

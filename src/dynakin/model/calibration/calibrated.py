@@ -52,8 +52,8 @@ class CalibratedModel:
         marker_variance: (M,) m^2, R of each marker as its set gives it.
         soft_tissue_m: (M,) declared size of the displacement of skin and flesh under each marker.
         ground: ground frame whose origin is the model's ground landmark (the toe).
-        plate_centre: (3,) m, ground frame: mean centre of pressure of the first second, the ground's origin where
-            nothing was measured.
+        plate_centre: (3,) m, ground frame: mean centre of pressure of the first second on the plates, the ground's
+            origin where nothing was measured.
         recorded_markers: names in the recording, in the order of spec.markers.
         side: "right", "left" or "both".
         mass_kg, height_m: as used; height None where nothing needed it.
@@ -144,12 +144,13 @@ class CalibratedModel:
 
 
 def first_centre_of_pressure(recording: Recording, ground: GroundFrame) -> Array:
-    """Mean centre of pressure (3,) m of the first second, on the ground (y = 0), ground frame; 0 without plates."""
+    """Mean centre of pressure (3,) m of the first second on the plates, on the ground (y = 0), ground frame; 0 without
+    plates."""
     if not recording.plates:
         return np.zeros(3)
     wrench = ground.wrench_to_ground(recording.total_wrench())
-    wrench = wrench[recording.time < recording.time[0] + 1.0]
-    loaded = wrench[np.isfinite(wrench).all(axis=1) & (wrench[:, 1] > LOADED_N)]
+    on = np.flatnonzero(np.isfinite(wrench).all(axis=1) & (wrench[:, 1] > LOADED_N))
+    loaded = wrench[on][recording.time[on] < recording.time[on[:1]] + 1.0]
     if not len(loaded):
         return np.zeros(3)
     x, z = level_pressure(loaded.mean(axis=0)[None], 0.0)[0]

@@ -228,7 +228,8 @@ class _Assignment:
                     elif stop > first and start < end and self.elsewhere(k, p, start, stop):
                         self.on[start:stop, k, p] = True
                 held |= self.on[first:end, k, p]
-            if end - first > GAP_S * self.recording.rate:
+            at_an_end = first == 0 or end == len(foot.seen)  # what lies beyond is not known either
+            if at_an_end or end - first > GAP_S * self.recording.rate:
                 self.hidden[first:end, k] |= ~held
 
     def elsewhere(self, k: int, p: int, start: int, stop: int) -> bool:

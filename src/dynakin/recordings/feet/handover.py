@@ -32,7 +32,7 @@ _HALF_S = 0.04  # of the cubic that is laid through a path for its derivatives: 
 
 class Span(NamedTuple):
     """A stance: its frames [first, end), and when the load comes and goes, in frames; -inf, inf: the recording cuts it
-    off there."""
+    off there, or the foot is not seen before, or after."""
 
     first: int
     end: int
@@ -64,7 +64,8 @@ def spans_of(foot: FootContact, ends: tuple[int, int] | None, rate: float) -> li
     for first, end in foot.stances:
         on = _highest(braked, first, DOWN_S, rate, first - EARLY_S * rate)
         off = _highest(gained, end, OFF_S, rate, end - 1 + LATE_S * rate)
-        found.append(Span(first, end, -np.inf if first == 0 else on, np.inf if end == frames else off))
+        cut_before, cut_after = not foot.seen[:first].any(), not foot.seen[end:].any()
+        found.append(Span(first, end, -np.inf if cut_before else on, np.inf if cut_after else off))
     return found
 
 
