@@ -1,5 +1,5 @@
-"""What all share of arrays: runs of true values, peaks, angles within a turn, vectors' products; no infinities, which
-no file may have."""
+"""What all share of arrays: runs of true values, peaks, angles within a turn, vectors' products, root mean squares; no
+infinities, which no file may have."""
 
 from __future__ import annotations
 
@@ -55,6 +55,22 @@ def cross(a: npt.NDArray[np.float64], b: npt.NDArray[np.float64]) -> npt.NDArray
     hundred vectors of a movement."""
     turned = a * b.take(_NEXT, -1) - a.take(_NEXT, -1) * b
     return np.asarray(turned.take(_NEXT, -1))
+
+
+def rms(values: npt.ArrayLike, axis: int | None = None) -> npt.NDArray[np.float64]:
+    """Root mean square of the numbers that are known, along an axis or of all; NaN where none is."""
+    return _root_mean(np.asarray(values) ** 2, axis)
+
+
+def rms_length(vectors: npt.NDArray[np.float64]) -> float:
+    """Root mean square length of vectors (..., n); one with an unknown component does not count. NaN without any."""
+    return float(_root_mean((vectors**2).sum(axis=-1), None))
+
+
+def _root_mean(squares: npt.NDArray[np.float64], axis: int | None) -> npt.NDArray[np.float64]:
+    known = np.isfinite(squares)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.sqrt(np.where(known, squares, 0.0).sum(axis=axis) / known.sum(axis=axis)))
 
 
 def finite(values: npt.ArrayLike) -> npt.NDArray[np.float64]:

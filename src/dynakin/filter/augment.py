@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import rms
 from dynakin.bindings import _core
 from dynakin.filter.noise import jerk_densities, joint_groups, plate_sd, soft_tissue_sd, soft_tissue_time_s
 from dynakin.model.calibration.calibrated import CalibratedModel
@@ -73,7 +74,7 @@ def _place_sd(initial: CalibratedModel, first: dict[str, int]) -> Array:
     for k, marker in enumerate(initial.spec.markers):
         places = [first[name] for axis in "xyz" if (name := f"marker/{marker.name}/{axis}") in first]
         if places:
-            found[k] = np.sqrt(np.mean(initial.sd0[places] ** 2))
+            found[k] = rms(initial.sd0[places])
     return found
 
 

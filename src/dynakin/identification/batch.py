@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve
 
+from dynakin.arrays import rms
 from dynakin.errors import RecordingError
 from dynakin.identification.trials import Common, MeasuredTrial, about
 from dynakin.identification.unknowns import Unknowns
@@ -112,7 +113,7 @@ def identify_batch(common: Common, trials: Sequence[MeasuredTrial], unknowns: Un
         for k, (columns, target) in enumerate(stacked):
             left = target - columns @ x
             if len(left):
-                sigma[k] = np.maximum(np.sqrt((left**2).mean(axis=0)), LEAST_SIGMA)
+                sigma[k] = np.maximum(rms(left, axis=0), LEAST_SIGMA)
                 tau[k] = [max(least[k], integrated_autocorrelation(left[:, c])) for c in range(len(rows))]
     theta[free] = x[:count]
     covariance = np.zeros((len(theta), len(theta)))

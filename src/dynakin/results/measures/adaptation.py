@@ -8,6 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from dynakin.arrays import rms
 from dynakin.results.estimate import Estimate
 from dynakin.results.records import Parameter
 from dynakin.units import COMPONENTS
@@ -60,7 +61,7 @@ def misfit_settling(time: np.ndarray, misfit: np.ndarray) -> Settling:
         time: (T,) s, evenly spaced. misfit: (T,) in any unit; NaN where nothing was measured.
     """
     half = len(time) // 2
-    early, level = _rms(misfit[:half]), _rms(misfit[half:])
+    early, level = (float(rms(part[np.isfinite(part)])) for part in (misfit[:half], misfit[half:]))
     running = running_rms(misfit, max(1, round(RUNNING_S / float(np.median(np.diff(time))))))
     growth = level / early if early > 0.0 else 1.0
     if not np.isfinite(level) or growth > FACTOR:
@@ -128,11 +129,6 @@ def _after(time: np.ndarray, outside: np.ndarray) -> float | None:
     wrong = np.flatnonzero(outside)
     after = float(time[min(wrong[-1] + 1, len(time) - 1)] - time[0]) if len(wrong) else 0.0
     return after if after <= LATEST * (time[-1] - time[0]) else None
-
-
-def _rms(values: np.ndarray) -> float:
-    seen = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(seen**2))) if len(seen) else float("nan")
 
 
 def _group(estimate: Estimate, group: list[Parameter]) -> dict[str, Any]:

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import rms
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures import sources
@@ -53,8 +55,8 @@ def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str,
     grounded = (contact != UNMEASURED).all(axis=1) & (contact != NO_CONTACT).any(axis=1) & given
     grounded &= _nothing_else_bears(estimate)[window]
     known = (contact == ON_PLATE) & grounded[:, None] & np.isfinite(adjusted).all(axis=2)  # not where it is lost
-    rms = {
-        name: dict(zip(COMPONENTS, _rms(adjusted[known[:, k], k]), strict=True)) if known[:, k].any() else None
+    adjustment = {
+        name: _rms(COMPONENTS, adjusted[known[:, k], k]) if known[:, k].any() else None
         for k, name in enumerate(estimate.foot_names)
     }
     about_root = np.concatenate(
@@ -62,8 +64,8 @@ def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str,
     )
     left = {"grounded": _largest(about_root[grounded]), "flight": _largest(about_root[flight])}
     figures = {
-        "adjustment_rms": rms,
-        "remainder_rms": dict(zip(COMPONENTS, _rms(remainder[flight]), strict=True)) if flight.any() else None,
+        "adjustment_rms": adjustment,
+        "remainder_rms": _rms(COMPONENTS, remainder[flight]) if flight.any() else None,
         "flight_frames": int(flight.sum()),
         "derived_frames": int((codes == sources.DERIVED).any(axis=1).sum()),
         "prior_frames": int((codes == sources.PRIOR).any(axis=1).sum()),
@@ -98,7 +100,7 @@ def contact_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[s
             **counts,
             "force_n": dict(zip(axes, force[known].mean(axis=0).tolist(), strict=True)) if some else None,
             "largest_n": float(np.linalg.norm(force[known], axis=1).max()) if some else None,
-            "sd_n": dict(zip(axes, _rms(sd[known]), strict=True)) if some else None,
+            "sd_n": _rms(axes, sd[known]) if some else None,
         }
     return found
 
@@ -126,8 +128,8 @@ def _nothing_else_bears(estimate: Estimate) -> npt.NDArray[np.bool_]:
     return np.asarray((sources.moment_sources(data)[:, own] != sources.ABSENT).all(axis=1))
 
 
-def _rms(values: np.ndarray) -> list[float]:
-    return [float(v) for v in np.sqrt(np.mean(values**2, axis=0))]
+def _rms(names: Sequence[str], values: np.ndarray) -> dict[str, float]:
+    return dict(zip(names, rms(values, axis=0).tolist(), strict=True))
 
 
 def _largest(wrench: np.ndarray) -> dict[str, float] | None:

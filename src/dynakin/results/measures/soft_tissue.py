@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from dynakin.arrays import rms
 from dynakin.elements import element
 from dynakin.recordings.landmarks import plain_name
 from dynakin.results.estimate import AXES, Estimate
@@ -73,7 +74,7 @@ def displacements(estimate: Estimate, window: np.ndarray) -> dict[str, MarkerDis
         offset = float(np.linalg.norm(moved.mean(axis=0) - start))
         found[name] = MarkerDisplacement(
             segment,
-            float(np.sqrt(np.mean(distance**2))),
+            float(rms(distance)),
             float(distance.max()),
             offset if np.isfinite(offset) else None,
             size,

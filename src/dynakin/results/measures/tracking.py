@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import runs
+from dynakin.arrays import rms, runs
 from dynakin.errors import LostError
 from dynakin.results.estimate import AXES, Estimate
 from dynakin.results.measures.soft_tissue import marker_sites, state_paths
@@ -166,7 +166,7 @@ def tracking_figures(estimate: Estimate) -> dict[str, Any] | None:
     if found is None:
         return None
     seen = np.isfinite(found.distance_m)
-    rms = np.sqrt(np.nanmean(np.where(seen, found.distance_m, np.nan)[found.measured] ** 2, axis=1))
+    distance_m = rms(found.distance_m[found.measured], axis=1)
     refused = found.refused.sum(axis=1) / np.maximum(seen.sum(axis=1), 1)
     return {
         "what": "distance of all measured markers from where the bones carry them (RMS over markers, skin in it), mm; "
@@ -175,8 +175,8 @@ def tracking_figures(estimate: Estimate) -> dict[str, Any] | None:
         "lost_share": lost_share(found),
         "trial_lost": why_lost(estimate) is not None,
         "unmeasured_frames": int(np.sum(~found.measured)),
-        "distance_median_mm": float(1000.0 * np.median(rms)) if len(rms) else None,
-        "distance_largest_mm": float(1000.0 * np.max(rms)) if len(rms) else None,
+        "distance_median_mm": float(1000.0 * np.median(distance_m)) if len(distance_m) else None,
+        "distance_largest_mm": float(1000.0 * np.max(distance_m)) if len(distance_m) else None,
         "refused_largest_share": float(refused.max()),
         "verdict": sentence(in_words(estimate, found)) if found.lost.any() else "",
     }

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from dynakin.arrays import rms_length
 from dynakin.bindings import _core
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.smoothing import MAX_GAP_S, even_step, fill_gaps, smooth
@@ -162,7 +163,7 @@ def with_plates(motion: RigidMotion, estimated: xr.Dataset) -> tuple[xr.Dataset,
     known = np.isfinite(force).all(axis=1) & np.isfinite(moment).all(axis=1)
     if not known.any():
         return data, [*notes, "The plates nowhere measure the whole: the residual is not known."]
-    sizes = [float(np.sqrt(np.mean(np.sum(part[known] ** 2, axis=1)))) for part in (force, moment)]
+    sizes = [rms_length(part[known]) for part in (force, moment)]
     return data, [
         *notes,
         f"What it leaves at the {motion.model.segment_names[0]}: {sizes[0]:.1f} N and {sizes[1]:.1f} N m "
