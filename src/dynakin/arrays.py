@@ -1,5 +1,5 @@
-"""What all share of arrays: runs of true values, peaks, angles within a turn, vectors' products, root mean squares; no
-infinities, which no file may have."""
+"""What all share of arrays: runs of true values, peaks, angles within a turn, vectors' products, wrenches about another
+point, root mean squares; no infinities, which no file may have."""
 
 from __future__ import annotations
 
@@ -55,6 +55,12 @@ def cross(a: npt.NDArray[np.float64], b: npt.NDArray[np.float64]) -> npt.NDArray
     hundred vectors of a movement."""
     turned = a * b.take(_NEXT, -1) - a.take(_NEXT, -1) * b
     return np.asarray(turned.take(_NEXT, -1))
+
+
+def wrench_about(wrench: npt.NDArray[np.float64], point: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Wrenches (..., 6) about the origin, their moments about ``point`` (..., 3) instead: m_r = m_O - r x f."""
+    force = wrench[..., :3]
+    return np.concatenate([force, wrench[..., 3:] - cross(point, force)], axis=-1)
 
 
 def rms(values: npt.ArrayLike, axis: int | None = None) -> npt.NDArray[np.float64]:

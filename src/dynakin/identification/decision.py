@@ -14,9 +14,9 @@ from typing import Literal, get_args
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import rms
+from dynakin.arrays import rms, wrench_about
 from dynakin.identification.batch import SHORTEST_S, Posterior, at_start, identify_batch, known_s
-from dynakin.identification.trials import Common, MeasuredTrial, about, middle_of
+from dynakin.identification.trials import Common, MeasuredTrial, middle_of
 from dynakin.identification.unknowns import Unknowns
 from dynakin.progress import Progress
 from dynakin.units import COMPONENTS
@@ -126,7 +126,7 @@ def rms_of(common: Common, trial: MeasuredTrial, predicted: Array) -> Array:
     """(r,) RMS of a prediction (T, 6) against the plates, about the trial's reference point: the metric. NaN where the
     plates say nothing."""
     rows = common.rows
-    error = about(trial.wrench, trial.reference)[:, rows] - about(predicted, trial.reference)[:, rows]
+    error = wrench_about(trial.wrench, trial.reference)[:, rows] - wrench_about(predicted, trial.reference)[:, rows]
     return rms(error[np.isfinite(error).all(axis=1)], axis=0)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 from numpy.lib.stride_tricks import sliding_window_view
 
+from dynakin.arrays import wrench_about
 from dynakin.filter.estimator import Estimator
 from dynakin.filter.expected import ContactPaths
 from dynakin.filter.prepared import Prepared
@@ -158,7 +159,7 @@ class _Judged:
         }
 
     def _seen(self, wrench: Array) -> Array:
-        force, moment = wrench[:, :3], wrench[:, 3:] - np.cross(self.below, wrench[:, :3])
+        force, moment = np.split(wrench_about(wrench, self.below), 2, axis=1)
         return np.hstack([force @ self.turn.T, moment @ self.turn.T])
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import rms
+from dynakin.arrays import rms, wrench_about
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
 from dynakin.results.estimate import Estimate
 from dynakin.results.measures import sources
@@ -45,9 +45,7 @@ def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str,
         return None
     contact = estimate.data["foot_contact"].transpose("time", "foot").values[window]
     adjusted = estimate.data["foot_adjustment"].transpose("time", "foot", "component").values[window]
-    adjusted = np.concatenate(
-        [adjusted[..., :3], adjusted[..., 3:] - np.cross(_joints(estimate)[window], adjusted[..., :3])], axis=-1
-    )
+    adjusted = wrench_about(adjusted, _joints(estimate)[window])
     remainder = estimate.data["wrench_remainder"].transpose("time", "component").values[window]
     codes = foot_sources(estimate.data)[window]
     given = np.isfinite(remainder).all(axis=1)
@@ -59,9 +57,7 @@ def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str,
         name: _rms(COMPONENTS, adjusted[known[:, k], k]) if known[:, k].any() else None
         for k, name in enumerate(estimate.foot_names)
     }
-    about_root = np.concatenate(
-        [remainder[:, :3], remainder[:, 3:] - np.cross(_root(estimate)[window], remainder[:, :3])], axis=-1
-    )
+    about_root = wrench_about(remainder, _root(estimate)[window])
     left = {"grounded": _largest(about_root[grounded]), "flight": _largest(about_root[flight])}
     figures = {
         "adjustment_rms": adjustment,

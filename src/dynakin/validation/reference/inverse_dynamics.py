@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
-from dynakin.arrays import rms_length
+from dynakin.arrays import rms_length, wrench_about
 from dynakin.bindings import _core
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.recordings.smoothing import MAX_GAP_S, even_step, fill_gaps, smooth
@@ -158,8 +158,7 @@ def with_plates(motion: RigidMotion, estimated: xr.Dataset) -> tuple[xr.Dataset,
     if external is None:
         return data, notes
     measured = estimated["wrench_measured"].transpose("time", "component").values
-    force, moment = np.split(measured - wrench, 2, axis=1)
-    moment = moment - np.cross(origins[:, 0], force)
+    force, moment = np.split(wrench_about(measured - wrench, origins[:, 0]), 2, axis=1)
     known = np.isfinite(force).all(axis=1) & np.isfinite(moment).all(axis=1)
     if not known.any():
         return data, [*notes, "The plates nowhere measure the whole: the residual is not known."]
