@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from dynakin.bindings import _core
-from dynakin.model.calibration.calibrated import CalibratedModel, first_centre_of_pressure
+from dynakin.model.calibration.calibrated import CalibratedModel, first_centre_of_pressure, starting_state
 from dynakin.model.calibration.pose_start import start_posture
 from dynakin.model.inertia import INERTIA_NAMES
 from dynakin.model.opensim.calibrate import (
@@ -31,7 +31,6 @@ from dynakin.model.opensim.scales import scale_names
 from dynakin.model.opensim.sites import sites, skin_of
 from dynakin.model.opensim.spec import moved_by, to_spec, unseen
 from dynakin.model.schema import kinds_of
-from dynakin.model.spec import in_layout
 from dynakin.model.state_priors import state_bounds, state_prior
 from dynakin.recordings.frame import GroundFrame, find_ground_frame, find_laboratory_frame
 from dynakin.recordings.recording import Recording
@@ -164,30 +163,27 @@ class OpenSimDefinition:
         messages += beyond_range(source, fit.coordinates)
         spec = spec_at(fit.coordinates)
         refuse_too_few(source, spec, [name for _, name in chosen], recording)
-        core = _core.Model(spec)
-        names = list(core.layout.names)
         bodies = {body.name: body.rigid for body in source.bodies}
         reach = reach_of(source)
         lengths = {parameter.name: 1.0 for parameter in spec.parameters}
         places = {marker.name: np.array(marker.location) for marker, _ in chosen}
-        intervals = state_bounds(limits, lengths, {}, places, bodies, reach, bounds or Bounds())
-        lower = in_layout(names, {name: pair[0] for name, pair in intervals.items()}, -np.inf)
-        upper = in_layout(names, {name: pair[1] for name, pair in intervals.items()}, np.inf)
-        x0 = np.array(core.initial_state(), dtype=float)
         table = {
             f"inertia/{s.name}/{k}": v for s in spec.segments for k, v in zip(INERTIA_NAMES, s.inertia, strict=True)
         }
         skin = np.array([skin_of(marker.name, marker.body) for marker, _ in chosen])
         kinds, known = kinds_of(spec.segments), priors or Priors()
         known = known.changed(marker_sd_m=float(np.hypot(known.marker_sd_m, fit.rms_m / np.sqrt(3.0))))
+        state, said = starting_state(
+            spec,
+            bounds=state_bounds(limits, lengths, {}, places, bodies, reach, bounds or Bounds()),
+            prior=state_prior(kinds, lengths, {}, places, bodies, reach, known),
+            table=table,
+            speeds={},
+        )
+        messages += said
         return CalibratedModel(
             spec=spec,
-            names=tuple(names),
-            x0=np.clip(x0, lower, upper),
-            sd0=in_layout(names, state_prior(kinds, lengths, {}, places, bodies, reach, known), np.nan),
-            lower=lower,
-            upper=upper,
-            table=in_layout(names, table, np.nan),
+            **state._asdict(),
             marker_variance=skin[:, 0],
             soft_tissue_m=skin[:, 1],
             ground=frame,
