@@ -21,6 +21,7 @@ from dynakin.filter.noise import marker_variance, soft_tissue_sd
 from dynakin.model.calibration.calibrated import CalibratedModel
 from dynakin.model.spec import free_coordinates
 from dynakin.recordings.feet.contact import UNMEASURED
+from dynakin.results.estimate import values_of
 from dynakin.results.measures.sources import MEASURED, PRIOR, moment_sources
 from dynakin.results.records import MISPLACED
 from dynakin.settings.noise import Noise
@@ -357,11 +358,11 @@ class Systematic:
         time = np.asarray(data["time"].values)
         states = states_of(data)
         # how inertia hangs together is known at the end alone, how well it is known in each frame
-        sd = data["state_sd"].transpose("time", "element").values[:, self._inertia]
+        sd = values_of(data, "state_sd")[:, self._inertia]
         together = _correlation(data["final_covariance"].values[np.ix_(self._inertia, self._inertia)])
         wrench, segments = np.zeros((len(time), 0, 6)), []
         if "foot_wrench" in data:
-            wrench = np.nan_to_num(data["foot_wrench"].transpose("time", "foot", "component").values)
+            wrench = np.nan_to_num(values_of(data, "foot_wrench"))
             segments = [str(name) for name in data["foot_segment"].values]
         chosen = _sampled(time)
         each = [self._at(states[k], sd[k, :, None] * together * sd[k], wrench[k], segments) for k in chosen]
@@ -443,13 +444,13 @@ class Systematic:
         """(T,) `movement_intensity` of a recording, by its states and the filter's own ``accelerations_sd``."""
         K = len(self._free)
         states = states_of(data)
-        sd = data["accelerations_sd"].transpose("time", "coordinate").values[:, self._free]
+        sd = values_of(data, "accelerations_sd")[:, self._free]
         return movement_intensity(states[:, 2 * K : 3 * K], sd)
 
 
 def states_of(data: xr.Dataset) -> Array:
     """(T, n) of a recording."""
-    return np.asarray(data["state"].transpose("time", "element").values)
+    return values_of(data, "state")
 
 
 def any_off_plates(data: xr.Dataset, feet: int) -> bool:
@@ -458,7 +459,7 @@ def any_off_plates(data: xr.Dataset, feet: int) -> bool:
     Args:
         feet: how many of the contacts are feet: the first ones, declared ones follow.
     """
-    return "foot_contact" in data and stands_off_plates(data["foot_contact"].transpose("time", "foot").values, feet)
+    return "foot_contact" in data and stands_off_plates(values_of(data, "foot_contact"), feet)
 
 
 def stands_off_plates(contact: npt.NDArray[np.uint8], feet: int) -> bool:

@@ -61,7 +61,7 @@ def standing_zero(estimator: Estimator, estimate: Estimate, static: Recording | 
             "(zero = 'standing'), there or in a trial of its own (--static)"
         )
     if static is None and estimate.smoothed:
-        coordinates = estimate.data["coordinates"].transpose("time", "coordinate").values[window]
+        coordinates = estimate.values("coordinates")[window]
         return mean_angles(estimate.coordinate_names, estimate.is_rotation(), coordinates)
     return _estimated_anew(estimator, estimate, standing, window)
 

@@ -18,7 +18,7 @@ from dynakin.model.definition import Definition
 from dynakin.model.identified import IdentifiedSubject
 from dynakin.recordings.frame import GroundFrame
 from dynakin.recordings.recording import Recording
-from dynakin.results.estimate import Estimate
+from dynakin.results.estimate import Estimate, values_of
 from dynakin.results.measures.fit import signal_fit
 from dynakin.results.measures.metrics import evaluation_window
 from dynakin.results.measures.tracking import why_lost, without_lost
@@ -324,7 +324,7 @@ def _referred(identified: IdentifyingTrial, recording: Recording, start: Calibra
             [values.get(name, table) for name, table in zip(fit.names, fit.table, strict=True)]
         )
     moving = reference_methods(recording, start, setup.definition, setup.cutoff_hz, lengths="frame")
-    wrenches = {f"AT {hertz}": at.data["wrench_estimated"].transpose("time", "component").values}
+    wrenches = {f"AT {hertz}": values_of(at.data, "wrench_estimated")}
     for label, parameters in inertia.items():
         wrenches[f"classical {hertz}, {label}"] = predicted_wrench(moving.chain, moving.kinematics, parameters)
     return wrenches

@@ -11,6 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from dynakin.arrays import rms
+from dynakin.results.estimate import values_of
 from dynakin.results.measures.adaptation import constant_groups
 from dynakin.results.measures.sources import legs_of
 from dynakin.results.naming import listed
@@ -121,10 +122,7 @@ def _where_all_say(trial: Trial) -> list[xr.Dataset]:
     import xarray as xr
 
     found = [
-        {
-            name: m.data[name].transpose("time", "coordinate").values
-            for name in ("coordinates", "speeds", "accelerations")
-        }
+        {name: values_of(m.data, name) for name in ("coordinates", "speeds", "accelerations")}
         | {"moments": m.measured_moments(), "wrench_estimated": m.wrench}
         for m in trial.methods
     ]

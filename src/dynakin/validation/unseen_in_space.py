@@ -165,7 +165,7 @@ class _Judged:
 
 def _of(estimate: Estimate, name: str, window: npt.NDArray[np.bool_]) -> Array:
     """A variable of an estimate; of one that is lost within the window nothing: its other frames would look good."""
-    values: Array = estimate.data[name].transpose("time", ...).values
+    values: Array = estimate.values(name)
     return np.full_like(values, np.nan) if estimate.lost[window].any() else values
 
 

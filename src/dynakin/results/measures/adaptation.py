@@ -133,7 +133,7 @@ def _after(time: np.ndarray, outside: np.ndarray) -> float | None:
 
 def _group(estimate: Estimate, group: list[Parameter]) -> dict[str, Any]:
     elements = [str(name) for name in estimate.data["element"].values]
-    state = estimate.data["state"].transpose("time", "element").values
+    state = estimate.values("state")
     after = {
         p.name: constant_settling(estimate.time, state[:, elements.index(p.name)], band_of(p)).after_s for p in group
     }
@@ -227,7 +227,7 @@ def convergence(estimate: Estimate) -> list[Convergence]:
 def _judge(estimate: Estimate, title: str, group: list[Parameter]) -> Convergence:
     moving, left, largest = [], [], 0.0
     at = {str(name): k for k, name in enumerate(estimate.data["element"].values)}
-    states, deviations = (estimate.data[name].transpose("time", "element").values for name in ("state", "state_sd"))
+    states, deviations = (estimate.values(name) for name in ("state", "state_sd"))
     for p in group:
         path = states[:, at[p.name]]
         late = path[3 * len(path) // 4 :]

@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from dynakin.arrays import rms, wrench_about
 from dynakin.recordings.feet.contact import NO_CONTACT, ON_PLATE, UNMEASURED
-from dynakin.results.estimate import Estimate
+from dynakin.results.estimate import Estimate, values_of
 from dynakin.results.measures import sources
 from dynakin.results.naming import plural
 from dynakin.units import COMPONENTS, GRAVITY_M_S2
@@ -26,8 +26,8 @@ FLIGHT = 0.05
 
 def foot_sources(data: xr.Dataset) -> sources.Codes:
     """(T, F) codes of `results.measures.sources` of the feet's wrenches; in the air they are known to be zero."""
-    known = np.isfinite(data["foot_wrench"].transpose("time", "foot", "component").values).all(axis=2)
-    return np.where(known, data["foot_source"].transpose("time", "foot").values, sources.ABSENT).astype(np.uint8)
+    known = np.isfinite(values_of(data, "foot_wrench")).all(axis=2)
+    return np.where(known, values_of(data, "foot_source"), sources.ABSENT).astype(np.uint8)
 
 
 def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str, Any] | None:
@@ -43,10 +43,10 @@ def foot_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[str,
     """
     if not estimate.foot_names or "foot_wrench" not in estimate.data:
         return None
-    contact = estimate.data["foot_contact"].transpose("time", "foot").values[window]
-    adjusted = estimate.data["foot_adjustment"].transpose("time", "foot", "component").values[window]
+    contact = estimate.values("foot_contact")[window]
+    adjusted = estimate.values("foot_adjustment")[window]
     adjusted = wrench_about(adjusted, _joints(estimate)[window])
-    remainder = estimate.data["wrench_remainder"].transpose("time", "component").values[window]
+    remainder = estimate.values("wrench_remainder")[window]
     codes = foot_sources(estimate.data)[window]
     given = np.isfinite(remainder).all(axis=1)
     flight = (contact == NO_CONTACT).all(axis=1) & given
@@ -85,9 +85,7 @@ def contact_figures(estimate: Estimate, window: npt.NDArray[np.bool_]) -> dict[s
         own = estimate.data.sel(foot=name)
         bears = window & (own["foot_contact"].values != NO_CONTACT)
         codes = foot_sources(estimate.data)[bears, estimate.contact_names.index(name)]
-        force, sd = (
-            own[key].transpose("time", "component").values[bears, :3] for key in ("foot_wrench", "foot_wrench_sd")
-        )
+        force, sd = (values_of(own, key)[bears, :3] for key in ("foot_wrench", "foot_wrench_sd"))
         known = np.isfinite(force).all(axis=1)
         counts = {what: int(np.sum(codes == code)) for code, what in enumerate(sources.MEANINGS)}
         axes, some = COMPONENTS[:3], bool(known.any())
@@ -105,13 +103,13 @@ def _joints(estimate: Estimate) -> np.ndarray:
     """(T, F, 3) m: where each foot's segment hangs."""
     segments = [str(name) for name in estimate.data["joint_segment"].values]
     own = [segments.index(str(name)) for name in estimate.data["foot_segment"].values]
-    return np.asarray(estimate.data["joint_centres"].transpose("time", "joint", "axis").values[:, own])
+    return estimate.values("joint_centres")[:, own]
 
 
 def _root(estimate: Estimate) -> np.ndarray:
     """(T, 3) m: the joint by which the body hangs on the ground."""
     root = int(np.flatnonzero(estimate.data["joint_parent"].values < 0)[0])
-    return np.asarray(estimate.data["joint_centres"].transpose("time", "joint", "axis").values[:, root])
+    return estimate.values("joint_centres")[:, root]
 
 
 def _nothing_else_bears(estimate: Estimate) -> npt.NDArray[np.bool_]:

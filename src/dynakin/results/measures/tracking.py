@@ -10,7 +10,7 @@ import numpy.typing as npt
 
 from dynakin.arrays import rms, runs
 from dynakin.errors import LostError
-from dynakin.results.estimate import AXES, Estimate
+from dynakin.results.estimate import AXES, Estimate, values_of
 from dynakin.results.measures.soft_tissue import marker_sites, state_paths
 from dynakin.results.measures.sources import ABSENT
 from dynakin.results.naming import listed, sentence
@@ -52,9 +52,9 @@ def tracking_of(estimate: Estimate) -> Tracking:
     data, axes = estimate.data, estimate.modelled_axes()
     gaps = (data["markers_measured"] - data["markers_estimated"]).transpose("time", "marker", "axis").values
     distance = np.linalg.norm(gaps[:, :, axes], axis=2) + _skin(estimate)
-    seen = np.isfinite(data["markers_measured"].transpose("time", "marker", "axis").values[:, :, axes]).all(axis=2)
+    seen = np.isfinite(values_of(data, "markers_measured")[:, :, axes]).all(axis=2)
     count = seen.shape[1]
-    verdict = data["verdict"].transpose("time", "sensor").values[:, :count] if "verdict" in data else np.ones_like(seen)
+    verdict = values_of(data, "verdict")[:, :count] if "verdict" in data else np.ones_like(seen)
     refused = (verdict == REFUSED) & seen
     astray = seen & ~(distance <= ASTRAY_M)
     n = np.maximum(seen.sum(axis=1), 1)
