@@ -12,7 +12,7 @@ import dynakin
 from dynakin.bindings import _core
 from dynakin.errors import ModelError
 from dynakin.filter.contacts import ContactLoads
-from dynakin.filter.systematic import OWN_AT_ONCE
+from dynakin.filter.reported_sd import OWN_AT_ONCE
 from dynakin.model.markers.recognise import recognise
 from dynakin.recordings.feet.assignment import foot_loads
 from dynakin.recordings.feet.contact import ON_PLATE, SHARED_PLATE, UNMEASURED

@@ -19,7 +19,7 @@ from dynakin.model.calibration.calibrated import (
     starting_state,
 )
 from dynakin.model.calibration.in_space import started
-from dynakin.model.calibration.measure import measure
+from dynakin.model.calibration.measure import Asked, measure
 from dynakin.model.markers.draft.draft import GUESSED
 from dynakin.model.markers.marker_set import load_marker_set
 from dynakin.model.markers.match import match_markers
@@ -195,10 +195,11 @@ class ModelDefinition:
     ) -> CalibratedModel:
         """As ``Definition.calibrate``: lengths and marker places from the first (or standing) frames, inertia from the
         table, coordinates from landmarks and, in space, markers."""
-        plan, rest = measure(
-            self.model, self.subject, self.table, self.marker_set, recording, ground,
-            static=static, side=side, vertical=vertical, forward=forward, functional=self.functional,
+        asked = Asked(
+            self.model, self.subject, self.table, self.marker_set, self.functional,
+            recording, static, side, vertical, forward, ground,
         )  # fmt: skip
+        plan, rest = measure(asked)
         messages, speeds, held = list(rest.messages), dict[str, float](), rest.held
         if plan.model.sided:
             begun = started(plan, rest.trial, rest.unplaced, rest.still)
