@@ -1,4 +1,4 @@
-"""How large the systematic errors are that the filter cannot know (`systematic`), by where a model's joints come from."""
+"""How large the systematic errors are that a filter cannot know (`systematic`), by where joints come from."""
 
 from __future__ import annotations
 
