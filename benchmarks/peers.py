@@ -20,6 +20,7 @@ from opensim_peer import Kinematics, inverse_kinematics, load, residual
 from peers_times import times
 
 import dynakin
+from dynakin.filter.estimator import Estimator
 from dynakin.filter.samples import recording_arrays
 from dynakin.model.definition import Definition, load_model
 from dynakin.model.opensim.definition import load_opensim
@@ -234,7 +235,7 @@ def forecast(peer: Kinematics) -> None:
     print(f"| OpenSim, 6 Hz, 60.05 kg, whole trial | {components(misfit)} |")
     print(f"| the same, second half | {components(misfit[last[: len(misfit)]])} |")
     for name, definition in models("squats1").items():
-        identified = identify_on(first, Setup(definition), same_recording=True)
+        identified = identify_on(first, Setup(Estimator(definition)), same_recording=True)
         blind = predict_blind(identified, second)
         truth = measured_wrench(second, blind.start)
         point = blind.start.ground.points_to_ground(centre)

@@ -15,7 +15,6 @@ from dynakin.simulation.trial import simulate
 from dynakin.studies.tuning.trial import prepare
 from dynakin.units import COMPONENTS
 from dynakin.validation.held_out import Blind, judge, measured_wrench
-from dynakin.validation.setup import Setup
 from dynakin.validation.unseen import _Trial
 
 WRONG = 1e6
@@ -29,7 +28,7 @@ def walk() -> Recording:
 @pytest.fixture(scope="module")
 def estimator() -> Estimator:
     subject = dynakin.Subject(mass_kg=70.0, height_m=1.75, sex="male")
-    return Setup(dynakin.load_model("fullbody", subject)).estimator("default")
+    return Estimator(dynakin.load_model("fullbody", subject))
 
 
 @pytest.fixture(scope="module")
