@@ -11,7 +11,7 @@ from dynakin.errors import RecordingError
 from dynakin.filter.samples import recording_arrays
 from dynakin.filter.tracker import can_smooth
 from dynakin.model.calibration.calibrated import CalibratedModel
-from dynakin.model.calibration.loads import with_loads
+from dynakin.model.calibration.declared import with_loads
 from dynakin.model.schema import kinds_of
 from dynakin.model.spec import free_names
 from dynakin.recordings.recording import Recording

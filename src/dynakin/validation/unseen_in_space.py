@@ -22,7 +22,6 @@ from dynakin.results.estimate import Estimate
 from dynakin.results.measures.fit import marker_rms_mm, signal_fit
 from dynakin.results.measures.metrics import evaluation_window
 from dynakin.units import COMPONENTS
-from dynakin.validation.extrapolation import extrapolated, persisted, span_frames
 from dynakin.validation.reference.inverse_dynamics import (
     RigidMotion,
     filled,
@@ -32,7 +31,18 @@ from dynakin.validation.reference.inverse_dynamics import (
 )
 from dynakin.validation.reference.inverse_kinematics import fixed_model, inverse_kinematics
 from dynakin.validation.setup import Setup
-from dynakin.validation.yardsticks import LEFT_OUT, LINEAR, PERSISTENCE, WITHHELD, Figures, ahead, with_mean
+from dynakin.validation.yardsticks import (
+    LEFT_OUT,
+    LINEAR,
+    PERSISTENCE,
+    WITHHELD,
+    Figures,
+    ahead,
+    extrapolated,
+    persisted,
+    span_frames,
+    with_mean,
+)
 
 Array = npt.NDArray[np.float64]
 
