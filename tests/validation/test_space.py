@@ -54,10 +54,10 @@ def test_one_mask_feeds_and_judges(
 
 def test_frames_beside_the_plates_are_not_judged(walk: Recording, initial: CalibratedModel, known: np.ndarray) -> None:
     """A prediction that is right where the total is known, and absurd elsewhere, has no error."""
-    told = initial.ground.wrench_to_ground(walk.total_wrench())
-    told[~known] = WRONG
-    rows = judge(Blind(walk, initial, {"told": told}, ()), walk)
+    wrench = initial.ground.wrench_to_ground(walk.total_wrench())
+    wrench[~known] = WRONG
+    rows = judge(Blind(walk, initial, {"right where known": wrench}, ()), walk)
     assert {row.quantity for row in rows} == set(COMPONENTS)
     assert all(row.rms.mean == 0.0 for row in rows)
     trial = _Trial(walk, initial, np.empty((walk.n_frames, 0, 3)), measured_wrench(walk, initial))
-    assert set(trial.wrench_errors("", "told", told).values()) == {0.0}
+    assert set(trial.wrench_errors("", "right where known", wrench).values()) == {0.0}
