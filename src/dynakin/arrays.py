@@ -1,5 +1,5 @@
 """What all share of arrays: runs of true values, peaks, angles within a turn, vectors' products, wrenches about another
-point, root mean squares; no infinities, which no file may have."""
+point, means of what is known; no infinities, which no file may have."""
 
 from __future__ import annotations
 
@@ -68,15 +68,23 @@ def rms(values: npt.ArrayLike, axis: int | None = None) -> npt.NDArray[np.float6
     return _root_mean(np.asarray(values) ** 2, axis)
 
 
-def rms_length(vectors: npt.NDArray[np.float64]) -> float:
-    """Root mean square length of vectors (..., n); one with an unknown component does not count. NaN without any."""
-    return float(_root_mean((vectors**2).sum(axis=-1), None))
+def rms_length(vectors: npt.NDArray[np.float64], axis: int | None = None) -> npt.NDArray[np.float64]:
+    """Root mean square length of vectors (..., n), along an axis or of all; one with an unknown component does not
+    count. NaN without any."""
+    return _root_mean((vectors**2).sum(axis=-1), axis)
 
 
 def _root_mean(squares: npt.NDArray[np.float64], axis: int | None) -> npt.NDArray[np.float64]:
     known = np.isfinite(squares)
     with np.errstate(invalid="ignore"):
         return np.asarray(np.sqrt(np.where(known, squares, 0.0).sum(axis=axis) / known.sum(axis=axis)))
+
+
+def mean_seen(points: npt.NDArray[np.float64], axis: int) -> npt.NDArray[np.float64]:
+    """Mean along an axis of the points (..., n) that are seen whole; NaN where none is."""
+    seen = np.isfinite(points).all(axis=-1, keepdims=True)
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.where(seen, points, 0.0).sum(axis=axis) / seen.sum(axis=axis))
 
 
 def finite(values: npt.ArrayLike) -> npt.NDArray[np.float64]:

@@ -128,7 +128,7 @@ def plates_misfit(initial: CalibratedModel, time: Array, markers: Array, wrench:
     found = closure(initial, time, markers, wrench, np.ones(len(time), dtype=bool))
     if found is None:
         return None
-    return rms_length(found.excess)
+    return float(rms_length(found.excess))
 
 
 def _load_ratio(need: Array, have: Array, judged: Flags, weight: float, window: int) -> float | None:

@@ -124,7 +124,7 @@ class Monitor:
         measured = np.stack([np.asarray(sample[self.initial.recorded_markers[k]], float) for k in used])
         axes = np.array([self.initial.spec.markers[k].measured for k in used])
         off = np.where(axes, self.initial.ground.points_to_ground(measured) - estimate.markers[used], 0.0)
-        return rms_length(off)
+        return float(rms_length(off))
 
     def published(self, time_s: float, latency_s: float) -> None:
         """An estimate went out, so long after its sample had arrived."""

@@ -52,10 +52,10 @@ def marker_fit(measured: Array, estimated: Array, axes: Mask) -> SignalFit:
     if not seen.any():
         return SignalFit(None, None, None, None)
     a, b = a[seen], b[seen]
-    off = rms_length(a - b)
+    off = float(rms_length(a - b))
     span = float(np.linalg.norm(np.ptp(a, axis=0)))
     a, b = a - a.mean(axis=0), b - b.mean(axis=0)
-    size, power = rms_length(a), float(np.sqrt(np.sum(a**2) * np.sum(b**2)))
+    size, power = float(rms_length(a)), float(np.sqrt(np.sum(a**2) * np.sum(b**2)))
     return SignalFit(
         1000.0 * off,
         100.0 * off / size if size > 0.0 else None,

@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from dynakin.arrays import rms
+from dynakin.arrays import rms, rms_length
 from dynakin.results.estimate import Estimate
 from dynakin.results.records import Parameter
 from dynakin.units import COMPONENTS
@@ -149,10 +149,7 @@ def _misfits(estimate: Estimate) -> dict[str, np.ndarray]:
     markers = (estimate.data["markers_measured"] - estimate.data["markers_estimated"]).transpose(
         "time", "marker", "axis"
     )
-    squares = np.sum(markers.values[:, :, axes] ** 2, axis=2)
-    seen = np.isfinite(squares)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        distance = np.sqrt(np.where(seen, squares, 0.0).sum(axis=1) / seen.sum(axis=1))
+    distance = rms_length(markers.values[:, :, axes], axis=1)
     wrench = (estimate.data["wrench_measured"] - estimate.data["wrench_estimated"]).transpose("time", "component")
     found = {"markers": distance} | {name: wrench.values[:, k] for k, name in enumerate(COMPONENTS)}
     return {name: path for name, path in found.items() if np.isfinite(path).any()}

@@ -21,7 +21,7 @@ def marker_rms_mm(measured: np.ndarray, estimated: np.ndarray, axes: np.ndarray)
     seen = np.isfinite(difference).all(axis=1)
     if not seen.any():
         return None
-    return 1000.0 * rms_length(difference[seen])
+    return 1000.0 * float(rms_length(difference[seen]))
 
 
 class SignalFit(NamedTuple):

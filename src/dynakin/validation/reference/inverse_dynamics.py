@@ -163,7 +163,7 @@ def with_plates(motion: RigidMotion, estimated: xr.Dataset) -> tuple[xr.Dataset,
     known = np.isfinite(force).all(axis=1) & np.isfinite(moment).all(axis=1)
     if not known.any():
         return data, [*notes, "The plates nowhere measure the whole: the residual is not known."]
-    sizes = [rms_length(part[known]) for part in (force, moment)]
+    sizes = [float(rms_length(part[known])) for part in (force, moment)]
     return data, [
         *notes,
         f"What it leaves at the {motion.model.segment_names[0]}: {sizes[0]:.1f} N and {sizes[1]:.1f} N m "
